@@ -3,10 +3,8 @@ takes long, from made-up findings."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from unittest import mock
 
 import pytest
 from _pytest.mark import ParameterSet
@@ -14,10 +12,8 @@ from _pytest.mark import ParameterSet
 import tank2sim as t2s
 from tank2sim.answer.result import Result
 from tank2sim.api.bundled_ships import list_ships
-from tank2sim.apps.steering import ship as page_ship
 from tank2sim.bundled import bundled
 from tank2sim.gap.result import Gap
-from tank2sim.native import cross
 from tank2sim.results.gap import NO_TRIALS, gap_result
 from tests.gap import made_up
 from tests.identification.captive.made_runs import oscillation
@@ -33,22 +29,6 @@ def _trials(folder: Path) -> Path:
 def _yaw(folder: Path, **options: str) -> Result:
     truth = Truth(humps=1)
     return t2s.yaw(written(folder / "water.csv", truth, record(truth)), inertia_kgm2=0.0204, **options)
-
-
-@contextmanager
-def without_wasm() -> Iterator[None]:
-    """Pages to steer hold an empty ship in place of one that is compiled in half a minute."""
-    with (
-        mock.patch.object(page_ship, "has_compiler", return_value=True),
-        mock.patch.object(page_ship, "ship_in_page", return_value="AA=="),
-        mock.patch.object(cross, "has_compiled", return_value=True),
-    ):
-        yield
-
-
-def _page_to_steer() -> Result:
-    with without_wasm():
-        return t2s.load("mariner").steering_page()
 
 
 def _tow(**options: object) -> Result:
@@ -144,7 +124,7 @@ RESULTS: dict[str, Callable[[Path], Result]] = {
     "stability": lambda _: t2s.load("esso-osaka-estimated").stability(),
     "stability of an ensemble": lambda _: t2s.load("kvlcc2-captive").stability(spirals=False, members=3),
     "stability with small probabilities": lambda _: t2s.load("mariner").stability(spirals=False, members=200),
-    "steer": lambda _: _page_to_steer(),
+    "steer": lambda _: t2s.load("mariner").steering_page(),
     "trials": _sea_trial,
     "tow": lambda _: _tow(),
     "tow of one term": lambda _: _tow(terms="B3", length_m=3.8, start_delay=True),

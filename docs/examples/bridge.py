@@ -12,7 +12,7 @@ def main() -> None:
     """Go through the tutorial."""
     tank2sim("poster", "mariner", "-o", "poster.html")
     tank2sim("pilotcard", "mariner", "-o", "pilot.html")
-    # tank2sim("steer", "mariner", "-o", "steer.html") needs the extra platforms
+    tank2sim("steer", "mariner", "-o", "steer.html")
 
     ship = t2s.load("mariner")
     zigzag = ship.zigzag(20, 20, members=100)

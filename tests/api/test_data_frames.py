@@ -17,7 +17,6 @@ from tank2sim.bundled import bundled
 from tank2sim.gap.outcome.correct_sensors import corrected_text
 from tank2sim.records.csv_table import read_table, table_of_frame
 from tests.apps.logs.made_logs import frame as logged
-from tests.made_results import without_wasm
 from tests.yaw_truth import Truth, record, written
 
 SHIP = t2s.load("mariner")
@@ -140,10 +139,9 @@ def test_a_log_is_a_frame(tmp_path) -> None:
 
 def test_a_ghost_is_a_frame() -> None:
     frame = SHIP.turn(20, duration_s=100.0).df[::10]
-    with without_wasm():
-        assert SHIP.steering_page(ghost=frame).study.ghost == "ghost"
-        with pytest.raises(t2s.InputError, match=r"^scenario: does not go with a ghost"):
-            SHIP.steering_page(ghost=frame, scenario="channel")
+    assert SHIP.steering_page(ghost=frame).study.ghost == "ghost"
+    with pytest.raises(t2s.InputError, match=r"^scenario: does not go with a ghost"):
+        SHIP.steering_page(ghost=frame, scenario="channel")
 
 
 def test_orders_and_tracks_are_frames() -> None:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from unittest import mock
 
 import numpy as np
 import pytest
 
-from tank2sim.apps.steering import ship as steer_ship
 from tests.cli.command_line import refused, tank2sim
 
 
@@ -46,16 +44,8 @@ def test_what_is_no_result_is_refused_in_one_line(tmp_path: Path, text: str | No
     assert not (tmp_path / "x.html").exists()
 
 
-def test_without_the_compiler_a_page_to_steer_is_refused(tmp_path: Path) -> None:
-    with mock.patch.object(steer_ship, "has_compiler", return_value=False):
-        for card in ("mariner", "otter"):
-            refused(tank2sim("steer", card, "-o", "s.html", cwd=tmp_path), "tank2sim[platforms]")
-    assert not list(tmp_path.iterdir())
-
-
 def test_a_towed_vehicle_has_nothing_to_steer(tmp_path: Path) -> None:
-    with mock.patch.object(steer_ship, "has_compiler", return_value=False):
-        refused(tank2sim("steer", "wilinski-zellman", "-o", "s.html", cwd=tmp_path), "has no rudder")
+    refused(tank2sim("steer", "wilinski-zellman", "-o", "s.html", cwd=tmp_path), "has no rudder")
     assert not (tmp_path / "s.html").exists()
 
 

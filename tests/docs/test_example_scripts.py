@@ -15,7 +15,7 @@ from .examples import MANUAL
 SCRIPTS = MANUAL / "examples"
 WRITTEN = {
     "autopilot": ["stability.html", "ap.html", "ap.fmu", "tuned.toml"],
-    "bridge": ["poster.html", "pilot.html", "zigzag.html", "report.html", "compare.html"],
+    "bridge": ["poster.html", "pilot.html", "steer.html", "zigzag.html", "report.html", "compare.html"],
     "glider_and_yaw_rig": ["glide.html", "glider.fmu", "ship.toml"],
     "sea_trials": ["report/report.html", "report/report.pdf", "report/form.html", "report/full-load.toml"],
     "simulator": ["mariner.fmu", "ship.fmu", "mariner.ssp"],

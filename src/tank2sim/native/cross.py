@@ -22,23 +22,14 @@ _LINK_FLAGS_OF = {".so": ("-lm",), ".dylib": ("-Wl,-install_name,@rpath/model.dy
 
 @dataclass(frozen=True)
 class CompileTarget:
-    """What to compile for: processor, system and the oldest version of it, and how the name of a library ends.
-
-    `exports` names the functions of a WebAssembly module that the page calls; other libraries export what their
-    sources mark.
-    """
+    """What to compile for: processor, system and the oldest version of it, and how the name of a library ends."""
 
     triple: str
     suffix: str
-    exports: tuple[str, ...] = ()
 
     @property
     def flags(self) -> tuple[str, ...]:
         """Flags of the compiler."""
-        if self.suffix == ".wasm":
-            exports = (f"-Wl,--export={name}" for name in self.exports)
-            compiling = (flag for flag in FLAGS if flag != "-fPIC")
-            return ("-target", self.triple, *compiling, "-s", "-mexec-model=reactor", *exports)
         # Code for Windows is always independent of its place, and the compiler refuses to be reported so.
         compiling = (flag for flag in FLAGS if not (flag == "-fPIC" and self.suffix == ".dll"))
         return ("-target", self.triple, *compiling, *_LINK_FLAGS, *_LINK_FLAGS_OF[self.suffix])

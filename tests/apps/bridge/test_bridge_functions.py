@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from unittest import mock
 
 import pytest
 
 import tank2sim as t2s
-from tank2sim.apps.steering import ship as page_ship
-from tests.made_results import without_wasm
 
 
 @pytest.fixture(scope="module")
@@ -81,15 +78,8 @@ def test_a_card_is_never_overwritten_by_its_own_sheet(tmp_path: Path) -> None:
     assert t2s.load(path).name == "Mariner class"
 
 
-def test_without_the_compiler_no_steering_page_is_written(tmp_path: Path) -> None:
-    with mock.patch.object(page_ship, "has_compiler", return_value=False), pytest.raises(t2s.InputError) as refusal:
-        t2s.load("mariner").steering_page()
-    assert "tank2sim[platforms]" in refusal.value.remedy and not list(tmp_path.iterdir())
-
-
 def test_a_steering_page_is_that_of_its_result(tmp_path: Path) -> None:
-    with without_wasm():
-        found = t2s.load("mariner").steering_page()
+    found = t2s.load("mariner").steering_page()
     found.to_html(tmp_path / "steer.html")
     page = (tmp_path / "steer.html").read_text(encoding="utf-8")
     assert found.to_dict()["steerable"] is True and page == found.page()

@@ -9,13 +9,11 @@ from html import unescape
 import numpy as np
 import pytest
 
-from tank2sim.apps.steering.ship import has_compiler
 from tests.answer.opened_page import CHROMIUM, opened
 
 in_browser = [
     pytest.mark.slow,
     pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed to open the page in"),
-    pytest.mark.skipif(not has_compiler(), reason="ziglang is not installed, which compiles the ship for the page"),
 ]
 
 # Frames by the clock, for a headless browser draws none that nobody asks for.

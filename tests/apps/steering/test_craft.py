@@ -7,7 +7,7 @@ import pytest
 
 import tank2sim as t2s
 from tank2sim.apps.steering.page import PageShip, steering_page
-from tank2sim.apps.steering.ship import controls, levers_of, ship_in_page, thrusters_of
+from tank2sim.apps.steering.ship import controls, levers_of, thrusters_of
 from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.running import Running
@@ -23,7 +23,7 @@ def otter():
 
 @pytest.fixture(scope="module")
 def page(otter):
-    return steering_page(PageShip(model=otter, library=ship_in_page(otter), beam_m=1.08))
+    return steering_page(PageShip(model=otter, beam_m=1.08))
 
 
 def test_the_thruster_at_port_turns_the_craft_to_starboard(otter):
@@ -41,7 +41,7 @@ def test_levers_have_the_range_of_the_thrusters(otter):
 
 
 def test_speeds_of_a_craft_are_in_metres_and_degrees_per_second(otter):
-    data = data_of(steering_page(PageShip(model=otter, library="AA==")))
+    data = data_of(steering_page(PageShip(model=otter)))
     units = {one["name"]: (one["unit"], one["factor"]) for one in data["readouts"]}
     assert units["motion.u"] == ("m/s", 1.0)
     assert units["motion.r"] == ("deg/s", pytest.approx(math.degrees(1.0)))
@@ -65,7 +65,7 @@ def test_a_craft_with_thrusters_on_one_side_alone_is_refused(tmp_path):
     card = tmp_path / "ship.toml"
     card.write_text(text.replace("y_m = -0.395", "y_m = 0.395"), encoding="utf-8")
     with pytest.raises(InputError, match="no thrusters that steer"):
-        steering_page(PageShip(model=t2s.load(card).model, library="AA=="))
+        steering_page(PageShip(model=t2s.load(card).model))
 
 
 class TestInABrowser:

@@ -19,8 +19,7 @@ from tank2sim.dynamics.ship import mass_fault
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
 from tests.answer.opened_page import opened
-from tests.apps.steering.sailing import in_browser, sailed
-from tests.made_results import without_wasm
+from tests.apps.steering.sailing import data_of, in_browser, sailed
 
 SAIL = """
   const sail = (seconds) => {
@@ -84,8 +83,7 @@ def test_members_have_the_spread_of_the_covariance():
 
 
 def test_a_card_without_covariance_has_no_members_and_says_so():
-    with without_wasm():  # half a minute, which has no part in it
-        result = make_steering_page(t2s.load("mariner"))
+    result = make_steering_page(t2s.load("mariner"))
     assert result.study.members == 0
     assert "has no covariance" in result.headline[1]
 
@@ -210,7 +208,7 @@ class TestInABrowser:
         )
         seen, _ = sailed(within(kvlcc2.page()), tmp_path, steps)
         assert seen["left"] == 0  # a hand on the rudder ends the zigzag of each, whose own may have ended before
-        member = build(read_card("kvlcc2")).with_values(kvlcc2.members[2])
+        member = build(read_card("kvlcc2")).with_values(data_of(kvlcc2.page())["members"][2])
         run = simulate(member, parse_manoeuvre("turn:5"), duration_s=300.0).trajectory
         assert seen["third"][:2] == pytest.approx([run["motion.x"][-1], run["motion.y"][-1]], abs=1e-3)
 

@@ -7,7 +7,7 @@ import pytest
 
 from tank2sim.apps.steering.ghost import ghost_of
 from tank2sim.apps.steering.page import PageShip, steering_page
-from tank2sim.apps.steering.ship import WEB, controls, ship_following_angle, ship_in_page
+from tank2sim.apps.steering.ship import controls, ship_following_angle
 from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
@@ -44,7 +44,7 @@ def mariner():
 
 @pytest.fixture(scope="module")
 def page(mariner):
-    return steering_page(PageShip(model=mariner, library=ship_in_page(mariner)))
+    return steering_page(PageShip(model=mariner))
 
 
 @pytest.fixture(scope="module")
@@ -76,13 +76,13 @@ def worst(voyage, trajectory):
 
 
 def test_notices_are_counted_at_the_top_and_listed(mariner):
-    html = steering_page(PageShip(model=mariner, library="AA=="), None, ["a notice <b>"])
+    html = steering_page(PageShip(model=mariner), None, ["a notice <b>"])
     assert "1 notice<" in html and "a notice &lt;b&gt;" in html
 
 
 def test_a_model_without_a_rudder_is_refused():
     with pytest.raises(InputError, match="has no rudder"):
-        steering_page(PageShip(model=build(read_card("wilinski-zellman")), library="AA=="))
+        steering_page(PageShip(model=build(read_card("wilinski-zellman"))))
 
 
 def test_the_rudder_slider_ends_where_the_gear_does_and_shows_degrees(mariner):
@@ -100,7 +100,7 @@ def test_a_ghost_starts_the_ship_where_the_trial_starts(mariner, ghost):
             "initial.rudder_angle": 0,
         }
     )
-    data = data_of(steering_page(PageShip(model=mariner, library="AA=="), ghost))
+    data = data_of(steering_page(PageShip(model=mariner), ghost))
     assert data["start"]["initial.u"] == 7.5
     assert data["ghost"]["t"] == pytest.approx([0, 1, 2.05, 3, 4])
     assert data["ghost"]["x"][3] is None
@@ -135,7 +135,7 @@ def test_the_mean_wind_of_a_trial_is_that_at_the_start(mariner, pond, tmp_path):
     mean = {"wind.speed": 2.5, "wind.direction": np.arctan2(3, 4)}
     assert ghost.held == pytest.approx(mean)
     assert any("2.5 m/s from 37 deg" in one for one in ghost.notices)
-    data = data_of(steering_page(PageShip(model=pond, library="AA=="), ghost))
+    data = data_of(steering_page(PageShip(model=pond), ghost))
     assert {one["name"]: one["start"] for one in data["controls"] if one["name"] in mean} == pytest.approx(mean)
     assert ghost_of(read_trial_file(file), mariner).held == {}
 
@@ -148,15 +148,9 @@ def test_what_surrounds_the_ship_has_the_bounds_of_a_card(pond):
 
 
 def test_the_page_fetches_nothing(mariner):
-    html = steering_page(PageShip(model=mariner, library="AA=="))
+    html = steering_page(PageShip(model=mariner))
     assert not re.search(r"""(src|href)=["'](?!#)""", html)
     assert "default-src 'none'" in html
-
-
-def test_a_web_library_exports_what_the_page_calls():
-    flags = WEB.flags
-    assert "-Wl,--export=fmi3DoStep" in flags and "-ffp-contract=off" in flags
-    assert not {"-shared", "-fPIC"} & set(flags)
 
 
 class TestInABrowser:
@@ -225,7 +219,7 @@ class TestInABrowser:
         put("set-wind.speed", "1e6", "change"); seen.wind = wind.value; seen.limit = at("said").textContent;
         put("set-wind.speed", "", "change"); seen.kept = wind.value; seen.empty = at("said").textContent;
         click("reset"); click("save");"""
-        reported, (voyage,) = sailed(steering_page(PageShip(model=pond, library=ship_in_page(pond))), tmp_path, steps)
+        reported, (voyage,) = sailed(steering_page(PageShip(model=pond)), tmp_path, steps)
         assert (reported["wheel"], reported["taken"], reported["down"], reported["focus"]) == (False,) * 4
         assert (reported["rudder"], reported["engine"]) == ("midships", "600.0 rpm ahead")
         assert (reported["sailing"], reported["under"]) == ("Stop", "Under way.")
@@ -284,7 +278,7 @@ class TestInABrowser:
         click("zigzag"); click("finish"); click("save");
         put("set-current.speed", "2", "change"); put("set-current.direction", "90", "change");
         click("reset"); click("zigzag"); click("finish"); click("save");"""
-        _, (first, second) = sailed(steering_page(PageShip(model=model, library=ship_in_page(model))), tmp_path, steps)
+        _, (first, second) = sailed(steering_page(PageShip(model=model)), tmp_path, steps)
         zigzag = parse_manoeuvre("zigzag:20/20")
         assert worst(first, simulate(model, zigzag).trajectory) < 1e-9
         stream = {"current.speed": 2 * 1852 / 3600, "current.direction": np.pi / 2}
@@ -302,9 +296,7 @@ class TestInABrowser:
         ghost = ghost_of(read_trial_file(file), mariner)
         model = ship_following_angle(mariner)
         steps = "click('trial'); click('finish'); click('save'); click('zigzag'); click('finish'); click('save');"
-        _, (voyage, zigzag) = sailed(
-            steering_page(PageShip(model=model, library=ship_in_page(model)), ghost), tmp_path, steps
-        )
+        _, (voyage, zigzag) = sailed(steering_page(PageShip(model=model), ghost), tmp_path, steps)
         last = np.flatnonzero(voyage["t_s"] <= run.t[-1] + 1e-4)[-1]
         assert voyage["t_s"][last] == pytest.approx(run.t[-1], abs=1e-4)
         assert np.interp(run.t, voyage["t_s"], voyage["delta_deg"]) == pytest.approx(columns["delta_deg"], abs=1e-4)
@@ -316,9 +308,7 @@ class TestInABrowser:
     def test_orders_of_a_trial_are_followed_through_the_gear(self, mariner, tmp_path):
         file = tmp_path / "trial.csv"
         file.write_text(TRIAL.replace("delta_deg", "delta_order_deg"), encoding="utf-8")
-        html = steering_page(
-            PageShip(model=mariner, library=ship_in_page(mariner)), ghost_of(read_trial_file(file), mariner)
-        )
+        html = steering_page(PageShip(model=mariner), ghost_of(read_trial_file(file), mariner))
         _, (voyage,) = sailed(html, tmp_path, "click('trial'); click('finish'); click('save');")
         assert voyage["x_m"][0] == 100
         assert voyage["t_s"][-1] == pytest.approx(4)

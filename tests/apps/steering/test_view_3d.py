@@ -8,7 +8,7 @@ import pytest
 from tank2sim.apps.steering.ghost import ghost_of
 from tank2sim.apps.steering.page import PageShip, steering_page
 from tank2sim.apps.steering.scenario import Feature, Scenario
-from tank2sim.apps.steering.ship import ship_following_angle, ship_in_page
+from tank2sim.apps.steering.ship import ship_following_angle
 from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
@@ -39,7 +39,7 @@ def mariner():
 
 
 def test_only_a_page_that_is_asked_for_it_has_the_view(mariner):
-    ship = PageShip(model=mariner, library="AA==")
+    ship = PageShip(model=mariner)
     plain, with_view = steering_page(ship), steering_page(ship, view_3d=True)
     assert not re.search(r"three|bridge-view|view-3d", plain, re.IGNORECASE)
     assert "Copyright 2010-2023 Three.js Authors" in with_view
@@ -66,7 +66,7 @@ class TestInABrowser:
             Feature("channel", ((0.0, 0.0), (2000.0, 0.0), (3000.0, 500.0)), {"width_m": 400.0}),
         )
         waters = Scenario("Waters", "", 0.0, None, features)
-        return steering_page(PageShip(model=mariner, library=ship_in_page(mariner)), scenario=waters, view_3d=True)
+        return steering_page(PageShip(model=mariner), scenario=waters, view_3d=True)
 
     def test_a_turn_to_starboard_moves_a_buoy_ahead_to_the_left(self, page, tmp_path):
         steps = f"""
@@ -103,7 +103,7 @@ class TestInABrowser:
         file.write_text("t_s,delta_deg,u_mps,psi_deg,x_m,y_m\n0,0,7,0,0,0\n1,5,7,0,,\n2,5,7,1,14,0\n", encoding="utf-8")
         model = ship_following_angle(mariner)
         ghost = ghost_of(read_trial_file(file), model)
-        html = steering_page(PageShip(model=model, library=ship_in_page(model)), ghost, view_3d=True)
+        html = steering_page(PageShip(model=model), ghost, view_3d=True)
         steps = """
         click("view-3d"); click("trial"); click("finish");
         const shown = [...document.querySelectorAll("#bridge-view, #bearing, .cameras button, #view-3d")];

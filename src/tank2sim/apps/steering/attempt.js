@@ -39,7 +39,7 @@ class Attempt {
   }
 
   // The attempt of a text; throws where it is of another page, or no attempt.
-  static parse(text, { id, step, controls, references }) {
+  static parse(text, { id, step, controls, places }) {
     const [page, end, ...rest] = text.split("~");
     if (page !== id) {
       throw new Error("this link is of another page: of another ship, scenario or version of the program");
@@ -58,7 +58,7 @@ class Attempt {
     attempt.end = time(end);
     for (const [first, second, ...words] of rest.map((one) => one.split("!"))) {
       if (first === "s") {
-        if (!(second in references)) throw broken();
+        if (!(second in places)) throw broken();
         attempt.start[second] = real(words[0]);
       } else if (first === "i") attempt.orders[name(second)] = real(words[0]);
       else {

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tank2sim.api.verbs import Progress, verb
+from tank2sim.api.verbs import verb
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.notices import Notice
 
@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from tank2sim.cards import CraftCard, ManoeuvringCard
     from tank2sim.dynamics.model import Model
     from tank2sim.dynamics.vessel import Vessel
-
-FIRST_COMPILATION = "the compiler makes its own library first, once: about a minute"
 
 STEERED_SHIP = "esso-osaka-ship"
 """Bundled ship of the page without a card: full scale, with an engine that goes astern, and with a covariance."""
@@ -41,7 +39,6 @@ def make_steering_page(
     ghost: str | Path | TrialRecord | pd.DataFrame | None = None,
     scenario: str | Path | None = None,
     view_3d: bool = False,
-    report: Progress = lambda _: None,
 ) -> SteeringPageResult:
     """Make a page on which a ship is steered in a browser; it needs no network.
 
@@ -55,8 +52,6 @@ def make_steering_page(
         Waters to steer in: a GeoJSON file, or ``channel`` or ``basin``.
     view_3d : bool
         Also show the view from the bridge (three.js, 0.6 MB).
-    report : callable
-        Called with the stage that begins.
 
     Raises
     ------
@@ -77,7 +72,7 @@ def make_steering_page(
             problem = "is a trial with a rudder, and a craft with thrusters has none"
             raise ArgumentError("ghost", "", problem, "leave it out")
         waters = read_scenario(scenario) if scenario else None
-        in_page = _page_ship(card, model, _compiled(model, report))
+        in_page = _page_ship(card, model)
         return _result(in_page, None, model.notices, waters, view_3d)
     if not isinstance(card, ManoeuvringCard):
         remedy = "a ship (kind linear, abkowitz or mmg) or a craft (small_craft) can be steered"
@@ -90,18 +85,17 @@ def make_steering_page(
     if shown and shown.by_angle:
         model = page_ship.ship_following_angle(model)
     model, autopilot, no_autopilot = _with_autopilot(model)
-    library = _compiled(model, report)
     notices = (*(trial.notices if trial else ()), *(shown.notices if shown else ()), *no_autopilot, *model.notices)
     members = members_of(card, model)
-    in_page = _page_ship(card, model, library, members=tuple(members), autopilot=autopilot)
+    in_page = _page_ship(card, model, members=tuple(members), autopilot=autopilot)
     return _result(in_page, shown, notices, waters, view_3d)
 
 
-def _page_ship(card: CraftCard | ManoeuvringCard, model: Model, library: str, **more: Any) -> PageShip:
+def _page_ship(card: CraftCard | ManoeuvringCard, model: Model, **more: Any) -> PageShip:
     from tank2sim.apps.steering.page import PageShip
 
     known = {"members": (), "autopilot": ""} | more
-    return PageShip(model=model, library=library, beam_m=card.ship.beam_m, draught_m=card.ship.draught_m, **known)
+    return PageShip(model=model, beam_m=card.ship.beam_m, draught_m=card.ship.draught_m, **known)
 
 
 def _result(
@@ -123,19 +117,6 @@ def _result(
         notices=said,
     )
     return SteeringPageResult(study, html)
-
-
-def _compiled(model: Model, report: Progress) -> str:
-    """The library of a model. Raises InputError without the compiler for WebAssembly."""
-    from tank2sim.apps.steering import ship as page_ship
-    from tank2sim.native.cross import has_compiled
-
-    if not page_ship.has_compiler():
-        problem = "needs a compiler for WebAssembly, which is not installed"
-        raise InputError("the page", "", problem, "pip install tank2sim[platforms], and write the page again")
-    if not has_compiled(page_ship.WEB):
-        report(FIRST_COMPILATION)
-    return page_ship.ship_in_page(model)
 
 
 def _with_autopilot(model: Model) -> tuple[Model, str, tuple[Notice, ...]]:

@@ -506,7 +506,7 @@ const LEVER_KEYS = [["u", "j"], ["i", "k"]]; // up and down of the first two thr
   }
 
   try {
-    helm = new Helm(await Ship.aboard(data), data);
+    helm = new Helm(new Ship(data), data);
   } catch (error) {
     say(`The ship cannot be steered here: ${error.message}`);
     console.error(error);

@@ -18,11 +18,11 @@ from tank2sim.apps.steering.ghost import Ghost
 from tank2sim.apps.steering.members import NO_COVARIANCE
 from tank2sim.apps.steering.scenario import Scenario
 from tank2sim.apps.steering.ship import (
-    TOKEN,
     Control,
     controls,
     levers_of,
-    references,
+    ship_equations,
+    ship_tables,
     shown_in,
     telegraph_of,
     thrusters_of,
@@ -30,7 +30,6 @@ from tank2sim.apps.steering.ship import (
 from tank2sim.dynamics.model import Input, Model, Parameter
 from tank2sim.errors import InputError
 from tank2sim.escaping import json_in_html
-from tank2sim.fmu.interface import interface
 from tank2sim.notices import Notice
 from tank2sim.version import __version__
 
@@ -110,8 +109,6 @@ class PageShip:
     model : Model
         A ship; for a ghost with a measured rudder angle that of
         :func:`tank2sim.apps.steering.ship.ship_following_angle`.
-    library : str
-        Of :func:`tank2sim.apps.steering.ship.ship_in_page`.
     members : sequence of mapping
         Parameters by name of ships that are steered together with the card's (:mod:`.members`).
     autopilot : str
@@ -123,7 +120,6 @@ class PageShip:
     """
 
     model: Model
-    library: str
     members: Sequence[Mapping[str, float]] = ()
     autopilot: str = ""
     beam_m: float | None = None
@@ -172,6 +168,7 @@ def steering_page(
     engine = next((control for control in controls_left if control.name == "propeller.speed"), None)
     set_by_hand = [control for control in controls_left if control is not engine and control.name not in names]
     environment.trim_blocks = environment.lstrip_blocks = True
+    equations = ship_equations(model)
     return environment.get_template("steering/page.html.j2").render(
         name=model.name,
         description=model.description,
@@ -201,8 +198,8 @@ def steering_page(
         fails="steering.failed" in model.input_names,
         view_3d=view_3d,
         style=Markup("".join(map(resource_text, _styles(view_3d)))),
-        script=Markup("\n".join(resource_text(f"apps/steering/{name}") for name in _scripts(view_3d))),
-        data=json_in_html(_data(ship, ghost, scenario)),
+        script=Markup("\n".join([equations, *(resource_text(f"apps/steering/{name}") for name in _scripts(view_3d))])),
+        data=json_in_html(_data(ship, equations, ghost, scenario)),
     )
 
 
@@ -216,10 +213,10 @@ def _scripts(view_3d: bool) -> list[str]:
     return [*parts, *(_VIEW_3D if view_3d else ()), page]
 
 
-def _data(ship: PageShip, ghost: Ghost | None, scenario: Scenario | None) -> dict[str, Any]:
+def _data(ship: PageShip, equations: str, ghost: Ghost | None, scenario: Scenario | None) -> dict[str, Any]:
     data = _ship_data(ship, ghost, scenario)
     # Names the ship, the trial, the scenario and all that moves them: a link with an attempt is of this page alone.
-    return {**data, "id": hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()[:8]}
+    return {**data, "id": hashlib.sha256((equations + json.dumps(data, sort_keys=True)).encode()).hexdigest()[:8]}
 
 
 def _ship_data(ship: PageShip, ghost: Ghost | None, scenario: Scenario | None) -> dict[str, Any]:
@@ -228,9 +225,7 @@ def _ship_data(ship: PageShip, ghost: Ghost | None, scenario: Scenario | None) -
     gear = [math.degrees(parameter.start) for parameter in model.parameters if parameter.name == "steering.max_angle"]
     return {
         "name": model.name,
-        "library": ship.library,
-        "token": TOKEN,
-        "references": references(interface(model), {name for member in ship.members for name in member}),
+        **ship_tables(model, {name for member in ship.members for name in member}),
         "members": [dict(member) for member in ship.members],
         "telegraph": [{"name": order.name, "value": order.value} for order in telegraph_of(model)],
         "turning": _turning(shown_in(model["motion.r"], _turning_unit(model))[1] * _USUAL_TURNING * speed / length),

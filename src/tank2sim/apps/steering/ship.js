@@ -1,98 +1,119 @@
 "use strict";
-// Ships: instances of the FMI 3 library of the FMU, compiled to WebAssembly, called by its own functions.
+// Ships: the equations of the model (EQUATIONS), their states, inputs and parameters, and Runge-Kutta steps.
 
 class Ship {
-  static async aboard(data) {
-    const bytes = Uint8Array.from(atob(data.library), (letter) => letter.charCodeAt(0));
-    const { instance } = await WebAssembly.instantiate(bytes, {});
-    instance.exports._initialize();
-    return new Ship(instance.exports, data);
-  }
+  static TRIM_STEPS = 50;
+  static TRIM_ACCURACY = 1e-10;
 
-  constructor(library, data) {
-    this.library = library;
+  constructor(data) {
     this.data = data;
-    this.references = data.references;
-    // Scratch memory: a value reference, a value, flags, the time come to, a state of the FMU (none yet).
-    this.room = library.malloc(64);
-    this.state = library.malloc(4);
-    this.memory().setUint32(this.state, 0, true);
-    const [name, token] = [this.#text("ship"), this.#text(data.token)];
-    this.self = library.fmi3InstantiateCoSimulation(name, token, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0);
-    if (!this.self) throw new Error("the ship in this page cannot be started");
+    this.places = data.places;
+    const count = data.limits.length;
+    this.x = new Float64Array(count);
+    this.u = Float64Array.from(data.inputs);
+    this.p = Float64Array.from(data.parameters);
+    this.c = new Float64Array(data.constants);
+    this.y = new Float64Array(data.outputs);
+    this.k = Array.from({ length: 4 }, () => new Float64Array(count));
+    this.next = new Float64Array(count);
+    this.stale = true;
   }
 
-  // One more ship of the same library.
-  another() { return new Ship(this.library, this.data); }
+  // One more ship with the same equations.
+  another() { return new Ship(this.data); }
 
-  memory() {
-    const { buffer } = this.library.memory;
-    if (this.view?.buffer !== buffer) this.view = new DataView(buffer); // memory that has grown is another
-    return this.view;
-  }
-
-  #text(letters) {
-    const bytes = new TextEncoder().encode(`${letters}\0`);
-    const place = this.library.malloc(bytes.length);
-    new Uint8Array(this.library.memory.buffer).set(bytes, place);
-    return place;
-  }
-
-  #done(status, what) {
-    if (status !== 0) throw new Error(`${what} (FMI status ${status})`);
-  }
-
-  has(name) { return name in this.references; }
+  has(name) { return name in this.places; }
 
   set(name, value) {
-    const memory = this.memory();
-    memory.setUint32(this.room, this.references[name], true);
-    memory.setFloat64(this.room + 8, value, true);
-    this.#done(this.library.fmi3SetFloat64(this.self, this.room, 1, this.room + 8, 1), `${name} cannot be ${value}`);
+    const [block, place] = this.places[name];
+    const [low, high] = this.data.bounds[name] ?? [1, 0];
+    if (!(value >= low && value <= high)) throw new Error(`${name} cannot be ${value}`);
+    this[block][place] = value;
+    if (block === "p") EQUATIONS.constants(this.p, this.c);
+    this.stale = true;
   }
 
-  setTruth(name, value) {
-    const memory = this.memory();
-    memory.setUint32(this.room, this.references[name], true);
-    memory.setUint8(this.room + 8, value ? 1 : 0);
-    this.#done(this.library.fmi3SetBoolean(this.self, this.room, 1, this.room + 8, 1), `${name} cannot be set`);
+  setTruth(name, value) { this.set(name, value ? 1 : 0); }
+
+  #value([block, place]) {
+    if (block === "y" && this.stale) {
+      EQUATIONS.outputs(this.x, this.u, this.p, this.y);
+      this.stale = false;
+    }
+    return this[block][place];
   }
 
-  get(name) {
-    this.memory().setUint32(this.room, this.references[name], true);
-    this.#done(this.library.fmi3GetFloat64(this.self, this.room, 1, this.room + 8, 1), `${name} cannot be read`);
-    return this.memory().getFloat64(this.room + 8, true);
-  }
+  get(name) { return this.#value(this.places[name]); }
 
-  // A function that reads these signals in one call; what it returns holds until the next call.
+  // A function that reads these signals; the array that it returns holds until the next call.
   reader(names) {
-    const [wanted, found] = [this.library.malloc(4 * names.length), this.library.malloc(8 * names.length)];
-    names.forEach((name, place) => this.memory().setUint32(wanted + 4 * place, this.references[name], true));
+    const found = new Float64Array(names.length);
+    const places = names.map((name) => this.places[name]);
     return () => {
-      const status = this.library.fmi3GetFloat64(this.self, wanted, names.length, found, names.length);
-      this.#done(status, "the motion cannot be read");
-      return new Float64Array(this.library.memory.buffer, found, names.length);
+      for (let at = 0; at < places.length; ++at) found[at] = this.#value(places[at]);
+      return found;
     };
   }
 
   begin(values) {
-    this.#done(this.library.fmi3Reset(this.self), "the ship cannot be put back");
+    this.u.set(this.data.inputs);
+    this.p.set(this.data.parameters);
     for (const [name, value] of Object.entries(values)) this.set(name, value);
-    this.#done(this.library.fmi3EnterInitializationMode(this.self, 0, 0, 0, 0, 0), "the ship cannot begin");
-    this.#done(this.library.fmi3ExitInitializationMode(this.self), "there is no start with these values");
+    EQUATIONS.constants(this.p, this.c);
+    EQUATIONS.initial(this.p, this.x);
+    if (this.data.trim !== null && this.p[this.data.trim] && EQUATIONS.trimmed) this.#trim();
+    this.stale = true;
+    if (!this.#plausible(this.x)) throw new Error("there is no start with these values");
+  }
+
+  #trim() {
+    const start = this.x.slice();
+    for (let round = 0; round < Ship.TRIM_STEPS; ++round) {
+      EQUATIONS.trimmed(this.x, this.u, this.p, this.next);
+      const settled = this.x.every((value, at) => {
+        const size = Math.max(this.data.nominal[at], Math.abs(this.next[at]));
+        return Math.abs(this.next[at] - value) <= Ship.TRIM_ACCURACY * size;
+      });
+      this.x.set(this.next);
+      if (settled) return;
+    }
+    this.x.set(start);
+  }
+
+  #plausible(states) {
+    for (let at = 0; at < states.length; ++at) if (!(Math.abs(states[at]) <= this.data.limits[at])) return false;
+    return true;
+  }
+
+  #rates(share, slope, into) {
+    let states = this.x;
+    if (slope) {
+      states = this.next;
+      for (let at = 0; at < states.length; ++at) states[at] = this.x[at] + share * slope[at];
+    }
+    EQUATIONS.rates(states, this.u, this.p, this.c, into);
   }
 
   // One Runge-Kutta step of `size` s, no longer than the model's own.
   step(time, size) {
-    const at = this.room + 16;
-    const status = this.library.fmi3DoStep(this.self, time, size, 0, at, at + 1, at + 2, at + 8);
-    this.#done(status, `the motion leaves all bounds at ${time.toFixed(1)} s`);
+    const [first, second, third, fourth] = this.k;
+    this.#rates(0, null, first);
+    this.#rates(size / 2, first, second);
+    this.#rates(size / 2, second, third);
+    this.#rates(size, third, fourth);
+    const part = size / 6;
+    for (let at = 0; at < this.x.length; ++at) {
+      this.next[at] = this.x[at] + part * (first[at] + 2 * second[at] + 2 * third[at] + fourth[at]);
+    }
+    if (!this.#plausible(this.next)) throw new Error(`the motion leaves all bounds at ${time.toFixed(1)} s`);
+    this.x.set(this.next);
+    this.stale = true;
   }
 
-  keep() { this.#done(this.library.fmi3GetFMUState(this.self, this.state), "the state cannot be kept"); }
+  keep() { this.kept = [this.x.slice(), this.u.slice(), this.p.slice(), this.c.slice()]; }
 
   back() {
-    const kept = this.memory().getUint32(this.state, true);
-    this.#done(this.library.fmi3SetFMUState(this.self, kept), "the state cannot be put back");
+    [this.x, this.u, this.p, this.c].forEach((values, at) => values.set(this.kept[at]));
+    this.stale = true;
   }
 }

@@ -1,44 +1,27 @@
-"""The ship in a page: the FMI 3 library of the FMU as WebAssembly, and what the page must know to steer it."""
+"""The ship in a page: the equations of the model as JavaScript, and the numbers that the page needs to steer it."""
 
 from __future__ import annotations
 
-import base64
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+import casadi as ca
+
 from tank2sim.apps.bridge.study import ORDERS_AHEAD, SHARES
 from tank2sim.dynamics.autopilot_loop import AUTOPILOT_ORDER
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Input, Model, Variable
-from tank2sim.errors import InputError
-from tank2sim.fmu.interface import Interface, interface
-from tank2sim.fmu.sources import c_sources
-from tank2sim.native.cross import CompileTarget, cross_compiled, require_cross_compiler
+from tank2sim.fmu.interface import interface
+from tank2sim.native.javascript import javascript_function
 from tank2sim.simulation.manoeuvres import FULL_ASTERN
 from tank2sim.simulation.thruster_manoeuvres import thruster_commands, thruster_sides
+from tank2sim.simulation.trajectory import TIMES_BEYOND
 from tank2sim.units import UNITS, from_si
 
-TOKEN = "page"
-"""Instantiation token: the page holds one model, and none is mistaken for another."""
-
-FUNCTIONS = (
-    "fmi3InstantiateCoSimulation",
-    "fmi3EnterInitializationMode",
-    "fmi3ExitInitializationMode",
-    "fmi3Reset",
-    "fmi3SetFloat64",
-    "fmi3SetBoolean",
-    "fmi3GetFloat64",
-    "fmi3GetFMUState",
-    "fmi3SetFMUState",
-    "fmi3DoStep",
-)
-"""What the page calls."""
-
-WEB = CompileTarget("wasm32-wasi", ".wasm", (*FUNCTIONS, "malloc"))
-"""WebAssembly with the C library of WASI, of which nothing is left but mathematics and memory: it imports nothing."""
+UNBOUNDED = 1e300
+"""Bound of a variable without one."""
 
 _LARGEST_RUDDER = math.radians(35.0)
 """End of the rudder slider where a card states no largest angle: the hard-over of IMO MSC.137(76)."""
@@ -154,25 +137,78 @@ def telegraph_of(model: Model) -> list[TelegraphOrder]:
     return [*reversed(astern), stop, *ahead, fastest]
 
 
-def has_compiler() -> bool:
-    """Whether the compiler to WebAssembly is installed."""
-    try:
-        require_cross_compiler()
-    except InputError:
-        return False
-    return True
+def ship_equations(model: Model) -> str:
+    """The equations of a model as JavaScript: an object `EQUATIONS` of functions that fill their last argument.
 
+    ``constants(p, c)`` are the terms of the parameters alone, ``rates(x, u, p, c, d)``, ``outputs(x, u, p, y)`` and
+    ``initial(p, x)`` as those of the FMU, and ``trimmed(x, u, p, next)`` is a step of Newton's method to steady motion.
 
-def ship_in_page(model: Model) -> str:
-    """The library of the model as WebAssembly, base64; compiled if it is not kept from before.
-
-    Raises
-    ------
-    InputError
-        The compiler is not installed or cannot be run.
+    Parameters
+    ----------
+    model : Model
     """
-    sources = c_sources(model, interface(model), 3, TOKEN)
-    return base64.b64encode(cross_compiled(sources, WEB)).decode("ascii")
+    x, u, p = model.x, model.u, model.p
+    shorter, symbols, values = ca.extract_parametric(model.rates, p)
+    none = ca.SX(0, 1)
+    constants = ca.vertcat(none, *symbols)
+    functions: dict[str, tuple[list[ca.SX], ca.SX]] = {
+        "constants": ([p], ca.vertcat(none, *values)),
+        "rates": ([x, u, p, constants], shorter),
+        "outputs": ([x, u, p], model.output(x, u, p)),
+        "initial": ([p], model.initial(p)),
+    }
+    if model.trim_step is not None:
+        functions["trimmed"] = ([x, u, p], model.trim_step(x, u, p))
+    texts = [
+        javascript_function(ca.Function(name, arguments, [ca.densify(result)], {"cse": True}), name)
+        for name, (arguments, result) in functions.items()
+    ]
+    return f"const EQUATIONS = (() => {{\n{''.join(texts)}return {{{', '.join(functions)}}};\n}})();\n"
+
+
+def ship_tables(model: Model, drawn: Iterable[str] = ()) -> dict[str, Any]:
+    """Numbers that :func:`ship_equations` need: places of the variables by name, starts, and bounds.
+
+    Parameters
+    ----------
+    model : Model
+    drawn : iterable of str
+        Parameters in which the members of a page differ.
+    """
+    described = interface(model)
+    rest = set(model.state_names) | set(model.input_names) | set(model.parameter_names)
+    blocks = {
+        "x": model.state_names,
+        "u": model.input_names,
+        "p": model.parameter_names,
+        "y": [name if name not in rest else "" for name in model.outputs],
+    }
+    wanted = ("initial.", "motion.", "rudder.", "thrusters.", "steering.failed", "propeller.", "validity")
+    named = {*model.input_names, *drawn, AUTOPILOT_ORDER}
+    places: dict[str, tuple[str, int]] = {
+        name: (block, place)
+        for block, names in blocks.items()
+        for place, name in enumerate(names)
+        if name in named or name.startswith(wanted)
+    }
+    bounds = {
+        name: [-UNBOUNDED if low is None else low, UNBOUNDED if high is None else high]
+        for name, (block, _) in places.items()
+        if block in "up"
+        for variable in [described.by_name[name]]
+        for low, high in [variable.accepted or (variable.minimum, variable.maximum)]
+    }
+    return {
+        "places": places,
+        "bounds": bounds,
+        "inputs": model.input_values().tolist(),
+        "parameters": model.parameter_values().tolist(),
+        "constants": ca.vertcat(ca.SX(0, 1), *ca.extract_parametric(model.rates, model.p)[1]).numel(),
+        "outputs": len(model.outputs),
+        "limits": [TIMES_BEYOND * UNITS[state.unit].extent for state in model.states],
+        "nominal": [state.nominal for state in model.states],
+        "trim": model.parameter_names.index("initial.trim") if "initial.trim" in model.parameter_names else None,
+    }
 
 
 def ship_following_angle(model: Model) -> Model:
@@ -189,26 +225,6 @@ def ship_following_angle(model: Model) -> Model:
     )
     followed = model.extend(steers, rate)
     return followed.redefine("rudder.rate", lambda gear: gear * (1 - steers.symbol) + rate.symbol * steers.symbol)
-
-
-def references(described: Interface, drawn: Iterable[str] = ()) -> dict[str, int]:
-    """Name to value reference of what the page sets and reads; `drawn` are parameters that its members differ in."""
-    wanted = (
-        "initial.",
-        "motion.",
-        "rudder.",
-        "thrusters.",
-        "steering.failed",
-        "propeller.",
-        "validity",
-        AUTOPILOT_ORDER,
-    )
-    named = {*(variable.name for variable in described.with_causality("input")), *drawn}
-    return {
-        variable.name: variable.reference
-        for variable in described.variables
-        if variable.name in named or variable.name.startswith(wanted)
-    }
 
 
 def controls(model: Model) -> list[Control]:
