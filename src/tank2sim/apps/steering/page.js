@@ -499,10 +499,13 @@ const LEVER_KEYS = [["u", "j"], ["i", "k"]]; // up and down of the first two thr
       p: () => choose("ahead", find("ahead").selectedIndex + 1 < find("ahead").length ? 1 : -find("ahead").length),
       g: () => find("members")?.click(),
     };
-    const what = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    const pressed = event.key.length === 1 ? event.key.toLowerCase() : event.key;
+    const what = keys[pressed];
     if (!what) return;
     event.preventDefault();
     what();
+    // The first order gets the ship under way.
+    if (!sailing && helm.time === 0 && (pressed.startsWith("Arrow") || "wsm".includes(pressed))) start();
   }
 
   try {
