@@ -503,7 +503,7 @@ def _recursive(problem: Problem, options: IdentificationOptions, progress: Searc
 
 
 def _follows_whole_runs(problem: Problem, estimate: Estimate) -> bool:
-    results = replay_error(problem, estimate.values, estimate.noise)
+    results = replay_error(problem, estimate.values, estimate.noise, windows=False)
     limits = {name: WHOLE_RUN_MISFIT * deviation for name, deviation in estimate.noise.items()}
     return all(error <= limits[name] for result in results for name, error in result.whole.items())
 
