@@ -31,7 +31,8 @@ __attribute__((visibility("default")))
 
 # Work arrays are on the stack, with sizes known at generation. A stride of 0 keeps an argument constant.
 _LOOP = """
-{export}void {name}_rows(long n, const double** arguments, const long* strides, double** results, const long* lengths) {{
+{export}void {name}_rows(long n, const double** arguments, const long* strides, double** results,
+                         const long* lengths) {{
   const double* arg[{sz_arg}];
   double* res[{sz_res}];
   casadi_int iw[{sz_iw}];

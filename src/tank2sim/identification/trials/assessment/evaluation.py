@@ -6,14 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise, white
-from tank2sim.identification.trials.methods.shooting import Pieces, Shooting, cut
+from tank2sim.identification.trials.methods.coloured_noise import white
+from tank2sim.identification.trials.methods.shooting import Shooting, cut
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
