@@ -7,7 +7,9 @@ trials hardly distinguish the two, the turns with hard rudder may still differ, 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -108,7 +110,10 @@ def _predicts_better(of_card: Problem, drag: Problem) -> bool:
     if len(of_card.runs) < 2:
         return False
     problems = {"cross_flow": drag, "card": of_card}
-    found = {name: cross_validate(posed, equation_error, yaw_rate_error) for name, posed in problems.items()}
+    with ThreadPoolExecutor(os.cpu_count()) as threads:  # most of the work is machine code: threads run in parallel
+        found = {
+            name: cross_validate(posed, equation_error, yaw_rate_error, threads) for name, posed in problems.items()
+        }
     return simplest(found) == "card"
 
 
