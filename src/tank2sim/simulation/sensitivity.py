@@ -127,6 +127,29 @@ class Sensitivity:
         return total
 
 
+def augmented_step(
+    following: ca.SX, x: ca.SX, theta: ca.SX, others: Sequence[ca.SX], of_starts: int = 0
+) -> ca.Function:
+    """``step((x, S), *others) -> (x, S)`` after a step of the states and of their derivatives, to be chained.
+
+    For models of a state or two, whose whole step is one expression; :class:`Sensitivity` is for ships.
+
+    Parameters
+    ----------
+    following : casadi.SX (nx,)
+        States after a step from `x` (nx,) with the parameters `theta` (k,).
+    others : sequence of casadi.SX
+        Further arguments, with `theta` or what holds it.
+    of_starts : int
+        Further columns of S (nx, k + of_starts): by unknowns that act through the first states alone.
+    """
+    S = ca.SX.sym("S", x.numel(), theta.numel() + of_starts)
+    moved = ca.jacobian(following, x) @ S
+    moved[:, : theta.numel()] += ca.jacobian(following, theta)
+    columns = [ca.horzcat(x, S), *others], [ca.horzcat(following, moved)]
+    return ca.Function("augmented", *columns, {"cse": True})
+
+
 def _places(arrays: Sequence[Array]) -> list[ctypes.c_void_p]:
     return [ctypes.c_void_p(array.ctypes.data) for array in arrays]
 
