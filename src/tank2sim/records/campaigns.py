@@ -162,7 +162,11 @@ class Campaign:
     @property
     def scales(self) -> Scales:
         """Scales of the prime system at the test speed."""
-        return Scales(self.test.water_density_kgpm3, self.model.length_m, self.test.speed_mps)
+        return self.scales_at(self.test.speed_mps)
+
+    def scales_at(self, speed_mps: float) -> Scales:
+        """Scales of the prime system at another speed."""
+        return Scales(self.test.water_density_kgpm3, self.model.length_m, speed_mps)
 
     def without(self, names: set[str]) -> Campaign:
         """The campaign less some runs."""

@@ -407,7 +407,7 @@ class Replayer:
                 return np.append(residuals(start) / each, (start - guess) / spread)
 
             begin = start, np.append(residual / each, (start - guess) / spread)
-            then, all_residuals = least_squares_steps(misfit, begin, lambda *_, J=J: J)  # type: ignore[misc]
+            then, all_residuals = least_squares_steps(misfit, begin, lambda *_, J=J: J)
             settled = float(np.max(np.abs(then - start) / spread)) < _SETTLED
             start, residual = then, all_residuals[: len(column)] * each
             if settled:

@@ -87,8 +87,8 @@ class Spread:
         roots: list[Array] = [math.sqrt(self.noise) * root for root in equations.roots]
         for direction, sizes, variances in self._common_errors(equations):
             along = (np.sqrt(1.0 + variances * sizes / self.noise) - 1.0) / sizes
-            for place, (start, root) in enumerate(zip(equations.first_rows, roots, strict=True)):
-                block = direction[start : start + len(root)]
+            for place, rows in enumerate(equations.rows):
+                block, root = direction[rows], roots[place]
                 roots[place] = root + np.outer(root @ block, along[place] * block)
         return roots
 
@@ -170,13 +170,18 @@ def solve(equations: CampaignEquations, spread: Spread) -> Solution:
     return replace(solution, spread=spread, covariance=solution.covariance @ scatter @ solution.covariance)
 
 
+def moved_terms(changed: CampaignEquations, solution: Solution) -> dict[str, float]:
+    """Change of each term of a solution (prime) if its equations are `changed`, with the same spread."""
+    moved = solve(changed, solution.spread).values - solution.values
+    return {name: float(shift) for name, shift in zip(changed.names, moved, strict=True)}
+
+
 def scatters(equations: CampaignEquations, spread: Spread) -> Array:
     """Covariance of each run's contribution to the weighted normal equations' right-hand side, (runs, terms, terms)."""
     design = (spread.weights or spread).weighted(equations, equations.design)
-    ends = [*equations.first_rows[1:], len(equations.values)]
     covariances = run_covariances(equations, spread)
-    blocks = [design[start:end] for start, end in zip(equations.first_rows, ends, strict=True)]
-    return np.array([block.T @ covariance @ block for block, covariance in zip(blocks, covariances, strict=True)])
+    pairs = zip(equations.rows, covariances, strict=True)
+    return np.array([design[rows].T @ covariance @ design[rows] for rows, covariance in pairs])
 
 
 def run_covariances(equations: CampaignEquations, spread: Spread) -> list[Array]:

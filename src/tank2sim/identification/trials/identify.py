@@ -18,11 +18,6 @@ from tank2sim.dynamics import build
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.identification.trials.assessment.evaluation import Comparison, compare_card, noise_of, replay_error
 from tank2sim.identification.trials.assessment.identifiability import Identifiability, identifiability, refuse_unseen
-from tank2sim.identification.trials.assessment.method_choice import (
-    MethodChoice,
-    choose_method,
-    signal_residuals,
-)
 from tank2sim.identification.trials.assessment.model_selection import (
     Criteria,
     CrossValidation,
@@ -39,7 +34,13 @@ from tank2sim.identification.trials.assessment.prediction_intervals import (
     compare_held_out,
     criteria_or_none,
 )
-from tank2sim.identification.trials.assessment.structure_choice import posed_in, structure_by_evidence
+from tank2sim.identification.trials.assessment.structure_choice import (
+    MethodChoice,
+    choose_method,
+    posed_in,
+    signal_residuals,
+    structure_by_evidence,
+)
 from tank2sim.identification.trials.methods.equation_error import equation_error
 from tank2sim.identification.trials.methods.kalman import KalmanSettings, kalman
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
