@@ -212,14 +212,7 @@ def reduce_campaign(campaign: Campaign, options: ReductionOptions | None = None)
     """
     options = options or ReductionOptions()
     _refuse_impossible_body(campaign)
-    runs, faults = _sound_runs(campaign)
-    if faults and not options.keep_going:
-        raise together(faults)
-    odd = contradicted(campaign, _used_runs(campaign, runs, options)[0])
-    faults += odd.values()
-    if odd and not options.keep_going:
-        raise together(faults)
-    runs = [run for run in runs if run.run.name not in odd]
+    runs, faults = _credible_runs(campaign, options)
     used, not_used = _used_runs(campaign, moderated(runs), options)
     if not used:
         messages = [*map(str, faults), *(f"{name}, for {reason}" for name, reason in not_used.items())]
@@ -293,6 +286,18 @@ def _refuse_thrust(campaign: Campaign, derivatives: Mapping[str, Derivative]) ->
         )
         remedy = "change the sign of the X columns; if its propeller worked, give [test] propeller_rps"
         raise InputError(campaign.path, "gauge X", problem, remedy)
+
+
+def _credible_runs(campaign: Campaign, options: ReductionOptions) -> tuple[list[ReducedRun], list[InputError]]:
+    """Runs without faults that do not contradict the others, and the faults; raised without `keep_going`."""
+    runs, faults = _sound_runs(campaign)
+    if faults and not options.keep_going:
+        raise together(faults)
+    odd = contradicted(campaign, _used_runs(campaign, runs, options)[0])
+    faults += odd.values()
+    if odd and not options.keep_going:
+        raise together(faults)
+    return [run for run in runs if run.run.name not in odd], faults
 
 
 def _sound_runs(campaign: Campaign) -> tuple[list[ReducedRun], list[InputError]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -228,34 +228,13 @@ def _identified(
     progress: SearchReport,
     executor: Executor | None,
 ) -> Identification:
-    if trials.captive is not None and not _by_output_error(options):
-        remedy = "leave the method out, or fit the card that reduce makes of the campaign"
-        raise ArgumentError("campaign", "", f"{options.method} fits trials alone", remedy)
-    if options.posterior:
-        check_sampler(options.posterior)
-        if not _by_output_error(options):
-            raise ArgumentError("posterior", "", f"{options.method} has no density to sample", "leave the method out")
-    if card.model.kind == "mmg" and options.structure not in ("card", BY_EVIDENCE):
-        problem_text = f"{options.structure} is a structure of a polynomial, and {card.source} is an MMG card"
-        remedy = "leave it out, or fit the card that convert makes of this one"
-        raise ArgumentError("structure", "", problem_text, remedy)
+    _refuse_options(card, trials, options)
     given, card = card, polynomial_over_trials(card, trials.trials)
     drifts = of_unknown_current(card, trials.trials)
     if drifts:
         card = card_in(card, _first_current(card, trials))
-    structures: Mapping[str, CrossValidation] = {}
-    weights: dict[str, float] = {}
-    chosen: tuple[Notice, ...] = ()
-    structure = options.structure
-    if structure in (AUTO, AVERAGE):
-        structures = cross_validate_structures(card, trials, options, executor)
-        structure = simplest(structures)
-    elif structure == BY_EVIDENCE:
-        structure, chosen = structure_by_evidence(card, trials, options, holdout)
-    if options.structure == AVERAGE:
-        weights = _kept_weights(card, trials, options, structures)
-        structure = max(weights, key=weights.__getitem__)
-        chosen = (Notice(_average_in_words(weights)),)
+    chosen = _choose_structure(card, trials, options, holdout, executor)
+    structure = chosen.name
     evidence = other_ship(problem_from_card(card, trials.trials, trials.driven_by))  # in the structure of the card
     if evidence and not options.force:
         raise not_of_ship(card, trials, evidence, _OF_ONE_SHIP)
@@ -275,7 +254,7 @@ def _identified(
     held = holdout if holdout is not None and holdout.trials else None
     average = [
         WeightedFit(fitted if name == structure else _fitted(card, name, trials, options, drifts=drifts).fitted, weight)
-        for name, weight in weights.items()
+        for name, weight in chosen.weights.items()
     ]
     return Identification(
         started=started,
@@ -289,8 +268,8 @@ def _identified(
         before=compare_card(card, trials, estimate.noise),
         before_holdout=compare_card(card, held, estimate.noise) if held else None,
         structure=structure,
-        structures=structures,
-        weights=weights,
+        structures=chosen.structures,
+        weights=chosen.weights,
         criteria=criteria_or_none(fitted),
         posterior=samples,
         bootstrap=bootstrap_estimates(
@@ -300,21 +279,79 @@ def _identified(
         manoeuvres=_manoeuvres(improved, (*trials.trials, *(held.trials if held else ()))),
         current=current,
         choice=fit.choice,
-        notices=(
-            *dict.fromkeys((*doubts(given), *doubts(improved))),
-            *trials.notices,
-            *(held.notices if held else ()),
-            *lowered_bound_notice(given, card),
-            *(() if card.uncertainty else (_NO_UNCERTAINTY,)),
-            *_captive_notice(card, trials.captive),
-            *chosen,
-            *_unseen_notice(fit.unseen),
-            *_current_notice(current),
-            *_choice_notice(fit.choice),
-            *(samples.notices if samples is not None and samples.converged else ()),
-            *estimate.notices,
-        ),
+        notices=_notices((given, card, improved), trials, held, chosen, fit, samples),
     )
+
+
+def _notices(
+    cards: tuple[ManoeuvringCard, ManoeuvringCard, ManoeuvringCard],
+    trials: Measured,
+    held: Measured | None,
+    chosen: _ChosenStructure,
+    fit: _Fit,
+    samples: PosteriorSamples | None,
+) -> tuple[Notice, ...]:
+    """All notices of an identification; `cards` are the given card, the card of the fit and the card found."""
+    given, card, improved = cards
+    return (
+        *dict.fromkeys((*doubts(given), *doubts(improved))),
+        *trials.notices,
+        *(held.notices if held else ()),
+        *lowered_bound_notice(given, card),
+        *(() if card.uncertainty else (_NO_UNCERTAINTY,)),
+        *_captive_notice(card, trials.captive),
+        *chosen.notices,
+        *_unseen_notice(fit.unseen),
+        *_current_notice(fit.current),
+        *_choice_notice(fit.choice),
+        *(samples.notices if samples is not None and samples.converged else ()),
+        *fit.fitted.estimate.notices,
+    )
+
+
+def _refuse_options(card: ManoeuvringCard, trials: Measured, options: IdentificationOptions) -> None:
+    """Raise ArgumentError for options that do not go together, or not with the card or captive tests."""
+    if trials.captive is not None and not _by_output_error(options):
+        remedy = "leave the method out, or fit the card that reduce makes of the campaign"
+        raise ArgumentError("campaign", "", f"{options.method} fits trials alone", remedy)
+    if options.posterior:
+        check_sampler(options.posterior)
+        if not _by_output_error(options):
+            raise ArgumentError("posterior", "", f"{options.method} has no density to sample", "leave the method out")
+    if card.model.kind == "mmg" and options.structure not in ("card", BY_EVIDENCE):
+        problem_text = f"{options.structure} is a structure of a polynomial, and {card.source} is an MMG card"
+        remedy = "leave it out, or fit the card that convert makes of this one"
+        raise ArgumentError("structure", "", problem_text, remedy)
+
+
+@dataclass(frozen=True, eq=False)
+class _ChosenStructure:
+    """Structure of the fit, cross-validation and weights of all where asked for, and what to say about the choice."""
+
+    name: str
+    structures: Mapping[str, CrossValidation] = field(default_factory=dict)
+    weights: Mapping[str, float] = field(default_factory=dict)
+    notices: tuple[Notice, ...] = ()
+
+
+def _choose_structure(
+    card: ManoeuvringCard,
+    trials: Measured,
+    options: IdentificationOptions,
+    holdout: Measured | None,
+    executor: Executor | None,
+) -> _ChosenStructure:
+    if options.structure == BY_EVIDENCE:
+        name, notices = structure_by_evidence(card, trials, options, holdout)
+        return _ChosenStructure(name, notices=notices)
+    if options.structure not in (AUTO, AVERAGE):
+        return _ChosenStructure(options.structure)
+    structures = cross_validate_structures(card, trials, options, executor)
+    if options.structure == AUTO:
+        return _ChosenStructure(simplest(structures), structures)
+    weights = _kept_weights(card, trials, options, structures)
+    heaviest = max(weights, key=weights.__getitem__)
+    return _ChosenStructure(heaviest, structures, weights, (Notice(_average_in_words(weights)),))
 
 
 def _manoeuvres(card: ManoeuvringCard, trials: Sequence[Trial]) -> dict[str, str]:
