@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,14 +82,13 @@ def replay_error(
             if not np.isnan(measured[:, :, place]).all()
         }
 
-    return tuple(
-        Following(
-            run.name,
-            errors(run, _WINDOW * problem.ship_time) if windows else {},
-            {name: error for name, (error, _) in errors(run, None).items()} if whole else {},
-        )
-        for run in problem.runs
-    )
+    def following(run: SampledRun) -> Following:
+        over_windows = errors(run, _WINDOW * problem.ship_time) if windows else {}
+        over_whole = {name: error for name, (error, _) in errors(run, None).items()} if whole else {}
+        return Following(run.name, over_windows, over_whole)
+
+    with ThreadPoolExecutor(os.cpu_count()) as threads:  # a simulation is machine code: threads run in parallel
+        return tuple(threads.map(following, problem.runs))
 
 
 def pooled(results: Sequence[Following], signal: str) -> float:
