@@ -138,8 +138,7 @@ def _largest_rudder(trial: Trial) -> float:
 
 def _turns_in_doubt(of_card: ManoeuvringCard, drag: ManoeuvringCard, taken: str) -> Sequence[Notice]:
     """A caution if the turns of two structures that the trials do not distinguish are different ones."""
-    gear = drag.steering_gear
-    rudder = min(HARD_RUDDER, gear.max_angle_rad if gear is not None and gear.max_angle_rad else HARD_RUDDER)
+    rudder = hard_rudder(drag)
     sizes = [_tactical_diameter(each, rudder) for each in (of_card, drag)]
     if not any(np.isfinite(sizes)) or abs(sizes[0] / sizes[1] - 1) < DIFFERENT_TURN:
         return ()
@@ -152,6 +151,12 @@ def _turns_in_doubt(of_card: ManoeuvringCard, drag: ManoeuvringCard, taken: str)
             f"card's own terms{mine}): fit or hold out a turn with as much rudder"
         ),
     )
+
+
+def hard_rudder(card: ManoeuvringCard) -> float:
+    """:data:`HARD_RUDDER`, or the largest angle of the card's gear if that is less, rad."""
+    gear = card.steering_gear
+    return min(HARD_RUDDER, gear.max_angle_rad if gear is not None and gear.max_angle_rad else HARD_RUDDER)
 
 
 def _tactical_diameter(card: ManoeuvringCard, rudder: float) -> float:
