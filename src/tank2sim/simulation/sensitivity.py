@@ -139,7 +139,7 @@ def augmented_step(
     following : casadi.SX (nx,)
         States after a step from `x` (nx,) with the parameters `theta` (k,).
     others : sequence of casadi.SX
-        Further arguments, with `theta` or what holds it.
+        Further arguments, with `theta` or a vector that holds it.
     of_starts : int
         Further columns of S (nx, k + of_starts): by unknowns that act through the first states alone.
     """

@@ -326,7 +326,7 @@ def _refuse_options(card: ManoeuvringCard, trials: Measured, options: Identifica
 
 @dataclass(frozen=True, eq=False)
 class _ChosenStructure:
-    """Structure of the fit, cross-validation and weights of all where asked for, and what to say about the choice."""
+    """Structure of the fit, cross-validation and weights of all where asked for, and notices of the choice."""
 
     name: str
     structures: Mapping[str, CrossValidation] = field(default_factory=dict)
