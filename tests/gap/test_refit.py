@@ -16,8 +16,7 @@ from tank2sim.gap.inference.fit import CoefficientEstimates
 from tank2sim.gap.outcome.improve_card import add_effects_to_card, card_with_effects_text
 from tank2sim.gap.outcome.refit import effects_like, refit_coefficients
 from tank2sim.gap.result import Refitted
-from tank2sim.identification.trials.problem.prepare_trials import Measured
-from tank2sim.identification.trials.problem.signatures import with_fitted_trials
+from tank2sim.identification.trials.problem.prepare_trials import Measured, with_fitted_trials
 from tank2sim.results.gap import improved_files
 from tests.records.motions import motion, trial
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from tank2sim.records.audit import audit_and_repair, audit_trial, record_noise, repair_trial
-from tank2sim.records.audit.rudder import rudder_response
-from tank2sim.records.audit.rudder_clock import rudder_clock_findings
+from tank2sim.records.audit.rudder import rudder_clock_findings, rudder_response
 from tank2sim.records.reading import read_trial_file
 from tank2sim.records.trials import select_rows
 from tank2sim.simulation.manoeuvres import parse_manoeuvre

@@ -153,7 +153,7 @@ def test_units_are_those_of_their_kind(unit, suffix, factor):
 def test_a_missing_library_is_asked_for_in_a_line(tmp_path, monkeypatch):
     (tmp_path / "run.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + b"\0" * 64)
     monkeypatch.setitem(sys.modules, "h5py", None)
-    from tank2sim.records.binary_tables import binary_columns
+    from tank2sim.records.run_tables import binary_columns
 
     with pytest.raises(InputError) as error:
         binary_columns(tmp_path / "run.h5")

@@ -7,8 +7,8 @@ import pytest
 
 from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.notices import Notice
+from tank2sim.records.audit import AuditedTrial, AuditStudy, ColumnNoise
 from tank2sim.records.audit.finding import ColumnFinding
-from tank2sim.records.audit.study import AuditedTrial, AuditStudy, ColumnNoise
 from tank2sim.results.audit import AuditResult
 
 STUDY = AuditStudy(

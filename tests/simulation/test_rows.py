@@ -25,7 +25,7 @@ def test_each_row_has_its_own_arguments_and_matrices_come_by_columns(compiler):
     rng = np.random.default_rng(1)
     a, b = rng.standard_normal((50, 2)), rng.standard_normal((50, 3))
     rows = RowFunction(function())
-    assert (rows._library is None) == (compiler == "numpy")
+    assert (rows._rows is None) == (compiler == "numpy")
     outer, sine = rows(a, b)
     expected = np.einsum("ni,nj->nij", a, b)
     np.testing.assert_allclose(outer.reshape(50, 3, 2).transpose(0, 2, 1), expected, rtol=1e-14)

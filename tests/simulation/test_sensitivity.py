@@ -9,8 +9,15 @@ from tank2sim.simulation.sensitivity import Sensitivity
 GAIN, LAG = 0.4, 6.0
 
 
-@pytest.fixture(scope="module")
-def first_order() -> Model:
+@pytest.fixture(params=["machine code", "numpy"])
+def compiler(request, monkeypatch):
+    if request.param == "numpy":
+        monkeypatch.setenv("CC", "no-such-compiler")
+    return request.param
+
+
+@pytest.fixture
+def first_order(compiler) -> Model:
     """T dr/dt + r = K delta (Nomoto)."""
     gain = Parameter(name="gain", unit="1", description="K, 1/s", start=GAIN)
     lag = Parameter(name="lag", unit="s", description="T", start=LAG)
@@ -42,8 +49,9 @@ def exact(time, start, rudder, gain=GAIN, lag=LAG):
     return gain * rudder + (start - gain * rudder) * fade, fade, rudder * (1 - fade), by_lag
 
 
-def test_motion_and_derivatives_are_those_of_the_closed_form(first_order):
+def test_motion_and_derivatives_are_those_of_the_closed_form(first_order, compiler):
     sensitivity = Sensitivity(first_order, ("gain", "lag"), ("rate", "double"))
+    assert (sensitivity._library is None) == (compiler == "numpy")
     h, n, p = 0.1, 100, first_order.parameter_values()
     starts, rudders = np.array([0.0, 0.3, -0.2]), np.array([0.2, 0.0, -0.5])
     inputs = np.repeat(rudders[:, None, None], n + 1, axis=1)
@@ -97,3 +105,12 @@ def test_derivatives_of_a_ship_are_those_of_differences(mariner):
     np.testing.assert_allclose(
         own / np.abs(difference).max(axis=0), difference / np.abs(difference).max(axis=0), atol=1e-5
     )
+
+
+def test_without_parameters_the_derivatives_are_those_by_the_initial_state(first_order):
+    inputs, p = np.full((1, 21, 1), 0.2), first_order.parameter_values()
+    with_gain, without = (Sensitivity(first_order, free, ("rate", "double")) for free in (("gain",), ()))
+    states = with_gain.motion(np.zeros(1), inputs[0, :-1], p, 0.1)[None]
+    by = without.derivatives(states, inputs, p, 0.1)[1]
+    assert by.shape == (1, 21, 2, 1)
+    np.testing.assert_array_equal(by, with_gain.derivatives(states, inputs, p, 0.1)[1][..., :1])

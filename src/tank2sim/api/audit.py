@@ -41,7 +41,7 @@ def audit(
     True
     """
     from tank2sim.api.trial import TrialRecord, trials_of
-    from tank2sim.records.audit.study import study_audit
+    from tank2sim.records.audit import study_audit
     from tank2sim.results.audit import AuditResult
 
     records = trials_of(trials, rising=False)

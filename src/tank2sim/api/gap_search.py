@@ -20,8 +20,7 @@ from tank2sim.files import folder_made
 from tank2sim.gap.inference.fit_all import StageReport
 from tank2sim.gap.outcome.files import refuse_early
 from tank2sim.gap.workflow import GapOptions, nonlinear_card, run_gap_workflow
-from tank2sim.identification.trials.problem.prepare_trials import Measured
-from tank2sim.identification.trials.problem.signatures import fitted_as
+from tank2sim.identification.trials.problem.prepare_trials import Measured, fitted_as
 from tank2sim.notices import Notice
 from tank2sim.results.gap import GapResult, gap_result
 

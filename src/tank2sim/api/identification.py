@@ -194,7 +194,7 @@ def _card(found: Identification, fitted: Measured) -> Card:
     """The card found, with the covariance of its estimates."""
     from tank2sim.analysis.ensemble.draws import by_file_name
     from tank2sim.cards import parse_card
-    from tank2sim.identification.trials.problem.signatures import with_fitted_trials
+    from tank2sim.identification.trials.problem.prepare_trials import with_fitted_trials
     from tank2sim.identification.trials.study import identified_card_text
 
     captive = fitted.captive

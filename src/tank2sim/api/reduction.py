@@ -99,10 +99,9 @@ def reduce(
     InputError
         A file is missing or at fault, or the runs do not determine the derivatives.
     """
-    from tank2sim.identification.captive.card_notices import fill_notices, heel_notices, length_ratio
     from tank2sim.identification.captive.findings import reduction_findings
     from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
-    from tank2sim.identification.captive.result_card import card_contents
+    from tank2sim.identification.captive.result_card import card_contents, fill_notices, heel_notices, length_ratio
     from tank2sim.identification.captive.study import study_reduction
     from tank2sim.records.campaigns import read_campaign
     from tank2sim.results.reduction import ReductionResult

@@ -241,8 +241,7 @@ def fitted_and_held(
         name or are one record, also where one of them is held out; the card was fitted to one that is held out; or
         there is none to fit.
     """
-    from tank2sim.identification.trials.problem.prepare_trials import measured
-    from tank2sim.identification.trials.problem.signatures import fitted_as
+    from tank2sim.identification.trials.problem.prepare_trials import fitted_as, measured
     from tank2sim.records.same_record import refuse_copies
 
     groups = (trials_of(trials), trials_of(holdout, "holdout"))

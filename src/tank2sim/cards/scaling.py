@@ -56,6 +56,10 @@ class Scales:
         """SI value of X' = 1, N."""
         return 0.5 * self.density * self.length**2 * self.speed**2
 
+    def unit(self, force: str) -> Any:
+        """SI value of X' = 1 or Y' = 1, N, or of N' = 1, N m."""
+        return self.force * (self.length if force == "N" else 1.0)
+
 
 @dataclass(frozen=True)
 class PrimeII:

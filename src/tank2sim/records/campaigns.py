@@ -162,7 +162,11 @@ class Campaign:
     @property
     def scales(self) -> Scales:
         """Scales of the prime system at the test speed."""
-        return Scales(self.test.water_density_kgpm3, self.model.length_m, self.test.speed_mps)
+        return self.scales_at(self.test.speed_mps)
+
+    def scales_at(self, speed_mps: float) -> Scales:
+        """Scales of the prime system at another speed."""
+        return Scales(self.test.water_density_kgpm3, self.model.length_m, speed_mps)
 
     def without(self, names: set[str]) -> Campaign:
         """The campaign less some runs."""
@@ -344,12 +348,6 @@ def read_captive_run(
     if speed is None:
         speed = np.full(len(time), test.speed_mps)
     y, psi = _optional(table, "y_m"), _optional(table, "psi_rad")
-    rate = _optional(table, "r_radps")
-    if rate is None and sheet.type == "steady_turn" and sheet.yaw_rate_radps is not None:
-        rate = np.full(len(time), sheet.yaw_rate_radps)
-    elif rate is None:
-        turns = sheet.type in ("pure_yaw", "yaw_with_drift", "steady_turn")
-        rate = _rate_of(table, psi, time) if turns else np.zeros(len(time))
     revolutions = sheet.propeller_radps if sheet.propeller_radps is not None else test.propeller_radps
     recorded = _optional(table, "propeller_radps")
     if recorded is not None:
@@ -360,7 +358,7 @@ def read_captive_run(
         sheet=sheet,
         time_s=time,
         v_mps=_sway_velocity(table, sheet, (time, y, speed)),
-        r_radps=rate,
+        r_radps=_yaw_rate(table, sheet, psi, time),
         speed_mps=speed,
         delta_rad=rudder,
         **{column: sense * _filled(table, column) for column in _FORCE_COLUMNS.values()},
@@ -373,6 +371,17 @@ def read_captive_run(
         heel_rad=sheet.heel_rad or 0.0,
         force_delay_s=test.force_delay_s,
     )
+
+
+def _yaw_rate(table: CsvTable, sheet: RunSheet, psi: Array | None, time: Array) -> Array:
+    """Yaw rate (n,), rad/s: as recorded, by the sheet of a steady turn, or the slope of the heading."""
+    recorded = _optional(table, "r_radps")
+    if recorded is not None:
+        return recorded
+    if sheet.type == "steady_turn" and sheet.yaw_rate_radps is not None:
+        return np.full(len(time), sheet.yaw_rate_radps)
+    turns = sheet.type in ("pure_yaw", "yaw_with_drift", "steady_turn")
+    return _rate_of(table, psi, time) if turns else np.zeros(len(time))
 
 
 def _filled(table: CsvTable, name: str) -> Array:

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.errors import InputError
-from tank2sim.records.number_rows import number_rows, read_bytes_as_text
+from tank2sim.records.csv_table import number_rows, read_bytes_as_text
 from tank2sim.records.trials import Trial, TrialReader, unwrapped
 from tank2sim.units import to_si
 

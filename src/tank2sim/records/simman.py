@@ -15,7 +15,7 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice
-from tank2sim.records.number_rows import NumberRows, number_rows, read_bytes_as_text
+from tank2sim.records.csv_table import NumberRows, number_rows, read_bytes_as_text
 from tank2sim.records.trials import TRIAL_SIGNALS, Trial, TrialReader, unwrapped
 from tank2sim.units import to_si
 

@@ -12,8 +12,8 @@ from tank2sim.answer.charts.motion import TimeMark
 from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
 from tank2sim.notices import Notice
+from tank2sim.records.audit import AuditedTrial, AuditStudy
 from tank2sim.records.audit.finding import ColumnFinding
-from tank2sim.records.audit.study import AuditedTrial, AuditStudy
 from tank2sim.units import from_si
 
 if TYPE_CHECKING:

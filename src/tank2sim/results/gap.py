@@ -26,8 +26,7 @@ from tank2sim.gap.outcome.improve_card import Found, card_with_effects_text
 from tank2sim.gap.outcome.study import EffectFound, GapStudy
 from tank2sim.gap.outcome.surroundings import with_surroundings
 from tank2sim.gap.result import AMBIGUOUS, COEFFICIENTS, MISSING, NO_EFFECT_MISSING, Gap
-from tank2sim.identification.trials.problem.prepare_trials import Measured
-from tank2sim.identification.trials.problem.signatures import with_fitted_trials
+from tank2sim.identification.trials.problem.prepare_trials import Measured, with_fitted_trials
 from tank2sim.notices import Notice, foremost
 from tank2sim.records.signals.writing import trial_text
 from tank2sim.results.gap_cause_charts import agreement_chart, expected_chart, lacking_chart, rival_chart, when_chart

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -116,6 +117,7 @@ def recorded(trial: Trial, model: Model) -> Recorded | None:
     return None if isinstance(found, str) else found
 
 
+@lru_cache(maxsize=32)  # each trial is asked for once by every comparison with a card
 def recognise(trial: Trial, model: Model) -> Recorded | str:
     """Recognise a turning circle or a zigzag in a trial, or say why it is neither.
 

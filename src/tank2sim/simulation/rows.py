@@ -8,7 +8,7 @@ to the next step as its first argument, as in integration.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -31,7 +31,8 @@ __attribute__((visibility("default")))
 
 # Work arrays are on the stack, with sizes known at generation. A stride of 0 keeps an argument constant.
 _LOOP = """
-{export}void loop(long n, const double** arguments, const long* strides, double** results, const long* lengths) {{
+{export}void {name}_rows(long n, const double** arguments, const long* strides, double** results,
+                         const long* lengths) {{
   const double* arg[{sz_arg}];
   double* res[{sz_res}];
   casadi_int iw[{sz_iw}];
@@ -126,22 +127,20 @@ class RowFunction:
     ----------
     function : casadi.Function
         Dense arguments and results; a matrix result is in CasADi's order, by columns.
+    library : ctypes.CDLL, optional
+        From :func:`compiled_rows` of this function, among others.
     """
 
-    def __init__(self, function: ca.Function):
+    def __init__(self, function: ca.Function, library: ctypes.CDLL | None = None):
         self.function = function
-        self._library: ctypes.CDLL | None = None
-        if find_compiler() is not None:
-            try:
-                self._library = _compiled(function)
-            except (InputError, OSError):  # a compiler that does not work, or compiles for another machine
-                self._library = None
+        library = library or compiled_rows([function])
+        self._rows = None if library is None else library[f"{function.name()}_rows"]
 
     def __call__(self, *arguments: Array) -> tuple[Array, ...]:
         """Results (n, elements) each; an argument is (elements,), the same for every row, or (n, elements)."""
         n = max(len(argument) for argument in arguments if argument.ndim == 2)
         arrays = [np.ascontiguousarray(argument, dtype=float) for argument in arguments]
-        if self._library is None:
+        if self._rows is None:
             return self._in_numpy(*arrays)
         results = [np.empty((n, self.function.numel_out(place))) for place in range(self.function.n_out())]
         self._loop(n, arrays, [array.shape[1] if array.ndim == 2 else 0 for array in arrays], results)
@@ -152,12 +151,12 @@ class RowFunction:
         return ArrayFunction(self.function)
 
     def _loop(self, n: int, arrays: Sequence[Array], strides: Sequence[int], results: Sequence[Array]) -> None:
-        assert self._library is not None
+        assert self._rows is not None
         starts = (ctypes.c_void_p * len(arrays))(*(array.ctypes.data for array in arrays))
         ends = (ctypes.c_void_p * len(results))(*(array.ctypes.data for array in results))
         lengths = [self.function.numel_out(place) for place in range(self.function.n_out())]
         longs = (ctypes.c_long * len(strides))(*strides), (ctypes.c_long * len(lengths))(*lengths)
-        self._library.loop(ctypes.c_long(n), starts, longs[0], ends, longs[1])
+        self._rows(ctypes.c_long(n), starts, longs[0], ends, longs[1])
 
 
 class Chain(RowFunction):
@@ -169,7 +168,7 @@ class Chain(RowFunction):
         states = np.empty((n + 1, len(start)))
         states[0] = start
         arrays = [np.ascontiguousarray(argument, dtype=float) for argument in arguments]
-        if self._library is not None:
+        if self._rows is not None:
             strides = [states.shape[1], *(array.shape[1] if array.ndim == 2 else 0 for array in arrays)]
             self._loop(n, [states, *arrays], strides, [states[1:]])
             return states
@@ -179,10 +178,28 @@ class Chain(RowFunction):
         return states
 
 
-def _compiled(function: ca.Function) -> ctypes.CDLL:
-    sizes = {name: max(1, getattr(function, name)()) for name in ("sz_arg", "sz_res", "sz_iw", "sz_w")}
-    counts = {"n_in": function.n_in(), "n_out": function.n_out(), "name": function.name()}
-    source = generate_c([function], "rows") + _LOOP.format(export=EXPORT, **sizes, **counts)
-    library = ctypes.CDLL(str(cached_library({"model.c": source})))
-    library.loop.restype = None
-    return library
+def compiled_rows(
+    functions: Sequence[ca.Function], sources: Mapping[str, str] | None = None, flags: Collection[str] = ()
+) -> ctypes.CDLL | None:
+    """Library of functions, each with its loop over rows; None without a compiler that works.
+
+    Parameters
+    ----------
+    functions : sequence of casadi.Function
+        Each with a name of its own.
+    sources : mapping, optional
+        Name to text of further C sources, which may call the functions.
+    flags : collection of str
+        More flags of the compiler.
+    """
+    if find_compiler() is None:
+        return None
+    code = generate_c(functions, "rows")
+    for function in functions:
+        sizes = {name: max(1, getattr(function, name)()) for name in ("sz_arg", "sz_res", "sz_iw", "sz_w")}
+        counts = {"n_in": function.n_in(), "n_out": function.n_out(), "name": function.name()}
+        code += _LOOP.format(export=EXPORT, **sizes, **counts)
+    try:
+        return ctypes.CDLL(str(cached_library({"model.c": code, **(sources or {})}, flags=flags)))
+    except (InputError, OSError):  # a compiler that does not work, or compiles for another machine
+        return None

@@ -12,9 +12,9 @@ from tank2sim.apps.signals.charts import (
 )
 from tank2sim.apps.signals.study import SignalSettings, analyse
 from tank2sim.records.signals.columns import SignalName
-from tank2sim.records.signals.correlation import autocorrelation, cross_correlation
 from tank2sim.records.signals.filtering import FilterType, butterworth
 from tank2sim.records.signals.spectra import spectrum, transfer_function
+from tank2sim.records.signals.statistics import autocorrelation, cross_correlation
 from tests.records.signals.made import first_order, nomoto, series, trial
 
 YAW, RUDDER = SignalName("r_radps"), SignalName("delta_rad")

@@ -13,9 +13,9 @@ from tank2sim.answer.study import study_values
 from tank2sim.cards import parse_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
+from tank2sim.identification.captive.consistency import repeats
 from tank2sim.identification.captive.findings import reduction_findings
 from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
-from tank2sim.identification.captive.repeats import repeats
 from tank2sim.identification.captive.result_card import card_contents, reduced_card_text, reynolds_ratio
 from tank2sim.identification.captive.stepwise import scatter_within_tests
 from tank2sim.identification.captive.study import prediction_errors, study_reduction

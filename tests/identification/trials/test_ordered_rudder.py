@@ -10,8 +10,8 @@ import pytest
 
 from tank2sim.cards import parse_card, read_card
 from tank2sim.dynamics import build
-from tank2sim.identification.trials.problem.ordered_rudder import ordered_rudder
 from tank2sim.identification.trials.problem.problem_from_card import fit_driven_by, problem_from_card
+from tank2sim.identification.trials.problem.sampled_runs import ordered_rudder
 from tank2sim.records.trials import Trial
 
 RATE, LAG, OVER = 5.0, 1.0, 20.0

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tank2sim.records.signals.correlation import autocorrelation, cross_correlation
+from tank2sim.records.signals.statistics import autocorrelation, cross_correlation
 from tests.records.signals.made import first_order, series, white
 
 

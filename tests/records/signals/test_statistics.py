@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from tank2sim.records.signals.correlation import autocorrelation
 from tank2sim.records.signals.statistics import (
     Stationary,
+    autocorrelation,
     mean_and_deviation,
     normality,
     probability_density,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tank2sim.records.number_rows import number_rows, read_bytes_as_text
+from tank2sim.records.csv_table import number_rows, read_bytes_as_text
 from tank2sim.records.trials import Trial, TrialReader
 from tank2sim.units import KNOT_MPS
 

@@ -41,7 +41,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.problem.signatures import fitted_as
+from tank2sim.identification.trials.problem.prepare_trials import fitted_as
 from tank2sim.notices import Notice
 from tank2sim.records.audit.noise import record_noise
 from tank2sim.records.trials import Trial, sampling_step

@@ -25,10 +25,9 @@ from tank2sim.answer.charts.parts import (
 )
 from tank2sim.answer.charts.theme import BAND_OPACITY
 from tank2sim.records.signals.columns import SignalName
-from tank2sim.records.signals.correlation import Autocorrelation, Correlation
-from tank2sim.records.signals.effect import FilterEffect
+from tank2sim.records.signals.filtering import FilterEffect
 from tank2sim.records.signals.spectra import Spectrum, Transfer
-from tank2sim.records.signals.statistics import Density
+from tank2sim.records.signals.statistics import Autocorrelation, Correlation, Density
 from tank2sim.records.thinning import thin_line, thin_points
 
 _SIZE_PX = (720, 300)

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from tank2sim.errors import ArgumentError, InputError
-from tank2sim.records.signals.effect import Filtered
 from tank2sim.records.signals.filtering import (
+    Filtered,
     FilterType,
     butterworth,
     decimate,

@@ -11,14 +11,17 @@ from tank2sim.arrays import Columns, Number
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice
 from tank2sim.records.signals.columns import DIRECTION_COLUMNS, SignalName, file_columns, find_signal
-from tank2sim.records.signals.correlation import Autocorrelation, Correlation, autocorrelation, cross_correlation
-from tank2sim.records.signals.effect import Filtered, FilterEffect
+from tank2sim.records.signals.filtering import Filtered, FilterEffect
 from tank2sim.records.signals.sampling import Series, even_series
 from tank2sim.records.signals.spectra import Spectrum, Transfer, spectrum, transfer_function
 from tank2sim.records.signals.statistics import (
+    Autocorrelation,
+    Correlation,
     Density,
     Normality,
     Stationarity,
+    autocorrelation,
+    cross_correlation,
     mean_and_deviation,
     normality,
     probability_density,

@@ -12,8 +12,9 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.reading import revised
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.gap.proof.open_loop import InputRecord, Replayer, difference_slopes, downhill, input_record
+from tank2sim.gap.proof.open_loop import InputRecord, Replayer, difference_slopes, input_record
 from tank2sim.gap.result import AMBIGUOUS, MISSING, Gap, Passed, misfit_of
+from tank2sim.identification.trials.methods.gauss_newton import least_squares_steps
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.notices import Notice, caution
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
@@ -154,14 +155,10 @@ class _Fit:
         def misfit(changes: Array) -> Array:
             return self.misfit(names, changes)
 
-        at, residual = start, misfit(start)
-        for _ in range(_STEPS):
-            before = float(residual @ residual)
-            at, residual = downhill(
-                misfit, at, residual, difference_slopes(misfit, at, residual, np.full(len(at), reach))
-            )
-            if before - float(residual @ residual) < 1e-3 * before:
-                break
+        def slopes(at: Array, residual: Array) -> Array:
+            return difference_slopes(misfit, at, residual, np.full(len(at), reach))
+
+        at, residual = least_squares_steps(misfit, (start, misfit(start)), slopes, _STEPS, 1e-3)
         return at, float(residual @ residual)
 
     def _parameters(self, names: Sequence[str], changes: Array) -> Array:

@@ -16,6 +16,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
+from tank2sim.identification.trials.methods.gauss_newton import least_squares_steps
 from tank2sim.identification.trials.problem.problem_from_card import driven_model
 from tank2sim.records.trials import Trial, sampling_step
 from tank2sim.simulation.motion_record import motion_record
@@ -405,7 +406,8 @@ class Replayer:
             def misfit(start: Array, each: Array = each) -> Array:
                 return np.append(residuals(start) / each, (start - guess) / spread)
 
-            then, all_residuals = downhill(misfit, start, np.append(residual / each, (start - guess) / spread), J)
+            begin = start, np.append(residual / each, (start - guess) / spread)
+            then, all_residuals = least_squares_steps(misfit, begin, lambda *_, J=J: J)
             settled = float(np.max(np.abs(then - start) / spread)) < _SETTLED
             start, residual = then, all_residuals[: len(column)] * each
             if settled:
@@ -450,21 +452,6 @@ def difference_slopes(function: Callable[[Array], Array], at: Array, value: Arra
         moved[place] += step
         columns.append((function(moved) - value) / step)
     return np.stack(columns, axis=1)
-
-
-def downhill(misfit: Callable[[Array], Array], at: Array, value: Array, slopes: Array) -> tuple[Array, Array]:
-    """One Gauss-Newton step from ``misfit(at) = value``: the new point and its misfit.
-
-    A step that does not lower the sum of squares is halved; if none does, the old point is kept. `misfit` may return
-    nan where a motion exceeds all bounds: such points are never taken.
-    """
-    step, cost = np.linalg.lstsq(slopes, value, rcond=None)[0], float(value @ value)
-    for _ in range(8):
-        then = misfit(at - step)
-        if float(then @ then) < cost:
-            return at - step, then
-        step = step / 2
-    return at, value
 
 
 def input_record(replayer: Replayer, trial: Trial) -> InputRecord:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
-from tank2sim.arrays import Array
 from tank2sim.identification.captive.equations import CampaignEquations
 from tank2sim.identification.captive.regression import (
     Spread,
@@ -84,16 +83,15 @@ def leave_one_out(equations: CampaignEquations, spread: Spread) -> tuple[LeftOut
     scatter = scatters(equations, spread) / np.outer(norms, norms)
     together = np.sum(scatter, axis=0) + prior.T @ prior
     found = []
-    ends = [*equations.first_rows[1:], len(equations.values)]
-    blocks = [design[start:end] for start, end in zip(equations.first_rows, ends, strict=True)]
+    blocks = [design[rows] for rows in equations.rows]
     remaining = normal - np.array([block.T @ block for block in blocks])
     determined = np.linalg.cond(remaining) <= 1e10
     inverses = np.linalg.inv(np.where(determined[:, None, None], remaining, np.eye(len(norms))))
     covariances, roots = run_covariances(equations, spread), weights.run_roots(equations)
-    for place, (start, end) in enumerate(zip(equations.first_rows, ends, strict=True)):
+    for place, rows in enumerate(equations.rows):
         if not determined[place]:
             continue
-        block, target, inverse = blocks[place], values[start:end], inverses[place]
+        block, target, inverse = blocks[place], values[rows], inverses[place]
         without = inverse @ (right - block.T @ target)
         shift = np.abs(without - estimate) / np.maximum(errors, 1e-300)
         largest = int(np.argmax(shift))
@@ -102,7 +100,8 @@ def leave_one_out(equations: CampaignEquations, spread: Spread) -> tuple[LeftOut
         root = roots[place]
         row = 1 if equations.runs[place].run.oscillates else 0
         shown, expected = root @ target, root @ (block @ without)
-        squares = _squares(target - block @ without, misfit_covariance)
+        misfit = target - block @ without
+        squares = float(misfit @ np.linalg.solve(misfit_covariance, misfit))
         found.append(
             LeftOut(
                 run=equations.runs[place].run.name,
@@ -111,8 +110,8 @@ def leave_one_out(equations: CampaignEquations, spread: Spread) -> tuple[LeftOut
                 predicted=float(expected[row]),
                 error=float(expected[row]) - float(shown[row]),
                 standard_error=float(np.sqrt((root @ misfit_covariance @ root.T)[row, row])),
-                chance=float(chdtrc(end - start, squares)),
-                misfit=float(np.sqrt(squares / (end - start))),
+                chance=float(chdtrc(len(target), squares)),
+                misfit=float(np.sqrt(squares / len(target))),
                 gap=float(np.linalg.norm(shown - expected)),
                 size=float(max(np.linalg.norm(shown), np.linalg.norm(expected))),
                 influence=float(shift[largest]),
@@ -120,7 +119,3 @@ def leave_one_out(equations: CampaignEquations, spread: Spread) -> tuple[LeftOut
             )
         )
     return tuple(found)
-
-
-def _squares(misfit: Array, covariance: Array) -> float:
-    return float(misfit @ np.linalg.solve(covariance, misfit))

@@ -127,6 +127,12 @@ class CampaignEquations:
         return np.searchsorted(self.run_of_row, np.arange(len(self.runs)))
 
     @cached_property
+    def rows(self) -> tuple[slice, ...]:
+        """Rows of each run."""
+        ends = [*self.first_rows[1:].tolist(), len(self.values)]
+        return tuple(slice(start, end) for start, end in zip(self.first_rows.tolist(), ends, strict=True))
+
+    @cached_property
     def zero_sizes(self) -> Array:
         """Squared norm of each run's rows of `zero`, (runs,)."""
         return self.run_sums(self.zero**2)
@@ -147,7 +153,7 @@ def campaign_equations(
         The inertia of a yaw run must be removed and the campaign does not give it.
     """
     scales = campaign.scales
-    unit = scales.force * (scales.length if force == "N" else 1.0)
+    unit = scales.unit(force)
     keys = _known_by(campaign, names)
     sizes = np.array([run.regressed for run in runs])
     ends = np.cumsum(sizes)

@@ -9,11 +9,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from tank2sim.cards.plausibility import Caution
+from tank2sim.identification.captive.consistency import repeats
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.oscillation import cubic_findings
 from tank2sim.identification.captive.reduction import ForceResult, Reduction, is_resistance
-from tank2sim.identification.captive.regression import solve
-from tank2sim.identification.captive.repeats import repeats
+from tank2sim.identification.captive.regression import moved_terms
 from tank2sim.identification.captive.systematic import can_show_delay, correct_delay
 from tank2sim.identification.captive.tank_conditions import Tank, tank_resonance, tank_size
 from tank2sim.identification.captive.warnings import OscillationMotion, cautions_of_result, cautions_of_test
@@ -203,10 +203,7 @@ def _effect_of_delay(reduction: Reduction) -> str:
     for name in ("Yvdot", "Nrdot"):
         result = reduction.forces[name[0]]
         if name in reduction.derivatives and name in result.solution.names:
-            used, solution = result.selection.equations, result.solution
-            shift = (solve(correct_delay(used, 0.01), solution.spread).values - solution.values)[
-                solution.names.index(name)
-            ]
+            shift = moved_terms(correct_delay(result.selection.equations, 0.01), result.solution)[name]
             moved.append(f"{name} by {abs(100 * shift / reduction.derivatives[name].value):.2g} %")
     return f"; 10 ms would change {', '.join(moved)}" if moved else ""
 

@@ -99,7 +99,7 @@ def _oscillation(campaign: Campaign, run: ReducedRun) -> OscillationDerivatives:
     errors: dict[str, float] = {}
     third: dict[str, tuple[float, float]] = {}
     for force in "YN":
-        unit = 0.5 * campaign.test.water_density_kgpm3 * length**2 * speed**2 * (length if force == "N" else 1.0)
+        unit = campaign.scales_at(speed).unit(force)
         fit = run.fits[force]
         water = (fit.coefficients[: run.regressed] + run.projected(inertial[force][:, None])[:, 0]) / unit
         error: Array = np.sqrt(np.diag(fit.covariance))[: run.regressed] / unit

@@ -10,7 +10,6 @@ from typing import Literal
 import numpy as np
 
 from tank2sim.arrays import Array, Columns
-from tank2sim.cards.scaling import Scales
 from tank2sim.cards.terms import parse_term
 from tank2sim.dynamics.abkowitz import polynomial
 from tank2sim.identification.captive.equations import rigid_body_force
@@ -219,8 +218,7 @@ def _coefficient(reduction: Reduction, force: str, run: ReducedRun) -> tuple[flo
 
 def _unit(reduction: Reduction, force: str, run: ReducedRun) -> float:
     campaign = reduction.campaign
-    scales = Scales(campaign.test.water_density_kgpm3, campaign.model.length_m, run.motion.mean_speed_mps)
-    return float(scales.force * (scales.length if force == "N" else 1.0))
+    return float(campaign.scales_at(run.motion.mean_speed_mps).unit(force))
 
 
 def _regressors(result: ForceResult, v: Array, r: Array, rudder: Array) -> Array:
@@ -280,8 +278,7 @@ def _harmonics(reduction: Reduction, force: str) -> HarmonicsPlot | None:
     for place, run in enumerate(equations.runs):
         if not run.run.oscillates:
             continue
-        start, root = int(equations.first_rows[place]), equations.roots[place]
-        rows = slice(start, start + len(root))
+        rows, root = equations.rows[place], equations.roots[place]
         measured = root @ equations.values[rows]
         fitted = root @ (equations.design[rows] @ values)
         bars.append(Harmonics(run=run.run.name, amplitude=_amplitudes(measured), fitted=_amplitudes(fitted)))

@@ -16,7 +16,7 @@ from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.consistency import Asymmetry, asymmetry, contradicted
 from tank2sim.identification.captive.cross_validation import LeftOut, leave_one_out
-from tank2sim.identification.captive.equations import SPEED_RANGE
+from tank2sim.identification.captive.equations import HEEL_TERMS, SPEED_RANGE
 from tank2sim.identification.captive.harmonics import ReducedRun, moderated, reduced_run
 from tank2sim.identification.captive.oscillation import (
     CubicByTwoWays,
@@ -25,7 +25,7 @@ from tank2sim.identification.captive.oscillation import (
     oscillations,
     run_frequency_parameter,
 )
-from tank2sim.identification.captive.regression import Solution, efficient_solution, solve
+from tank2sim.identification.captive.regression import Solution, efficient_solution, moved_terms
 from tank2sim.identification.captive.run_faults import record_faults, reduced_faults
 from tank2sim.identification.captive.selection import Selection, Trend, select, trends
 from tank2sim.identification.captive.stepwise import (
@@ -212,14 +212,7 @@ def reduce_campaign(campaign: Campaign, options: ReductionOptions | None = None)
     """
     options = options or ReductionOptions()
     _refuse_impossible_body(campaign)
-    runs, faults = _sound_runs(campaign)
-    if faults and not options.keep_going:
-        raise together(faults)
-    odd = contradicted(campaign, _used_runs(campaign, runs, options)[0])
-    faults += odd.values()
-    if odd and not options.keep_going:
-        raise together(faults)
-    runs = [run for run in runs if run.run.name not in odd]
+    runs, faults = _credible_runs(campaign, options)
     used, not_used = _used_runs(campaign, moderated(runs), options)
     if not used:
         messages = [*map(str, faults), *(f"{name}, for {reason}" for name, reason in not_used.items())]
@@ -293,6 +286,18 @@ def _refuse_thrust(campaign: Campaign, derivatives: Mapping[str, Derivative]) ->
         )
         remedy = "change the sign of the X columns; if its propeller worked, give [test] propeller_rps"
         raise InputError(campaign.path, "gauge X", problem, remedy)
+
+
+def _credible_runs(campaign: Campaign, options: ReductionOptions) -> tuple[list[ReducedRun], list[InputError]]:
+    """Runs without faults that do not contradict the others, and the faults; raised without `keep_going`."""
+    runs, faults = _sound_runs(campaign)
+    if faults and not options.keep_going:
+        raise together(faults)
+    odd = contradicted(campaign, _used_runs(campaign, runs, options)[0])
+    faults += odd.values()
+    if odd and not options.keep_going:
+        raise together(faults)
+    return [run for run in runs if run.run.name not in odd], faults
 
 
 def _sound_runs(campaign: Campaign) -> tuple[list[ReducedRun], list[InputError]]:
@@ -399,13 +404,17 @@ def common_shifts(campaign: Campaign, result: ForceResult) -> dict[str, dict[str
     used, solution = result.selection.equations, result.solution
     shown = {error.source: error.shifts(used, solution) for error in result.systematic}
     if result.timing_s:
-        moved = solve(correct_delay(used, result.timing_s), solution.spread).values - solution.values
-        shown["force_delay"] = {name: float(shift) for name, shift in zip(used.names, moved, strict=True)}
+        shown["force_delay"] = moved_terms(correct_delay(used, result.timing_s), solution)
     if result.alignment_rad:
         turned = with_common_error(campaign, used, "alignment_rad", result.alignment_rad)
-        moved = solve(turned, solution.spread).values - solution.values
-        shown["alignment"] = {name: float(shift) for name, shift in zip(used.names, moved, strict=True)}
+        shown["alignment"] = moved_terms(turned, solution)
     return type_b_shifts(campaign, used, solution) | shown
+
+
+def terms_of_heel(reduction: Reduction) -> list[str]:
+    """Names of the derivatives of the heel that were found."""
+    names = [name for terms in HEEL_TERMS.values() for name in terms]
+    return [name for name in names if name in reduction.derivatives]
 
 
 def is_resistance(campaign: Campaign) -> bool:

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -87,8 +87,8 @@ class Spread:
         roots: list[Array] = [math.sqrt(self.noise) * root for root in equations.roots]
         for direction, sizes, variances in self._common_errors(equations):
             along = (np.sqrt(1.0 + variances * sizes / self.noise) - 1.0) / sizes
-            for place, (start, root) in enumerate(zip(equations.first_rows, roots, strict=True)):
-                block = direction[start : start + len(root)]
+            for place, rows in enumerate(equations.rows):
+                block, root = direction[rows], roots[place]
                 roots[place] = root + np.outer(root @ block, along[place] * block)
         return roots
 
@@ -170,13 +170,18 @@ def solve(equations: CampaignEquations, spread: Spread) -> Solution:
     return replace(solution, spread=spread, covariance=solution.covariance @ scatter @ solution.covariance)
 
 
+def moved_terms(changed: CampaignEquations, solution: Solution) -> dict[str, float]:
+    """Change of each term of a solution (prime) if its equations are `changed`, with the same spread."""
+    moved = solve(changed, solution.spread).values - solution.values
+    return {name: float(shift) for name, shift in zip(changed.names, moved, strict=True)}
+
+
 def scatters(equations: CampaignEquations, spread: Spread) -> Array:
     """Covariance of each run's contribution to the weighted normal equations' right-hand side, (runs, terms, terms)."""
     design = (spread.weights or spread).weighted(equations, equations.design)
-    ends = [*equations.first_rows[1:], len(equations.values)]
     covariances = run_covariances(equations, spread)
-    blocks = [design[start:end] for start, end in zip(equations.first_rows, ends, strict=True)]
-    return np.array([block.T @ covariance @ block for block, covariance in zip(blocks, covariances, strict=True)])
+    pairs = zip(equations.rows, covariances, strict=True)
+    return np.array([design[rows].T @ covariance @ design[rows] for rows, covariance in pairs])
 
 
 def run_covariances(equations: CampaignEquations, spread: Spread) -> list[Array]:
@@ -316,18 +321,13 @@ class _ZeroLikelihood:
         variances = noise + zeros * self.sizes
         runs, across = len(variances), len(self.across)
         system = np.vstack([self.along / np.sqrt(variances)[:, None], self.across / math.sqrt(noise), self.prior])
-        design, values = system[:, :-1], system[:, -1]
-        norms = column_norms(design)
-        q, r = np.linalg.qr(design / norms)
-        residual = values - q @ (q.T @ values)
-        information = 2 * float(np.sum(np.log(np.abs(np.diag(r)) * norms + 1e-300)))
+        q, residual, restricted = _restricted(system[:, :-1], system[:, -1])
         determinant = self.count * math.log(noise) + float(np.sum(np.log(variances)))
         # Of each row: 1 less its leverage less its squared residual.
         free = np.sum(q**2, axis=1) + residual**2
         by_run = (1.0 - free[:runs]) / variances
         rest = (self.count - float(np.sum(free[runs : runs + across]))) / noise
-        value = determinant + information + float(residual @ residual)
-        return value, rest + float(np.sum(by_run)), by_run * self.sizes
+        return determinant + restricted, rest + float(np.sum(by_run)), by_run * self.sizes
 
 
 def _with_gain(equations: CampaignEquations, base: Spread, single: bool) -> Spread:
@@ -341,13 +341,7 @@ def _with_gain(equations: CampaignEquations, base: Spread, single: bool) -> Spre
         by_type = {kind: variance * factor for kind, variance in base.by_type.items()}
         return Spread(noise, base.zero_variance * factor, by_type, _GAIN * math.exp(logs[2]), base)
 
-    return _likeliest(equations, spread, [_NOISE_RANGE, _ZERO_RANGE, _GAIN_RANGE])[0]
-
-
-def _likeliest(
-    equations: CampaignEquations, spread: Callable[[Array], Spread], bounds: list[tuple[float, float]]
-) -> tuple[Spread, float]:
-    """The spread of largest likelihood over its logarithms, from zero within their bounds, and -2 log likelihood."""
+    bounds = [_NOISE_RANGE, _ZERO_RANGE, _GAIN_RANGE]
     found = minimize(
         lambda logs: _criterion(equations, spread(logs)),
         np.zeros(len(bounds)),
@@ -355,17 +349,21 @@ def _likeliest(
         bounds=bounds,
         options={"eps": 1e-4},
     )
-    return spread(found.x), float(found.fun)
+    return spread(found.x)
 
 
 def _criterion(equations: CampaignEquations, spread: Spread) -> float:
     """-2 log of the restricted likelihood."""
-    design, values = weighted_system(equations, spread)
+    return spread.log_determinant(equations) + _restricted(*weighted_system(equations, spread))[2]
+
+
+def _restricted(design: Array, values: Array) -> tuple[Array, Array, float]:
+    """Orthonormal columns of a design of unit variance, residuals, their squares plus log det of the information."""
     norms = column_norms(design)
     q, r = np.linalg.qr(design / norms)
     residual = values - q @ (q.T @ values)
     information = 2 * float(np.sum(np.log(np.abs(np.diag(r)) * norms + 1e-300)))
-    return spread.log_determinant(equations) + information + float(residual @ residual)
+    return q, residual, information + float(residual @ residual)
 
 
 def _starting_zero(equations: CampaignEquations) -> float:

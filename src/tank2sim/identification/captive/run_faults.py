@@ -126,7 +126,7 @@ def _impossible_values(campaign: Campaign, run: CaptiveRun) -> Iterator[InputErr
             yield InputError(run.name, f"column {column}", problem, f"give it in {remedy}")
     scales = Scales(campaign.test.water_density_kgpm3, length, speed)
     for force in FORCE_COLUMNS:
-        unit = scales.force * (length if force == "N" else 1.0)
+        unit = scales.unit(force)
         largest = float(np.max(np.abs(run.force(force)))) / unit
         if largest > _LARGEST_PRIME[force]:
             column = "N_Nm" if force == "N" else f"{force}_N"

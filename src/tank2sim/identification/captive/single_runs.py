@@ -30,7 +30,7 @@ CYCLE_BINS = 72
 """Parts of the averaged cycle, of 5 deg each. Project choice: the fifth harmonic then has 14 points."""
 SAME_MOTION = 0.02
 """Relative difference of frequency, amplitude and speed within which two runs are repeats, as those of a campaign
-are (:mod:`tank2sim.identification.captive.repeats`)."""
+are (:mod:`tank2sim.identification.captive.consistency`)."""
 REPEATS_DIFFER = 0.01
 """Probability below which repeats differ by more than the noise within them. Project choice."""
 

@@ -8,15 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tank2sim.arrays import Array, Number, Unbounded
-from tank2sim.cards.scaling import Scales
-from tank2sim.identification.captive.consistency import Asymmetry
+from tank2sim.identification.captive.consistency import Asymmetry, Repeats, repeats
 from tank2sim.identification.captive.cross_validation import LeftOut
-from tank2sim.identification.captive.equations import HEEL_TERMS
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.oscillation import CubicByTwoWays, OscillationDerivatives
 from tank2sim.identification.captive.plot_data import ForcePlot, HarmonicsPlot, LoopPlot, reduction_plots
-from tank2sim.identification.captive.reduction import ForceResult, Reduction, is_resistance
-from tank2sim.identification.captive.repeats import Repeats, repeats
+from tank2sim.identification.captive.reduction import ForceResult, Reduction, is_resistance, terms_of_heel
 from tank2sim.identification.captive.result_card import Contents
 from tank2sim.identification.captive.selection import Choice, Trend
 from tank2sim.identification.captive.stepwise import Disagreement, Stepwise
@@ -363,12 +360,6 @@ def study_reduction(
     )
 
 
-def terms_of_heel(reduction: Reduction) -> list[str]:
-    """Names of the derivatives of the heel that were found."""
-    names = [name for terms in HEEL_TERMS.values() for name in terms]
-    return [name for name in names if name in reduction.derivatives]
-
-
 def prediction_errors(reduction: Reduction) -> dict[str, dict[str, PredictionError]]:
     """Leave-one-condition-out errors: type of run to force to error."""
     found: dict[str, dict[str, PredictionError]] = {}
@@ -459,10 +450,9 @@ def _spread(result: ForceResult) -> RunSpread:
 
 def _run(campaign: Campaign, run: ReducedRun) -> RunSummary:
     motion = run.motion
-    scales = Scales(campaign.test.water_density_kgpm3, campaign.model.length_m, motion.mean_speed_mps)
     harmonics = {}
     for force, fit in run.fits.items():
-        unit = scales.force * (scales.length if force == "N" else 1.0)
+        unit = campaign.scales_at(motion.mean_speed_mps).unit(force)
         errors = np.sqrt(np.diag(fit.covariance))
         harmonics[force] = {
             label: PrimeValue(value=float(value / unit), standard_error=float(error / unit))

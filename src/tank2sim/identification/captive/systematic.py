@@ -22,7 +22,7 @@ from tank2sim.arrays import Array
 from tank2sim.identification.captive.equations import CampaignEquations
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.oscillation import distinct
-from tank2sim.identification.captive.regression import Solution, Spread, fitted_spread, solve
+from tank2sim.identification.captive.regression import Solution, Spread, fitted_spread, moved_terms, solve
 from tank2sim.identification.conditioning import SINGULAR_CONDITION
 
 _SHOWN = 4.0
@@ -118,8 +118,7 @@ class SystematicError:
             return {}
         size = self.standard_error if self.corrected else self.size
         corrected = _correct_gain(equations, self.runs, size) if self.runs else correct_delay(equations, size)
-        moved = solve(corrected, solution.spread).values - solution.values
-        return {name: float(shift) for name, shift in zip(equations.names, moved, strict=True)}
+        return moved_terms(corrected, solution)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -393,10 +392,9 @@ def _slope(equations: CampaignEquations, kinds: Sequence[str]) -> Array:
 
 
 def _oscillating(equations: CampaignEquations) -> Iterator[tuple[slice, ReducedRun, Array]]:
-    for place, (run, root) in enumerate(zip(equations.runs, equations.roots, strict=True)):
+    for rows, run, root in zip(equations.rows, equations.runs, equations.roots, strict=True):
         if run.run.oscillates:
-            start = int(equations.first_rows[place])
-            yield slice(start, start + len(root)), run, root
+            yield rows, run, root
 
 
 def _rate(count: int, frequency_radps: float) -> Array:

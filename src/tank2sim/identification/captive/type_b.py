@@ -16,7 +16,7 @@ from scipy.special import chdtrc
 from tank2sim.identification.captive.equations import CampaignEquations, campaign_equations
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.motion import CaptiveMotion
-from tank2sim.identification.captive.regression import Solution, solve
+from tank2sim.identification.captive.regression import Solution, moved_terms
 from tank2sim.identification.captive.systematic import correct_delay
 from tank2sim.records.campaigns import Campaign
 
@@ -33,15 +33,11 @@ def type_b_shifts(campaign: Campaign, used: CampaignEquations, solution: Solutio
 
     `solution` is the solution of the equations `used`.
     """
-    stated = campaign.uncertainty.model_dump()
-    found = {}
-    for source, size in stated.items():
-        if not size:
-            continue
-        erring = with_common_error(campaign, used, source, size)
-        moved = solve(erring, solution.spread).values - solution.values
-        found[source] = {name: float(shift) for name, shift in zip(used.names, moved, strict=True)}
-    return found
+    return {
+        source: moved_terms(with_common_error(campaign, used, source, size), solution)
+        for source, size in campaign.uncertainty.model_dump().items()
+        if size
+    }
 
 
 def with_common_error(campaign: Campaign, used: CampaignEquations, source: str, size: float) -> CampaignEquations:
@@ -141,7 +137,7 @@ def alignment_estimate(
         if not {zero, f"{force}v"} <= set(solution.names):
             return None
         turned = with_common_error(campaign, equations[force], "alignment_rad", _SMALL_RAD)
-        slope = (solve(turned, solution.spread).value(zero) - solution.value(zero)) / _SMALL_RAD
+        slope = moved_terms(turned, solution)[zero] / _SMALL_RAD
         if not slope:
             return None
         found[force] = (-solution.value(zero) / slope, solution.error(zero) / abs(slope))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
+from dataclasses import dataclass
 
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.cards.plausibility import (
@@ -195,55 +195,20 @@ def foreign_units(
     body : CarriedBody
         Its length, beam and draught scale the estimates.
     """
-    length, beam, draught = body.length_m, body.beam_m, body.draught_m
-    slender = math.pi * (draught / length) ** 2 if draught else 0.0
-    sway = slender * (1.0 + 0.4 * _USUAL_BLOCK * beam / draught) if draught and beam else 0.0
-    inertias = {"Yvdot": mass_prime, "Nrdot": inertia_prime or 0.0}
-    carried = {} if removed else {**inertias, "Nr": mass_prime * body.x_G_m / length}
-    units = {**inertias, "Yv": sway, "Nr": slender}
-    ranges = {**DEEP_ADDED_SHARES, "Yv": SWAY_DAMPING, "Nr": YAW_DAMPING}
-
-    def sizes(names: Sequence[str], factor: float) -> dict[str, float]:
-        found = {}
-        for name in names:
-            if derivatives.get(name) and units[name]:
-                own = carried.get(name, 0.0)
-                found[name] = (factor * (own - derivatives[name]) - own) / units[name]
-        return found
-
-    def moments(factor: float, force: float) -> dict[str, float]:
-        found = sizes(("Nrdot", "Nr"), factor)
-        for moment, against, _, _ in LEVERS:
-            if derivatives.get(moment) and derivatives.get(against):
-                found[moment] = factor * derivatives[moment] / (force * derivatives[against])
-        return found
-
-    def of_a_ship(found: Mapping[str, float]) -> bool:
-        limits = {**ranges, **{moment: limit for moment, _, limit, _ in LEVERS}}
-        return all(limits[name][0] <= value <= limits[name][1] for name, value in found.items())
-
-    def nearest(candidates: Mapping[str, float], found: Callable[[float], Mapping[str, float]]) -> str:
-        fitting = {name: found(factor) for name, factor in candidates.items() if of_a_ship(found(factor))}
-        return min(
-            fitting,
-            key=lambda name: sum(math.log(value / _USUAL[each]) ** 2 for each, value in fitting[name].items()),
-            default="",
-        )
-
-    forces = partial(sizes, ("Yvdot", "Yv"))
+    hull = _HullShares.of(derivatives, mass_prime, inertia_prime, removed, body)
     force, moment = "", ""
-    if not of_a_ship(forces(1.0)):
-        force = nearest(FORCE_UNITS, forces)
+    if not _of_a_ship(hull.forces(1.0)):
+        force = _nearest(FORCE_UNITS, hull.forces)
         if not force:
             return
     factor = FORCE_UNITS.get(force, 1.0)
-    if force or not of_a_ship(moments(1.0, factor)):
+    if force or not _of_a_ship(hull.moments(1.0, factor)):
         candidates = {"N m": 1.0, **MOMENT_UNITS} if force else MOMENT_UNITS
-        moment = nearest(candidates, lambda tried: moments(tried, factor))
+        moment = _nearest(candidates, lambda tried: hull.moments(tried, factor))
         moment = "" if moment == "N m" else moment
     said = []
     if force:
-        shares = ", ".join(f"{name} {value:.2g}" for name, value in forces(factor).items())
+        shares = ", ".join(f"{name} {value:.2g}" for name, value in hull.forces(factor).items())
         said.append(f"X and Y are in {force}, 1 {force} = {factor:.4g} N (then {shares} times those of usual hulls)")
     if moment:
         said.append(f"N is in {moment}, 1 {moment} = {MOMENT_UNITS[moment]:.4g} N m")
@@ -253,6 +218,68 @@ def foreign_units(
             "the derivatives are of no ship if forces are in N and moments in N m, and of one if "
             f"{' and '.join(said)}; convert the columns.",
         )
+
+
+@dataclass(frozen=True)
+class _HullShares:
+    """Derivatives, the shares of the carried inertia in them, and the sizes that a usual hull has; prime."""
+
+    derivatives: Mapping[str, float]
+    carried: Mapping[str, float]
+    usual: Mapping[str, float]
+
+    @classmethod
+    def of(
+        cls,
+        derivatives: Mapping[str, float],
+        mass_prime: float,
+        inertia_prime: float | None,
+        removed: bool,
+        body: CarriedBody,
+    ) -> _HullShares:
+        """As the arguments of :func:`foreign_units`."""
+        length, beam, draught = body.length_m, body.beam_m, body.draught_m
+        slender = math.pi * (draught / length) ** 2 if draught else 0.0
+        sway = slender * (1.0 + 0.4 * _USUAL_BLOCK * beam / draught) if draught and beam else 0.0
+        inertias = {"Yvdot": mass_prime, "Nrdot": inertia_prime or 0.0}
+        carried = {} if removed else {**inertias, "Nr": mass_prime * body.x_G_m / length}
+        return cls(derivatives, carried, {**inertias, "Yv": sway, "Nr": slender})
+
+    def forces(self, factor: float) -> dict[str, float]:
+        """Derivatives of Y over their usual sizes, if the force is in a unit of `factor` newtons."""
+        return self._sizes(("Yvdot", "Yv"), factor)
+
+    def moments(self, factor: float, force: float) -> dict[str, float]:
+        """Derivatives of N over their usual sizes, and levers in ship lengths, with a unit of force, too."""
+        found = self._sizes(("Nrdot", "Nr"), factor)
+        for moment, against, _, _ in LEVERS:
+            if self.derivatives.get(moment) and self.derivatives.get(against):
+                found[moment] = factor * self.derivatives[moment] / (force * self.derivatives[against])
+        return found
+
+    def _sizes(self, names: Sequence[str], factor: float) -> dict[str, float]:
+        found = {}
+        for name in names:
+            if self.derivatives.get(name) and self.usual[name]:
+                own = self.carried.get(name, 0.0)
+                found[name] = (factor * (own - self.derivatives[name]) - own) / self.usual[name]
+        return found
+
+
+def _of_a_ship(found: Mapping[str, float]) -> bool:
+    limits = {**DEEP_ADDED_SHARES, "Yv": SWAY_DAMPING, "Nr": YAW_DAMPING}
+    limits |= {moment: limit for moment, _, limit, _ in LEVERS}
+    return all(limits[name][0] <= value <= limits[name][1] for name, value in found.items())
+
+
+def _nearest(candidates: Mapping[str, float], found: Callable[[float], Mapping[str, float]]) -> str:
+    """The unit with which the derivatives are nearest to usual ones; empty if none makes them those of a ship."""
+    fitting = {name: found(factor) for name, factor in candidates.items() if _of_a_ship(found(factor))}
+    return min(
+        fitting,
+        key=lambda name: sum(math.log(value / _USUAL[each]) ** 2 for each, value in fitting[name].items()),
+        default="",
+    )
 
 
 def _likely_cause(value: float, inertia: float, convention: str) -> str:

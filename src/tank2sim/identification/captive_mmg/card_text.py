@@ -45,8 +45,8 @@ def mmg_card_text(tests: SteadyTests, values: Mapping[str, float], errors: Mappi
         Sentence that says where the numbers are from.
     """
     form = tests.form
-    model, rudder = form.model, form.rudder
-    assert rudder is not None and model.draught_m is not None and model.beam_m is not None
+    model = form.model
+    assert model.draught_m is not None and model.beam_m is not None
     volume_unit = 0.5 * form.test.water_density_kgpm3 * model.length_m**2 * model.draught_m
     inertia, inertia_source = model_yaw_inertia(model)
     document = tomlkit.document()
@@ -73,6 +73,16 @@ def mmg_card_text(tests: SteadyTests, values: Mapping[str, float], errors: Mappi
         ),
         "x_G": _rounded(model.x_G_m / model.length_m),
     }
+    document.update(_coefficients(tests, values, errors))
+    return tomlkit.dumps(document)
+
+
+def _coefficients(
+    tests: SteadyTests, values: Mapping[str, float], errors: Mapping[str, float]
+) -> dict[str, tomlkit.items.Table]:
+    """Tables of derivatives, propeller, rudder and standard errors."""
+    form, rudder = tests.form, tests.form.rudder
+    assert rudder is not None
     derivatives, uncertainty = tomlkit.table(), tomlkit.table()
     of_hull = [name for names in HULL_TERMS.values() for name in names if name in values]
     for name in of_hull:
@@ -96,9 +106,7 @@ def mmg_card_text(tests: SteadyTests, values: Mapping[str, float], errors: Mappi
         (propeller if name in PROPELLER_COEFFICIENTS else of_rudder)[name] = _rounded(values[name])
         if name in errors:
             uncertainty[name] = _rounded(errors[name], 3)
-    document["derivatives"], document["propeller"], document["rudder"] = derivatives, propeller, of_rudder
-    document["uncertainty"] = uncertainty
-    return tomlkit.dumps(document)
+    return {"derivatives": derivatives, "propeller": propeller, "rudder": of_rudder, "uncertainty": uncertainty}
 
 
 def tested_card(tests: SteadyTests, values: Mapping[str, float], errors: Mapping[str, float], note: str) -> MmgCard:

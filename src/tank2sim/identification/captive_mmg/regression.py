@@ -11,13 +11,14 @@ The error sigma_c of a channel is estimated from what is left, sigma_c^2 = RSS_c
 of the projection (variance components: Förstner 1979). m_k and s_k are those of ordinary ships with one screw, wide
 enough that only what the tests leave open takes its value from there; such coefficients are marked. m_x' and m_y',
 which steady tests do not show, have those of a published estimate: its error is in those of Y_r' and X_vr'. The
-covariance is the inverse of the normal matrix, and the outer products of what errors common to all conditions, as
-``[uncertainty]`` states them, move the coefficients by.
+covariance is the inverse of the normal matrix, plus Type B errors, which the scatter of the conditions does not show
+(ITTC 7.5-02-06-04): each error of ``[uncertainty]`` is applied to the tests with one standard deviation, the change of
+the misfit moves the coefficients as the linearised regression says, and the outer product of these moves is added.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -33,9 +34,9 @@ from tank2sim.dynamics.build import build
 from tank2sim.dynamics.mmg.hull import HULL_TERMS, MMG_TERMS
 from tank2sim.dynamics.mmg.propeller import torque_over_density
 from tank2sim.dynamics.model import Model
+from tank2sim.dynamics.rigid_body import inertial_forces
 from tank2sim.errors import InputError
 from tank2sim.identification.captive_mmg.card_text import estimated_masses, tested_card
-from tank2sim.identification.captive_mmg.common_errors import erring_tests
 from tank2sim.identification.captive_mmg.steady_tests import TORQUE, SteadyTests
 
 ORDINARY: dict[str, tuple[float, float]] = {
@@ -422,3 +423,50 @@ class _Regression:
             explained=1 - residuals.var(axis=0) / tests.readings.var(axis=0),
             not_excited=not_excited,
         )
+
+
+def erring_tests(tests: SteadyTests) -> Iterator[tuple[str, SteadyTests]]:
+    """Stated errors, by their key in ``[uncertainty]``, and the tests with one standard deviation of each.
+
+    The calibration gives one for each gauge, whose errors are independent. An error of the yaw inertia or of a delay
+    does not show in steady tests.
+    """
+    stated = tests.form.uncertainty
+    if size := stated.calibration_relative:
+        for place in range(len(tests.channels)):
+            gains = np.ones(len(tests.channels))
+            gains[place] += size
+            yield "calibration_relative", replace(tests, readings=tests.readings * gains)
+    if size := stated.alignment_rad:
+        u, v = tests.motion[:, 0], tests.motion[:, 1]
+        turned = [u * np.cos(size) + v * np.sin(size), v * np.cos(size) - u * np.sin(size)]
+        yield "alignment_rad", _with_motion(tests, np.column_stack([*turned, tests.motion[:, 2:]]))
+    if size := stated.rudder_rad:
+        yield "rudder_rad", _with_motion(tests, tests.motion + size * np.eye(5)[3])
+    for key in ("speed_relative", "blockage_relative"):
+        if size := getattr(stated, key):
+            yield key, _with_motion(tests, tests.motion * np.array([1 + size, 1 + size, 1, 1, 1]))
+    if (size := stated.mass_relative) and not _inertia_removed(tests):
+        carried = np.zeros_like(tests.readings)
+        carried[:, :3] = size * _inertia(tests)
+        yield "mass_relative", replace(tests, readings=tests.readings - carried)
+
+
+def _with_motion(tests: SteadyTests, motion: Array) -> SteadyTests:
+    """The tests with another motion; forces of the water alone have been given the inertia of the recorded one."""
+    moved = replace(tests, motion=motion)
+    if not _inertia_removed(tests):
+        return moved
+    readings = tests.readings.copy()
+    readings[:, :3] += _inertia(moved) - _inertia(tests)
+    return replace(moved, readings=readings)
+
+
+def _inertia_removed(tests: SteadyTests) -> bool:
+    return tests.form.test.force_convention == "hydrodynamic"
+
+
+def _inertia(tests: SteadyTests) -> Array:
+    """Reaction of the carried body, (conditions, 3), N and N m."""
+    u, v, r = tests.motion[:, :3].T
+    return np.column_stack(inertial_forces(tests.form.model.mass_kg, tests.form.model.x_G_m, u, v, r))

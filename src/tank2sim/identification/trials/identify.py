@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -18,11 +18,6 @@ from tank2sim.dynamics import build
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.identification.trials.assessment.evaluation import Comparison, compare_card, noise_of, replay_error
 from tank2sim.identification.trials.assessment.identifiability import Identifiability, identifiability, refuse_unseen
-from tank2sim.identification.trials.assessment.method_choice import (
-    MethodChoice,
-    choose_method,
-    signal_residuals,
-)
 from tank2sim.identification.trials.assessment.model_selection import (
     Criteria,
     CrossValidation,
@@ -39,7 +34,13 @@ from tank2sim.identification.trials.assessment.prediction_intervals import (
     compare_held_out,
     criteria_or_none,
 )
-from tank2sim.identification.trials.assessment.structure_choice import posed_in, structure_by_evidence
+from tank2sim.identification.trials.assessment.structure_choice import (
+    MethodChoice,
+    choose_method,
+    posed_in,
+    signal_residuals,
+    structure_by_evidence,
+)
 from tank2sim.identification.trials.methods.equation_error import equation_error
 from tank2sim.identification.trials.methods.kalman import KalmanSettings, kalman
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
@@ -227,34 +228,13 @@ def _identified(
     progress: SearchReport,
     executor: Executor | None,
 ) -> Identification:
-    if trials.captive is not None and not _by_output_error(options):
-        remedy = "leave the method out, or fit the card that reduce makes of the campaign"
-        raise ArgumentError("campaign", "", f"{options.method} fits trials alone", remedy)
-    if options.posterior:
-        check_sampler(options.posterior)
-        if not _by_output_error(options):
-            raise ArgumentError("posterior", "", f"{options.method} has no density to sample", "leave the method out")
-    if card.model.kind == "mmg" and options.structure not in ("card", BY_EVIDENCE):
-        problem_text = f"{options.structure} is a structure of a polynomial, and {card.source} is an MMG card"
-        remedy = "leave it out, or fit the card that convert makes of this one"
-        raise ArgumentError("structure", "", problem_text, remedy)
+    _refuse_options(card, trials, options)
     given, card = card, polynomial_over_trials(card, trials.trials)
     drifts = of_unknown_current(card, trials.trials)
     if drifts:
         card = card_in(card, _first_current(card, trials))
-    structures: Mapping[str, CrossValidation] = {}
-    weights: dict[str, float] = {}
-    chosen: tuple[Notice, ...] = ()
-    structure = options.structure
-    if structure in (AUTO, AVERAGE):
-        structures = cross_validate_structures(card, trials, options, executor)
-        structure = simplest(structures)
-    elif structure == BY_EVIDENCE:
-        structure, chosen = structure_by_evidence(card, trials, options, holdout)
-    if options.structure == AVERAGE:
-        weights = _kept_weights(card, trials, options, structures)
-        structure = max(weights, key=weights.__getitem__)
-        chosen = (Notice(_average_in_words(weights)),)
+    chosen = _choose_structure(card, trials, options, holdout, executor)
+    structure = chosen.name
     evidence = other_ship(problem_from_card(card, trials.trials, trials.driven_by))  # in the structure of the card
     if evidence and not options.force:
         raise not_of_ship(card, trials, evidence, _OF_ONE_SHIP)
@@ -274,7 +254,7 @@ def _identified(
     held = holdout if holdout is not None and holdout.trials else None
     average = [
         WeightedFit(fitted if name == structure else _fitted(card, name, trials, options, drifts=drifts).fitted, weight)
-        for name, weight in weights.items()
+        for name, weight in chosen.weights.items()
     ]
     return Identification(
         started=started,
@@ -288,8 +268,8 @@ def _identified(
         before=compare_card(card, trials, estimate.noise),
         before_holdout=compare_card(card, held, estimate.noise) if held else None,
         structure=structure,
-        structures=structures,
-        weights=weights,
+        structures=chosen.structures,
+        weights=chosen.weights,
         criteria=criteria_or_none(fitted),
         posterior=samples,
         bootstrap=bootstrap_estimates(
@@ -299,21 +279,79 @@ def _identified(
         manoeuvres=_manoeuvres(improved, (*trials.trials, *(held.trials if held else ()))),
         current=current,
         choice=fit.choice,
-        notices=(
-            *dict.fromkeys((*doubts(given), *doubts(improved))),
-            *trials.notices,
-            *(held.notices if held else ()),
-            *lowered_bound_notice(given, card),
-            *(() if card.uncertainty else (_NO_UNCERTAINTY,)),
-            *_captive_notice(card, trials.captive),
-            *chosen,
-            *_unseen_notice(fit.unseen),
-            *_current_notice(current),
-            *_choice_notice(fit.choice),
-            *(samples.notices if samples is not None and samples.converged else ()),
-            *estimate.notices,
-        ),
+        notices=_notices((given, card, improved), trials, held, chosen, fit, samples),
     )
+
+
+def _notices(
+    cards: tuple[ManoeuvringCard, ManoeuvringCard, ManoeuvringCard],
+    trials: Measured,
+    held: Measured | None,
+    chosen: _ChosenStructure,
+    fit: _Fit,
+    samples: PosteriorSamples | None,
+) -> tuple[Notice, ...]:
+    """All notices of an identification; `cards` are the given card, the card of the fit and the card found."""
+    given, card, improved = cards
+    return (
+        *dict.fromkeys((*doubts(given), *doubts(improved))),
+        *trials.notices,
+        *(held.notices if held else ()),
+        *lowered_bound_notice(given, card),
+        *(() if card.uncertainty else (_NO_UNCERTAINTY,)),
+        *_captive_notice(card, trials.captive),
+        *chosen.notices,
+        *_unseen_notice(fit.unseen),
+        *_current_notice(fit.current),
+        *_choice_notice(fit.choice),
+        *(samples.notices if samples is not None and samples.converged else ()),
+        *fit.fitted.estimate.notices,
+    )
+
+
+def _refuse_options(card: ManoeuvringCard, trials: Measured, options: IdentificationOptions) -> None:
+    """Raise ArgumentError for options that do not go together, or not with the card or captive tests."""
+    if trials.captive is not None and not _by_output_error(options):
+        remedy = "leave the method out, or fit the card that reduce makes of the campaign"
+        raise ArgumentError("campaign", "", f"{options.method} fits trials alone", remedy)
+    if options.posterior:
+        check_sampler(options.posterior)
+        if not _by_output_error(options):
+            raise ArgumentError("posterior", "", f"{options.method} has no density to sample", "leave the method out")
+    if card.model.kind == "mmg" and options.structure not in ("card", BY_EVIDENCE):
+        problem_text = f"{options.structure} is a structure of a polynomial, and {card.source} is an MMG card"
+        remedy = "leave it out, or fit the card that convert makes of this one"
+        raise ArgumentError("structure", "", problem_text, remedy)
+
+
+@dataclass(frozen=True, eq=False)
+class _ChosenStructure:
+    """Structure of the fit, cross-validation and weights of all where asked for, and notices of the choice."""
+
+    name: str
+    structures: Mapping[str, CrossValidation] = field(default_factory=dict)
+    weights: Mapping[str, float] = field(default_factory=dict)
+    notices: tuple[Notice, ...] = ()
+
+
+def _choose_structure(
+    card: ManoeuvringCard,
+    trials: Measured,
+    options: IdentificationOptions,
+    holdout: Measured | None,
+    executor: Executor | None,
+) -> _ChosenStructure:
+    if options.structure == BY_EVIDENCE:
+        name, notices = structure_by_evidence(card, trials, options, holdout)
+        return _ChosenStructure(name, notices=notices)
+    if options.structure not in (AUTO, AVERAGE):
+        return _ChosenStructure(options.structure)
+    structures = cross_validate_structures(card, trials, options, executor)
+    if options.structure == AUTO:
+        return _ChosenStructure(simplest(structures), structures)
+    weights = _kept_weights(card, trials, options, structures)
+    heaviest = max(weights, key=weights.__getitem__)
+    return _ChosenStructure(heaviest, structures, weights, (Notice(_average_in_words(weights)),))
 
 
 def _manoeuvres(card: ManoeuvringCard, trials: Sequence[Trial]) -> dict[str, str]:
@@ -503,7 +541,7 @@ def _recursive(problem: Problem, options: IdentificationOptions, progress: Searc
 
 
 def _follows_whole_runs(problem: Problem, estimate: Estimate) -> bool:
-    results = replay_error(problem, estimate.values, estimate.noise)
+    results = replay_error(problem, estimate.values, estimate.noise, windows=False)
     limits = {name: WHOLE_RUN_MISFIT * deviation for name, deviation in estimate.noise.items()}
     return all(error <= limits[name] for result in results for name, error in result.whole.items())
 

@@ -1,23 +1,25 @@
-"""The audit of trials: faults of the data, found by consistency alone.
+"""The audit of trials: faults of the data, found by consistency alone, and the study of them.
 
 Each group of checks sees the record as the safe corrections of those before it leave it.
 """
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tank2sim.records.audit.finding import Finding
+from tank2sim.arrays import Columns, Number
+from tank2sim.notices import Notice
+from tank2sim.records.audit.finding import ColumnFinding, Finding
 from tank2sim.records.audit.noise import record_noise
-from tank2sim.records.audit.rudder import rudder_findings, rudder_unit_findings
-from tank2sim.records.audit.rudder_clock import rudder_clock_findings
+from tank2sim.records.audit.rudder import rudder_clock_findings, rudder_findings, rudder_unit_findings
 from tank2sim.records.audit.sensors import sensor_findings
-from tank2sim.records.audit.speed_unit import speed_unit_findings
 from tank2sim.records.audit.time_base import time_findings, time_unit_findings
-from tank2sim.records.audit.track import track_findings
+from tank2sim.records.audit.track import speed_unit_findings, track_findings
 from tank2sim.records.audit.yaw import heading_unit_findings, rate_unit_findings, yaw_findings
-from tank2sim.records.trials import Trial, with_signals
+from tank2sim.records.signals.columns import file_columns
+from tank2sim.records.thinning import MEASURED_SAMPLES, drawn_columns
+from tank2sim.records.trials import Trial, sampling_step, with_signals
 
 __all__ = ["Finding", "audit_and_repair", "audit_trial", "record_noise", "repair_trial"]
 
@@ -87,3 +89,83 @@ def _without_empty(trial: Trial) -> Trial:
         return trial
     headings = ", ".join(trial.heading(name) for name in empty)
     return with_signals(trial, dict.fromkeys(empty), f"{headings}: no reading is left")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ColumnNoise:
+    """White noise of a signal.
+
+    Parameters
+    ----------
+    column : str
+        Head of the column in the file.
+    sigma : float
+        Standard deviation, SI.
+    stated : bool
+        Whether the file states it; elsewhere it is estimated from the record.
+    """
+
+    column: str
+    sigma: Number
+    stated: bool
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AuditedTrial:
+    """An audited trial.
+
+    Parameters
+    ----------
+    file : str
+    duration_s, step_s : float
+    rows : int
+    columns : tuple of str
+        Heads in the file.
+    noise : dict
+        Noise by the name of the signal in SI.
+    notices : tuple of Notice
+    histories : dict
+        The record thinned to draw.
+    """
+
+    file: str
+    duration_s: Number
+    step_s: Number
+    rows: int
+    columns: tuple[str, ...]
+    noise: dict[str, ColumnNoise]
+    notices: tuple[Notice, ...]
+    histories: Columns
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AuditStudy:
+    """Faults and notes by column, and the trials with their noise."""
+
+    findings: tuple[ColumnFinding, ...]
+    trials: tuple[AuditedTrial, ...]
+
+
+def study_audit(trials: Sequence[Trial]) -> AuditStudy:
+    """Audit trials, SI and radians."""
+    findings = [finding for trial in trials for finding in audit_trial(trial)]
+    return AuditStudy(
+        findings=tuple(entry for finding in findings for entry in finding.entries),
+        trials=tuple(map(_audited, trials)),
+    )
+
+
+def _audited(trial: Trial) -> AuditedTrial:
+    return AuditedTrial(
+        file=str(trial.path),
+        duration_s=float(trial.time_s.max() - trial.time_s.min()),
+        step_s=sampling_step(trial),
+        rows=len(trial.time_s),
+        columns=tuple(trial.heading(name) for name in trial.signals),
+        noise={
+            name: ColumnNoise(column=trial.heading(name), sigma=sigma, stated=name in trial.noise)
+            for name, sigma in record_noise(trial).items()
+        },
+        notices=tuple(trial.notices),
+        histories=drawn_columns(file_columns(trial), MEASURED_SAMPLES, peaks=True),
+    )

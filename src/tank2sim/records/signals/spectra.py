@@ -11,8 +11,8 @@ from scipy import signal, stats
 from tank2sim.arrays import Array, ComplexArray, Mask
 from tank2sim.errors import InputError
 from tank2sim.records.signals.columns import SignalName
-from tank2sim.records.signals.correlation import autocorrelation
 from tank2sim.records.signals.sampling import Series, at_common_times
+from tank2sim.records.signals.statistics import autocorrelation
 
 CONFIDENCE = 0.95
 

@@ -13,7 +13,7 @@ from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice
 from tank2sim.records.signals.columns import HELD_COLUMNS, SignalName, file_columns
-from tank2sim.records.signals.effect import Filtered
+from tank2sim.records.signals.filtering import Filtered
 from tank2sim.records.signals.sampling import Series, even_series
 from tank2sim.records.trials import Trial, with_signals
 

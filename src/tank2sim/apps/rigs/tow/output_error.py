@@ -21,6 +21,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import column_norms, scaled_condition
 from tank2sim.simulation.scheme import runge_kutta_step
+from tank2sim.simulation.sensitivity import augmented_step
 
 Predictor = Callable[[Array], tuple[Array, Array]]
 
@@ -166,12 +167,7 @@ def _sensitive_step(names: tuple[str, ...], width: int) -> ca.Function:
     chosen = [model.parameter_names.index(f"surge.{name}") for name in names]
     step = runge_kutta_step(model)
     x, u, p, h = step.sx_in()
-    following = step(x, u, p, h)
-    sensitivity = ca.SX.sym("S", len(model.states), width)
-    moved = ca.jacobian(following, x) @ sensitivity
-    moved[:, : len(chosen)] += ca.jacobian(following, p)[:, chosen]
-    columns = [ca.horzcat(x, sensitivity), h, u, p], [ca.horzcat(following, moved)]
-    return ca.Function("augmented", *columns, {"cse": True})
+    return augmented_step(step(x, u, p, h), x, p[chosen], (h, u, p), of_starts=width - len(chosen))
 
 
 def simulated_speeds(

@@ -24,6 +24,7 @@ from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import column_norms
 from tank2sim.simulation.scheme import runge_kutta_step
+from tank2sim.simulation.sensitivity import augmented_step
 
 _STEP_S = 0.02
 """Least step of the integration; a record with a longer step uses its own. The current is its mean over a step."""
@@ -240,12 +241,7 @@ def _predictor(rig: YawRig, terms: tuple[str, ...]):  # type: ignore[no-untyped-
     following = x
     for _ in range(_SUBSTEPS):
         following = runge_kutta_step(model)(following, model.u, whole, h / _SUBSTEPS)
-    sensitivity = ca.SX.sym("S", x.numel(), len(terms) + 2)
-    moved = ca.jacobian(following, x) @ sensitivity
-    moved[:, : len(terms)] += ca.jacobian(following, given)
-    step = ca.Function(
-        "step", [ca.horzcat(x, sensitivity), model.u, h, given], [ca.horzcat(following, moved)], {"cse": True}
-    )
+    step = augmented_step(following, x, given, (model.u, h, given), of_starts=2)
     width = 1 + len(terms) + 2
     first = np.hstack([np.zeros((2, len(terms))), np.eye(2)])
     loops: dict[int, ca.Function] = {}

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise, white
-from tank2sim.identification.trials.methods.shooting import Pieces, Shooting, cut
+from tank2sim.identification.trials.methods.coloured_noise import white
+from tank2sim.identification.trials.methods.shooting import Shooting, cut
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
@@ -61,34 +62,33 @@ class Following:
         return error / size if size > 0 else np.inf
 
 
-def replay_error(problem: Problem, values: Array, noise: Mapping[str, float]) -> tuple[Following, ...]:
-    """Errors of the model at `values` (k,) on each run of a problem; `noise` weighs signals in the initial states."""
-    shooting = Shooting(problem)
+def replay_error(
+    problem: Problem, values: Array, noise: Mapping[str, float], *, windows: bool = True, whole: bool = True
+) -> tuple[Following, ...]:
+    """Errors of the model at `values` (k,) on each run of a problem, over windows and over the whole run.
+
+    `noise` weighs signals in the initial states; without `windows` or `whole` these errors are left out.
+    """
+    shooting = Shooting(problem, starts_alone=True)
     weights = [white(noise[name]) for name in problem.seen]
-    results = []
-    for run in problem.runs:
-        found = {}
-        for length in (_WINDOW * problem.ship_time, None):
-            pieces = cut(problem, run, length)
-            starts = _settled(shooting, pieces, values, weights)
-            found[length] = shooting.residuals(pieces, starts, values)[0], pieces.measured
-        windows, whole = found.values()
-        results.append(
-            Following(
-                run.name,
-                {
-                    name: (_rms(windows[0][:, :, place]), _spread(name, windows[1][:, :, place]))
-                    for place, name in enumerate(problem.seen)
-                    if not np.isnan(windows[1][:, :, place]).all()
-                },
-                {
-                    name: _rms(whole[0][:, :, place])
-                    for place, name in enumerate(problem.seen)
-                    if not np.isnan(whole[1][:, :, place]).all()
-                },
-            )
-        )
-    return tuple(results)
+
+    def errors(run: SampledRun, length: float | None) -> dict[str, tuple[float, float]]:
+        """Signal to error and size."""
+        pieces = cut(problem, run, length)
+        residuals, measured = shooting.settled(pieces, values, weights).residuals, pieces.measured
+        return {
+            name: (_rms(residuals[:, :, place]), _spread(name, measured[:, :, place]))
+            for place, name in enumerate(problem.seen)
+            if not np.isnan(measured[:, :, place]).all()
+        }
+
+    def following(run: SampledRun) -> Following:
+        over_windows = errors(run, _WINDOW * problem.ship_time) if windows else {}
+        over_whole = {name: error for name, (error, _) in errors(run, None).items()} if whole else {}
+        return Following(run.name, over_windows, over_whole)
+
+    with ThreadPoolExecutor(os.cpu_count()) as threads:  # a simulation is machine code: threads run in parallel
+        return tuple(threads.map(following, problem.runs))
 
 
 def pooled(results: Sequence[Following], signal: str) -> float:
@@ -217,7 +217,7 @@ def comparison_windows(
         ground = not {"motion.u", "motion.v"} <= set(_given(run))
         simulated: Trajectory | None
         if manoeuvre is None:
-            shooting = shooting or Shooting(problem)
+            shooting = shooting or Shooting(problem, starts_alone=True)
             begin, replayed = run.begin_s, _replayed(shooting, run, noise)
             simulated = replayed if replayed.is_finite() else None
         else:
@@ -271,26 +271,10 @@ def _replayed(shooting: Shooting, run: SampledRun, noise: Mapping[str, float]) -
     problem = shooting.problem
     model, values = problem.model, problem.prior_mean
     pieces = cut(problem, run, None)
-    starts = _settled(shooting, pieces, values, [white(noise.get(name) or 1.0) for name in problem.seen])
-    x = shooting.residuals(pieces, starts, values)[1][0]
+    x = shooting.settled(pieces, values, [white(noise.get(name) or 1.0) for name in problem.seen]).states[0]
     u, p = pieces.inputs[0], problem.parameters(values)
     y = np.array(model.output(x.T, u.T, np.repeat(p[:, None], len(x), axis=1))).T
     return Trajectory(model, run.step_s * np.arange(len(x), dtype=float), x, u, y)
-
-
-def _settled(shooting: Shooting, pieces: Pieces, values: Array, noise: Sequence[ColouredNoise]) -> NDArray[np.float64]:
-    """Initial states (pieces, nx) that fit the record best, at these parameters."""
-    starts = pieces.starts.copy()
-    for _ in range(3):  # the motion is nearly linear in its initial state: three steps are enough
-        cost = shooting.cost(pieces, starts, values, noise)
-        if not np.isfinite(cost):
-            break
-        step = shooting.normal(pieces, starts, values, noise).step.reshape(starts.shape)
-        better = starts - step
-        if shooting.cost(pieces, better, values, noise) >= cost:
-            break
-        starts = better
-    return starts
 
 
 def select_figures(figures: Mapping[str, object], *, turn: bool) -> dict[str, float]:
@@ -338,9 +322,7 @@ def compare_card(
     whole : bool
         Compare also outside the card's range of speeds.
     """
-    posed = problem_from_card(card, trials.trials, trials.driven_by, whole=whole)
-    # Without estimation a single free parameter is enough; the sensitivities of the others need not be compiled.
-    problem = posed.without(posed.free[1:])
+    problem = problem_from_card(card, trials.trials, trials.driven_by, whole=whole)
     weights = {name: residual.get(name) or 1.0 for name in problem.seen}
     return Comparison(
         replay_error(problem, problem.prior_mean, weights),

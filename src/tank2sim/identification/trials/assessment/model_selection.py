@@ -248,7 +248,7 @@ def yaw_rate_error(problem: Problem, estimate: Estimate) -> float:
     """A score: error of the yaw rate over free-running windows, as a share of it (:mod:`.evaluation`)."""
     spreads = np.nanstd(np.concatenate([run.measured for run in problem.runs]), axis=0)
     weights = {name: float(spread) or 1.0 for name, spread in zip(problem.seen, spreads, strict=True)}
-    return pooled(replay_error(problem, estimate.values, weights), "motion.r")
+    return pooled(replay_error(problem, estimate.values, weights, whole=False), "motion.r")
 
 
 def _fold(task: tuple[Problem | Portable, tuple[int, ...], TrialEstimator, Score]) -> HeldOutFold:

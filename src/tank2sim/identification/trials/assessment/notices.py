@@ -8,13 +8,11 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.assessment.evaluation import pooled
+from tank2sim.identification.trials.assessment.structure_choice import hard_rudder
 from tank2sim.identification.trials.identify import Identification
 from tank2sim.notices import Level, Notice, caution
 from tank2sim.simulation.manoeuvres import Turn
 from tank2sim.simulation.run import simulate
-
-HARD_TURN = math.radians(35.0)
-"""Rudder angle of the turn in which a card is tested (IMO MSC.137(76)); the gear's largest angle if that is less."""
 
 STOPPED = 0.15
 """Share of its speed below which a ship in a turn has stopped: full hulls keep a third (project choice)."""
@@ -110,9 +108,7 @@ def _outside(result: Identification) -> list[Notice]:
 
 def _stops(card: ManoeuvringCard) -> list[Notice]:
     """Trials seldom hold a full turn: simulate a turn to each side with the card."""
-    gear = card.steering_gear
-    largest = HARD_TURN if gear is None or gear.max_angle_rad is None else min(HARD_TURN, gear.max_angle_rad)
-    messages = []
+    largest, messages = hard_rudder(card), []
     for side, word in ((1, "starboard"), (-1, "port")):
         words = caution(f"in a {math.degrees(largest):.0f} deg turn to {word} the model found")
         try:

@@ -7,8 +7,10 @@ executor or the order of its work.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, ThreadPoolExecutor
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -327,10 +329,11 @@ def _members(
     if not settings.members:
         return {}
     ship = PicklableShip(steerable(fitted.card).text, "order")
-    try:
-        return bands(ship, fitted.estimate, manoeuvre, _disturbances(fitted), settings, executor).members
-    except InputError:
-        return {}
+    # Without an executor by threads: half of a simulation is machine code, and processes would begin too slowly.
+    making = nullcontext(executor) if executor is not None else ThreadPoolExecutor(os.cpu_count())
+    with making as pool, suppress(InputError):
+        return bands(ship, fitted.estimate, manoeuvre, _disturbances(fitted), settings, pool).members
+    return {}
 
 
 def criteria_or_none(fitted: FittedProblem) -> Criteria | None:

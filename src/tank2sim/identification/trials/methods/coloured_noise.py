@@ -37,6 +37,8 @@ class ColouredNoise:
 
         The first sample of a piece represents the stationary past: it is divided by the deviation of the residual.
         """
+        if not self.phi and not self.psi:
+            return residuals / self.sigma
         white: Array = lfilter([1.0, -self.phi], [1.0, -self.psi], residuals, axis=1) / self.sigma
         white[:, 0] = residuals[:, 0] / self.deviation  # unit variance, as if the previous residual had been zero
         return white

@@ -1,9 +1,14 @@
-"""The damped Gauss-Newton search that the estimators of free-running trials share (Levenberg 1944; Marquardt 1963)."""
+"""The damped Gauss-Newton search of the estimators (Levenberg 1944; Marquardt 1963)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol, TypeVar
+
+import numpy as np
+
+from tank2sim.arrays import Array
 
 MOST_ATTEMPTS = 10
 """Most attempts of a step, each with ten times the damping of the previous one: the last steps are negligible."""
@@ -67,3 +72,54 @@ def damped_gauss_newton(
         if report(point, gain):
             break
     return point, costs, None
+
+
+@dataclass(frozen=True, eq=False)
+class _Residuals:
+    """Unknowns (k,), residuals (n,) there, and their sum of squares."""
+
+    at: Array
+    residual: Array
+
+    @property
+    def cost(self) -> float:
+        return float(self.residual @ self.residual)
+
+
+def least_squares_steps(
+    misfit: Callable[[Array], Array],
+    start: tuple[Array, Array],
+    slopes: Callable[[Array, Array], Array],
+    steps: int = 1,
+    least_gain: float = 0.0,
+) -> tuple[Array, Array]:
+    """Unknowns (k,) and residuals (n,) after some steps that each lower the sum of squares.
+
+    Parameters
+    ----------
+    misfit : callable
+        ``misfit(at) -> residuals``; may be nan where a motion exceeds all bounds: such points are never taken.
+    start : arrays (k,), (n,)
+        First unknowns and their residuals.
+    slopes : callable
+        ``slopes(at, residuals) -> derivatives`` (n, k).
+    steps : int
+        Most steps.
+    least_gain : float
+        Share of the sum of squares: a step that lowers it by less is the last.
+    """
+
+    def move(point: _Residuals, J: Array, damping: float) -> _Residuals:
+        stiff = np.diag(np.sqrt(damping * np.sum(J**2, axis=0)))
+        right = np.append(point.residual, np.zeros(len(stiff)))
+        at = point.at - np.linalg.lstsq(np.concatenate([J, stiff]), right, rcond=None)[0]
+        return _Residuals(at, misfit(at))
+
+    found = damped_gauss_newton(
+        _Residuals(*start),
+        lambda point: slopes(point.at, point.residual),
+        move,
+        lambda better, gain: gain < least_gain * (better.cost + gain),
+        steps,
+    )[0]
+    return found.at, found.residual

@@ -17,7 +17,7 @@ from tank2sim.arrays import Array
 from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise, estimate_coloured_noise, white
 from tank2sim.identification.trials.methods.gauss_newton import damped_gauss_newton
 from tank2sim.identification.trials.methods.posterior import evidence_scale, sandwich, scaled_prior
-from tank2sim.identification.trials.methods.shooting import Normal, Pieces, Shooting, cut
+from tank2sim.identification.trials.methods.shooting import Normal, Pieces, Shooting, Shot, cut
 from tank2sim.identification.trials.problem.estimation_problem import (
     Estimate,
     FittedMotion,
@@ -57,10 +57,10 @@ class OutputErrorSettings:
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """Parameters (k,), initial states of each run, and the sum of squares with the prior."""
+    """Parameters (k,), motion of each run, and the sum of squares with the prior."""
 
     values: Array
-    starts: list[Array]
+    shots: list[Shot]
     cost: float
 
 
@@ -104,18 +104,18 @@ def output_error(
         try:
             for number in range(settings.rounds):
                 last = number == settings.rounds - 1
-                normals = _minimise(work, search, tolerance=1e-4 if last else 1e-2)
+                shots, normals = _minimise(work, search, tolerance=1e-4 if last else 1e-2)
                 if not last:
-                    search.noise = _new_noise(problem, pieces, normals, settings)
+                    search.noise = _new_noise(problem, pieces, shots, settings)
                     if settings.scale_prior:
                         information = np.asarray(sum(normal.matrix for normal in normals))
                         information = information + _captive_normal(problem, search.values)[0]
                         search.scale = evidence_scale(problem, information, search.values, search.scale)
         except KeyboardInterrupt:
             notices.append(INTERRUPTED)
-            normals = work.normals(search.values, search.starts, search.noise)
+            normals = work.normals(search.values, work.shots(search.values, search.starts, search.noise), search.noise)
     motion = FittedMotion(settings.piece_s, tuple(search.starts), search.noise)
-    return _estimate(problem, search, normals, tuple(notices), motion)
+    return _estimate(work, search, normals, tuple(notices), motion)
 
 
 def _first_noise(problem: Problem, pieces: list[Pieces]) -> tuple[ColouredNoise, ...]:
@@ -135,22 +135,20 @@ class _Work:
     threads: ThreadPoolExecutor
     progress: SearchReport
 
-    def normals(self, values: Array, starts: list[Array], noise: tuple[ColouredNoise, ...]) -> list[Normal]:
+    def shots(self, values: Array, starts: list[Array], noise: tuple[ColouredNoise, ...]) -> list[Shot]:
+        """Motion of all runs."""
+        return list(
+            self.threads.map(lambda piece, start: self.shooting.shot(piece, start, values, noise), self.pieces, starts)
+        )
+
+    def normals(self, values: Array, shots: list[Shot], noise: tuple[ColouredNoise, ...]) -> list[Normal]:
         """Normal equations of all runs."""
         return list(
-            self.threads.map(
-                lambda piece, start: self.shooting.normal(piece, start, values, noise), self.pieces, starts
-            )
-        )
-
-    def cost(self, values: Array, starts: list[Array], noise: tuple[ColouredNoise, ...]) -> float:
-        """Sum of squares of all runs."""
-        return sum(
-            self.threads.map(lambda piece, start: self.shooting.cost(piece, start, values, noise), self.pieces, starts)
+            self.threads.map(lambda piece, shot: self.shooting.normal(piece, shot, values, noise), self.pieces, shots)
         )
 
 
-def _minimise(work: _Work, search: _Search, tolerance: float) -> list[Normal]:
+def _minimise(work: _Work, search: _Search, tolerance: float) -> tuple[list[Shot], list[Normal]]:
     """Damped Gauss-Newton steps from the state of the search, which holds the best point afterwards."""
     problem, noise = work.problem, search.noise
     prior = problem.prior_precision(scaled_prior(problem, search.scale))
@@ -159,10 +157,11 @@ def _minimise(work: _Work, search: _Search, tolerance: float) -> list[Normal]:
         distance = values - problem.prior_mean
         penalty = float(distance @ prior @ distance)
         captive = _captive_normal(problem, values)[2]
-        return _Point(values, starts, penalty + captive + work.cost(values, starts, noise))
+        shots = work.shots(values, starts, noise)
+        return _Point(values, shots, penalty + captive + sum(shot.cost for shot in shots))
 
     def linearise(start: _Point) -> list[Normal]:
-        return work.normals(start.values, start.starts, noise)
+        return work.normals(start.values, start.shots, noise)
 
     def move(start: _Point, normals: list[Normal], damping: float) -> _Point:
         tank, pull, _ = _captive_normal(problem, start.values)
@@ -171,20 +170,20 @@ def _minimise(work: _Work, search: _Search, tolerance: float) -> list[Normal]:
         step = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
         step = np.clip(start.values + step, *problem.bounds) - start.values
         starts = [
-            states - (normal.step + normal.states @ step).reshape(states.shape)
-            for states, normal in zip(start.starts, normals, strict=True)
+            shot.starts - (normal.step + normal.states @ step).reshape(shot.starts.shape)
+            for shot, normal in zip(start.shots, normals, strict=True)
         ]
         return point(start.values + step, starts)
 
     def report(better: _Point, gain: float) -> bool:
-        search.values, search.starts = better.values, better.starts
+        search.values, search.starts = better.values, [shot.starts for shot in better.shots]
         search.costs.append(better.cost)
         work.progress("output error", better.values, better.cost)
         return gain < tolerance * max(1.0, 1e-3 * better.cost)
 
     found = damped_gauss_newton(point(search.values, search.starts), linearise, move, report, LONGEST_SEARCH)
     best, _, last = found
-    return last or linearise(best)
+    return best.shots, last or linearise(best)
 
 
 def _captive_normal(problem: Problem, values: Array) -> tuple[Array, Array, float]:
@@ -195,11 +194,11 @@ def _captive_normal(problem: Problem, values: Array) -> tuple[Array, Array, floa
 
 
 def _new_noise(
-    problem: Problem, pieces: list[Pieces], normals: list[Normal], settings: OutputErrorSettings
+    problem: Problem, pieces: list[Pieces], shots: list[Shot], settings: OutputErrorSettings
 ) -> tuple[ColouredNoise, ...]:
     noise = []
     for place in range(len(problem.seen)):
-        residuals = [residual for normal in normals for residual in normal.residuals[:, :, place]]
+        residuals = [residual for shot in shots for residual in shot.residuals[:, :, place]]
         measured = np.concatenate([piece.measured[:, :, place].ravel() for piece in pieces])
         smallest = 1e-6 * float(np.nanmax(np.abs(measured)) or 1.0)
         found = estimate_coloured_noise(residuals, smallest)
@@ -208,8 +207,9 @@ def _new_noise(
 
 
 def _estimate(
-    problem: Problem, search: _Search, normals: list[Normal], notices: tuple[Notice, ...], motion: FittedMotion
+    work: _Work, search: _Search, normals: list[Normal], notices: tuple[Notice, ...], motion: FittedMotion
 ) -> Estimate:
+    problem = work.problem
     information = np.asarray(sum(normal.matrix for normal in normals))
     prior = scaled_prior(problem, search.scale)
     before = problem.prior_precision(prior) + _captive_normal(problem, search.values)[0]
@@ -217,7 +217,7 @@ def _estimate(
         method="output_error",
         free=problem.free,
         values=search.values,
-        covariance=sandwich(information, prior, [normal.scores for normal in normals], before),
+        covariance=sandwich(information, prior, list(map(work.shooting.scores, work.pieces, normals)), before),
         information=information,
         noise={name: noise.deviation for name, noise in zip(problem.seen, search.noise, strict=True)},
         cost=tuple(search.costs),

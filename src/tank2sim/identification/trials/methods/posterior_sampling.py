@@ -232,7 +232,8 @@ class _Run:
         self.shooting, self.adjoint, self.starts = shooting, adjoint, starts
         self.pieces = cut(shooting.problem, run, estimate.motion.piece_s)
         self.noise, self.center, self.wide = estimate.motion.noise, estimate.values, shooting.wide
-        J = shooting.linearised(self.pieces, starts, self.center, self.noise)[2]
+        shot = shooting.shot(self.pieces, starts, self.center, self.noise)
+        J = shooting.linearised(self.pieces, shot, self.center, self.noise)[1]
         nx = starts.shape[1]
         self.by_state = np.ascontiguousarray(J[:, :, :nx])  # (pieces, samples, nx)
         transposed = self.by_state.transpose(0, 2, 1)
@@ -262,8 +263,9 @@ class _Run:
     def _profile(self, values: Array) -> tuple[float, Array, Array, Array, Array]:
         """Cost, its derivatives by whitened residuals and (directly) by initial states, states and residuals."""
         starts = self.starts + self.follow @ (values - self.center)
-        residuals, states = self.shooting.residuals(self.pieces, starts, values)
-        if not np.isfinite(states).all() or np.abs(states).max() > 1e9:
+        shot = self.shooting.shot(self.pieces, starts, values, self.noise)
+        states, residuals = shot.states, shot.residuals
+        if not np.isfinite(shot.cost):
             return np.inf, residuals, starts, states, residuals
         white = whitened(residuals, residuals, self.noise).reshape(len(starts), -1)
         away = (starts - self.pieces.starts) / self.wide

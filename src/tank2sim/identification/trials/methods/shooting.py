@@ -87,126 +87,146 @@ def _local(column: Array, first: int) -> float | None:
 
 
 @dataclass(frozen=True, eq=False)
+class Shot:
+    """Simulated motion of the pieces of one run.
+
+    Parameters
+    ----------
+    starts : array (pieces, nx)
+        Initial states.
+    states : array (pieces, n + 1, nx)
+    residuals : array (pieces, n + 1, ny)
+        Simulated less measured.
+    cost : float
+        Sum of squares, with the weak prior of the initial states; inf where the motion leaves all bounds.
+    """
+
+    starts: Array
+    states: Array
+    residuals: Array
+    cost: float
+
+
+@dataclass(frozen=True, eq=False)
 class Normal:
     """Normal equations of one run with the initial states eliminated, at given parameters and initial states.
 
     Parameters
     ----------
-    cost : float
-        Sum of squares.
     matrix : array (k, k)
     vector : array (k,)
         ``matrix @ step = -vector`` for the parameters alone.
     states : array (unknown, k), and step (unknown,)
         Change of the initial states: ``-(step + states @ parameter step)``.
-    scores : array (blocks, k)
-        Shares of `vector` in the order of time, each of :data:`BLOCK` lengths or less: for standard errors.
-    residuals : array (pieces, n + 1, ny)
-        Simulated less measured.
+    white, white_by : arrays (pieces, samples) and (pieces, samples, nx + k)
+        Whitened residuals, and their derivatives by the initial state of the piece and by the parameters.
     """
 
-    cost: float
     matrix: Array
     vector: Array
     states: Array
     step: Array
-    scores: Array
-    residuals: Array
+    white: Array
+    white_by: Array
 
 
 class Shooting:
-    """Residuals of pieces and their normal equations, for the parameters `free` of a problem."""
+    """Motion of pieces and its normal equations, for the parameters `free` of a problem.
 
-    def __init__(self, problem: Problem):
+    Parameters
+    ----------
+    problem : Problem
+    starts_alone : bool
+        Derivatives by initial states alone: the normal equations have no parameters.
+    """
+
+    def __init__(self, problem: Problem, *, starts_alone: bool = False):
         self.problem = problem
-        self.sensitivity = Sensitivity(problem.model, problem.free, problem.seen)
+        self.sensitivity = Sensitivity(problem.model, () if starts_alone else problem.free, problem.seen)
         # Weak prior of initial states: within a nominal value of the guess.
         self.wide = np.array([state.nominal for state in problem.model.states])
 
-    def residuals(self, pieces: Pieces, starts: Array, values: Array) -> tuple[Array, Array]:
-        """Simulated less measured (pieces, n + 1, ny), and the states (pieces, n + 1, nx)."""
+    def shot(self, pieces: Pieces, starts: Array, values: Array, noise: Sequence[ColouredNoise]) -> Shot:
+        """Motion of the pieces of a run from `starts`, with the parameters `values`."""
         p, h = self.problem.parameters(values), pieces.run.step_s
         pairs = zip(starts, pieces.inputs, strict=True)
         states = np.stack([self.sensitivity.motion(start, inputs[:-1], p, h) for start, inputs in pairs])
         flat = states.reshape(-1, states.shape[2]), pieces.inputs.reshape(-1, pieces.inputs.shape[2])
-        seen = self.sensitivity.shown(*flat, p).reshape(pieces.measured.shape)
-        return seen - pieces.measured, states
-
-    def cost(self, pieces: Pieces, starts: Array, values: Array, noise: Sequence[ColouredNoise]) -> float:
-        """Sum of squares of a run, inf where the motion leaves all bounds."""
-        residuals, states = self.residuals(pieces, starts, values)
+        residuals = self.sensitivity.shown(*flat, p).reshape(pieces.measured.shape) - pieces.measured
         if not np.isfinite(states).all() or np.abs(states).max() > 1e9:
-            return np.inf
-        total = float(np.sum(whitened(residuals, residuals, noise) ** 2))
-        total += float(np.sum(((starts - pieces.starts) / self.wide) ** 2))
-        return total
+            return Shot(starts, states, residuals, np.inf)
+        cost = float(np.sum(whitened(residuals, residuals, noise) ** 2))
+        cost += float(np.sum(((starts - pieces.starts) / self.wide) ** 2))
+        return Shot(starts, states, residuals, cost)
 
     def linearised(
-        self, pieces: Pieces, starts: Array, values: Array, noise: Sequence[ColouredNoise]
-    ) -> tuple[Array, Array, Array]:
-        """Residuals (pieces, n + 1, ny) of a run; whitened (pieces, samples), and their derivatives (pieces, samples,
-        nx + k) by the initial state of the piece and by the parameters.
-        """
-        p, h = self.problem.parameters(values), pieces.run.step_s
-        residuals, states = self.residuals(pieces, starts, values)
-        _, by, _ = self.sensitivity.derivatives(states, pieces.inputs, p, h)
-        white = whitened(residuals, residuals, noise)
-        white_by = whitened(residuals, by.reshape(*by.shape[:2], -1), noise, by.shape[3])
-        return residuals, white.reshape(len(starts), -1), white_by.reshape(len(starts), -1, by.shape[3])
+        self, pieces: Pieces, shot: Shot, values: Array, noise: Sequence[ColouredNoise]
+    ) -> tuple[Array, Array]:
+        """Whitened residuals of a run and their derivatives: `white` and `white_by` of :class:`Normal`."""
+        p, count = self.problem.parameters(values), len(shot.starts)
+        _, by, _ = self.sensitivity.derivatives(shot.states, pieces.inputs, p, pieces.run.step_s)
+        white = whitened(shot.residuals, shot.residuals, noise)
+        white_by = whitened(shot.residuals, by.reshape(*by.shape[:2], -1), noise, by.shape[3])
+        return white.reshape(count, -1), white_by.reshape(count, -1, by.shape[3])
 
-    def normal(self, pieces: Pieces, starts: Array, values: Array, noise: Sequence[ColouredNoise]) -> Normal:
+    def normal(self, pieces: Pieces, shot: Shot, values: Array, noise: Sequence[ColouredNoise]) -> Normal:
         """Normal equations of one run."""
-        count, nx = starts.shape
-        residuals, r, J = self.linearised(pieces, starts, values, noise)
+        count, nx = shot.starts.shape
+        r, J = self.linearised(pieces, shot, values, noise)
         products = J.transpose(0, 2, 1) @ J
         pull = (J.transpose(0, 2, 1) @ r[:, :, None])[:, :, 0]
         # Unknowns: initial states of all pieces, then parameters.
         k = products.shape[1] - nx
         size = count * nx
-        H = np.zeros((size + k, size + k))
-        shares = np.zeros((count, size + k))
+        H, g = np.zeros((size + k, size + k)), np.zeros(size + k)
         spread = np.tile(self.wide, count)
         H[np.arange(size), np.arange(size)] = 1 / spread**2
         for piece in range(count):
             at = np.r_[piece * nx : (piece + 1) * nx, size : size + k]
             H[np.ix_(at, at)] += products[piece]
-            shares[piece, at] += pull[piece]
-        g = shares.sum(axis=0)
-        g[:size] += ((starts - pieces.starts) / self.wide**2).ravel()
+            g[at] += pull[piece]
+        g[:size] += ((shot.starts - pieces.starts) / self.wide**2).ravel()
         inner = np.linalg.inv(H[:size, :size])
         mixed = inner @ H[:size, size:]
-        return Normal(
-            cost=self.cost(pieces, starts, values, noise),
-            matrix=H[size:, size:] - H[size:, :size] @ mixed,
-            vector=g[size:] - mixed.T @ g[:size],
-            states=mixed,
-            step=inner @ g[:size],
-            scores=self._scores(pieces, r, J, mixed),
-            residuals=residuals,
-        )
+        matrix, vector = H[size:, size:] - H[size:, :size] @ mixed, g[size:] - mixed.T @ g[:size]
+        return Normal(matrix, vector, mixed, inner @ g[:size], r, J)
 
-    def _scores(self, pieces: Pieces, r: Array, J: Array, mixed: Array) -> Array:
-        """Contribution of each block of time to the gradient by the parameters, (blocks, k)."""
+    def scores(self, pieces: Pieces, normal: Normal) -> Array:
+        """Shares of `vector` in the order of time, each of :data:`BLOCK` lengths or less (blocks, k): for standard
+        errors."""
         count, nx = pieces.starts.shape
         rows, ny = pieces.measured.shape[1:]
-        ship_time = self.problem.ship_time
-        blocks = max(1, round(rows * pieces.run.step_s / (BLOCK * ship_time)))
+        blocks = max(1, round(rows * pieces.run.step_s / (BLOCK * self.problem.ship_time)))
         edges = np.linspace(0, rows, blocks + 1).astype(int)[:-1] * ny
-        pull = np.add.reduceat(J * r[:, :, None], edges, axis=1)  # (pieces, blocks, nx + k)
-        by_piece = mixed.reshape(count, nx, -1)
+        pull = np.add.reduceat(normal.white_by * normal.white[:, :, None], edges, axis=1)  # (pieces, blocks, nx + k)
+        by_piece = normal.states.reshape(count, nx, -1)
         scores: Array = pull[:, :, nx:] - np.einsum("pbx,pxk->pbk", pull[:, :, :nx], by_piece)
         return scores.reshape(count * blocks, -1)
+
+    def settled(self, pieces: Pieces, values: Array, noise: Sequence[ColouredNoise]) -> Shot:
+        """Motion from the initial states that fit a run best, at these parameters."""
+        best = self.shot(pieces, pieces.starts.copy(), values, noise)
+        for _ in range(3):  # the motion is nearly linear in its initial state: three steps are enough
+            if not np.isfinite(best.cost):
+                break
+            step = self.normal(pieces, best, values, noise).step.reshape(best.starts.shape)
+            moved = self.shot(pieces, best.starts - step, values, noise)
+            if moved.cost >= best.cost:
+                break
+            best = moved
+        return best
 
 
 def whitened(residuals: Array, values: Array, noise: Sequence[ColouredNoise], columns: int = 1) -> Array:
     """Values (pieces, n, ny * columns) whitened like the residuals; 0 where not measured."""
     shape = (*residuals.shape[:2], residuals.shape[2], columns)
-    values = values.reshape(shape)
-    result = np.zeros(shape)
+    values, result = values.reshape(shape), np.empty(shape)
     for place, signal_noise in enumerate(noise):
         known, used = _samples(residuals[:, :, place], signal_noise)
-        filled = np.where(known[:, :, None], values[:, :, place, :], 0.0)
-        result[:, :, place, :] = np.where(used[:, :, None], signal_noise.whitened(filled), 0.0)
+        filled = values[:, :, place].copy()
+        filled[~known] = 0.0
+        result[:, :, place] = signal_noise.whitened(filled)
+        result[:, :, place][~used] = 0.0
     return result.reshape(*residuals.shape[:2], -1)
 
 

@@ -56,9 +56,16 @@ class _Prepared:
 
     run: SampledRun
     motion: MeasuredMotion
-    middle: Array  # MEASURED_STATES in the middle of each step
+    inputs: Array  # of each step, with MEASURED_STATES in its middle
     averaging: sparse.csr_matrix  # (windows, steps)
     change: Array  # mean measured acceleration of each window
+    hidden: Array | None  # unmeasured states in the middle of each step, if no free parameter moves them
+
+    @property
+    def middle(self) -> Array:
+        """MEASURED_STATES in the middle of each step."""
+        return self.inputs[:, self.run.inputs.shape[1] :]
+
     pieces: tuple[slice, ...]  # windows that follow each other without a gap
 
 
@@ -98,9 +105,8 @@ class WeakForm:
 
     def _windows(self, run: _Prepared, p: Array) -> WeakWindows:
         k = len(self.problem.free)
-        inputs = np.hstack([run.run.inputs[:-1], run.middle])
-        hidden, by_theta = self._hidden_states(run, inputs, p)
-        values, by_parameters, by_hidden = self._accelerations(hidden, inputs, p)
+        hidden, by_theta = (run.hidden, None) if run.hidden is not None else self._hidden_states(run.run, run.inputs, p)
+        values, by_parameters, by_hidden = self._accelerations(hidden, run.inputs, p)
         jacobian = by_parameters.reshape(-1, k, 3)
         if by_theta is not None:
             jacobian = jacobian + by_theta.transpose(0, 2, 1) @ by_hidden.reshape(len(by_parameters), -1, 3)
@@ -110,7 +116,7 @@ class WeakForm:
             jacobian=mean.reshape(-1, k, 3).transpose(0, 2, 1),
         )
 
-    def _hidden_states(self, run: _Prepared, inputs: Array, p: Array) -> tuple[Array, Array | None]:
+    def _hidden_states(self, run: SampledRun, inputs: Array, p: Array) -> tuple[Array, Array | None]:
         """Simulated unmeasured states in the middle of steps (n, nz), and slopes by the parameters (n, nz, k)."""
         if self._sensitivity is None:
             return np.zeros((len(inputs), 0)), None
@@ -118,15 +124,15 @@ class WeakForm:
         names = self.problem.model.state_names
         first = start[[names.index(name) for name in self._hidden.state_names]]
         if "rudder.angle" in self._hidden.state_names:
-            order = run.run.inputs[:, self.problem.model.input_names.index("rudder.command")]
-            angle = rudder_at_start(run.run, order, self.problem.ship_time)
+            order = run.inputs[:, self.problem.model.input_names.index("rudder.command")]
+            angle = rudder_at_start(run, order, self.problem.ship_time)
             first[self._hidden.state_names.index("rudder.angle")] = angle
-        states = self._sensitivity.motion(first, inputs, p, run.run.step_s)
+        states = self._sensitivity.motion(first, inputs, p, run.step_s)
         middle = 0.5 * (states[:-1] + states[1:])
         if not self._moves_hidden:
             return middle, None
         full = np.vstack([inputs, inputs[-1:]])
-        _, by, _ = self._sensitivity.derivatives(states[None], full[None], p, run.run.step_s)
+        _, by, _ = self._sensitivity.derivatives(states[None], full[None], p, run.step_s)
         by_theta = by[0, :, :, states.shape[1] :]
         return middle, 0.5 * (by_theta[:-1] + by_theta[1:])
 
@@ -144,10 +150,13 @@ class WeakForm:
         averaging = sparse.csr_matrix((np.tile(bump, len(starts)), (rows, columns)), (len(starts), len(steps)))
         breaks = np.flatnonzero(np.diff(starts) > half) + 1
         edges = [0, *breaks.tolist(), len(starts)]
+        inputs = np.hstack([run.inputs[:-1], 0.5 * (motion.smooth[:-1] + motion.smooth[1:])])
+        p = self.problem.parameters(self.problem.prior_mean)
         return _Prepared(
             run=run,
             motion=motion,
-            middle=0.5 * (motion.smooth[:-1] + motion.smooth[1:]),
+            inputs=inputs,
+            hidden=None if self._moves_hidden else self._hidden_states(run, inputs, p)[0],
             averaging=averaging,
             change=averaging @ np.nan_to_num(steps) / run.step_s,
             pieces=tuple(slice(a, b) for a, b in pairwise(edges) if b > a),

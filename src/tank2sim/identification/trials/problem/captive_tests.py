@@ -189,8 +189,7 @@ def captive_tests(card: ManoeuvringCard, model: Model, free: Sequence[str], sour
         inertial = rigid_body_force(campaign, run.motion)
         for place, name in enumerate(FORCE_COLUMNS):
             values = run.fits[name].coefficients[: run.regressed] + run.projected(inertial[name][:, None])[:, 0]
-            scales = Scales(campaign.test.water_density_kgpm3, campaign.model.length_m, run.motion.mean_speed_mps)
-            measured.append(values / (scales.force * (scales.length if name == "N" else 1.0)))
+            measured.append(values / campaign.scales_at(run.motion.mean_speed_mps).unit(name))
             force.append(np.full(run.regressed, place))
             mean.append(np.arange(run.regressed) == 0)
     tests = CaptiveTests(

@@ -7,6 +7,7 @@ from positions or from velocities over the ground.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -71,9 +72,13 @@ def measured_motion(problem: Problem, run: SampledRun) -> MeasuredMotion:
     InputError
         Velocities are neither measured nor determined by heading and positions.
     """
+    return _measured_motion(problem.model, _window(problem, run), run)
+
+
+@lru_cache(maxsize=16)  # the folds of a cross-validation share their runs
+def _measured_motion(model: Model, window: int, run: SampledRun) -> MeasuredMotion:
     columns = {name: run.column(name) for name in MEASURED_STATES}
     missing = {name for name, column in columns.items() if np.isnan(column).all()}
-    window = _window(problem, run)
     if len(run.measured) <= window:
         raise InputError(run.origin, "", f"has only {len(run.measured)} steps", f"at least {window + 1} are needed")
     notices = []
@@ -86,7 +91,7 @@ def measured_motion(problem: Problem, run: SampledRun) -> MeasuredMotion:
         columns["motion.psi"] = cumulative_trapezoid(_filled(columns["motion.r"]), dx=run.step_s, initial=0.0)
     derived = missing & {"motion.u", "motion.v"}
     if derived:
-        derived_columns, source = _velocities(problem.model, run, columns, window)
+        derived_columns, source = _velocities(model, run, columns, window)
         columns |= {name: derived_columns[name] for name in derived}
         notices.append(Notice(f"{run.name}: {' and '.join(name[7:] for name in sorted(derived))} {source}"))
     _complete_positions(columns, missing, run.step_s)

@@ -28,9 +28,8 @@ from tank2sim.dynamics.roll import roll_terms
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns, captive_tests
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, noise_alone
-from tank2sim.identification.trials.problem.ordered_rudder import ordered_rudder
 from tank2sim.identification.trials.problem.prepare_trials import Measured
-from tank2sim.identification.trials.problem.sampled_runs import SampledRun, in_range, prepare, seen_in
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun, in_range, ordered_rudder, prepare, seen_in
 from tank2sim.notices import Notice
 from tank2sim.records.trials import Trial, window
 from tank2sim.units import from_si
@@ -190,7 +189,7 @@ def fit_driven_by(card: ManoeuvringCard, driven_by: str) -> str:
     """Return the signal that drives the model which is fitted to trials.
 
     The ``angle`` of the rudder also where only orders were recorded, which the gear of the card follows
-    (:mod:`.ordered_rudder`); the ``order`` where more than this gear acts between them.
+    (:mod:`.sampled_runs`); the ``order`` where more than this gear acts between them.
 
     Parameters
     ----------
