@@ -34,7 +34,8 @@ def test_the_readme_has_at_most_150_lines() -> None:
 
 
 def test_the_readme_has_exactly_two_one_line_commands_that_set_up_what_they_need() -> None:
-    setting_up = [block.strip() for block in blocks("sh") if "python3 -m venv" in block]
+    first, *setting_up = [block.strip() for block in blocks("sh") if "python3 -m venv" in block]
+    assert len(first.splitlines()) == 3 and "tank2sim simulate" in first and "tank2sim steer" in first
     assert len(setting_up) == 2 and all("\n" not in block for block in setting_up)
     assert "tank2sim demo" in setting_up[0] and "pytest" in setting_up[1]
 
