@@ -91,6 +91,13 @@ def test_what_a_card_does_not_tell_is_none(mariner_card) -> None:
     assert [one.within for one in tanker.telegraph] == [True, True, True, False, False]
 
 
+def test_a_speed_that_does_not_follow_the_revolutions_is_outside_the_card() -> None:
+    """The KVLCC2 at 40 % of its revolutions: 8.6 knots by the polynomial, 6.2 in proportion."""
+    shown = {round(one.rpm, 1): (one.speed_mps, one.within) for one in bridge_of(read_card("kvlcc2")).telegraph}
+    assert shown[55.0][1] is True
+    assert shown[36.7][0] > 1.3 * 0.4 * 7.97 and shown[36.7][1] is False
+
+
 def test_what_is_read_off_before_the_range_ends_is_kept() -> None:
     changed = {"model.valid_speed_mps": [5.8, 9.5], "model.valid_yaw_rate_prime": 1.0}
     ship = ship_of(read_card("kvlcc2-captive", changed))

@@ -44,6 +44,11 @@ what a channel has, and a speed that a ship makes in one; more rows leave no roo
 ORDERS_AHEAD = ("Full sea speed", "Full ahead", "Half ahead", "Slow ahead", "Dead slow ahead")
 """Orders ahead of the wheelhouse poster's form (A.601(15), appendix 2)."""
 
+FOLLOWS = 0.15
+"""Largest deviation of a steady speed from the revolutions' share of the card's speed, over that share: the resistance
+goes with the square of the speed (ITTC 7.5-04-01-01.1), speed is nearly proportional to revolutions, and a card whose
+speed does not follow them does not hold there. Project choice: wave resistance bends the line by less."""
+
 _LARGEST_SHARE = 2.0
 """Largest revolutions of an order over the nominal ones: engines trip far below. Project choice."""
 
@@ -57,7 +62,8 @@ _RADIANS_PER_S = 2 * math.pi / 60
 class Telegraph:
     """An order: its name (may be empty), revolutions, steady speed straight ahead (None if unknown).
 
-    `within` is False where that speed is outside the card's range.
+    `within` is False where that speed is outside the card's range, or does not follow the revolutions
+    (:data:`FOLLOWS`).
     """
 
     order: str
@@ -295,7 +301,9 @@ def _telegraph(ship: TrialShip, orders: Mapping[str, float] | None) -> tuple[Tel
     rows = []
     for order, rpm in orders_and_rpm:
         speed = steady_speed(ship, rpm * _RADIANS_PER_S) if rpm > 0 else None
-        rows.append(Telegraph(order, rpm, speed, speed is None or slowest <= speed <= fastest))
+        proportional = ship.card.model.speed_mps * rpm / nominal
+        within = speed is None or (slowest <= speed <= fastest and abs(speed / proportional - 1) <= FOLLOWS)
+        rows.append(Telegraph(order, rpm, speed, within))
     return tuple(rows)
 
 
