@@ -114,19 +114,16 @@ def autopilot(
     from tank2sim.analysis.heading.designs import LqrWeights
     from tank2sim.analysis.heading.study import StudySettings, study_autopilot
     from tank2sim.analysis.heading.track_keeping import waypoints_of
-    from tank2sim.cards import CraftCard, ManoeuvringCard
+    from tank2sim.cards import SteeredBy
     from tank2sim.results.autopilot import AutopilotResult
 
     if course_change_deg == 0:
         raise ArgumentError("course_change_deg", "", "is 0", "give the angle to turn by")
-    if isinstance(ship.card, CraftCard):
+    if ship.steered().steered_by is SteeredBy.THRUSTERS:
         rest: dict[str, Any] = {"heading_weight_deg": heading_weight_deg, "rudder_weight_deg": rudder_weight_deg}
         rest |= {"wave_filter_radps": wave_filter_radps, "current_mps": current_mps, "wind_mps": wind_mps}
         rest |= {"wave_yaw_deg": wave_yaw_deg, "seed": seed, "track": track, "design": design}
         return _pilot_craft(ship, speed_mps, course_change_deg, rest)
-    if not isinstance(ship.card, ManoeuvringCard):
-        remedy = "an autopilot needs a ship with a rudder, or a craft with thrusters"
-        raise InputError(ship.card.source, "model.kind", "has no rudder", remedy)
     weights = LqrWeights(heading_rad=math.radians(heading_weight_deg), rudder_rad=math.radians(rudder_weight_deg))
     settings = StudySettings(
         kind=design,
@@ -143,7 +140,7 @@ def autopilot(
         waypoints=None if track is None else waypoints_of(track),
     )
     try:
-        study, piloted = study_autopilot(ship.card, ship.model, settings)
+        study, piloted = study_autopilot(ship.manoeuvring(), ship.model, settings)
     except ArgumentError as fault:
         if fault.source != "track" or not isinstance(track, str | Path):
             raise
@@ -156,15 +153,13 @@ def _pilot_craft(
 ) -> CraftAutopilotResult:
     """The autopilot of a craft; `rest` are the arguments that only a ship takes."""
     from tank2sim.analysis.heading.craft import study_craft_autopilot
-    from tank2sim.cards import CraftCard
     from tank2sim.results.autopilot import CraftAutopilotResult
 
     usual = {"heading_weight_deg": 5.0, "rudder_weight_deg": 5.0, "design": "pid"}
     if given := next((name for name, value in rest.items() if value is not None and value != usual.get(name)), ""):
         raise ArgumentError(given, "", "is not for a craft with thrusters", "leave it out")
-    assert isinstance(ship.card, CraftCard)
     change = math.radians(course_change_deg)
-    study, piloted = study_craft_autopilot(ship.card, ship.model, speed_mps=speed_mps, course_change_rad=change)
+    study, piloted = study_craft_autopilot(ship.steered(), ship.model, speed_mps=speed_mps, course_change_rad=change)
     return CraftAutopilotResult(replace(study, notices=_no_compiler()), piloted)
 
 

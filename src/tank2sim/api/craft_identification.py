@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tank2sim.cards import CraftCard
+from tank2sim.cards import SteeredCard
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.identification.craft.card import identified_craft
 from tank2sim.identification.craft.fit import FreePrediction, fit_craft, predict_free
@@ -22,13 +22,13 @@ from tank2sim.results.craft_identification import CraftIdentificationResult
 
 
 def identify_craft(
-    card: CraftCard, fitted: Sequence[Trial], held: Sequence[Trial], progress: SearchReport = silent
+    card: SteeredCard, fitted: Sequence[Trial], held: Sequence[Trial], progress: SearchReport = silent
 ) -> CraftIdentificationResult:
     """Identify hull and thrust curves of a craft with thrusters from trials with position, heading and revolutions.
 
     Parameters
     ----------
-    card : CraftCard
+    card : SteeredCard
         Mass and places of the thrusters are taken as exact, all else with the stated standard errors or wide ones.
     fitted, held : sequence of Trial
         Trials to fit, and trials only to predict (:func:`.read_craft_trial`).

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tank2sim.cards import CraftCard
+from tank2sim.cards import SteeredCard
 from tank2sim.errors import InputError
 from tank2sim.identification.craft.fit import PREDICTION_LEAD_S, SHORTEST_PREDICTION_S, predict_by_card
 from tank2sim.identification.craft.problem import craft_problem
@@ -18,13 +18,13 @@ from tank2sim.records.trials import Trial
 
 
 def validate_craft(
-    card: CraftCard, trials: Sequence[Trial]
-) -> tuple[CraftValidationStudy, CraftCard, tuple[Path, ...]]:
+    card: SteeredCard, trials: Sequence[Trial]
+) -> tuple[CraftValidationStudy, SteeredCard, tuple[Path, ...]]:
     """Predict trials of a craft by its card and recorded revolutions, from the state of a filter after ten seconds.
 
     Parameters
     ----------
-    card : CraftCard
+    card : SteeredCard
     trials : sequence of Trial
         Trials (:func:`.read_craft_trial`).
 

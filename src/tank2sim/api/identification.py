@@ -143,19 +143,22 @@ def identify(
     given = dict(locals())
     from tank2sim.api.craft_identification import identify_craft
     from tank2sim.api.trial import craft_trials_of, fitted_and_held
-    from tank2sim.cards import CraftCard
+    from tank2sim.cards import SteeredBy
     from tank2sim.identification.trials.identify import identify_trials
     from tank2sim.identification.trials.problem.structures import STRUCTURES
     from tank2sim.identification.trials.study import study_identification
     from tank2sim.results.identification import IdentificationResult
 
     progress = _step_report(report)
-    if isinstance(ship.card, CraftCard):
+    steered = ship.steered()
+    if steered.steered_by is SteeredBy.THRUSTERS:
         taken = {"ship", "trials", "holdout", "report"}
         refuse_set(identify, given, "is not for a craft with thrusters", taken=taken)
-        thrusters = ship.card.thrusters
-        to_fit, to_predict = craft_trials_of(trials, thrusters), craft_trials_of(holdout, thrusters, "holdout")
-        return identify_craft(ship.card, to_fit, to_predict, progress)
+        to_fit, to_predict = (
+            craft_trials_of(trials, steered.thrusters),
+            craft_trials_of(holdout, steered.thrusters, "holdout"),
+        )
+        return identify_craft(steered, to_fit, to_predict, progress)
     card = ship.manoeuvring()
     if structure not in (known := (*STRUCTURES.names(), AUTO, AVERAGE, BY_EVIDENCE)):
         raise ArgumentError("structure", "", f"{structure!r} is not known", close_name(structure, known))

@@ -67,17 +67,17 @@ def judge_stability(
     from tank2sim.analysis.stability.craft import craft_stability
     from tank2sim.analysis.stability.study import stability_study
     from tank2sim.api.ensemble import EnsembleOptions
-    from tank2sim.cards import CraftCard
+    from tank2sim.cards import SteeredBy
     from tank2sim.native.compiler import find_compiler
     from tank2sim.results.craft_stability import CraftStabilityResult
     from tank2sim.results.stability import StabilityResult
     from tank2sim.simulation.integrator import NO_COMPILER
 
     ensemble = EnsembleOptions(members, seed, executor)
-    if isinstance(ship.card, CraftCard):
+    if ship.steered().steered_by is SteeredBy.THRUSTERS:
         if members:
             raise ArgumentError("members", "", "are judged by the IMO criteria, which need a rudder", "leave them out")
-        return CraftStabilityResult(craft_stability(ship.card, speed_mps), ship)
+        return CraftStabilityResult(craft_stability(ship.steered(), speed_mps), ship)
     study = stability_study(ship.model, speed_mps, spirals=spirals)
     compiler = () if find_compiler() else (NO_COMPILER,)
     study = replace(study, notices=tuple(dict.fromkeys([*ship.model.notices, *study.notices, *compiler])))

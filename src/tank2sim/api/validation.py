@@ -56,10 +56,11 @@ def validate(
     from tank2sim.api.craft_validation import validate_craft
     from tank2sim.api.trial import craft_trials_of, trials_of
     from tank2sim.api.validation_study import validate_ship
-    from tank2sim.cards import CraftCard
+    from tank2sim.cards import SteeredBy
     from tank2sim.results.craft_validation import CraftValidationResult
     from tank2sim.results.validation import ValidationResult
 
-    if isinstance(ship.card, CraftCard):
-        return CraftValidationResult(*validate_craft(ship.card, craft_trials_of(trials, ship.card.thrusters)))
+    card = ship.steered()
+    if card.steered_by is SteeredBy.THRUSTERS:
+        return CraftValidationResult(*validate_craft(card, craft_trials_of(trials, card.thrusters)))
     return ValidationResult(*validate_ship(ship.manoeuvring(), trials_of(trials), members, required_percent))

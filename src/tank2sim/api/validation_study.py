@@ -56,7 +56,7 @@ def validate_ship(
 
 def _study(ready: TrialShip, given: Measured, found: Validation) -> ValidationStudy:
     """Document and verify a ship, replay its trials, and join what was validated."""
-    card, model = ready.manoeuvring, ready.model
+    card, model = ready.card.manoeuvring(), ready.model
     verified, troubles = verify(ready, found.members)
     replays, not_replayed = _replays(card, given)
     compiler = () if ready.integrator.compiled else (NO_COMPILER,)

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from tank2sim.answer.parts import KeyFigure, Section, records_table
 from tank2sim.answer.result import Result
-from tank2sim.cards import CraftCard
+from tank2sim.cards import SteeredCard
 from tank2sim.identification.craft.fit import PREDICTED_S
 from tank2sim.identification.craft.study import CraftValidationStudy
 
@@ -21,14 +21,14 @@ class CraftValidationResult(Result[CraftValidationStudy]):
     Parameters
     ----------
     study : CraftValidationStudy
-    card : CraftCard, optional
+    card : SteeredCard, optional
         None if the result was read from its JSON; ``ship`` is its ship.
     paths : tuple of Path
         Files of all trials.
     """
 
     study: CraftValidationStudy
-    card: CraftCard | None = None
+    card: SteeredCard | None = None
     paths: tuple[Path, ...] = ()
     command: ClassVar[str] = "validate"
 

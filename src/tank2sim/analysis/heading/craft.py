@@ -13,8 +13,8 @@ from tank2sim.analysis.heading.piloted import AutopilotExport, Piloted
 from tank2sim.analysis.heading.runs import HeadingLoop, StepFigures, step_figures
 from tank2sim.analysis.linearisation import OperatingPoint, jacobians
 from tank2sim.arrays import Array, Columns, ComplexNumber
-from tank2sim.cards.card import CraftCard
-from tank2sim.cards.small_craft import CRAFT_ADDED_MASSES
+from tank2sim.cards.card import SteeredCard
+from tank2sim.cards.craft_terms import CRAFT_ADDED_MASSES
 from tank2sim.dynamics.craft_autopilot import CraftGains, craft_autopilot_model, thrust_limits
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import inertia
@@ -86,13 +86,13 @@ class CraftAutopilotStudy:
 
 
 def study_craft_autopilot(
-    card: CraftCard, model: Model, *, speed_mps: float | None, course_change_rad: float
+    card: SteeredCard, model: Model, *, speed_mps: float | None, course_change_rad: float
 ) -> tuple[CraftAutopilotStudy, Piloted]:
     """Design the autopilot of a craft, and try a change of course and one of speed.
 
     Parameters
     ----------
-    card, model : CraftCard, Model
+    card, model : SteeredCard, Model
     speed_mps : float, optional
         Of the design and of the runs; by default that of the card.
     course_change_rad : float
@@ -147,7 +147,7 @@ def study_craft_autopilot(
     return study, Piloted(model, autopilot, runs)
 
 
-def craft_gains(card: CraftCard, speed_mps: float, faster: float = 1.0) -> CraftGains:
+def craft_gains(card: SteeredCard, speed_mps: float, faster: float = 1.0) -> CraftGains:
     """Gains for a craft at a speed, with `faster` times the frequency of heading.
 
     Yaw, I r' = d r + N with the added inertia in I and d = Nr + Nrabsu u: poles where (s^2 + 2 z w s + w^2)(s + a) = 0,
@@ -186,7 +186,7 @@ def craft_gains(card: CraftCard, speed_mps: float, faster: float = 1.0) -> Craft
     )
 
 
-def _effectiveness(card: CraftCard) -> Array:
+def _effectiveness(card: SteeredCard) -> Array:
     """Surge force and yaw moment by the thrust of each thruster (2, m): 1, and m."""
     for place, thruster in enumerate(card.thrusters):
         if thruster.max_azimuth_rad is not None:
@@ -201,7 +201,7 @@ def _effectiveness(card: CraftCard) -> Array:
     return gives
 
 
-def _largest_moments(card: CraftCard, gives: Array, speed_mps: float) -> tuple[float, float]:
+def _largest_moments(card: SteeredCard, gives: Array, speed_mps: float) -> tuple[float, float]:
     """Largest yaw moments to port (negative) and to starboard, N m, with the surge share of the least squares."""
     bounds = [tuple(map(float, thrust_limits(thruster, speed_mps))) for thruster in card.thrusters]
     if any(high <= 0 for _, high in bounds):
@@ -238,7 +238,7 @@ def _poles(loop: HeadingLoop, state: Array, speed_mps: float) -> tuple[complex, 
     return tuple(complex(pole) for pole in sorted(np.linalg.eigvals(A), key=lambda pole: -pole.real))
 
 
-def _at_limit(card: CraftCard, run: Trajectory) -> float:
+def _at_limit(card: SteeredCard, run: Trajectory) -> float:
     """Share of the time in which the order of a thruster is at one of its limits."""
     at = np.zeros(len(run.t), dtype=bool)
     for thruster in card.thrusters:

@@ -23,7 +23,7 @@ from scipy.optimize import root
 from tank2sim.analysis.linearisation import OperatingPoint, jacobians
 from tank2sim.analysis.stability.straight_line import steering_constants
 from tank2sim.arrays import Array, ComplexNumber, Unbounded
-from tank2sim.cards.card import CraftCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.errors import ArgumentError, InputError
@@ -128,12 +128,12 @@ class CraftStabilityStudy:
     notices: tuple[Notice, ...]
 
 
-def craft_stability(card: CraftCard, speed_mps: float | None = None) -> CraftStabilityStudy:
+def craft_stability(card: SteeredCard, speed_mps: float | None = None) -> CraftStabilityStudy:
     """Stability and turning of a craft, by default at its cruising speed.
 
     Parameters
     ----------
-    card : CraftCard
+    card : SteeredCard
     speed_mps : float, optional
         Surge velocity through the water, positive.
 
@@ -181,7 +181,7 @@ def keeps_nearly_straight(run: CraftAtSpeed, turns: Sequence[SteadyCraftTurn], l
 class _Craft:
     """The accelerations of a craft by its motion and the revolutions of its sides."""
 
-    def __init__(self, card: CraftCard) -> None:
+    def __init__(self, card: SteeredCard) -> None:
         # Twice the bounds, so that the slopes at the largest revolutions are those of the thrust curve.
         free = [
             thruster.model_copy(

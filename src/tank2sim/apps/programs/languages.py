@@ -26,8 +26,8 @@ from tank2sim.apps.programs.robotics import (
     vrx_model,
     vrx_text,
 )
-from tank2sim.cards import Card, CraftCard, ManoeuvringCard
-from tank2sim.cards.card import MmgCard, manoeuvring_card
+from tank2sim.cards import Card, ManoeuvringCard, SteeredBy, SteeredCard
+from tank2sim.cards.card import MmgCard
 from tank2sim.cards.reading import changed_text, craft_in_scaling, parse_card
 from tank2sim.dynamics import build
 from tank2sim.errors import ArgumentError
@@ -42,7 +42,7 @@ class ConvertedText:
     """A card in another language: the text, the card if it is one, the fit and the figures that changed."""
 
     text: str
-    card: ManoeuvringCard | CraftCard | None = None
+    card: SteeredCard | None = None
     fit: PolynomialFit | None = None
     changes: tuple[FigureChange, ...] = ()
 
@@ -67,8 +67,8 @@ def converted(
     InputError
         The card cannot be had in that language.
     """
-    if isinstance(card, CraftCard):
-        return _of_craft(card, to, wanted)
+    if card.steered().steered_by is SteeredBy.THRUSTERS:
+        return _of_craft(card.steered(), to, wanted)
     given = _of_ship(card, to)
     if abs(wanted.origin_m) > given.ship.length_m:
         raise ArgumentError("origin_m", f"{wanted.origin_m:g}", "is more than a length from midships", "give it in m")
@@ -100,10 +100,10 @@ def _of_ship(card: Card, to: str) -> ManoeuvringCard:
     """The card of a ship; raises InputError if it is none, or the language is one of small craft."""
     if to in _OF_CRAFT:
         raise card.fault("model.kind", f"is {card.model.kind}, and {to} is for small_craft", "use mss or pvs")
-    return manoeuvring_card(card)
+    return card.manoeuvring()
 
 
-def _of_craft(card: CraftCard, to: str, wanted: Conventions) -> tuple[ConvertedText, tuple[Notice, ...]]:
+def _of_craft(card: SteeredCard, to: str, wanted: Conventions) -> tuple[ConvertedText, tuple[Notice, ...]]:
     if to not in _OF_CRAFT:
         problem = "is small_craft, whose damping is not a polynomial about a speed"
         raise card.fault("model.kind", problem, f"convert it to {', '.join(_OF_CRAFT)}")

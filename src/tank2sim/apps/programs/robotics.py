@@ -17,8 +17,9 @@ from dataclasses import replace
 from itertools import combinations_with_replacement
 
 from tank2sim.apps.programs.polynomial_fit import FigureChange
-from tank2sim.cards.card import CraftCard
-from tank2sim.cards.small_craft import CRAFT_ADDED_MASSES, VELOCITY_TERMS, cruising_revolutions
+from tank2sim.cards.card import SteeredCard
+from tank2sim.cards.craft_terms import CRAFT_ADDED_MASSES, VELOCITY_TERMS
+from tank2sim.cards.small_craft import cruising_revolutions
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import added_mass_forces
@@ -75,7 +76,7 @@ def coriolis_products(derivatives: Mapping[str, float]) -> dict[str, float]:
     return {name: value for name, value in products.items() if value}
 
 
-def gazebo_text(card: CraftCard) -> str:
+def gazebo_text(card: SteeredCard) -> str:
     """SDF of the plugins of a craft for Gazebo: hydrodynamics, and one thruster each."""
     hull = {gazebo_name(name): value for name, value in card.derivatives.items() if value}
     lines = [
@@ -106,7 +107,7 @@ def gazebo_text(card: CraftCard) -> str:
     return "\n".join(lines) + "\n"
 
 
-def vrx_text(card: CraftCard) -> str:
+def vrx_text(card: SteeredCard) -> str:
     """SDF of VRX's SimpleHydrodynamics for a craft."""
     masses = {VRX_MASSES[name]: -card.derivatives.get(name, 0.0) for name in VRX_MASSES}
     damping = {VRX_TERMS[name]: -card.derivatives.get(name, 0.0) for name in VRX_TERMS}
@@ -120,7 +121,7 @@ def vrx_text(card: CraftCard) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _head(card: CraftCard, where: str) -> list[str]:
+def _head(card: SteeredCard, where: str) -> list[str]:
     """Comments on a craft, and its rigid body."""
     body = card.rigid_body
     # About the centre of gravity, as SDF has it.
@@ -132,7 +133,7 @@ def _head(card: CraftCard, where: str) -> list[str]:
     ]
 
 
-def vrx_model(card: CraftCard) -> Model:
+def vrx_model(card: SteeredCard) -> Model:
     """The model of a craft with what VRX's plugin has of its hull: six terms of damping, no C_A, no effects."""
     kept = {*VRX_TERMS, *VRX_MASSES}
     derivatives = {name: value for name, value in card.derivatives.items() if name in kept}
@@ -144,12 +145,12 @@ def vrx_model(card: CraftCard) -> Model:
     return model
 
 
-def gazebo_model(card: CraftCard) -> Model:
+def gazebo_model(card: SteeredCard) -> Model:
     """The model of a craft with what Gazebo's plugin has of it: the whole hull, without effects."""
     return build(replace(card, effects=()))
 
 
-def craft_changes(card: CraftCard, model: Model) -> tuple[FigureChange, ...]:
+def craft_changes(card: SteeredCard, model: Model) -> tuple[FigureChange, ...]:
     """Figures of a straight run, a turn and a spin of a card, and of another `model` of the same craft."""
     n = cruising_revolutions(card)
     before = build(card)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tank2sim.apps.steering.page import PageShip
     from tank2sim.apps.steering.result import SteeringPageResult
     from tank2sim.apps.steering.scenario import Scenario
-    from tank2sim.cards import CraftCard, ManoeuvringCard
+    from tank2sim.cards import SteeredCard
     from tank2sim.dynamics.model import Model
     from tank2sim.dynamics.vessel import Vessel
 
@@ -68,36 +68,33 @@ def make_steering_page(
     from tank2sim.apps.steering.ghost import ghost_of
     from tank2sim.apps.steering.members import members_of
     from tank2sim.apps.steering.scenario import read_scenario
-    from tank2sim.cards import CraftCard, ManoeuvringCard
+    from tank2sim.cards import SteeredBy
     from tank2sim.identification.trials.problem.prepare_trials import measured
 
-    card, model = ship.card, ship.model
-    if isinstance(card, CraftCard):
+    card, model = ship.steered(), ship.model
+    if card.steered_by is SteeredBy.THRUSTERS:
         if ghost is not None:
             problem = "is a trial with a rudder, and a craft with thrusters has none"
             raise ArgumentError("ghost", "", problem, "leave it out")
         waters = read_scenario(scenario) if scenario else None
         in_page = _page_ship(card, model, _compiled(model, report))
         return _result(in_page, None, model.notices, waters, view_3d)
-    if not isinstance(card, ManoeuvringCard):
-        remedy = "a ship (kind linear, abkowitz or mmg) or a craft (small_craft) can be steered"
-        raise InputError(card.source, "", "has no rudder", remedy)
     if ghost is not None and scenario:
         raise ArgumentError("scenario", "", "does not go with a ghost: both set the start of the ship", "leave one out")
     waters = read_scenario(scenario) if scenario else None
-    trial = None if ghost is None else measured(trials_of(ghost, "ghost"), card)
+    trial = None if ghost is None else measured(trials_of(ghost, "ghost"), ship.manoeuvring())
     shown = ghost_of(trial.trials[0], model) if trial else None
     if shown and shown.by_angle:
         model = page_ship.ship_following_angle(model)
     model, autopilot, no_autopilot = _with_autopilot(model)
     library = _compiled(model, report)
     notices = (*(trial.notices if trial else ()), *(shown.notices if shown else ()), *no_autopilot, *model.notices)
-    members = members_of(card, model)
+    members = members_of(ship.manoeuvring(), model)
     in_page = _page_ship(card, model, library, members=tuple(members), autopilot=autopilot)
     return _result(in_page, shown, notices, waters, view_3d)
 
 
-def _page_ship(card: CraftCard | ManoeuvringCard, model: Model, library: str, **more: Any) -> PageShip:
+def _page_ship(card: SteeredCard, model: Model, library: str, **more: Any) -> PageShip:
     from tank2sim.apps.steering.page import PageShip
 
     known = {"members": (), "autopilot": ""} | more

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.arrays import Array, Number
-from tank2sim.cards.card import CraftCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.examination import doubts
 from tank2sim.identification.craft.fit import (
     PREDICTION_LEAD_S,
@@ -113,8 +113,8 @@ class CraftIdentificationStudy:
 
 
 def study_craft(
-    card: CraftCard,
-    found: CraftCard,
+    card: SteeredCard,
+    found: SteeredCard,
     fit: CraftFit,
     held: Mapping[str, FreePrediction | None],
     responses: Mapping[str, OrderResponse],
@@ -124,7 +124,7 @@ def study_craft(
 
     Parameters
     ----------
-    card, found : CraftCard
+    card, found : SteeredCard
         Given and found.
     fit : CraftFit
     held : mapping
@@ -173,7 +173,7 @@ def study_craft(
     )
 
 
-def _dead_band_notices(card: CraftCard, responses: Mapping[str, OrderResponse], driven_by: str) -> list[Notice]:
+def _dead_band_notices(card: SteeredCard, responses: Mapping[str, OrderResponse], driven_by: str) -> list[Notice]:
     if not responses:
         words = "orders" if driven_by == "orders" else "revolutions"
         other = "revolutions" if driven_by == "orders" else "orders"
@@ -273,13 +273,13 @@ class CraftValidationStudy:
 
 
 def study_predictions(
-    card: CraftCard, files: Sequence[str], predictions: Sequence[FreePrediction], alike: Sequence[Notice]
+    card: SteeredCard, files: Sequence[str], predictions: Sequence[FreePrediction], alike: Sequence[Notice]
 ) -> CraftValidationStudy:
     """Study of predictions of trials by a card.
 
     Parameters
     ----------
-    card : CraftCard
+    card : SteeredCard
     files : sequence of str
         Files of all trials.
     predictions : sequence of FreePrediction
