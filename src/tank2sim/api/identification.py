@@ -142,7 +142,7 @@ def identify(
     """
     given = dict(locals())
     from tank2sim.api.craft_identification import identify_craft
-    from tank2sim.api.trial import craft_trials_of, fitted_and_held
+    from tank2sim.api.trial import fitted_and_held, trials_of
     from tank2sim.cards import SteeredBy
     from tank2sim.identification.trials.identify import identify_trials
     from tank2sim.identification.trials.problem.structures import STRUCTURES
@@ -155,8 +155,8 @@ def identify(
         taken = {"ship", "trials", "holdout", "report"}
         refuse_set(identify, given, "is not for a craft with thrusters", taken=taken)
         to_fit, to_predict = (
-            craft_trials_of(trials, steered.thrusters),
-            craft_trials_of(holdout, steered.thrusters, "holdout"),
+            trials_of(trials, thrusters=steered.thrusters),
+            trials_of(holdout, "holdout", thrusters=steered.thrusters),
         )
         return identify_craft(steered, to_fit, to_predict, progress)
     card = ship.manoeuvring()

@@ -80,5 +80,11 @@ def craft_scale(name: str, scales: Scales) -> float:
 
 
 def body_scales(scales: FileScales) -> dict[str, float]:
-    """SI values of ``mass``, ``yaw_inertia`` and ``x_G`` that are 1 in the prime system."""
+    """Values of ``mass``, ``yaw_inertia`` and ``x_G`` that are 1 in the prime system.
+
+    Parameters
+    ----------
+    scales : Scales, PrimeII or Bis
+        In which the values are; :class:`Scales` give SI.
+    """
     return {"mass": float(scales.mass), "yaw_inertia": float(scales.inertia), "x_G": float(scales.length)}

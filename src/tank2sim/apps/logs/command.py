@@ -119,7 +119,7 @@ def _read(name: str, file: str | Path | pd.DataFrame) -> VesselLog:
 def _identified(craft: Vessel, cuts: Sequence[TrialCut]) -> CraftIdentificationResult | None:
     """Coefficients of a craft from all trials; None without any."""
     from tank2sim.api.craft_identification import identify_craft
-    from tank2sim.api.trial import craft_trials_of
+    from tank2sim.api.trial import trials_of
 
     card = craft.steered()
     turning = any(thruster.max_azimuth_rad is not None for thruster in card.thrusters)
@@ -129,4 +129,4 @@ def _identified(craft: Vessel, cuts: Sequence[TrialCut]) -> CraftIdentificationR
     with tempfile.TemporaryDirectory() as name:
         paths = [Path(name) / cut.trial.path.name for cut in taken]
         write_together({path: cut.text for path, cut in zip(paths, taken, strict=True)})
-        return identify_craft(card, craft_trials_of(paths, card.thrusters), [])
+        return identify_craft(card, trials_of(paths, thrusters=card.thrusters), [])
