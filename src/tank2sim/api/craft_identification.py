@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from tank2sim.analysis.ensemble.draws import by_file_name
 from tank2sim.cards import SteeredCard
 from tank2sim.errors import ArgumentError, InputError
-from tank2sim.identification.craft.card import identified_craft
+from tank2sim.identification.craft.card import estimated_numbers, identified_craft
 from tank2sim.identification.craft.fit import FreePrediction, fit_craft, predict_free
 from tank2sim.identification.craft.order_response import order_responses
 from tank2sim.identification.craft.problem import craft_driven_by, craft_problem
@@ -57,8 +58,11 @@ def identify_craft(
     responses = order_responses(card, fitted)
     names = [run.name for run in runs[len(fitted) :]]
     found = identified_craft(card, fit, responses)
+    estimated = estimated_numbers(card, fit)
+    places = list(estimated.values())
+    covariance = by_file_name(found, list(estimated), fit.estimate.covariance[np.ix_(places, places)])
     held_out: dict[str, FreePrediction | None] = dict.fromkeys(names)
     held_out |= {prediction.run.name: prediction for prediction in predictions}
     study = study_craft(card, found, fit, held_out, responses, driven_by)
     study = replace(study, notices=(*alike, *study.notices))
-    return CraftIdentificationResult(study, found, fit, tuple(predictions))
+    return CraftIdentificationResult(study, replace(found, covariance=covariance), fit, tuple(predictions))

@@ -159,7 +159,9 @@ class ResultWithController(Result[_S]):
         if not self.study.track:
             return []
         study, runs, points = self.study, self.study.track_histories.items(), self.study.waypoints_m
-        sailed: list[TrackData] = [TrackData(label=name, x_m=one["x_m"], y_m=one["y_m"], time_s=one["t_s"]) for name, one in runs]
+        sailed: list[TrackData] = [
+            TrackData(label=name, x_m=one["x_m"], y_m=one["y_m"], time_s=one["t_s"]) for name, one in runs
+        ]
         wanted: list[TrackData] = [
             TrackData(label=label, x_m=points[:, 0], y_m=points[:, 1], time_s=np.zeros(len(points)), measured=measured)
             for label, measured in (("legs", False), ("waypoints", True))

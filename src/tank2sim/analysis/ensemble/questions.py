@@ -34,7 +34,7 @@ from tank2sim.simulation.lane_figures import USUAL_PACE, LaneManoeuvre, LaneMano
 from tank2sim.simulation.manoeuvres import Manoeuvre, Stop, Turn, Zigzag
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.running import RUNAWAY
-from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn
+from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, StraightRun
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.units import from_si
 
@@ -78,6 +78,7 @@ _READ_OFF: Mapping[type, tuple[str, ...]] = {
     DifferenceTurn: ("motion.beta",),
     Zigzag: ("motion.rdot",),
     Stop: ("motion.udot",),
+    StraightRun: ("motion.udot",),
 }
 
 

@@ -49,23 +49,17 @@ def identified_craft(
         value, error = response.dead_band
         changes[f"{place}.{key}"] = float(value * unit)
         changes[f"{place}.uncertainty.{key}"] = float(error * unit)
-    shared = twins(card)
-    estimates = zip(fit.problem.free, fit.estimate.values, fit.estimate.standard_errors, strict=True)
-    for name, value, error in estimates:
-        first, *rest = name.split(".")
-        if first == "derivatives":
+    values, errors = fit.estimate.values.tolist(), fit.estimate.standard_errors.tolist()
+    for name, at in estimated_numbers(card, fit).items():
+        section, *rest = name.split(".")
+        if section == "derivatives":
             factor = card.file_factor(rest[0])
-            names = ["Yrdot", "Nvdot"] if rest[0] == "Yrdot" and "derivatives.Nvdot" not in fit.problem.free else rest
-            for term in names:
-                changes[f"derivatives.{term}"] = float(value * factor)
-                changes[f"uncertainty.{term}"] = float(error * abs(factor))
+            changes[name] = values[at] * factor
+            changes[f"uncertainty.{rest[0]}"] = errors[at] * abs(factor)
             continue
-        for number, thruster in enumerate(card.thrusters):
-            twin = thruster.name in shared and rest[0] == card.thrusters[0].name
-            if thruster.name == rest[0] or twin:
-                key = _KEYS[rest[1]]
-                changes[f"thrusters.{number}.{key}"] = max(0.0, float(value))
-                changes[f"thrusters.{number}.uncertainty.{key}"] = float(error)
+        number = [thruster.name for thruster in card.thrusters].index(rest[0])
+        changes[f"thrusters.{number}.{_KEYS[rest[1]]}"] = max(0.0, values[at])
+        changes[f"thrusters.{number}.uncertainty.{_KEYS[rest[1]]}"] = errors[at]
     try:
         return parse_card(changed_text(card.text, card.source, changes, comment="identified"), card.source).steered()
     except InputError as error:
@@ -74,3 +68,23 @@ def identified_craft(
             "check the mass, the inertia, and places and largest revolutions of the thrusters: they are taken as exact"
         )
         raise InputError(card.source, error.place, problem, remedy) from error
+
+
+def estimated_numbers(card: SteeredCard, fit: CraftFit) -> dict[str, int]:
+    """Parameter of the model to the place of its estimate; twins of an estimated number have its place.
+
+    Parameters
+    ----------
+    card : SteeredCard
+        The card of the problem.
+    fit : CraftFit
+    """
+    found, free = {}, fit.problem.free
+    for place, name in enumerate(free):
+        found[name] = place
+        if name == "derivatives.Yrdot" and "derivatives.Nvdot" not in free:
+            found["derivatives.Nvdot"] = place
+        if name.startswith(f"thrusters.{card.thrusters[0].name}."):
+            key = name.rpartition(".")[2]
+            found |= {f"thrusters.{other}.{key}": place for other in twins(card)}
+    return found
