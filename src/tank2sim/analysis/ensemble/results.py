@@ -290,6 +290,33 @@ def stability_bands(
     )
 
 
+def growth_bands(
+    card: SteeredCard, question: Question, request: EnsembleRequest, executor: Executor | None = None
+) -> StabilityBands:
+    """Bands of the figures of a `question`, and the probability that its ``growth_per_s`` (1/s) is negative.
+
+    Parameters
+    ----------
+    card : SteeredCard
+    question : Question
+        Each usable member shows ``growth_per_s``, the real part of the least damped mode.
+    request : EnsembleRequest
+    executor : Executor, optional
+    """
+    draws, messages = draws_of(card, request.seed)
+    found = _ensemble(card, question, draws, request.members, executor)
+    stable, between = _share(int(np.sum(found.figures["growth_per_s"] < 0)), found.usable)
+    return StabilityBands(
+        **_members(card, draws, found, messages),
+        figures=figure_bands(found),
+        probability_stable=stable,
+        probability_stable_interval_95=between,
+        imo=(),
+        imo_all=None,
+        curves=None,
+    )
+
+
 def named_bands(
     card: SteeredCard, figures: Sequence[str], request: EnsembleRequest, executor: Executor | None = None
 ) -> FigureBands:
