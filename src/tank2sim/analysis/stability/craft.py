@@ -296,14 +296,28 @@ class CraftMotions:
         return other
 
     def point(self, motion: Array, mean: float, difference: float) -> OperatingPoint:
-        """Motion (3,) and revolutions (rad/s): their mean, and port less starboard."""
+        """The craft in a motion with revolutions.
+
+        Parameters
+        ----------
+        motion : array (3,)
+            u, v (m/s) and r (rad/s).
+        mean, difference : float
+            Mean revolutions, and port less starboard, rad/s.
+        """
         x, inputs = self._begin.copy(), self._calm.copy()
         x[self._moved] = motion
         inputs[self._ordered] = [mean + side * difference / 2 for side in self.sides.values()]
         return OperatingPoint(x, inputs, self.p)
 
     def rates(self, motion: Array, mean: float, difference: float) -> Array:
-        """du/dt, dv/dt, dr/dt (3,)."""
+        """du/dt, dv/dt, dr/dt (3,).
+
+        Parameters
+        ----------
+        motion, mean, difference
+            As of :meth:`point`.
+        """
         point = self.point(motion, mean, difference)
         return np.array(self._rates(point.x, point.u, point.p)).ravel()
 
@@ -313,7 +327,13 @@ class CraftMotions:
         return np.array(by_motion), np.array(by_revolutions)
 
     def highest_speed(self, about: float) -> float:
-        """Speed (m/s) that the largest revolutions hold on a straight course."""
+        """Speed (m/s) that the largest revolutions hold on a straight course.
+
+        Parameters
+        ----------
+        about : float
+            A speed from which it is sought, m/s.
+        """
         ahead = self._solved(
             lambda z: self.rates(np.array([z[0], z[1], 0.0]), self.high, z[2]), np.array([about, 0.0, 0.0])
         )
