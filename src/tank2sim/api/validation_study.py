@@ -51,8 +51,8 @@ def validate_ship(
         As of :func:`.validate`.
     """
     ready = ship_of(card)
-    study = _documented(ready, members)
     more = _of_craft(card, records) if card.thrusters else _of_ship(ready, records, members, required_percent)
+    study = _documented(ready, members)
     notices = (*ready.model.notices, *more.pop("notices"), *study.notices)
     return replace(study, notices=notices, **more), card, tuple(trial.path for trial in records)
 

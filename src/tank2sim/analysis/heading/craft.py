@@ -15,12 +15,11 @@ from tank2sim.analysis.heading.disturbances import (
     wave_yaw_acceleration,
     weather_for,
 )
-from tank2sim.analysis.heading.piloted import AutopilotExport, Piloted
+from tank2sim.analysis.heading.piloted import Piloted, PilotStudy
 from tank2sim.analysis.heading.runs import CraftKeeping, HeadingLoop, StepFigures, step_figures
 from tank2sim.analysis.heading.study import StudySettings, keep_tracks, not_held, unfinished
-from tank2sim.analysis.heading.track_keeping import TrackKeeping
 from tank2sim.analysis.linearisation import OperatingPoint, jacobians
-from tank2sim.arrays import Array, Columns, ComplexNumber
+from tank2sim.arrays import Array, ComplexNumber
 from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.craft_terms import CRAFT_ADDED_MASSES
 from tank2sim.dynamics.autopilot_loop import YAW_DISTURBANCE
@@ -28,7 +27,6 @@ from tank2sim.dynamics.craft_autopilot import CraftGains, craft_autopilot_model,
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import inertia
 from tank2sim.errors import InputError
-from tank2sim.notices import Notice
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.simulation.trial_file import histories
 
@@ -57,17 +55,16 @@ RUN_LENGTHS = 30.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class CraftAutopilotStudy:
-    """The autopilot of a craft, and its runs.
+class CraftAutopilotStudy(PilotStudy):
+    """The autopilot of a craft, and its runs ``course``, ``speed`` and ``keeping``.
+
+    Gains are the yaw moment (N m) by heading error and yaw rate, the surge force (N) by speed error, with their
+    integrals.
 
     Parameters
     ----------
-    ship, source : str
-        Name of the craft, and how the autopilot was found, in a sentence.
     speed_mps : float
         Speed of the design.
-    gains : dict
-        Yaw moment (N m) by heading error and yaw rate, surge force (N) by speed error, with their integrals.
     largest_moment_Nm : tuple of two floats
         Largest yaw moment to port (negative) and to starboard.
     poles : tuple of complex
@@ -78,36 +75,15 @@ class CraftAutopilotStudy:
         In current, wind and waves.
     at_limit_percent : dict
         Share of the time of each run in which an order is at a limit of a thruster.
-    weather : dict
-        Fields of :class:`.Weather`, angles in degrees.
-    track : dict
-        Figures of the track by guidance (``line of sight``, ``with integral``); empty without waypoints.
-    waypoints_m : array (n, 2)
-        North and east; empty without a track.
-    histories, track_histories : dict
-        Columns of the runs ``course``, ``speed`` and ``keeping``, and by guidance, to draw.
-    notices : tuple of Notice
-    export : AutopilotExport, optional
-        The autopilot as an FMU, if one was made.
     """
 
-    ship: str
-    source: str
     speed_mps: float
-    gains: dict[str, float]
     largest_moment_Nm: tuple[float, float]
     poles: tuple[ComplexNumber, ...]
     course_change: StepFigures
     speed_change: StepFigures
     course_keeping: CraftKeeping
     at_limit_percent: dict[str, float]
-    weather: dict[str, float]
-    track: dict[str, TrackKeeping]
-    waypoints_m: Array
-    histories: dict[str, Columns]
-    track_histories: dict[str, Columns]
-    notices: tuple[Notice, ...] = ()
-    export: AutopilotExport | None = None
 
 
 def study_craft_autopilot(

@@ -26,7 +26,7 @@ from tank2sim.analysis.heading.margins import (
     loop_margins,
     loop_response,
 )
-from tank2sim.analysis.heading.piloted import AutopilotExport, Piloted
+from tank2sim.analysis.heading.piloted import Piloted, PilotStudy
 from tank2sim.analysis.heading.runs import (
     CourseChange,
     CourseKeeping,
@@ -36,7 +36,7 @@ from tank2sim.analysis.heading.runs import (
     course_keeping,
     without_anti_windup,
 )
-from tank2sim.analysis.heading.track_keeping import Guidance, TrackKeeping, TrackRun, keep_track
+from tank2sim.analysis.heading.track_keeping import Guidance, TrackRun, keep_track
 from tank2sim.arrays import Array, Columns
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.autopilot_loop import YAW_DISTURBANCE
@@ -139,15 +139,13 @@ class ClosedLoop:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class AutopilotStudy:
-    """A heading controller, its margins and its runs.
+class AutopilotStudy(PilotStudy):
+    """A heading controller, its margins and its runs; gains in rad of rudder for rad of heading, and s.
 
     Parameters
     ----------
-    ship, design, source : str
-        Name of the ship, way of design, and how the controller was found, in a sentence.
-    gains : dict
-        Figures of the controller by name with their unit: rad of rudder for rad of heading, and s.
+    design : str
+        Way of design.
     limits : dict
         ``largest_rudder_deg``, and with an integral ``anti_windup_time_s`` and ``integral_band_deg`` (for designs with
         their own states ``integral_limit_radps``, the band times its gain).
@@ -157,35 +155,14 @@ class AutopilotStudy:
     responses : tuple of LoopResponse
         At the speed of the design, and at the slowest and the fastest of `margins`.
     closed_loop : ClosedLoop
-    weather : dict
-        Fields of :class:`Weather`, angles in degrees.
-    track : dict
-        Figures of the track by guidance (``line of sight``, ``with integral``); empty without waypoints.
-    waypoints_m : array (n, 2)
-        North and east; empty without a track.
-    histories, track_histories : dict
-        Columns to draw by run, and by guidance.
-    notices : tuple of Notice
-    export : AutopilotExport, optional
-        The controller as an FMU, if one was made.
     """
 
-    ship: str
     design: str
-    source: str
-    gains: dict[str, float]
     limits: dict[str, float]
     ship_alone: ShipAlone
     margins: tuple[LoopMargins, ...]
     responses: tuple[LoopResponse, ...]
     closed_loop: ClosedLoop
-    weather: dict[str, float]
-    track: dict[str, TrackKeeping]
-    waypoints_m: Array
-    histories: dict[str, Columns]
-    track_histories: dict[str, Columns]
-    notices: tuple[Notice, ...]
-    export: AutopilotExport | None = None
 
 
 def _limits(autopilot: Model) -> dict[str, float]:

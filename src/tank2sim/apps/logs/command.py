@@ -118,7 +118,7 @@ def _read(name: str, file: str | Path | pd.DataFrame) -> VesselLog:
 
 def _identified(craft: Vessel, cuts: Sequence[TrialCut]) -> CraftIdentificationResult | None:
     """Coefficients of a craft from all trials; None without any."""
-    from tank2sim.api.craft_identification import identify_craft
+    from tank2sim.api.identification import identify_craft
     from tank2sim.api.trial import trials_of
 
     card = craft.steered()
