@@ -5,13 +5,13 @@ from __future__ import annotations
 import pickle
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import cast
 
-from tank2sim.cards.card import Card, ManoeuvringCard, SteeredBy, SteeredCard
+from tank2sim.cards.card import Card, SteeredBy, SteeredCard
 from tank2sim.cards.examination import doubts
 from tank2sim.cards.form import EffectEntry
 from tank2sim.cards.kinds import CARD_KINDS
 from tank2sim.dynamics.effects import EFFECTS, Effect
+from tank2sim.dynamics.effects.effect import card_for_effects
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.ship import ship_model
 from tank2sim.dynamics.simulator_interface import force_shares
@@ -94,7 +94,7 @@ def _check_effect(card: SteeredCard, entry: EffectEntry, place: str) -> None:
     if card.steered_by is SteeredBy.THRUSTERS and not effect.fits_craft:
         fitting = ", ".join(name for name, other in EFFECTS.items() if other.fits_craft)
         raise card.fault(f"{place}.name", f"{entry.name} is not for a small craft", f"it can have {fitting}")
-    shared = _as_ship(card)
+    shared = card_for_effects(card)
     known = {parameter.name: parameter for parameter in effect.parameters}
     for section, given in (("parameters", entry.parameters), ("uncertainty", entry.uncertainty)):
         for name in given:
@@ -113,14 +113,9 @@ def _check_effect(card: SteeredCard, entry: EffectEntry, place: str) -> None:
             raise card.fault(key, f"is {shown:g}", f"{lowest:g} to {highest:g} was expected")
 
 
-def _as_ship(card: SteeredCard) -> ManoeuvringCard:
-    """The card as effects take it: what fits a craft reads nothing else of a card than what both kinds have."""
-    return cast(ManoeuvringCard, card)
-
-
 def _with_effect(model: Model, card: SteeredCard, entry: EffectEntry) -> Model:
     effect = EFFECTS[entry.name]
-    changed = effect.apply(model, entry.parameters, _as_ship(card))
+    changed = effect.apply(model, entry.parameters, card_for_effects(card))
     # One that changes derivatives has no force of its own.
     if effect.acts_on != "force" or effect.reads_derivatives or effect.changes:
         return changed

@@ -10,15 +10,15 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, ManoeuvringCard, MmgCard, SteeredCard
+from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, MmgCard, SteeredCard
 from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.effects.effect import card_for_effects
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.small_craft import THRUSTER_PARAMETERS
 from tank2sim.errors import ArgumentError
@@ -195,8 +195,7 @@ def _thrusters(card: SteeredCard) -> list[CardParameter]:
 def _effects(card: SteeredCard, model: Model) -> list[CardParameter]:
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
     found = []
-    # What fits a craft reads nothing else of a card than what both kinds have.
-    shared = cast(ManoeuvringCard, card)
+    shared = card_for_effects(card)
     for number, entry in enumerate(card.effects):
         effect = EFFECTS[entry.name]
         if effect.acts_on == "sensor":

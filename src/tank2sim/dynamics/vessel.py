@@ -53,16 +53,17 @@ class Vessel:
 
     @property
     def derivatives(self) -> pd.DataFrame:
-        """Hydrodynamic derivatives: prime value and standard error by name, rudder positive to starboard.
+        """Hydrodynamic derivatives: value and standard error by name; prime with the rudder positive to starboard, of a
+        craft with thrusters SI.
 
         Raises
         ------
         InputError
-            The card is not one of a ship that manoeuvres.
+            The card is not one of a ship or craft that manoeuvres.
         """
         import pandas as pd
 
-        card = self.manoeuvring()
+        card = self.steered()
         rows = [(name, value, card.standard_error(name)) for name, value in card.derivatives.items()]
         return pd.DataFrame(rows, columns=["name", "value", "standard_error"]).set_index("name")
 

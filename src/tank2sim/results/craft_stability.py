@@ -5,31 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
 
 from tank2sim.analysis.stability.craft import STRAIGHT_FROM_LENGTHS, CraftStabilityStudy
 from tank2sim.answer.parts import Cell, KeyFigure, Section, Verdict, records_table, table
-from tank2sim.answer.result import Result
-from tank2sim.notices import Notice
-from tank2sim.results.ensembles import chance_sentences, figures_section, members_frame
-
-if TYPE_CHECKING:
-    import pandas as pd
+from tank2sim.results.ensembles import chance_sentences, figures_section
+from tank2sim.results.stability import ResultOnCourse
 
 _DEGPS_PER_100_RPM = 600.0
 """Yaw rate in deg/s for a difference of 100 rpm, over the same in rad/s by rad/s."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CraftStabilityResult(Result[CraftStabilityStudy]):
+class CraftStabilityResult(ResultOnCourse[CraftStabilityStudy]):
     """Straight-line stability, surge and turning of a craft with thrusters at both sides.
 
-    Parameters
-    ----------
-    study : CraftStabilityStudy
-    ship : Ship, optional
-        The craft (:class:`tank2sim.Ship`); None if the result was read from its JSON.
+    Parameters are those of :class:`ResultOnCourse`, with the study :class:`.CraftStabilityStudy`.
 
     Examples
     --------
@@ -37,15 +27,6 @@ class CraftStabilityResult(Result[CraftStabilityStudy]):
     >>> t2s.load("otter").stability().stable
     True
     """
-
-    study: CraftStabilityStudy
-    ship: Any = None
-    command: ClassVar[str] = "stability"
-
-    @property
-    def title(self) -> str:
-        """The craft."""
-        return self.study.ship
 
     @property
     def subtitle(self) -> str:
@@ -83,24 +64,6 @@ class CraftStabilityResult(Result[CraftStabilityStudy]):
                 f"{last.difference_rpm:.4g} rpm of difference."
             )
         return (*lines, *(chance_sentences(study.ensemble) if study.ensemble else []))
-
-    @property
-    def notices(self) -> tuple[Notice, ...]:
-        """Those of the study, and of its ensemble."""
-        members = self.study.ensemble.notices if self.study.ensemble else ()
-        return tuple(dict.fromkeys([*self.study.notices, *members]))
-
-    @cached_property
-    def members(self) -> pd.DataFrame:
-        """The craft of the ensemble, one row each: the numbers drawn, by the dotted keys of the card; the growth of the
-        least damped mode (1/s), surge, highest speed and fastest turn; and whether the craft is ``usable``.
-
-        Raises
-        ------
-        InputError
-            The result has no ensemble, or was read from its JSON, which has only the bands.
-        """
-        return members_frame(self.study.ensemble)
 
     def _left_alone(self) -> str:
         """Motion of an unstable craft without a difference of revolutions."""
