@@ -243,7 +243,7 @@ def find_influence(
 
 
 def default_figures(card: SteeredCard) -> list[InfluenceFigure]:
-    """Figures where none is given: those of a ship, or the top speed, turn and spin of a craft's standard trials.
+    """Figures where none is given: of a ship usual ones, of a craft its top speed, turn and spin in standard trials.
 
     Parameters
     ----------

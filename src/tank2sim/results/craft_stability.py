@@ -19,7 +19,7 @@ _DEGPS_PER_100_RPM = 600.0
 class CraftStabilityResult(ResultOnCourse[CraftStabilityStudy]):
     """Straight-line stability, surge and turning of a craft with thrusters at both sides.
 
-    Parameters are those of :class:`ResultOnCourse`, with the study :class:`.CraftStabilityStudy`.
+    Parameters as of :class:`ResultOnCourse`, with the study :class:`.CraftStabilityStudy`.
 
     Examples
     --------

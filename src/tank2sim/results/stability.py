@@ -88,7 +88,7 @@ class ResultOnCourse(Result[_S]):
 
     @property
     def notices(self) -> tuple[Notice, ...]:
-        """Those of the study, and of its ensemble."""
+        """Notices of the study and of its ensemble."""
         drawn: tuple[Notice, ...] = self.study.ensemble.notices if self.study.ensemble else ()
         return tuple(dict.fromkeys([*self.study.notices, *drawn]))
 
@@ -112,7 +112,7 @@ class ResultOnCourse(Result[_S]):
 class StabilityResult(ResultOnCourse[StabilityStudy]):
     """Stability, steady turning and IMO criteria of a ship.
 
-    Parameters are those of :class:`ResultOnCourse`, with the study :class:`.StabilityStudy`.
+    Parameters as of :class:`ResultOnCourse`, with the study :class:`.StabilityStudy`.
 
     Examples
     --------

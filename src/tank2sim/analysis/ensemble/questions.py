@@ -53,7 +53,7 @@ ENSEMBLE_SIGNALS: Mapping[str, tuple[str, float]] = {
 
 
 def signals_with_bands(model: Model) -> Mapping[str, tuple[str, float]]:
-    """Those of :data:`ENSEMBLE_SIGNALS` that the model has, ``phi_deg`` if it heels, and ``n_<name>_rpm`` of thrusters.
+    """The :data:`ENSEMBLE_SIGNALS` of a model, ``phi_deg`` if it heels, and ``n_<name>_rpm`` of its thrusters.
 
     Parameters
     ----------

@@ -95,7 +95,7 @@ def study_craft_autopilot(
     ----------
     card, model : SteeredCard, Model
     settings : StudySettings
-        Way of design, weights and wave filter are those of a rudder, and are not used.
+        Way of design, weights and wave filter belong to a rudder, and are not used.
 
     Raises
     ------
