@@ -34,14 +34,13 @@ def ship(truth) -> t2s.Ship:
 @pytest.mark.slow
 def test_the_true_card_predicts_and_one_of_half_the_thrust_does_not(truth, ship, tmp_path) -> None:
     paths = written(tmp_path, truth, ["zigzag"])
-    right = t2s.validate(ship, paths)
+    right = t2s.validate(ship, paths, members=0).study.predictions
     assert min(right.determination.values()) > 0.97
-    content = right.to_dict()
     # 1 cm and 0.1 deg of noise, in the state from which the prediction begins, too
-    assert content["end_distance_m"] < 1.0 and content["end_heading_deg"] < 3.0
+    assert right.end_distance_m < 1.0 and right.end_heading_deg < 3.0
     half = {f"thrusters.{number}.ahead_Ns2": 0.5 * truth["ahead"] for number in (0, 1)}
-    wrong = t2s.validate(ship.replace(half), paths)
-    assert wrong.to_dict()["end_distance_m"] > 3 * content["end_distance_m"]
+    wrong = t2s.validate(ship.replace(half), paths, members=0).study.predictions
+    assert wrong.end_distance_m > 3 * right.end_distance_m
     assert wrong.determination["u"] < right.determination["u"] - 0.1
 
 
@@ -51,6 +50,11 @@ def test_a_trial_that_is_too_short_is_said(truth, ship, tmp_path) -> None:
         t2s.validate(ship, written(tmp_path, truth, ["straight"]))
 
 
-def test_without_trials_nothing_is_validated(ship) -> None:
-    with pytest.raises(InputError, match="there are none"):
-        t2s.validate(ship)
+def test_without_trials_the_model_is_documented_and_verified(ship) -> None:
+    result = t2s.validate(ship, members=0)
+    assert result.study.predictions is None and "not validated" in result.headline[0]
+    assert "Fossen" in result.study.documentation["Mathematical model"]
+    figures = {row.name: row for row in result.study.verification}
+    assert 0 < figures["final_speed_mps"].U_num < 1e-3 * figures["final_speed_mps"].value
+    coefficients = next(table.df for table in result.tables if table.caption == "SI").set_index("coefficient")
+    assert coefficients.loc["Xu", "value"] == pytest.approx(ship.card.derivatives["Xu"], rel=1e-3)

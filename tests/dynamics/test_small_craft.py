@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+import tank2sim as t2s
 from tank2sim.cards import CraftCard, parse_card, read_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
@@ -348,3 +349,9 @@ def test_a_craft_without_thrust_only_loses_energy() -> None:
 def test_the_otter_is_a_craft_of_the_card_format() -> None:
     assert isinstance(OTTER, CraftCard)
     assert [thruster.name for thruster in OTTER.thrusters] == ["port", "starboard"]
+
+
+def test_the_derivatives_of_a_craft_are_a_table_in_si() -> None:
+    otter = t2s.load("otter").replace({"uncertainty.Nr": 2.5})
+    assert otter.derivatives.loc["Xu", "value"] == pytest.approx(-77.5544)
+    assert otter.derivatives.loc["Nr", "standard_error"] == 2.5

@@ -53,6 +53,18 @@ def test_the_card_written_is_a_craft_with_the_estimates_and_their_errors(found) 
 
 
 @pytest.mark.slow
+def test_members_of_the_card_found_have_the_speeds_that_the_trials_have(found, tmp_path) -> None:
+    """Trials show the speed better than thrust or drag: the covariance next to the card knows that they go together."""
+    found.card.save(tmp_path / "found.toml")
+    (tmp_path / "alone.toml").write_text(found.card.text, encoding="utf-8")
+    spread = {}
+    for name in ("found", "alone"):
+        run = t2s.load(tmp_path / f"{name}.toml").simulate("straight:500", members=40)
+        spread[name] = run.study.ensemble.figures["final_speed_mps"].standard_deviation
+    assert spread["found"] < 0.5 * spread["alone"]
+
+
+@pytest.mark.slow
 def test_orders_alone_give_thrust_curve_damping_and_lag(craft, tmp_path) -> None:
     paths = written(tmp_path, craft, ["straight", "spin", "astern", "steps", "zigzag"], ordered=True)
     text = craft_log.first_card(craft, np.random.default_rng(5)).card.text

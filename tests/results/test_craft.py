@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from tank2sim.cards import SteeredBy
 from tank2sim.identification.craft.fit import CoefficientVerdict
 from tank2sim.identification.craft.next_trial import CandidateTrial
 from tank2sim.identification.craft.study import (
     CraftCoefficient,
     CraftIdentificationStudy,
-    CraftReplay,
-    CraftValidationStudy,
+    PredictionStudy,
     ThrusterResponse,
+    TrialPrediction,
 )
 from tank2sim.notices import Notice
 from tank2sim.results.craft_identification import CraftIdentificationResult
-from tank2sim.results.craft_validation import CraftValidationResult
+from tank2sim.results.validation import ValidationResult, ValidationStudy
 
 IDENTIFIED = CraftIdentificationStudy(
     ship="A craft",
@@ -55,13 +56,12 @@ IDENTIFIED = CraftIdentificationStudy(
     notices=(Notice("a notice"),),
 )
 
-VALIDATED = CraftValidationStudy(
-    ship="A craft",
+PREDICTED = PredictionStudy(
     determination={"u": 0.98, "v": 0.9, "r": 0.95},
     end_distance_m=1.5,
     end_heading_deg=None,
     trials={
-        "zigzag": CraftReplay(
+        "zigzag": TrialPrediction(
             predictions=12,
             rms_u_mps=0.05,
             rms_v_mps=0.02,
@@ -70,7 +70,23 @@ VALIDATED = CraftValidationStudy(
             end_heading_deg=None,
         )
     },
+)
+VALIDATED = ValidationStudy(
+    ship="A craft",
+    source="made up",
+    documentation={"Ship": "length 2 m"},
+    coefficients={},
+    steered_by=SteeredBy.THRUSTERS,
+    propulsion=True,
+    verdict="12 free-running predictions",
+    counts={},
+    figures=(),
+    members=0,
+    verification=(),
+    imo=(),
+    replays=(),
     notices=(),
+    predictions=PREDICTED,
 )
 
 
@@ -84,13 +100,13 @@ def test_coefficients_have_their_verdicts_and_the_next_trial_is_named() -> None:
 
 
 def test_predictions_of_each_trial_are_a_table() -> None:
-    result = CraftValidationResult(VALIDATED)
-    (predictions,) = (table.df for table in result.tables)
+    result = ValidationResult(VALIDATED)
+    predictions = result.tables[0].df
     assert predictions["position (m)"].to_list() == [1.5] and predictions["predictions"].to_list() == [12]
     assert "12 free-running predictions" in result.headline[0] and result.headline[1].endswith("1.5 m.")
 
 
 def test_results_read_from_their_json_have_the_same_pages() -> None:
-    for result in (CraftIdentificationResult(IDENTIFIED), CraftValidationResult(VALIDATED)):
+    for result in (CraftIdentificationResult(IDENTIFIED), ValidationResult(VALIDATED)):
         again = type(result).read(result.to_dict(), "c.json")
         assert again.page() == result.page() and again.to_dict() == result.to_dict()

@@ -12,6 +12,7 @@ from tank2sim.analysis.validation.documentation import model_documentation
 from tank2sim.analysis.validation.study import TURN_FIGURES, ZIGZAG_FIGURES, Validated, Validation, Verified
 from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.answer.parts import Verdict
+from tank2sim.cards import SteeredBy
 from tank2sim.notices import Notice
 from tank2sim.results.validation import CardValue, TrialReplay, ValidationResult, ValidationStudy
 from tests.answer.browser import measured_in_browser
@@ -35,6 +36,7 @@ def validation(figures: tuple[Validated, ...] = FIGURES, **changes: object) -> V
         source="a paper",
         documentation={},
         coefficients={"Yv": CardValue(value=-0.01, standard_error=0.001, stated=True)},
+        steered_by=SteeredBy.RUDDER,
         propulsion=True,
         verdict=found.verdict,
         counts=found.counts,

@@ -77,12 +77,12 @@ def autopilot(
 ) -> AutopilotResult | CraftAutopilotResult:
     """Design a heading controller for a ship, judge its loop and try it.
 
-    For a craft with thrusters it is a controller of heading and speed.
+    A craft with thrusters gets a controller of heading and speed, without choice of `design`, weights and wave filter.
 
     Parameters
     ----------
     ship : Vessel
-        A ship with a rudder, or a craft with thrusters. A craft takes the speed and the change of course alone.
+        A ship with a rudder, or a craft with fixed thrusters.
     design : str
         Way of design.
     speed_mps : float, optional
@@ -111,22 +111,19 @@ def autopilot(
     InputError
         The ship has neither rudder nor fixed thrusters, a value is out of bounds, or no controller holds the ship.
     """
+    from tank2sim.analysis.heading.craft import study_craft_autopilot
     from tank2sim.analysis.heading.designs import LqrWeights
     from tank2sim.analysis.heading.study import StudySettings, study_autopilot
     from tank2sim.analysis.heading.track_keeping import waypoints_of
-    from tank2sim.cards import CraftCard, ManoeuvringCard
-    from tank2sim.results.autopilot import AutopilotResult
+    from tank2sim.cards import SteeredBy
+    from tank2sim.results.autopilot import AutopilotResult, CraftAutopilotResult
 
     if course_change_deg == 0:
         raise ArgumentError("course_change_deg", "", "is 0", "give the angle to turn by")
-    if isinstance(ship.card, CraftCard):
-        rest: dict[str, Any] = {"heading_weight_deg": heading_weight_deg, "rudder_weight_deg": rudder_weight_deg}
-        rest |= {"wave_filter_radps": wave_filter_radps, "current_mps": current_mps, "wind_mps": wind_mps}
-        rest |= {"wave_yaw_deg": wave_yaw_deg, "seed": seed, "track": track, "design": design}
-        return _pilot_craft(ship, speed_mps, course_change_deg, rest)
-    if not isinstance(ship.card, ManoeuvringCard):
-        remedy = "an autopilot needs a ship with a rudder, or a craft with thrusters"
-        raise InputError(ship.card.source, "model.kind", "has no rudder", remedy)
+    card = ship.steered()
+    if card.steered_by is SteeredBy.THRUSTERS:
+        rudders = {"heading_weight_deg": heading_weight_deg, "rudder_weight_deg": rudder_weight_deg}
+        _refuse_rudder(rudders | {"wave_filter_radps": wave_filter_radps, "design": design})
     weights = LqrWeights(heading_rad=math.radians(heading_weight_deg), rudder_rad=math.radians(rudder_weight_deg))
     settings = StudySettings(
         kind=design,
@@ -143,7 +140,10 @@ def autopilot(
         waypoints=None if track is None else waypoints_of(track),
     )
     try:
-        study, piloted = study_autopilot(ship.card, ship.model, settings)
+        if card.steered_by is SteeredBy.THRUSTERS:
+            craft, piloted = study_craft_autopilot(card, ship.model, settings)
+            return CraftAutopilotResult(replace(craft, notices=(*craft.notices, *_no_compiler())), piloted)
+        study, piloted = study_autopilot(card.manoeuvring(), ship.model, settings)
     except ArgumentError as fault:
         if fault.source != "track" or not isinstance(track, str | Path):
             raise
@@ -151,21 +151,12 @@ def autopilot(
     return AutopilotResult(replace(study, notices=(*study.notices, *_no_compiler())), piloted)
 
 
-def _pilot_craft(
-    ship: Vessel, speed_mps: float | None, course_change_deg: float, rest: dict[str, Any]
-) -> CraftAutopilotResult:
-    """The autopilot of a craft; `rest` are the arguments that only a ship takes."""
-    from tank2sim.analysis.heading.craft import study_craft_autopilot
-    from tank2sim.cards import CraftCard
-    from tank2sim.results.autopilot import CraftAutopilotResult
-
-    usual = {"heading_weight_deg": 5.0, "rudder_weight_deg": 5.0, "design": "pid"}
-    if given := next((name for name, value in rest.items() if value is not None and value != usual.get(name)), ""):
-        raise ArgumentError(given, "", "is not for a craft with thrusters", "leave it out")
-    assert isinstance(ship.card, CraftCard)
-    change = math.radians(course_change_deg)
-    study, piloted = study_craft_autopilot(ship.card, ship.model, speed_mps=speed_mps, course_change_rad=change)
-    return CraftAutopilotResult(replace(study, notices=_no_compiler()), piloted)
+def _refuse_rudder(given: dict[str, Any]) -> None:
+    """Refuse arguments of a rudder's controller that are not at their defaults."""
+    usual = {"heading_weight_deg": 5.0, "rudder_weight_deg": 5.0, "design": "pid", "wave_filter_radps": None}
+    if name := next((name for name, value in given.items() if value != usual[name]), ""):
+        remedy = "leave it out: the controller of a craft with thrusters has one design"
+        raise ArgumentError(name, "", "is of a rudder", remedy)
 
 
 def _no_compiler() -> tuple[Notice, ...]:

@@ -32,12 +32,13 @@ if TYPE_CHECKING:
 
     from tank2sim.api.trial import TrialRecord
     from tank2sim.arrays import Array
-    from tank2sim.cards import Card
+    from tank2sim.cards import Card, SteeredCard
     from tank2sim.dynamics.vessel import Vessel
     from tank2sim.identification.trials.identify import Identification
     from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
     from tank2sim.identification.trials.problem.estimation_problem import SearchReport
     from tank2sim.identification.trials.problem.prepare_trials import Measured
+    from tank2sim.records.trials import Trial
     from tank2sim.results.craft_identification import CraftIdentificationResult
     from tank2sim.results.identification import IdentificationResult
 
@@ -141,21 +142,23 @@ def identify(
     True
     """
     given = dict(locals())
-    from tank2sim.api.craft_identification import identify_craft
-    from tank2sim.api.trial import craft_trials_of, fitted_and_held
-    from tank2sim.cards import CraftCard
+    from tank2sim.api.trial import fitted_and_held, trials_of
+    from tank2sim.cards import SteeredBy
     from tank2sim.identification.trials.identify import identify_trials
     from tank2sim.identification.trials.problem.structures import STRUCTURES
     from tank2sim.identification.trials.study import study_identification
     from tank2sim.results.identification import IdentificationResult
 
     progress = _step_report(report)
-    if isinstance(ship.card, CraftCard):
+    steered = ship.steered()
+    if steered.steered_by is SteeredBy.THRUSTERS:
         taken = {"ship", "trials", "holdout", "report"}
         refuse_set(identify, given, "is not for a craft with thrusters", taken=taken)
-        thrusters = ship.card.thrusters
-        to_fit, to_predict = craft_trials_of(trials, thrusters), craft_trials_of(holdout, thrusters, "holdout")
-        return identify_craft(ship.card, to_fit, to_predict, progress)
+        to_fit, to_predict = (
+            trials_of(trials, thrusters=steered.thrusters),
+            trials_of(holdout, "holdout", thrusters=steered.thrusters),
+        )
+        return identify_craft(steered, to_fit, to_predict, progress)
     card = ship.manoeuvring()
     if structure not in (known := (*STRUCTURES.names(), AUTO, AVERAGE, BY_EVIDENCE)):
         raise ArgumentError("structure", "", f"{structure!r} is not known", close_name(structure, known))
@@ -178,6 +181,65 @@ def identify(
     with _computing(options, executor, workers, held=bool(held.trials)) as pool:
         found = identify_trials(card, fitted, held, options, progress, pool)
     return IdentificationResult(study_identification(card, found, fitted, held), _card(found, fitted), found)
+
+
+def identify_craft(
+    card: SteeredCard, fitted: Sequence[Trial], held: Sequence[Trial], progress: SearchReport | None = None
+) -> CraftIdentificationResult:
+    """Identify hull and thrust curves of a craft with thrusters from trials with position, heading and revolutions.
+
+    Parameters
+    ----------
+    card : SteeredCard
+        Mass and places of the thrusters are taken as exact, all else with the stated standard errors or wide ones.
+    fitted, held : sequence of Trial
+        Trials to fit, and trials only to predict (:func:`.read_craft_trial`).
+    progress : callable, optional
+        Called with each better estimate.
+
+    Raises
+    ------
+    InputError
+        A file is at fault, or a trial is given twice.
+    """
+    import numpy as np
+    from threadpoolctl import threadpool_limits
+
+    from tank2sim.analysis.ensemble.draws import by_file_name
+    from tank2sim.identification.craft.card import estimated_numbers, identified_craft
+    from tank2sim.identification.craft.fit import FreePrediction, fit_craft, predict_free
+    from tank2sim.identification.craft.order_response import order_responses
+    from tank2sim.identification.craft.problem import craft_driven_by, craft_problem
+    from tank2sim.identification.craft.study import study_craft
+    from tank2sim.identification.trials.problem.estimation_problem import silent
+    from tank2sim.records.same_record import refuse_copies
+    from tank2sim.results.craft_identification import CraftIdentificationResult
+
+    if not fitted:
+        raise ArgumentError("trials", "", "is empty", "give trials, or a folder with CSV files")
+    read = [*fitted, *held]
+    alike = (*refuse_copies(fitted), *refuse_copies(fitted, held))
+    problem, driven_by = craft_problem(card, read), craft_driven_by(card, read)
+    runs = problem.runs
+    try:
+        # A step of the search may be one to an unstable craft. Threads of the linear algebra only wait for each other.
+        with np.errstate(all="ignore"), threadpool_limits(limits=1, user_api="blas"):
+            fit = fit_craft(problem.with_runs(runs[: len(fitted)]), progress or silent)
+    except np.linalg.LinAlgError:
+        remedy = "check mass, thrust curves and damping of the card, and the places and signs of the thrusters"
+        raise InputError(card.source, "", "does not move as the trials do, not even roughly", remedy) from None
+    predictions = predict_free(fit, runs[len(fitted) :]) if held else []
+    responses = order_responses(card, fitted)
+    names = [run.name for run in runs[len(fitted) :]]
+    found = identified_craft(card, fit, responses)
+    estimated = estimated_numbers(card, fit)
+    places = list(estimated.values())
+    covariance = by_file_name(found, list(estimated), fit.estimate.covariance[np.ix_(places, places)])
+    held_out: dict[str, FreePrediction | None] = dict.fromkeys(names)
+    held_out |= {prediction.run.name: prediction for prediction in predictions}
+    study = study_craft(card, found, fit, held_out, responses, driven_by)
+    study = replace(study, notices=(*alike, *study.notices))
+    return CraftIdentificationResult(study, replace(found, covariance=covariance), fit, tuple(predictions))
 
 
 def _step_report(report: Progress) -> SearchReport:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tank2sim.analysis.influence.figures import InfluenceFigure
     from tank2sim.analysis.influence.study import Study
     from tank2sim.api.ensemble import EnsembleOptions
-    from tank2sim.cards import CraftCard
+    from tank2sim.cards import SteeredCard
     from tank2sim.dynamics.vessel import Vessel
     from tank2sim.results.influence import InfluenceResult, TuningResult
 
@@ -230,30 +230,32 @@ def find_influence(
     from tank2sim.analysis.influence.figures import parse_figure
     from tank2sim.analysis.influence.study import Study
     from tank2sim.api.ensemble import EnsembleOptions
-    from tank2sim.cards import CraftCard
     from tank2sim.results.influence import InfluenceResult
 
     ensemble = EnsembleOptions(members, seed, executor)
     card = ship.steered()
     asked = [parse_figure(text) for text in dict.fromkeys(_listed(figures))]
     if not asked:
-        asked = craft_figures(card) if isinstance(card, CraftCard) else [parse_figure(text) for text in DEFAULT_FIGURES]
+        asked = default_figures(card)
     study = Study(card, asked)
     reported = _reported(influence(study, joint_variation or {}))
     return InfluenceResult(replace(reported, ensemble=_bands(ship, study, ensemble)), ship)
 
 
-def craft_figures(card: CraftCard) -> list[InfluenceFigure]:
-    """Figures of a craft where none is given: top speed, a turn by half of the largest difference, and a spin.
+def default_figures(card: SteeredCard) -> list[InfluenceFigure]:
+    """Figures where none is given: of a ship usual ones, of a craft its top speed, turn and spin in standard trials.
 
     Parameters
     ----------
-    card : CraftCard
+    card : SteeredCard
     """
     from tank2sim.analysis.influence.figures import parse_figure
     from tank2sim.analysis.validation.standard_trials import craft_trials
+    from tank2sim.cards import SteeredBy
     from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, StraightRun
 
+    if card.steered_by is SteeredBy.RUDDER:
+        return [parse_figure(text) for text in DEFAULT_FIGURES]
     names = {StraightRun: ["final_speed_mps"], DifferenceTurn: ["steady_diameter_m", "steady_rate_degps"]}
     trials = craft_trials([card]).values()
     return [
@@ -284,4 +286,4 @@ def _bands(ship: Vessel, study: Study, ensemble: EnsembleOptions) -> FigureBands
         return None
     names = [figure.text for figure in study.figures]
     with ensemble.computing(FEW_IN_LANES) as computing:
-        return named_bands(ship.manoeuvring(), names, EnsembleRequest(ensemble.members, ensemble.seed), computing)
+        return named_bands(ship.steered(), names, EnsembleRequest(ensemble.members, ensemble.seed), computing)

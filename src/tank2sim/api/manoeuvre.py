@@ -102,6 +102,6 @@ def simulate_manoeuvre(
 
         length = duration_s, float(run.trajectory.t[-1])
         with ensemble.computing(FEW_IN_LANES if runs_in_lanes(parsed, duration_s) else FEW) as computing:
-            bands = manoeuvre_bands(ship.manoeuvring(), parsed, length, EnsembleRequest(members, seed), computing)
+            bands = manoeuvre_bands(ship.steered(), parsed, length, EnsembleRequest(members, seed), computing)
         study = replace(study, ensemble=bands)
     return ManoeuvreResult(study, run, ship)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from tank2sim.api.verbs import verb
 from tank2sim.arguments import PROCESSES, EnsembleSize, Seed, SpeedArgument
-from tank2sim.errors import ArgumentError
 
 if TYPE_CHECKING:
     from tank2sim.dynamics.vessel import Vessel
@@ -34,7 +33,7 @@ def judge_stability(
 ) -> StabilityResult | CraftStabilityResult:
     """Judge straight-line stability, steady turning and the IMO criteria of a ship.
 
-    A craft with thrusters has no spirals and no IMO criteria.
+    A craft with thrusters has steady turns by the difference of its revolutions, no spirals and no IMO criteria.
 
     Parameters
     ----------
@@ -54,7 +53,7 @@ def judge_stability(
     Raises
     ------
     InputError
-        The ship holds no straight course, or an ensemble is asked for a craft.
+        The ship holds no straight course.
 
     Examples
     --------
@@ -64,26 +63,30 @@ def judge_stability(
     """
     from tank2sim.analysis.ensemble.results import EnsembleRequest, stability_bands
     from tank2sim.analysis.ensemble.steering import Grid
-    from tank2sim.analysis.stability.craft import craft_stability
+    from tank2sim.analysis.stability.craft import craft_bands, craft_stability
     from tank2sim.analysis.stability.study import stability_study
     from tank2sim.api.ensemble import EnsembleOptions
-    from tank2sim.cards import CraftCard
+    from tank2sim.cards import SteeredBy
     from tank2sim.native.compiler import find_compiler
     from tank2sim.results.craft_stability import CraftStabilityResult
     from tank2sim.results.stability import StabilityResult
     from tank2sim.simulation.integrator import NO_COMPILER
 
     ensemble = EnsembleOptions(members, seed, executor)
-    if isinstance(ship.card, CraftCard):
+    card = ship.steered()
+    if card.steered_by is SteeredBy.THRUSTERS:
+        craft = craft_stability(card, speed_mps)
         if members:
-            raise ArgumentError("members", "", "are judged by the IMO criteria, which need a rudder", "leave them out")
-        return CraftStabilityResult(craft_stability(ship.card, speed_mps), ship)
+            speed, request = craft.straight_run.speed_mps, EnsembleRequest(members, seed)
+            with ensemble.computing() as computing:
+                craft = replace(craft, ensemble=craft_bands(card, speed, request, computing))
+        return CraftStabilityResult(craft, ship)
     study = stability_study(ship.model, speed_mps, spirals=spirals)
     compiler = () if find_compiler() else (NO_COMPILER,)
     study = replace(study, notices=tuple(dict.fromkeys([*ship.model.notices, *study.notices, *compiler])))
     if members:
         curves = (speed_mps, Grid.of(ship.model, study.responses[0])) if study.responses else None
         with ensemble.computing() as computing:
-            bands = stability_bands(ship.manoeuvring(), study.imo, EnsembleRequest(members, seed), computing, curves)
+            bands = stability_bands(card, study.imo, EnsembleRequest(members, seed), computing, curves)
         study = replace(study, ensemble=bands)
     return StabilityResult(study, ship)

@@ -153,7 +153,9 @@ def trial_files(given: TrialPaths, name: str = "trials") -> list[Path]:
     ]
 
 
-def trials_of(given: TrialPaths, name: str = "trials", *, rising: bool = True) -> list[Trial]:
+def trials_of(
+    given: TrialPaths, name: str = "trials", *, rising: bool = True, thrusters: Sequence[ThrusterSection] = ()
+) -> list[Trial]:
     """The trials that are meant: records as they are, files and data frames read, and of a folder the trials in it.
 
     Parameters
@@ -165,37 +167,23 @@ def trials_of(given: TrialPaths, name: str = "trials", *, rising: bool = True) -
         Name of the argument: data frames are called ``trials[0]``, ``trials[1]``, ... by it.
     rising : bool
         False lets times through that do not rise.
+    thrusters : sequence of ThrusterSection
+        Thrusters of the craft that was tried, by which its files are read; none of a ship with a rudder. Files of
+        records are read again.
 
     Raises
     ------
     InputError
-        It is none of these; as :func:`tank2sim.records.reading.read_trial_file`; or a folder holds no trial.
+        It is none of these; as :func:`tank2sim.records.reading.read_trial_file`, or of a craft as
+        :func:`tank2sim.records.craft_trials.read_craft_trial`; or a folder holds no trial.
     """
     sources = trial_sources(given, name)
+    if thrusters:
+        from tank2sim.records.craft_trials import read_craft_trial
+
+        files = [source.path if isinstance(source, Trial) else source for source in sources]
+        return [read_craft_trial(file, thrusters) for file in files]
     return [source if isinstance(source, Trial) else read_record(source, rising=rising) for source in sources]
-
-
-def craft_trials_of(given: TrialPaths, thrusters: Sequence[ThrusterSection], name: str = "trials") -> list[Trial]:
-    """The trials of a craft with thrusters that are meant.
-
-    Parameters
-    ----------
-    given : path, TrialRecord, DataFrame, or sequence of them
-        Of a record the file is read again: a trial of a ship has no thrusters.
-    thrusters : sequence of ThrusterSection
-        Thrusters of the card.
-    name : str
-        Name of the argument, as of :func:`trials_of`.
-
-    Raises
-    ------
-    InputError
-        As :func:`trials_of` and :func:`tank2sim.records.craft_trials.read_craft_trial`.
-    """
-    from tank2sim.records.craft_trials import read_craft_trial
-
-    sources = (source.path if isinstance(source, Trial) else source for source in trial_sources(given, name))
-    return [read_craft_trial(source, thrusters) for source in sources]
 
 
 def trial_sources(given: TrialPaths, name: str = "trials") -> list[Trial | Path | CsvTable]:

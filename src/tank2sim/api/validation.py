@@ -14,16 +14,12 @@ if TYPE_CHECKING:
 
     from tank2sim.api.trial import TrialRecord
     from tank2sim.dynamics.vessel import Vessel
-    from tank2sim.results.craft_validation import CraftValidationResult
     from tank2sim.results.validation import ValidationResult
 
 
 @verb(
     "a validation report after ITTC 7.5-02-06-03",
-    results=(
-        "tank2sim.results.validation:ValidationResult",
-        "tank2sim.results.craft_validation:CraftValidationResult",
-    ),
+    results=("tank2sim.results.validation:ValidationResult",),
 )
 def validate(
     ship: Vessel,
@@ -31,18 +27,18 @@ def validate(
     *,
     members: SmallEnsemble = VALIDATION_MEMBERS,
     required_percent: PositiveArgument = REQUIRED_PERCENT,
-) -> ValidationResult | CraftValidationResult:
+) -> ValidationResult:
     """Validate a ship in the manner of ITTC 7.5-02-06-03 by trials that did not make its card, figure by figure.
 
-    A trial that the card was identified from can only refute it. A craft with thrusters is validated by free-running
-    predictions of its trials, without `members` and `required_percent`.
+    A trial that the card was identified from can only refute it. Trials of a craft with thrusters are predicted by
+    their recorded revolutions, 30 s at a time.
 
     Parameters
     ----------
     ship : Vessel, Card, str or path
     trials : path, TrialRecord, DataFrame, or sequence of them
-        Turning circles and zigzags; a folder means the trials in it. Without any, the model is documented and
-        verified.
+        Turning circles and zigzags of a ship, any trials of a craft; a folder means the trials in it. Without any, the
+        model is documented and verified.
     members : int
         Ships drawn within the errors of the card for u_input; with 0 no figure can be judged.
     required_percent : float
@@ -51,15 +47,14 @@ def validate(
     Raises
     ------
     InputError
-        The card is not one of a ship that manoeuvres, or a file is at fault.
+        The card is not one of a ship or craft that manoeuvres, a file is at fault, or no trial of a craft is long
+        enough to be predicted.
     """
-    from tank2sim.api.craft_validation import validate_craft
-    from tank2sim.api.trial import craft_trials_of, trials_of
+    from tank2sim.api.trial import trials_of
     from tank2sim.api.validation_study import validate_ship
-    from tank2sim.cards import CraftCard
-    from tank2sim.results.craft_validation import CraftValidationResult
     from tank2sim.results.validation import ValidationResult
 
-    if isinstance(ship.card, CraftCard):
-        return CraftValidationResult(*validate_craft(ship.card, craft_trials_of(trials, ship.card.thrusters)))
-    return ValidationResult(*validate_ship(ship.manoeuvring(), trials_of(trials), members, required_percent))
+    card = ship.steered()
+    return ValidationResult(
+        *validate_ship(card, trials_of(trials, thrusters=card.thrusters), members, required_percent)
+    )

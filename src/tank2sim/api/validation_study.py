@@ -6,24 +6,28 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from tank2sim.analysis.stability.imo import imo_criteria
 from tank2sim.analysis.validation.documentation import model_documentation
 from tank2sim.analysis.validation.standard_trials import TrialShip, ship_of
-from tank2sim.analysis.validation.study import Validation, verify
+from tank2sim.analysis.validation.study import NOTHING_VALIDATED, verify
 from tank2sim.analysis.validation.study import validate_card as validate_figures
 from tank2sim.arrays import Array, Columns
-from tank2sim.cards import ManoeuvringCard
+from tank2sim.cards import ManoeuvringCard, SteeredCard
 from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.errors import InputError
 from tank2sim.gap.outcome.export import signal_display_name
 from tank2sim.gap.proof.replay import replay_by_card
 from tank2sim.gap.result import Passed
+from tank2sim.identification.craft.fit import PREDICTED_S
+from tank2sim.identification.craft.study import predict_trials
 from tank2sim.identification.trials.assessment.other_ship import evidence_of_other_ship
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
 from tank2sim.notices import Notice, caution
+from tank2sim.records.same_record import refuse_copies
 from tank2sim.records.thinning import drawn_columns
 from tank2sim.records.trials import Trial
 from tank2sim.results.validation import CardValue, SignalError, TrialReplay, ValidationStudy
@@ -35,45 +39,75 @@ itself is the file."""
 
 
 def validate_ship(
-    card: ManoeuvringCard, records: Sequence[Trial], members: int, required_percent: float
-) -> tuple[ValidationStudy, ManoeuvringCard, tuple[Path, ...]]:
-    """Validate a ship: the study, its card, and the files of its trials. Raises as :func:`.validate`.
+    card: SteeredCard, records: Sequence[Trial], members: int, required_percent: float
+) -> tuple[ValidationStudy, SteeredCard, tuple[Path, ...]]:
+    """Validate a ship or craft: the study, its card, and the files of its trials. Raises as :func:`.validate`.
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
     records : sequence of Trial
     members, required_percent
         As of :func:`.validate`.
     """
+    ready = ship_of(card)
+    more = _of_craft(card, records) if card.thrusters else _of_ship(ready, records, members, required_percent)
+    study = _documented(ready, members)
+    notices = (*ready.model.notices, *more.pop("notices"), *study.notices)
+    return replace(study, notices=notices, **more), card, tuple(trial.path for trial in records)
+
+
+def _of_craft(card: SteeredCard, records: Sequence[Trial]) -> dict[str, Any]:
+    """Fields of the study of a craft that are from its trials."""
+    if not records:
+        return {"notices": ()}
+    alike = refuse_copies(records)
+    predictions, notices = predict_trials(card, records)
+    count, named = sum(one.predictions for one in predictions.trials.values()), len(predictions.trials)
+    found = ", ".join(f"{name} {value:.3f}" for name, value in predictions.determination.items())
+    verdict = f"{count} free-running predictions of up to {PREDICTED_S:g} s of {named} trial{'s' * (named != 1)}"
+    return {"predictions": predictions, "verdict": f"{verdict}: R^2 of {found}", "notices": (*alike, *notices)}
+
+
+def _of_ship(ready: TrialShip, records: Sequence[Trial], members: int, required_percent: float) -> dict[str, Any]:
+    """Fields of the study of a ship that are from its trials."""
+    card = ready.card.manoeuvring()
     given = measured(records, card) if records else Measured((), "angle", ())
     found = validate_figures(card, given.trials, members, required_percent)
+    notices = [*given.notices, *found.notices]
     if records and (evidence := evidence_of_other_ship(card, given)):
-        notice = caution(f"these look like trials of another ship: {'; '.join(evidence)}")
-        found = replace(found, notices=(notice, *found.notices))
-    return _study(ship_of(card), given, found), card, tuple(trial.path for trial in given.trials)
-
-
-def _study(ready: TrialShip, given: Measured, found: Validation) -> ValidationStudy:
-    """Document and verify a ship, replay its trials, and join what was validated."""
-    card, model = ready.manoeuvring, ready.model
-    verified, troubles = verify(ready, found.members)
+        notices.insert(len(given.notices), caution(f"these look like trials of another ship: {'; '.join(evidence)}"))
     replays, not_replayed = _replays(card, given)
+    return {
+        "verdict": found.verdict,
+        "counts": found.counts,
+        "figures": found.figures,
+        "imo": tuple(imo_criteria(ready.model)),
+        "replays": replays,
+        "notices": (*notices, *not_replayed),
+    }
+
+
+def _documented(ready: TrialShip, members: int) -> ValidationStudy:
+    """Document and verify a ship or craft."""
+    card, model = ready.card, ready.model
+    verified, troubles = verify(ready, members)
     compiler = () if ready.integrator.compiled else (NO_COMPILER,)
     return ValidationStudy(
         ship=card.ship.name,
         source=card.ship.source,
         documentation=model_documentation(card, model),
         coefficients=_coefficients(card),
-        propulsion=card.propulsion is not None,
-        verdict=found.verdict,
-        counts=found.counts,
-        figures=found.figures,
-        members=found.members,
+        steered_by=card.steered_by,
+        propulsion=bool(card.propulsion or card.thrusters),
+        verdict=NOTHING_VALIDATED,
+        counts={},
+        figures=(),
+        members=members,
         verification=verified,
-        imo=tuple(imo_criteria(model)),
-        replays=replays,
-        notices=(*model.notices, *given.notices, *found.notices, *troubles, *not_replayed, *compiler),
+        imo=(),
+        replays=(),
+        notices=(*troubles, *compiler),
     )
 
 
@@ -124,8 +158,8 @@ def _replay_error(replay: Passed, name: str) -> SignalError:
     )
 
 
-def _coefficients(card: ManoeuvringCard) -> dict[str, CardValue]:
-    """The derivatives of a card with their standard errors, prime."""
+def _coefficients(card: SteeredCard) -> dict[str, CardValue]:
+    """The derivatives of a card with their standard errors, prime or SI."""
     return {
         name: CardValue(
             value=card.derivatives[name], standard_error=card.standard_error(name), stated=name in card.uncertainty

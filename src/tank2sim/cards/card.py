@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
 from pathlib import Path
 
 from tank2sim.cards.covariance import Covariance, covariance_file, not_referring, referring
+from tank2sim.cards.craft_terms import body_scales, craft_scale
 from tank2sim.cards.form import (
     BodyModel,
     BodySection,
@@ -91,12 +93,136 @@ class Card:
         """An error about this card, to be raised: its place, the problem, and the remedy."""
         return InputError(self.source, place, problem, remedy)
 
+    @property
+    def speed_range_mps(self) -> tuple[float, float] | None:
+        """Speeds through the water (m/s) at which the card holds; None where it states none."""
+        return self.model.valid_speed_mps
+
+    def steered(self) -> SteeredCard:
+        """The card, if its vessel is steered in the horizontal plane, by a rudder or by thrusters.
+
+        Raises
+        ------
+        InputError
+            It is not: a towed body, a yaw rig or a glider.
+        """
+        raise self.fault("model.kind", NOT_STEERED, f"give {SHIP_KINDS} card, or one of kind small_craft")
+
+    def manoeuvring(self) -> ManoeuvringCard:
+        """The card, if its ship is steered by a rudder.
+
+        Raises
+        ------
+        InputError
+            It is not: a towed body, a yaw rig, a glider or a craft with thrusters.
+        """
+        raise self.fault("model.kind", NOT_STEERED, f"give {SHIP_KINDS} card")
+
+
+SHIP_KINDS = "a linear, abkowitz or mmg"
+NOT_STEERED = "is not of a ship that manoeuvres"
+
+
+class SteeredBy(StrEnum):
+    """What steers a vessel."""
+
+    RUDDER = "rudder"
+    THRUSTERS = "thrusters"
+
+
+@dataclass(frozen=True)
+class SteeredCard(Card):
+    """Card of a vessel that is steered in the horizontal plane, by a rudder or by thrusters.
+
+    Parameters
+    ----------
+    rigid_body : RigidBody
+        Mass, yaw inertia and x_G, all about the origin: prime for a ship, SI for a craft.
+    derivatives : mapping
+        Canonical name to value, prime or SI as the rigid body, rudder positive to starboard; absent means 0.
+    uncertainty : mapping
+        Canonical name to standard error, same scaling; absent means :data:`DEFAULT_RELATIVE_ERROR`.
+    places : mapping
+        Canonical name to the key under which the file has it.
+    spelt : mapping
+        Place of an angle or a rate in SI (``effects.0.parameters.direction_rad``) to its place in the file
+        (``effects.0.parameters.direction_deg``).
+    roll : Roll, optional
+        What makes roll a degree of freedom; its inertia is prime.
+    effects : tuple
+        Effects on top of the hull's forces, in the order of the file.
+    thrusters : tuple of ThrusterSection
+        Thrusters of a craft; none of a ship with a rudder.
+    """
+
+    ship: ShipSection
+    model: ShipModel | CraftModel
+    rigid_body: RigidBody
+    derivatives: Mapping[str, float]
+    uncertainty: Mapping[str, float] = field(default_factory=dict)
+    places: Mapping[str, str] = field(default_factory=dict)
+    spelt: Mapping[str, str] = field(default_factory=dict)
+    roll: Roll | None = None
+    steering_gear: SteeringGear | None = None
+    propulsion: Propulsion | None = None
+    effects: tuple[EffectEntry, ...] = ()
+    thrusters: tuple[ThrusterSection, ...] = ()
+
+    @property
+    def steered_by(self) -> SteeredBy:
+        """What steers the vessel."""
+        return SteeredBy.THRUSTERS if self.thrusters else SteeredBy.RUDDER
+
+    @property
+    def speed_range_mps(self) -> tuple[float, float]:
+        """Speeds through the water (m/s) at which the card holds, stated or usual."""
+        return self.model.speed_range_mps
+
+    @property
+    def scales(self) -> Scales:
+        """Density, length and speed, which make the numbers of the vessel non-dimensional."""
+        return Scales(self.environment.water_density_kgpm3, self.ship.length_m, self.model.speed_mps)
+
+    @property
+    def file_scales(self) -> FileScales | None:
+        """What the numbers of the card's text are in; None for the prime system."""
+        return scales_of_file(self.ship, self.environment, self.model)
+
+    @property
+    def body_si(self) -> dict[str, float]:
+        """``mass`` (kg), ``yaw_inertia`` (kg m2) and ``x_G`` (m)."""
+        raise NotImplementedError
+
+    @property
+    def body_file_factors(self) -> dict[str, float]:
+        """Factor from each number of :attr:`body_si` to the number of the card's text."""
+        in_file = self.file_scales
+        known = body_scales(in_file) if in_file else {}
+        return {key: known.get(key, 1.0) / scale for key, scale in body_scales(self.scales).items()}
+
+    def file_factor(self, name: str) -> float:
+        """Factor from a derivative (canonical name) to the number of the card's text."""
+        raise NotImplementedError
+
+    def steered(self) -> SteeredCard:
+        """The card itself."""
+        return self
+
+    def in_file(self, place: str, value: float) -> tuple[str, float]:
+        """Place and value as the file has them, from those in SI: for messages about an angle."""
+        spelling = self.spelt.get(place, place)
+        return spelling, from_si(spelling, value)
+
+    def standard_error(self, name: str) -> float:
+        """Standard error of a derivative, in its scaling: as stated, or the default share of its value."""
+        return self.uncertainty.get(name, DEFAULT_RELATIVE_ERROR * abs(self.derivatives.get(name, 0.0)))
+
 
 OPPOSITE = {"R0": ("X0", -1.0), "mx": ("Xudot", -1.0), "my": ("Yvdot", -1.0), "Jz": ("Nrdot", -1.0)}
 """Names of the MMG method in ``[derivatives]``: R_0', m_x', m_y', J_z' to the derivative and the factor."""
 
 
-def scales_of_file(ship: ShipSection, environment: Environment, model: ShipModel) -> FileScales | None:
+def scales_of_file(ship: ShipSection, environment: Environment, model: ShipModel | CraftModel) -> FileScales | None:
     """What the numbers of a card's text are in, by its ``scaling``; None for the prime system.
 
     Raises
@@ -120,73 +246,38 @@ def scales_of_file(ship: ShipSection, environment: Environment, model: ShipModel
 
 
 @dataclass(frozen=True)
-class ManoeuvringCard(Card):
-    """Card of a ship that manoeuvres in the horizontal plane.
+class ManoeuvringCard(SteeredCard):
+    """Card of a ship with a rudder, in the prime system.
 
     Parameters
     ----------
     model : ShipModel
         Kind of equations; ``speed_scale`` and ``yaw_rate_terms`` hold for the numbers below, the file's ``scaling`` and
         ``rudder_sign`` only for the text.
-    rigid_body : RigidBody
-        m', J_z', x_G', all about the origin.
-    derivatives : mapping
-        Canonical name to prime value, rudder positive to starboard; absent means 0.
-    uncertainty : mapping
-        Canonical name to standard error, same scaling; absent means :data:`DEFAULT_RELATIVE_ERROR`.
-    places : mapping
-        Canonical name to the key under which the file has it.
-    spelt : mapping
-        Place of an angle or a rate in SI (``effects.0.parameters.direction_rad``) to its place in the file
-        (``effects.0.parameters.direction_deg``).
-    roll : Roll, optional
-        What makes roll a degree of freedom; its inertia is prime.
     waves : WavesSection, optional
         What regular waves do to the ship.
-    effects : tuple
-        Effects on top of the polynomial, in the order of the file.
     fitted_trials : tuple
         Trials that the card was fitted to.
     """
 
-    ship: ShipSection
     model: ShipModel
-    rigid_body: RigidBody
-    derivatives: Mapping[str, float]
-    uncertainty: Mapping[str, float] = field(default_factory=dict)
-    places: Mapping[str, str] = field(default_factory=dict)
-    spelt: Mapping[str, str] = field(default_factory=dict)
-    roll: Roll | None = None
-    steering_gear: SteeringGear | None = None
-    propulsion: Propulsion | None = None
     waves: WavesSection | None = None
-    effects: tuple[EffectEntry, ...] = ()
     fitted_trials: tuple[FittedTrial, ...] = ()
 
-    @property
-    def scales(self) -> Scales:
-        """What makes this ship's numbers non-dimensional."""
-        return Scales(self.environment.water_density_kgpm3, self.ship.length_m, self.model.speed_mps)
+    def manoeuvring(self) -> ManoeuvringCard:
+        """The card itself."""
+        return self
 
     @property
-    def file_scales(self) -> FileScales | None:
-        """What the numbers of the card's text are in; None for the prime system."""
-        return scales_of_file(self.ship, self.environment, self.model)
+    def body_si(self) -> dict[str, float]:
+        """``mass`` (kg), ``yaw_inertia`` (kg m2) and ``x_G`` (m)."""
+        return {key: getattr(self.rigid_body, key) * scale for key, scale in body_scales(self.scales).items()}
 
     def file_factor(self, name: str) -> float:
         """Factor from a derivative (canonical name; prime, starboard) to the number of the card's text."""
         to_port = self.model.rudder_sign == "port"
         sign = OPPOSITE.get(self.places.get(name, name), (name, 1.0))[1]
         return sign * file_factor(known_term(name), self.file_scales, rudder_to_port=to_port)
-
-    def in_file(self, place: str, value: float) -> tuple[str, float]:
-        """Place and value as the file has them, from those in SI: for messages about an angle."""
-        spelling = self.spelt.get(place, place)
-        return spelling, from_si(spelling, value)
-
-    def standard_error(self, name: str) -> float:
-        """Standard error of a derivative (prime): as stated, or the default share of its value."""
-        return self.uncertainty.get(name, DEFAULT_RELATIVE_ERROR * abs(self.derivatives.get(name, 0.0)))
 
 
 @dataclass(frozen=True)
@@ -247,66 +338,34 @@ RUDDER_COEFFICIENTS = (
 
 
 @dataclass(frozen=True)
-class CraftCard(Card):
+class CraftCard(SteeredCard):
     """Card of a small craft with thrusters: Fossen's equations in three degrees of freedom, SI.
 
     Parameters
     ----------
-    rigid_body : RigidBody
-        m (kg), I_z (kg m2) about the origin, x_G (m, positive forward).
     derivatives : mapping
-        Name (:data:`tank2sim.cards.small_craft.CRAFT_TERMS`) to value, SI; absent means 0.
-    uncertainty : mapping
-        Name to standard error, SI; absent means :data:`DEFAULT_RELATIVE_ERROR`.
-    thrusters : tuple of ThrusterSection
+        Name (:data:`tank2sim.cards.craft_terms.CRAFT_TERMS`) to value, SI; absent means 0.
     effects : tuple of EffectEntry
         Current, wind and others that a craft can have.
-    spelt : mapping
-        As in :class:`ManoeuvringCard`.
     """
 
-    ship: ShipSection
     model: CraftModel
-    rigid_body: RigidBody
-    derivatives: Mapping[str, float]
-    thrusters: tuple[ThrusterSection, ...]
-    uncertainty: Mapping[str, float] = field(default_factory=dict)
-    effects: tuple[EffectEntry, ...] = ()
-    spelt: Mapping[str, str] = field(default_factory=dict)
     roll: None = None
 
-    def standard_error(self, name: str) -> float:
-        """Standard error of a derivative (SI): as stated, or the default share of its value."""
-        return self.uncertainty.get(name, DEFAULT_RELATIVE_ERROR * abs(self.derivatives.get(name, 0.0)))
-
-    def in_file(self, place: str, value: float) -> tuple[str, float]:
-        """Place and value as the file has them, as in :class:`ManoeuvringCard`."""
-        spelling = self.spelt.get(place, place)
-        return spelling, from_si(spelling, value)
-
-
-SteeredCard = ManoeuvringCard | CraftCard
-"""Card of a vessel that is steered in the horizontal plane, by a rudder or by thrusters."""
-
-
-CRAFT_COMMANDS = (
-    "identify, validate, compare, simulate, stability, autopilot, influence, convert, export, steer (without ensembles)"
-)
-"""Commands that take the card of a craft with thrusters."""
-
-
-def manoeuvring_card(card: Card) -> ManoeuvringCard:
-    """The card, if it is one of a ship that manoeuvres in the horizontal plane.
-
-    Raises
-    ------
-    InputError
-        It is not: a towed body, a yaw rig, a glider or a craft without a rudder.
-    """
-    if isinstance(card, CraftCard):
+    def manoeuvring(self) -> ManoeuvringCard:
+        """Raise InputError: a craft has no rudder."""
         remedy = f"craft with thrusters are taken by {CRAFT_COMMANDS}"
-        raise InputError(card.source, "model.kind", "is small_craft, and this is of ships with a rudder", remedy)
-    if not isinstance(card, ManoeuvringCard):
-        remedy = "give a linear, abkowitz or mmg card"
-        raise InputError(card.source, "model.kind", "is not that of a ship that manoeuvres", remedy)
-    return card
+        raise self.fault("model.kind", f"is {self.model.kind}, and this is for ships with a rudder", remedy)
+
+    @property
+    def body_si(self) -> dict[str, float]:
+        """``mass`` (kg), ``yaw_inertia`` (kg m2) and ``x_G`` (m)."""
+        return {key: getattr(self.rigid_body, key) for key in body_scales(self.scales)}
+
+    def file_factor(self, name: str) -> float:
+        """Factor from a derivative (SI) to the number of the card's text."""
+        return 1 / craft_scale(name, self.scales) if self.model.scaling == "prime" else 1.0
+
+
+CRAFT_COMMANDS = "identify, validate, compare, simulate, stability, autopilot, influence, convert, export, steer"
+"""Commands that take the card of a craft with thrusters."""

@@ -185,7 +185,10 @@ def _check_errors(card: Card, path: Path, names: Sequence[str], matrix: Array) -
 
 
 def _uncertainty_of(name: str) -> str:
-    """Key of the standard error that belongs to a key: of an effect its own, else in ``[uncertainty]``."""
+    """Key of the standard error that belongs to a key: effects and thrusters have their own, or ``[uncertainty]``."""
+    if name.startswith("thrusters."):
+        section, _, key = name.rpartition(".")
+        return f"{section}.uncertainty.{key}"
     if name.startswith("effects."):
         return name.replace(".parameters.", ".uncertainty.")
     return f"uncertainty.{name.partition('.')[2]}" if name.startswith("derivatives.") else ""

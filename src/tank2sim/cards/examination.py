@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from tank2sim.cards.card import Card, CraftCard, ManoeuvringCard, MmgCard
+from tank2sim.cards.card import Card, ManoeuvringCard, MmgCard, SteeredBy, SteeredCard
 from tank2sim.cards.form import BodySection
 from tank2sim.cards.plausibility import (
     EXPECTED_SIGNS,
@@ -122,16 +122,16 @@ def refuse_impossible(card: Card) -> None:
         The hull is fuller than a box, its mass lies outside it, it is aground, or an angle or a rate of the steering
         gear is far too small (radians for degrees).
     """
-    if isinstance(card, ManoeuvringCard | CraftCard):
+    if isinstance(card, SteeredCard):
         _refuse_body(card)
     ship = card.ship
     if ship.water_depth_m is not None and ship.draught_m is not None and ship.water_depth_m <= ship.draught_m:
         problem = f"is {ship.water_depth_m:g} m, and the draught {ship.draught_m:g} m: the ship is aground"
         raise InputError(card.source, "ship.water_depth_m", problem, "check both")
-    gear = card.steering_gear if isinstance(card, ManoeuvringCard) else None
+    gear = card.steering_gear if isinstance(card, SteeredCard) else None
     for key, least, unit in (("max_angle_rad", LEAST_ANGLE_RAD, "deg"), ("max_rate_radps", LEAST_RATE_RADPS, "deg/s")):
         value = getattr(gear, key, None)
-        if isinstance(card, ManoeuvringCard) and value is not None and value < least:
+        if isinstance(card, SteeredCard) and value is not None and value < least:
             place, shown = card.in_file(f"steering_gear.{key}", value)
             problem = f"is {shown:.3g}, less than any steering gear has"
             if not place.endswith(("_rad", "_radps")):
@@ -152,7 +152,7 @@ def doubts(card: Card) -> tuple[Notice, ...]:
     """
     if isinstance(card, ManoeuvringCard):
         facts = [*_of_ship(card), *(_of_mmg(card) if isinstance(card, MmgCard) else ())]
-    elif isinstance(card, CraftCard):
+    elif isinstance(card, SteeredCard):
         facts = list(_of_craft(card))
     else:
         return ()
@@ -162,18 +162,18 @@ def doubts(card: Card) -> tuple[Notice, ...]:
     return (caution(f"{name}: {'; '.join(facts)}. Correct the card, or confirm that this ship is so."),)
 
 
-def _refuse_body(card: ManoeuvringCard | CraftCard) -> None:
-    mass, gyradius_2 = _mass_kg(card), _gyradius_2(card)
+def _refuse_body(card: SteeredCard) -> None:
+    mass, gyradius_2 = card.body_si["mass"], _gyradius_2(card)
     block = _block(card.ship, mass, card.environment.water_density_kgpm3)
     if block is not None and not LEAST_BLOCK < block < FULLEST_BLOCK:
         problem = f"is {mass:.4g} kg, {block:.3g} times the water that a box of length, beam and draught displaces"
         remedy = "check mass, scaling, length_m, beam_m and draught_m (all in m)"
         raise InputError(card.source, "rigid_body.mass", problem, remedy)
     stated = card.ship.displacement_kg
-    if isinstance(card, CraftCard) and stated is not None and not 0.5 < mass / stated < 2.0:
+    if card.steered_by is SteeredBy.THRUSTERS and stated is not None and not 0.5 < mass / stated < 2.0:
         problem = f"is {mass:.4g} kg, and ship.displacement_kg is {stated:.4g}"
         raise InputError(card.source, "rigid_body.mass", problem, "give both in kg (or the mass in the card's scaling)")
-    centre = card.rigid_body.x_G / (card.ship.length_m if isinstance(card, CraftCard) else 1.0)
+    centre = card.body_si["x_G"] / card.ship.length_m
     if not centre**2 <= gyradius_2 <= LARGEST_GYRADIUS**2:
         problem = (
             f"gives a radius of gyration of {math.sqrt(gyradius_2):.3g} L about midships with x_G at {centre:.3g} L"
@@ -259,12 +259,12 @@ def _of_mmg(card: MmgCard) -> Iterator[str]:
             )
 
 
-def _of_craft(card: CraftCard) -> Iterator[str]:
+def _of_craft(card: SteeredCard) -> Iterator[str]:
     known = {name: value for name, value in card.derivatives.items() if name in EXPECTED_SIGNS and value}
     yield from (caution.fact for caution in unusual_signs(known, card.uncertainty) if "Nv" not in caution.fact)
     yield from _proportions(card, USUAL_OF_CRAFT)
     thrust = sum(thruster.largest_thrust_N for thruster in card.thrusters)
-    weight = _mass_kg(card) * card.environment.gravity_mps2
+    weight = card.body_si["mass"] * card.environment.gravity_mps2
     yield from _beyond("thrust over weight", thrust / weight, USUAL_OF_CRAFT)
     for thruster in card.thrusters:
         for side, sign in (("port", -1.0), ("starboard", 1.0)):
@@ -272,10 +272,9 @@ def _of_craft(card: CraftCard) -> Iterator[str]:
                 yield f"thruster {thruster.name} is at y_m = {thruster.y_m:g}: y is positive to starboard"
 
 
-def _proportions(card: ManoeuvringCard | CraftCard, usual: dict[str, tuple[float, float]]) -> Iterator[str]:
+def _proportions(card: SteeredCard, usual: dict[str, tuple[float, float]]) -> Iterator[str]:
     ship, length = card.ship, card.ship.length_m
-    of_length = length if isinstance(card, CraftCard) else 1.0
-    block = _block(ship, _mass_kg(card), card.environment.water_density_kgpm3)
+    block = _block(ship, card.body_si["mass"], card.environment.water_density_kgpm3)
     found = {
         "length (m)": length,
         "length over beam": _over(length, ship.beam_m),
@@ -285,7 +284,7 @@ def _proportions(card: ManoeuvringCard | CraftCard, usual: dict[str, tuple[float
         "added mass ahead over mass": -card.derivatives.get("Xudot", 0.0) / card.rigid_body.mass or None,
         "Froude number": card.model.speed_mps / math.sqrt(card.environment.gravity_mps2 * length),
         "radius of gyration over length": math.sqrt(_gyradius_2(card)),
-        "place of the centre of gravity over length": card.rigid_body.x_G / of_length,
+        "place of the centre of gravity over length": card.body_si["x_G"] / length,
         "propeller diameter over draught": _over(ship.propeller_diameter_m, ship.draught_m),
         "metacentric height over beam": _over(ship.metacentric_height_m, ship.beam_m),
     }
@@ -315,13 +314,9 @@ def _hydrodynamic(card: ManoeuvringCard) -> dict[str, float]:
     return hull
 
 
-def _mass_kg(card: ManoeuvringCard | CraftCard) -> float:
-    return card.rigid_body.mass * (1.0 if isinstance(card, CraftCard) else float(card.scales.mass))
-
-
-def _gyradius_2(card: ManoeuvringCard | CraftCard) -> float:
-    body = card.rigid_body
-    return body.yaw_inertia / body.mass / (card.ship.length_m**2 if isinstance(card, CraftCard) else 1.0)
+def _gyradius_2(card: SteeredCard) -> float:
+    body = card.body_si
+    return body["yaw_inertia"] / body["mass"] / card.ship.length_m**2
 
 
 def _block(ship: BodySection, mass: float, density: float) -> float | None:

@@ -16,14 +16,14 @@ from tomlkit.exceptions import TOMLKitError
 from tank2sim.bundled import bundled, bundled_cards
 from tank2sim.cards.card import (
     Card,
-    CraftCard,
     ManoeuvringCard,
     MmgCard,
+    SteeredCard,
 )
+from tank2sim.cards.craft_terms import body_scales, craft_scale
 from tank2sim.cards.examination import refuse_impossible
 from tank2sim.cards.form_faults import form_fault, short
 from tank2sim.cards.kinds import CARD_KINDS
-from tank2sim.cards.small_craft import body_scales, craft_scale, craft_scales
 from tank2sim.errors import InputError, close_name
 from tank2sim.escaping import one_line
 from tank2sim.files import BYTE_ORDER_MARK, read_exact_text, refuse_deep
@@ -153,9 +153,7 @@ def revised(
         key = card.places.get(name, name)
         changes[f"derivatives.{key}"] = value * factor
         changes[f"uncertainty.{key}"] = error * abs(factor)
-    new = parse_card(changed_text(card.text, card.source, changes, comment=comment), card.source)
-    assert isinstance(new, ManoeuvringCard)
-    return new
+    return parse_card(changed_text(card.text, card.source, changes, comment=comment), card.source).manoeuvring()
 
 
 def linear_card(card: Card) -> ManoeuvringCard:
@@ -168,26 +166,22 @@ def linear_card(card: Card) -> ManoeuvringCard:
     """
     if isinstance(card, MmgCard):
         raise card.fault("model.kind", "is mmg, which has no linear form of its own", "convert it to abkowitz first")
-    new = parse_card(changed_text(card.text, card.source, {"model.kind": "linear"}), card.source)
-    assert isinstance(new, ManoeuvringCard)
-    return new
+    return parse_card(changed_text(card.text, card.source, {"model.kind": "linear"}), card.source).manoeuvring()
 
 
-def craft_in_scaling(card: CraftCard, scaling: str) -> CraftCard:
+def craft_in_scaling(card: SteeredCard, scaling: str) -> SteeredCard:
     """The card of a small craft with its numbers in another scaling, ``dimensional`` or ``prime``: the same craft."""
     to_prime, was_prime = scaling == "prime", card.model.scaling == "prime"
     if to_prime == was_prime:
         return card
-    scales, body = craft_scales(card), card.rigid_body
+    scales, body = card.scales, card.rigid_body
     changes: dict[str, object] = {"model.scaling": scaling}
     for key, unit in body_scales(scales).items():
         changes[f"rigid_body.{key}"] = getattr(body, key) / (unit if to_prime else 1.0)
     for section, values in (("derivatives", card.derivatives), ("uncertainty", card.uncertainty)):
         for name, value in values.items():
             changes[f"{section}.{name}"] = value / (craft_scale(name, scales) if to_prime else 1.0)
-    made = parse_card(changed_text(card.text, card.source, changes), card.source)
-    assert isinstance(made, CraftCard)
-    return made
+    return parse_card(changed_text(card.text, card.source, changes), card.source).steered()
 
 
 def _content(text: str, source: str) -> dict[str, Any]:

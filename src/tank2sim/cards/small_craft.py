@@ -1,102 +1,20 @@
-"""What a card of a small craft states, checked and brought to SI; its coefficients in the prime system.
-
-Terms are named by what they multiply: ``Xuabsu`` is the coefficient of u|u| in X, ``Nrabsv`` that of r|v| in N. All are
-zero at rest, so that a craft may stop, spin and go astern; a coefficient that damps is negative. Fossen (2021),
-Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd ed., 6.4 and 6.5 (there X_|u|u, N_|v|r).
-"""
+"""The card of a small craft, read from its form, checked and brought to SI."""
 
 from __future__ import annotations
 
 import difflib
 import math
 from collections.abc import Mapping
-from typing import NamedTuple
 
-from tank2sim.cards.card import CraftCard
+from tank2sim.cards.card import CraftCard, SteeredCard
+from tank2sim.cards.craft_terms import CRAFT_TERMS, body_scales, craft_scale
 from tank2sim.cards.form import CraftForm
 from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
 from tank2sim.units import from_si
 
-
-class CraftTerm(NamedTuple):
-    """A velocity term of a small craft.
-
-    Parameters
-    ----------
-    name : str
-    force : str
-        ``X``, ``Y`` or ``N``.
-    factor : str
-        ``u``, ``v`` or ``r``.
-    size : str
-        The velocity whose size it has as a second factor; empty for a linear term.
-    """
-
-    name: str
-    force: str
-    factor: str
-    size: str
-
-    @property
-    def lengths(self) -> int:
-        """Lengths that it has more than a term of a force by linear velocities: an arm, and one for each yaw rate."""
-        return (self.force == "N") + (self.factor == "r") + (self.size == "r")
-
-
-def _terms() -> tuple[CraftTerm, ...]:
-    surge = [("X", "u", ""), ("X", "u", "u")]
-    others = [(force, factor, size) for force in "YN" for factor in "vr" for size in ("", "v", "r", "u")]
-    return tuple(
-        CraftTerm(f"{force}{factor}{'abs' * bool(size)}{size}", force, factor, size)
-        for force, factor, size in (*surge, *others)
-    )
-
-
-VELOCITY_TERMS: tuple[CraftTerm, ...] = _terms()
-"""Damping of a small craft: linear terms, and products of a velocity with the size of one."""
-
-CRAFT_ADDED_MASSES = ("Xudot", "Yvdot", "Yrdot", "Nvdot", "Nrdot")
-"""Acceleration derivatives of a small craft, negative for added masses."""
-
-CRAFT_TERMS: tuple[str, ...] = (*CRAFT_ADDED_MASSES, *(term.name for term in VELOCITY_TERMS))
-"""Names in ``[derivatives]`` of a small craft."""
-
 UNCERTAIN_OF_THRUSTER = ("ahead_Ns2", "astern_Ns2", "speed_loss_kg", "dead_band_radps", "time_constant_s")
 """Keys of ``[[thrusters]]`` that may have a standard error."""
-
-
-def craft_scale(name: str, scales: Scales) -> float:
-    """SI value of a term of a small craft that is 1 in the prime system: with 1/2 rho L^2 V^2, L and V.
-
-    Parameters
-    ----------
-    name : str
-        One of :data:`CRAFT_TERMS`.
-    scales : Scales
-        Density (kg/m3), length (m) and speed V (m/s).
-
-    Examples
-    --------
-    >>> from tank2sim.cards.scaling import Scales
-    >>> craft_scale("Xuabsu", Scales(1000.0, 2.0, 3.0))  # 1/2 rho L^2
-    2000.0
-    """
-    length, speed = float(scales.length), float(scales.speed)
-    if name in CRAFT_ADDED_MASSES:
-        return float(scales.mass) * length ** ((name[0] == "N") + (name[1] == "r"))
-    term = next(term for term in VELOCITY_TERMS if term.name == name)
-    return float(scales.force) * length**term.lengths / speed ** (2 if term.size else 1)
-
-
-def craft_scales(card: CraftCard) -> Scales:
-    """Density, length and cruising speed, which make the numbers of a craft non-dimensional."""
-    return Scales(card.environment.water_density_kgpm3, card.ship.length_m, card.model.speed_mps)
-
-
-def body_scales(scales: Scales) -> dict[str, float]:
-    """SI values of ``mass``, ``yaw_inertia`` and ``x_G`` that are 1 in the prime system."""
-    return {"mass": float(scales.mass), "yaw_inertia": float(scales.inertia), "x_G": float(scales.length)}
 
 
 def craft_card(form: CraftForm, text: str, source: str, spelt: Mapping[str, str]) -> CraftCard:
@@ -193,7 +111,7 @@ def _check_signs(card: CraftCard) -> None:
         raise card.fault("derivatives.Nr", "is positive", "coefficients that damp are negative")
 
 
-def cruising_revolutions(card: CraftCard) -> float:
+def cruising_revolutions(card: SteeredCard) -> float:
     """Revolutions (rad/s) at which the thrusters that push ahead together hold the cruising speed, all with the same.
 
     (sum k cos a) n^2 - (sum l cos^2 a) u n = -(Xu u + Xuabsu u^2), a their azimuths.
@@ -219,6 +137,6 @@ def cruising_revolutions(card: CraftCard) -> float:
     return n
 
 
-def pushes_ahead(card: CraftCard) -> tuple[bool, ...]:
+def pushes_ahead(card: SteeredCard) -> tuple[bool, ...]:
     """For each thruster, whether it is one of those that hold the cruising speed."""
     return tuple(math.cos(thruster.azimuth_rad) > 1e-6 for thruster in card.thrusters)

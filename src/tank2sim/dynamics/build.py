@@ -5,13 +5,13 @@ from __future__ import annotations
 import pickle
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import cast
 
-from tank2sim.cards.card import Card, CraftCard, ManoeuvringCard
+from tank2sim.cards.card import Card, SteeredBy, SteeredCard
 from tank2sim.cards.examination import doubts
 from tank2sim.cards.form import EffectEntry
 from tank2sim.cards.kinds import CARD_KINDS
 from tank2sim.dynamics.effects import EFFECTS, Effect
+from tank2sim.dynamics.effects.effect import card_for_effects
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.ship import ship_model
 from tank2sim.dynamics.simulator_interface import force_shares
@@ -34,7 +34,7 @@ def build(card: Card) -> Model:
         The card names a derivative, an effect or a parameter that the model does not know, or its mass matrix is
         singular; the message names the key.
     """
-    entries = card.effects if isinstance(card, ManoeuvringCard | CraftCard) else ()
+    entries = card.effects if isinstance(card, SteeredCard) else ()
     effects = tuple(EFFECTS.get(entry.name) for entry in entries)
     return _built(_described(card, effects))
 
@@ -60,7 +60,7 @@ def _built(described: _Described) -> Model:
 
 
 def _model(card: Card) -> Model:
-    if not isinstance(card, ManoeuvringCard | CraftCard):
+    if not isinstance(card, SteeredCard):
         kind = CARD_KINDS[card.model.kind]
         if kind.model is None:
             raise TypeError(f"no model for {type(card).__name__}")
@@ -78,26 +78,23 @@ def _model(card: Card) -> Model:
 @lru_cache(maxsize=KEPT_MODELS)
 def _without_effects(described: _Described) -> Model:
     """The model on which the effects of a card go: the same whatever they are, and most of the work."""
-    card = described.card
-    if isinstance(card, CraftCard):
-        return craft_model(card)
-    assert isinstance(card, ManoeuvringCard)
-    return ship_model(card)
+    card = described.card.steered()
+    return craft_model(card) if card.steered_by is SteeredBy.THRUSTERS else ship_model(card.manoeuvring())
 
 
 def _comes_last(entry: EffectEntry) -> bool:
     return EFFECTS[entry.name].last
 
 
-def _check_effect(card: ManoeuvringCard | CraftCard, entry: EffectEntry, place: str) -> None:
+def _check_effect(card: SteeredCard, entry: EffectEntry, place: str) -> None:
     """Refuse an effect that is not known, not for this kind of ship, or whose parameters are not as it has them."""
     effect = EFFECTS.get(entry.name)
     if effect is None:
         raise card.fault(f"{place}.name", f"{entry.name!r} is not an effect", EFFECTS.remedy(entry.name))
-    if isinstance(card, CraftCard) and not effect.fits_craft:
+    if card.steered_by is SteeredBy.THRUSTERS and not effect.fits_craft:
         fitting = ", ".join(name for name, other in EFFECTS.items() if other.fits_craft)
         raise card.fault(f"{place}.name", f"{entry.name} is not for a small craft", f"it can have {fitting}")
-    shared = _as_ship(card)
+    shared = card_for_effects(card)
     known = {parameter.name: parameter for parameter in effect.parameters}
     for section, given in (("parameters", entry.parameters), ("uncertainty", entry.uncertainty)):
         for name in given:
@@ -116,14 +113,9 @@ def _check_effect(card: ManoeuvringCard | CraftCard, entry: EffectEntry, place: 
             raise card.fault(key, f"is {shown:g}", f"{lowest:g} to {highest:g} was expected")
 
 
-def _as_ship(card: ManoeuvringCard | CraftCard) -> ManoeuvringCard:
-    """The card as effects take it: what fits a craft reads nothing else of a card than what both kinds have."""
-    return cast(ManoeuvringCard, card)
-
-
-def _with_effect(model: Model, card: ManoeuvringCard | CraftCard, entry: EffectEntry) -> Model:
+def _with_effect(model: Model, card: SteeredCard, entry: EffectEntry) -> Model:
     effect = EFFECTS[entry.name]
-    changed = effect.apply(model, entry.parameters, _as_ship(card))
+    changed = effect.apply(model, entry.parameters, card_for_effects(card))
     # One that changes derivatives has no force of its own.
     if effect.acts_on != "force" or effect.reads_derivatives or effect.changes:
         return changed

@@ -10,16 +10,15 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, CraftCard, ManoeuvringCard, MmgCard, SteeredCard
+from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, MmgCard, SteeredCard
 from tank2sim.cards.covariance_reading import read_covariance
-from tank2sim.cards.small_craft import body_scales, craft_scale, craft_scales
 from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.effects.effect import card_for_effects
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.small_craft import THRUSTER_PARAMETERS
 from tank2sim.errors import ArgumentError
@@ -75,46 +74,21 @@ def study_model(card: SteeredCard) -> Model:
 
 def card_parameters(card: SteeredCard, model: Model) -> tuple[CardParameter, ...]:
     """Parameters of a card that are in its model, except for those that are zero without a standard error."""
-    hull = _of_craft(card) if isinstance(card, CraftCard) else _of_ship(card, model)
-    found = (*hull, *_effects(card, model))
+    found = (
+        *_derivatives(card, model),
+        *_interaction(card),
+        *_rigid_body(card),
+        *_gear(card),
+        *_propulsion(card),
+        *_thrusters(card),
+        *_effects(card, model),
+    )
     known = set(model.parameter_names)
     return tuple(
         parameter
         for parameter in found
         if parameter.name in known and (parameter.value != 0 or parameter.standard_error > 0)
     )
-
-
-def _of_ship(card: ManoeuvringCard, model: Model) -> list[CardParameter]:
-    return [
-        *_derivatives(card, model),
-        *_interaction(card),
-        *_rigid_body(card),
-        *_gear(card),
-        *_propulsion(card),
-    ]
-
-
-def _of_craft(card: CraftCard) -> list[CardParameter]:
-    """Rigid body, derivatives and thrusters of a craft, SI."""
-    scales, prime = craft_scales(card), card.model.scaling == "prime"
-    found = []
-    for name in dict.fromkeys((*card.derivatives, *card.uncertainty)):
-        value, error, stated = card.derivatives.get(name, 0.0), card.standard_error(name), name in card.uncertainty
-        factor = 1 / craft_scale(name, scales) if prime else 1.0
-        found.append(CardParameter(f"derivatives.{name}", value, error, not stated, f"derivatives.{name}", factor))
-    for key, unit in body_scales(scales).items():
-        value, factor = getattr(card.rigid_body, key), 1 / unit if prime else 1.0
-        found.append(CardParameter(f"ship.{key}", value, 0.0, False, f"rigid_body.{key}", factor))
-    for number, thruster in enumerate(card.thrusters):
-        for key, part in THRUSTER_PARAMETERS.items():
-            value, place = getattr(thruster, key) or 0.0, f"thrusters.{number}.{key}"
-            certain = key in ("x_m", "y_m")
-            error = thruster.uncertainty.get(key, 0.0 if certain else DEFAULT_RELATIVE_ERROR * abs(value))
-            assumed = not certain and key not in thruster.uncertainty
-            spelling, factor = card.in_file(place, 1.0)
-            found.append(CardParameter(f"thrusters.{thruster.name}.{part}", value, error, assumed, spelling, factor))
-    return found
 
 
 def find_parameter(parameters: Sequence[CardParameter], name: str, argument: str) -> CardParameter:
@@ -135,7 +109,7 @@ def find_parameter(parameters: Sequence[CardParameter], name: str, argument: str
     raise ArgumentError(argument, name, "is not a non-zero parameter of this card", remedy)
 
 
-def _derivatives(card: ManoeuvringCard, model: Model) -> list[CardParameter]:
+def _derivatives(card: SteeredCard, model: Model) -> list[CardParameter]:
     stated = {*card.derivatives, *card.uncertainty}
     return [
         CardParameter(
@@ -151,7 +125,7 @@ def _derivatives(card: ManoeuvringCard, model: Model) -> list[CardParameter]:
     ]
 
 
-def _interaction(card: ManoeuvringCard) -> list[CardParameter]:
+def _interaction(card: SteeredCard) -> list[CardParameter]:
     """Coefficients ``mmg.*`` of propeller and rudder."""
     if not isinstance(card, MmgCard):
         return []
@@ -168,20 +142,15 @@ def _interaction(card: ManoeuvringCard) -> list[CardParameter]:
     ]
 
 
-def _rigid_body(card: ManoeuvringCard) -> list[CardParameter]:
-    scales, in_file, body = card.scales, card.file_scales, card.rigid_body
-    described = (
-        ("ship.mass", "mass", body.mass, scales.mass, in_file.mass if in_file else 1.0),
-        ("ship.yaw_inertia", "yaw_inertia", body.yaw_inertia, scales.inertia, in_file.inertia if in_file else 1.0),
-        ("ship.x_G", "x_G", body.x_G, scales.length, in_file.length if in_file else 1.0),
-    )
+def _rigid_body(card: SteeredCard) -> list[CardParameter]:
+    factors = card.body_file_factors
     return [
-        CardParameter(name, value * scale, 0.0, False, f"rigid_body.{key}", file_scale / scale)
-        for name, key, value, scale, file_scale in described
+        CardParameter(f"ship.{key}", value, 0.0, False, f"rigid_body.{key}", factors[key])
+        for key, value in card.body_si.items()
     ]
 
 
-def _gear(card: ManoeuvringCard) -> list[CardParameter]:
+def _gear(card: SteeredCard) -> list[CardParameter]:
     gear = card.steering_gear
     if gear is None:
         return []
@@ -193,12 +162,12 @@ def _gear(card: ManoeuvringCard) -> list[CardParameter]:
     return [_exact(card, name, f"steering_gear.{key}", value) for name, key, value in described if value is not None]
 
 
-def _exact(card: ManoeuvringCard, name: str, place: str, value: float) -> CardParameter:
+def _exact(card: SteeredCard, name: str, place: str, value: float) -> CardParameter:
     key, factor = card.in_file(place, 1.0)
     return CardParameter(name, value, 0.0, False, key, factor)
 
 
-def _propulsion(card: ManoeuvringCard) -> list[CardParameter]:
+def _propulsion(card: SteeredCard) -> list[CardParameter]:
     """Xnn; the nominal revolutions are also those of the order, and have no influence."""
     if card.propulsion is None:
         return []
@@ -208,11 +177,25 @@ def _propulsion(card: ManoeuvringCard) -> list[CardParameter]:
     return [CardParameter("propulsion.Xnn", value, error, True, "propulsion.Xnn", factor)]
 
 
+def _thrusters(card: SteeredCard) -> list[CardParameter]:
+    found = []
+    for number, thruster in enumerate(card.thrusters):
+        for key, part in THRUSTER_PARAMETERS.items():
+            value, place = getattr(thruster, key) or 0.0, f"thrusters.{number}.{key}"
+            certain = key in ("x_m", "y_m")
+            error = thruster.uncertainty.get(key, 0.0 if certain else DEFAULT_RELATIVE_ERROR * abs(value))
+            assumed = not certain and key not in thruster.uncertainty
+            spelling, factor = card.in_file(place, 1.0)
+            bounds = (None if certain else 0.0, None)
+            name = f"thrusters.{thruster.name}.{part}"
+            found.append(CardParameter(name, value, error, assumed, spelling, factor, bounds))
+    return found
+
+
 def _effects(card: SteeredCard, model: Model) -> list[CardParameter]:
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
     found = []
-    # What fits a craft reads nothing else of a card than what both kinds have.
-    shared = cast(ManoeuvringCard, card)
+    shared = card_for_effects(card)
     for number, entry in enumerate(card.effects):
         effect = EFFECTS[entry.name]
         if effect.acts_on == "sensor":

@@ -21,9 +21,9 @@ from typing import Any
 import casadi as ca
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import CraftCard
+from tank2sim.cards.card import SteeredCard
+from tank2sim.cards.craft_terms import CRAFT_TERMS
 from tank2sim.cards.form import ThrusterSection
-from tank2sim.cards.small_craft import CRAFT_TERMS
 from tank2sim.dynamics.autopilot import heading_error, heading_signals, limit, within
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State, Variable
 from tank2sim.dynamics.small_craft import craft_damping, revolutions_for, thrust_of
@@ -60,7 +60,7 @@ class CraftGains:
     allocation: Array
 
 
-def craft_autopilot_model(card: CraftCard, gains: CraftGains, step_s: float) -> Model:
+def craft_autopilot_model(card: SteeredCard, gains: CraftGains, step_s: float) -> Model:
     """The autopilot of a craft.
 
     Inputs ``motion.psi``, ``motion.r``, ``motion.u``, ``heading.command`` and ``speed.command`` (m/s, by default the
@@ -68,7 +68,7 @@ def craft_autopilot_model(card: CraftCard, gains: CraftGains, step_s: float) -> 
 
     Parameters
     ----------
-    card : CraftCard
+    card : SteeredCard
         Fixed thrusters and resistance are its.
     gains : CraftGains
     step_s : float

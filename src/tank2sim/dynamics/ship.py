@@ -167,24 +167,26 @@ def _refuse_singular_mass(card: ManoeuvringCard) -> None:
         raise card.fault("roll.roll_inertia", problem, "check roll_inertia, z_G, Kpdot, Kvdot and Ypdot")
 
 
-def mass_fault(p: Mapping[str, float]) -> str:
-    """Why a ship with the parameters `p` (all, by name) has no mass matrix that can be used; empty if it has one."""
-    matrix = _mass_matrix(p)
+def mass_fault(model: Model, p: Mapping[str, float]) -> str:
+    """Why a model with the parameters `p` (all, by name) has no mass matrix that can be used; empty if it has one."""
+    matrix = _mass_matrix(model, p)
     if _is_singular(matrix):
         return SINGULAR
     return "" if _is_positive(matrix) else NOT_POSITIVE
 
 
-def mass_faults(p: Mapping[str, Array]) -> list[str]:
+def mass_faults(model: Model, p: Mapping[str, Array]) -> list[str]:
     """As :func:`mass_fault` for many ships, with parameters (n,) each."""
-    matrix = _mass_matrix(p)
+    matrix = _mass_matrix(model, p)
     singular, positive = np.broadcast_arrays(_is_singular(matrix), _is_positive(matrix))
     return [str(fault) for fault in np.where(singular, SINGULAR, np.where(positive, "", NOT_POSITIVE))]
 
 
-def _mass_matrix(p: Mapping[str, Any]) -> Inertia:
-    scales = Scales(p["ship.water_density"], p["ship.length"], p["ship.speed"])
+def _mass_matrix(model: Model, p: Mapping[str, Any]) -> Inertia:
     added = {name: p[f"derivatives.{name}"] for name in ACCELERATION_TERMS}
+    if model["derivatives.Xudot"].unit == "kg":
+        return inertia(p["ship.mass"], p["ship.x_G"], p["ship.yaw_inertia"], added)
+    scales = Scales(p["ship.water_density"], p["ship.length"], p["ship.speed"])
     mass, yaw_inertia = p["ship.mass"] / scales.mass, p["ship.yaw_inertia"] / scales.inertia
     return inertia(mass, p["ship.x_G"] / p["ship.length"], yaw_inertia, added)
 

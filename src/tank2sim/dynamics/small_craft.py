@@ -23,15 +23,10 @@ from collections.abc import Mapping
 
 import casadi as ca
 
-from tank2sim.cards.card import CraftCard
+from tank2sim.cards.card import SteeredCard
+from tank2sim.cards.craft_terms import CRAFT_ADDED_MASSES, CRAFT_TERMS, VELOCITY_TERMS
 from tank2sim.cards.form import ThrusterSection
-from tank2sim.cards.small_craft import (
-    CRAFT_ADDED_MASSES,
-    CRAFT_TERMS,
-    VELOCITY_TERMS,
-    cruising_revolutions,
-    pushes_ahead,
-)
+from tank2sim.cards.small_craft import cruising_revolutions, pushes_ahead
 from tank2sim.dynamics.geographic import GEOGRAPHIC_OUTPUTS, geographic
 from tank2sim.dynamics.hull import (
     VALIDITY_MARGIN,
@@ -76,7 +71,7 @@ _OUTPUTS = (
 )
 
 
-def craft_model(card: CraftCard) -> Model:
+def craft_model(card: SteeredCard) -> Model:
     """The model of a small craft without its effects.
 
     Inputs are ``thrusters.<name>.command`` (rad/s, positive ahead) and, of one that turns,
@@ -120,7 +115,7 @@ def craft_model(card: CraftCard) -> Model:
     )
 
 
-def _craft_step(card: CraftCard) -> float:
+def _craft_step(card: SteeredCard) -> float:
     """Step of integration, s: 1, 2 or 5 times a power of ten."""
     lags = [thruster.time_constant_s for thruster in card.thrusters]
     lags += [thruster.azimuth_time_constant_s for thruster in card.thrusters]
@@ -129,7 +124,7 @@ def _craft_step(card: CraftCard) -> float:
     return rounded_down(wanted)
 
 
-def _refuse_mass(card: CraftCard) -> None:
+def _refuse_mass(card: SteeredCard) -> None:
     body = card.rigid_body
     added = {name: card.derivatives.get(name, 0.0) for name in CRAFT_ADDED_MASSES}
     matrix = inertia(body.mass, body.x_G, body.yaw_inertia, added)
@@ -138,13 +133,13 @@ def _refuse_mass(card: CraftCard) -> None:
         raise card.fault("rigid_body", problem, "check mass, yaw_inertia, x_G and the signs of the added masses")
 
 
-def _nominal_forces(card: CraftCard) -> tuple[float, float]:
+def _nominal_forces(card: SteeredCard) -> tuple[float, float]:
     """Thrust (N) of all thrusters at their largest revolutions, and its moment (N m) at half the length."""
     thrust = sum(thruster.largest_thrust_N for thruster in card.thrusters)
     return thrust, thrust * card.ship.length_m / 2
 
 
-def _craft_particulars(card: CraftCard) -> tuple[Parameter, ...]:
+def _craft_particulars(card: SteeredCard) -> tuple[Parameter, ...]:
     slowest, fastest = card.model.speed_range_mps
     described = (
         ("ship.length", "m", "Length between perpendiculars", card.ship.length_m),
@@ -192,7 +187,7 @@ def craft_unit(name: str) -> str:
     return _DAMPING_UNITS[int(bool(term.size))][term.lengths]
 
 
-def _craft_derivatives(card: CraftCard) -> tuple[Parameter, ...]:
+def _craft_derivatives(card: SteeredCard) -> tuple[Parameter, ...]:
     velocity = {term.name: term for term in VELOCITY_TERMS}
 
     def described(name: str) -> str:
@@ -224,7 +219,7 @@ def craft_damping(coefficients: Mapping[str, ca.SX], u: ca.SX, v: ca.SX, r: ca.S
     Parameters
     ----------
     coefficients : mapping
-        Name of each of :data:`tank2sim.cards.small_craft.VELOCITY_TERMS` to its value, SI.
+        Name of each of :data:`tank2sim.cards.craft_terms.VELOCITY_TERMS` to its value, SI.
     u, v, r : casadi.SX
         m/s through the water, rad/s.
     """
@@ -285,7 +280,7 @@ def revolutions_for(thrust: ca.SX, along: ca.SX, ahead: ca.SX, astern: ca.SX, lo
     return ca.if_else(thrust >= 0, forward, -ca.sqrt(ca.fmax(-thrust, 0) / astern))
 
 
-def _thrusters(card: CraftCard, s: Mapping[str, ca.SX]) -> tuple[list[Variable], tuple[ca.SX, ca.SX, ca.SX]]:
+def _thrusters(card: SteeredCard, s: Mapping[str, ca.SX]) -> tuple[list[Variable], tuple[ca.SX, ca.SX, ca.SX]]:
     """Variables of all thrusters, and their X, Y (N) and N (N m)."""
     cruising = cruising_revolutions(card)
     found: list[Variable] = []

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 from tank2sim.arguments import checked
-from tank2sim.cards import Card, CraftCard, ManoeuvringCard, SteeredCard, parse_card, read_card
-from tank2sim.cards.card import manoeuvring_card
+from tank2sim.cards import Card, ManoeuvringCard, SteeredCard, parse_card, read_card
 from tank2sim.cards.reading import changed_text
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.model import Model
@@ -54,16 +53,17 @@ class Vessel:
 
     @property
     def derivatives(self) -> pd.DataFrame:
-        """Hydrodynamic derivatives: prime value and standard error by name, rudder positive to starboard.
+        """Hydrodynamic derivatives: value and standard error by name; prime with the rudder positive to starboard, of a
+        craft with thrusters SI.
 
         Raises
         ------
         InputError
-            The card is not one of a ship that manoeuvres.
+            The card is not one of a ship or craft that manoeuvres.
         """
         import pandas as pd
 
-        card = self.manoeuvring()
+        card = self.steered()
         rows = [(name, value, card.standard_error(name)) for name, value in card.derivatives.items()]
         return pd.DataFrame(rows, columns=["name", "value", "standard_error"]).set_index("name")
 
@@ -75,7 +75,7 @@ class Vessel:
         InputError
             It is not: a towed body, a yaw rig, a glider or a craft without a rudder.
         """
-        return manoeuvring_card(self.card)
+        return self.card.manoeuvring()
 
     def steered(self) -> SteeredCard:
         """The card, if it is one of a ship that manoeuvres or of a small craft with thrusters.
@@ -85,7 +85,7 @@ class Vessel:
         InputError
             It is neither: a towed body, a yaw rig or a glider.
         """
-        return self.card if isinstance(self.card, CraftCard) else self.manoeuvring()
+        return self.card.steered()
 
     @checked
     def replace(self, values: Mapping[str, object]) -> Self:
@@ -111,7 +111,7 @@ class Vessel:
 
     def __repr__(self) -> str:
         particulars = [f"{self.card.model.kind} model"]
-        if isinstance(self.card, ManoeuvringCard):
+        if isinstance(self.card, SteeredCard):
             particulars += [f"L = {self.card.ship.length_m:g} m", f"u0 = {self.card.model.speed_mps:.4g} m/s"]
             particulars += [f"{len(self.card.derivatives)} derivatives"]
             particulars += (

@@ -8,7 +8,7 @@ from typing import Any
 
 import tomlkit
 
-from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, Card, CraftCard, ManoeuvringCard
+from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, Card, SteeredBy, SteeredCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.effects.particulars import estimated_from
 from tank2sim.dynamics.low_speed import SOURCES
@@ -94,25 +94,20 @@ def origins(card: Card) -> dict[str, ValueOrigin]:
         if comment is not None:
             error, whence = _stated_error(card, key)
             found[variable] = ValueOrigin(card.ship.source, comment, error, whence)
-    if isinstance(card, CraftCard):
-        return found | dict(_of_craft(card, document)) | dict(_of_effects(card, document))
-    if not isinstance(card, ManoeuvringCard):
+    if not isinstance(card, SteeredCard):
         return found
-    found = _of_low_speed() | found
+    if card.steered_by is SteeredBy.RUDDER:
+        found = _of_low_speed() | found
     for name in card.derivatives:
         comment = _line_comment(document.get("derivatives"), card.places.get(name, name))
         whence = STATED_ERROR if name in card.uncertainty else ASSUMED_ERROR
         found[f"derivatives.{name}"] = ValueOrigin(card.ship.source, comment or "", card.standard_error(name), whence)
-    return found | dict(_of_effects(card, document))
+    return found | dict(_of_thrusters(card, document)) | dict(_of_effects(card, document))
 
 
-def _of_craft(card: CraftCard, document: Mapping[str, Any]) -> Iterator[tuple[str, ValueOrigin]]:
-    """Derivatives and thrust curves of a small craft."""
-    for name in card.derivatives:
-        comment = _line_comment(document.get("derivatives"), name)
-        whence = STATED_ERROR if name in card.uncertainty else ASSUMED_ERROR
-        yield f"derivatives.{name}", ValueOrigin(card.ship.source, comment or "", card.standard_error(name), whence)
-    for thruster, table in zip(card.thrusters, document["thrusters"], strict=True):
+def _of_thrusters(card: SteeredCard, document: Mapping[str, Any]) -> Iterator[tuple[str, ValueOrigin]]:
+    """Thrust curves."""
+    for thruster, table in zip(card.thrusters, document.get("thrusters", ()), strict=True):
         for key, name in THRUSTER_PARAMETERS.items():
             comment = _line_comment(table, key)
             if comment is not None:
@@ -138,7 +133,7 @@ def _stated_error(card: Card, key: str) -> tuple[float | None, str]:
     return stated, NOT_STATED if stated is None else STATED_ERROR
 
 
-def _of_effects(card: ManoeuvringCard | CraftCard, document: Mapping[str, Any]) -> Iterator[tuple[str, ValueOrigin]]:
+def _of_effects(card: SteeredCard, document: Mapping[str, Any]) -> Iterator[tuple[str, ValueOrigin]]:
     for entry, table in zip(card.effects, document.get("effects", ()), strict=True):
         effect = EFFECTS[entry.name]
         for name, variable in effect.model_names().items():
@@ -196,9 +191,9 @@ def documents_without_card(card: Card) -> Documents:
 
 def documents_of(card: Card) -> Documents:
     """Source, validity, the origin of every coefficient and the card itself, to lie in the FMU."""
-    speeds = card.model.speed_range_mps if isinstance(card, ManoeuvringCard | CraftCard) else card.model.valid_speed_mps
+    speeds = card.speed_range_mps
     validity = f"The card holds for speeds through the water of {speeds[0]:g} to {speeds[1]:g} m/s." if speeds else ""
-    if isinstance(card, ManoeuvringCard) and card.propulsion is None:
+    if isinstance(card, SteeredCard) and card.steered_by is SteeredBy.RUDDER and card.propulsion is None:
         validity += (
             " It states no propulsion: the ship holds its revolutions at every speed, so that it leaves rest by "
             "itself and cannot be stopped."

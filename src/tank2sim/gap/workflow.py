@@ -109,12 +109,11 @@ def nonlinear_card(card: Card) -> ManoeuvringCard:
     InputError
         It is not of a manoeuvring ship, or its equations are linear.
     """
-    if not isinstance(card, ManoeuvringCard):
-        raise InputError(card.source, "model.kind", "is not a manoeuvring ship", "give an abkowitz or mmg card")
-    if card.model.kind == "linear":
+    ship = card.manoeuvring()
+    if ship.model.kind == "linear":
         remedy = 'set kind = "abkowitz"; its missing third-order terms are then zero'
-        raise InputError(card.source, "model.kind", "is linear, and most effects are not part of such a model", remedy)
-    return card
+        raise ship.fault("model.kind", "is linear, and most effects are not part of such a model", remedy)
+    return ship
 
 
 def run_gap_workflow(

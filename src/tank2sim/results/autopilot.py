@@ -154,6 +154,52 @@ class ResultWithController(Result[_S]):
         write_together(found.files, inputs=[Path(origin)])
         return found
 
+    def _tracks(self) -> list[Section]:
+        """The track that was kept, if one was given."""
+        if not self.study.track:
+            return []
+        study, runs, points = self.study, self.study.track_histories.items(), self.study.waypoints_m
+        sailed: list[TrackData] = [
+            TrackData(label=name, x_m=one["x_m"], y_m=one["y_m"], time_s=one["t_s"]) for name, one in runs
+        ]
+        wanted: list[TrackData] = [
+            TrackData(label=label, x_m=points[:, 0], y_m=points[:, 1], time_s=np.zeros(len(points)), measured=measured)
+            for label, measured in (("legs", False), ("waypoints", True))
+        ]
+        errors = [CrossTrack(label=name, time_s=one["t_s"], error_m=one["cross_track_error_m"]) for name, one in runs]
+        section = Section(
+            heading="Track keeping",
+            text="Line of sight with lookahead, in the current and the wind of the course keeping. Errors leap at the "
+            "end of a leg, where the next one begins to count; errors on legs are taken from the second half of each.",
+            tables=[
+                records_table(
+                    "Cross-track errors, positive to starboard", study.track, first="guidance", fields=_TRACK, digits=3
+                )
+            ],
+            charts=[
+                Illustration(chart=track_chart([*sailed, *wanted], title="Track and its legs")),
+                Illustration(chart=cross_track_chart(errors, title="Cross-track error")),
+            ],
+        )
+        return [section]
+
+    def _in_words(self) -> str:
+        """Weather of the course keeping."""
+        weather = self.study.weather
+        return (
+            f"Steering north in a current of {weather['current_mps']:.3g} m/s towards "
+            f"{weather['current_towards_deg']:.0f} deg, wind of {weather['wind_mps']:.3g} m/s from "
+            f"{weather['wind_from_deg']:.0f} deg, and waves of {weather['wave_radps']:.3g} rad/s that alone would "
+            f"yaw the ship by {weather['wave_yaw_deg']:.3g} deg (standard deviation); seed {weather['seed']:.0f}."
+        )
+
+    @property
+    def cross_track(self) -> pd.DataFrame:
+        """Figures of the track by guidance, m and s; empty without a track."""
+        import pandas as pd
+
+        return pd.DataFrame({name: asdict(one) for name, one in self.study.track.items()}).T
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AutopilotResult(ResultWithController[AutopilotStudy]):
@@ -185,13 +231,6 @@ class AutopilotResult(ResultWithController[AutopilotStudy]):
     def course_keeping(self) -> dict[str, float]:
         """Figures of course keeping in current, wind and waves, deg and s."""
         return asdict(self.study.closed_loop.course_keeping)
-
-    @property
-    def cross_track(self) -> pd.DataFrame:
-        """Figures of the track by guidance, m and s; empty without a track."""
-        import pandas as pd
-
-        return pd.DataFrame({name: asdict(one) for name, one in self.study.track.items()}).T
 
     @property
     def headline(self) -> tuple[str, ...]:
@@ -249,10 +288,9 @@ class AutopilotResult(ResultWithController[AutopilotStudy]):
     @property
     def sections(self) -> Sequence[Section]:
         """Course changes, the track, course keeping, the loop, the controller and its FMU."""
-        track = [self._track()] if self.study.track else []
         return [
             self._course_changes(),
-            *track,
+            *self._tracks(),
             self._course_keeping(),
             self._loop(),
             self._controller(),
@@ -282,38 +320,12 @@ class AutopilotResult(ResultWithController[AutopilotStudy]):
             ],
         )
 
-    def _track(self) -> Section:
-        study, runs, points = self.study, self.study.track_histories.items(), self.study.waypoints_m
-        sailed = [TrackData(label=name, x_m=one["x_m"], y_m=one["y_m"], time_s=one["t_s"]) for name, one in runs]
-        wanted = [
-            TrackData(label=label, x_m=points[:, 0], y_m=points[:, 1], time_s=np.zeros(len(points)), measured=measured)
-            for label, measured in (("legs", False), ("waypoints", True))
-        ]
-        errors = [CrossTrack(label=name, time_s=one["t_s"], error_m=one["cross_track_error_m"]) for name, one in runs]
-        return Section(
-            heading="Track keeping",
-            text="Line of sight with lookahead, in the current and the wind of the course keeping. Errors leap at the "
-            "end of a leg, where the next one begins to count; errors on legs are taken from the second half of each.",
-            tables=[
-                records_table(
-                    "Cross-track errors, positive to starboard", study.track, first="guidance", fields=_TRACK, digits=3
-                )
-            ],
-            charts=[
-                Illustration(chart=track_chart([*sailed, *wanted], title="Track and its legs")),
-                Illustration(chart=cross_track_chart(errors, title="Cross-track error")),
-            ],
-        )
-
     def _course_keeping(self) -> Section:
-        weather, kept = self.study.weather, self.study.closed_loop.course_keeping
+        kept = self.study.closed_loop.course_keeping
         figures = {name: value for name, value in asdict(kept).items() if name != "duration_s"}
         return Section(
             heading="Course keeping",
-            text=f"Steering north in a current of {weather['current_mps']:.3g} m/s towards "
-            f"{weather['current_towards_deg']:.0f} deg, wind of {weather['wind_mps']:.3g} m/s from "
-            f"{weather['wind_from_deg']:.0f} deg, and waves of {weather['wave_radps']:.3g} rad/s that alone would "
-            f"yaw the ship by {weather['wave_yaw_deg']:.3g} deg (standard deviation); seed {weather['seed']:.0f}.",
+            text=self._in_words(),
             tables=[quantities(f"Course keeping, over the last {kept.duration_s:.0f} s", figures)],
             charts=[self._histories("Course keeping, the last waves", "keeping")],
         )
@@ -435,11 +447,12 @@ class CraftAutopilotResult(ResultWithController[CraftAutopilotStudy]):
         more = (f"{self.study.source}.", *fmu_line(self.study.export))
         if course.settling_time_s is None or speed.settling_time_s is None:
             return (f"{turned}, or one of speed by {speed.ordered:.3g} m/s, does not settle in the run.", *more)
-        share = max(self.study.at_limit_percent.values())
+        share = max(self.study.at_limit_percent[name] for name in ("course", "speed"))
+        kept = f"In weather the heading is {self.study.course_keeping.heading_error_rms_deg:.2g} deg off (rms)"
         limit = f"A thruster is at its limit for {share:.2g} % of the time" if share else "No thruster is at its limit"
         return (
             f"{turned} {_settles(course.settling_time_s)} with {course.overshoot:.2g} deg of overshoot, one of speed "
-            f"by {speed.ordered:.3g} m/s in {speed.settling_time_s:.3g} s. {limit}.",
+            f"by {speed.ordered:.3g} m/s in {speed.settling_time_s:.3g} s. {limit}. {kept}.",
             *more,
         )
 
@@ -461,13 +474,35 @@ class CraftAutopilotResult(ResultWithController[CraftAutopilotStudy]):
     @property
     def sections(self) -> Sequence[Section]:
         """Changes of course and speed, the controller and its FMU."""
-        return [self._changes(), self._controller(), *fmu_section(self.study.export)]
+        return [
+            self._changes(),
+            *self._tracks(),
+            self._course_keeping(),
+            self._controller(),
+            *fmu_section(self.study.export),
+        ]
+
+    def _course_keeping(self) -> Section:
+        kept, columns = self.study.course_keeping, self.study.histories["keeping"]
+        signals = [_HEADING, _SPEED, *self._revolutions]
+        figures = {name: value for name, value in asdict(kept).items() if name != "duration_s"}
+        figures["at_limit_percent"] = self.study.at_limit_percent["keeping"]
+        drawn = history_chart([_history("keeping", columns, signals)], signals, title="Course keeping")
+        return Section(
+            heading="Course keeping",
+            text=self._in_words(),
+            tables=[quantities(f"Course keeping, over the last {kept.duration_s:.0f} s", figures)],
+            charts=[Illustration(chart=drawn)],
+        )
+
+    @property
+    def _revolutions(self) -> list[Signal]:
+        names = sorted(name for name in self.study.histories["course"] if name.startswith("n_"))
+        titles = [name.removeprefix("n_").removesuffix("_rpm").replace("_", " ") for name in names]
+        return [Signal(name=name, title=title, unit="rpm") for name, title in zip(names, titles, strict=True)]
 
     def _changes(self) -> Section:
-        study, turning = self.study, []
-        for name in sorted(key for key in study.histories["course"] if key.startswith("n_")):
-            thruster = name.removeprefix("n_").removesuffix("_rpm").replace("_", " ")
-            turning.append(Signal(name=name, title=thruster, unit="rpm"))
+        study, turning = self.study, self._revolutions
         charts = [
             Illustration(
                 chart=history_chart([_history(name, study.histories[name], signals)], signals, title=title), half=True

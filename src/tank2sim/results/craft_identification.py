@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from tank2sim.answer.parts import Cell, Column, KeyFigure, Section, records_table, table
 from tank2sim.answer.result import Result
-from tank2sim.cards import CraftCard
+from tank2sim.cards import SteeredCard
 from tank2sim.identification.craft.fit import CoefficientVerdict, CraftFit, FreePrediction
 from tank2sim.identification.craft.next_trial import CandidateTrial
 from tank2sim.identification.craft.study import CraftIdentificationStudy
@@ -21,7 +21,7 @@ class CraftIdentificationResult(Result[CraftIdentificationStudy]):
     Parameters
     ----------
     study : CraftIdentificationStudy
-    card : CraftCard, optional
+    card : SteeredCard, optional
         The card found; ``card.save("better.toml")`` writes it, and ``ship`` is its ship.
     fit : CraftFit, optional
     predictions : tuple of FreePrediction
@@ -29,7 +29,7 @@ class CraftIdentificationResult(Result[CraftIdentificationStudy]):
     """
 
     study: CraftIdentificationStudy
-    card: CraftCard | None = None
+    card: SteeredCard | None = None
     fit: CraftFit | None = None
     predictions: tuple[FreePrediction, ...] = ()
     command: ClassVar[str] = "identify"

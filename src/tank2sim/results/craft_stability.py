@@ -5,25 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
 
 from tank2sim.analysis.stability.craft import STRAIGHT_FROM_LENGTHS, CraftStabilityStudy
 from tank2sim.answer.parts import Cell, KeyFigure, Section, Verdict, records_table, table
-from tank2sim.answer.result import Result
+from tank2sim.results.ensembles import chance_sentences, figures_section
+from tank2sim.results.stability import ResultOnCourse
 
 _DEGPS_PER_100_RPM = 600.0
 """Yaw rate in deg/s for a difference of 100 rpm, over the same in rad/s by rad/s."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CraftStabilityResult(Result[CraftStabilityStudy]):
+class CraftStabilityResult(ResultOnCourse[CraftStabilityStudy]):
     """Straight-line stability, surge and turning of a craft with thrusters at both sides.
 
-    Parameters
-    ----------
-    study : CraftStabilityStudy
-    ship : Ship, optional
-        The craft (:class:`tank2sim.Ship`); None if the result was read from its JSON.
+    Parameters as of :class:`ResultOnCourse`, with the study :class:`.CraftStabilityStudy`.
 
     Examples
     --------
@@ -31,15 +27,6 @@ class CraftStabilityResult(Result[CraftStabilityStudy]):
     >>> t2s.load("otter").stability().stable
     True
     """
-
-    study: CraftStabilityStudy
-    ship: Any = None
-    command: ClassVar[str] = "stability"
-
-    @property
-    def title(self) -> str:
-        """The craft."""
-        return self.study.ship
 
     @property
     def subtitle(self) -> str:
@@ -76,7 +63,7 @@ class CraftStabilityResult(Result[CraftStabilityStudy]):
                 f"Steady turns: up to {last.yaw_rate_degps:.3g} deg/s, {last.diameter_m:.3g} m wide, at "
                 f"{last.difference_rpm:.4g} rpm of difference."
             )
-        return tuple(lines)
+        return (*lines, *(chance_sentences(study.ensemble) if study.ensemble else []))
 
     def _left_alone(self) -> str:
         """Motion of an unstable craft without a difference of revolutions."""
@@ -135,4 +122,5 @@ class CraftStabilityResult(Result[CraftStabilityStudy]):
                 ],
             ),
             Section(heading="Steady turning", tables=[turns]),
+            *([figures_section(study.ensemble)] if study.ensemble else []),
         ]

@@ -92,12 +92,12 @@ def band_table(found: Members, figures: Mapping[str, Band]) -> Table:
     return table(caption, ("figure", "unit", "5 %", "50 %", "95 %", "shown by"), rows)
 
 
-def figures_section(found: FigureBands) -> Section:
+def figures_section(found: FigureBands | StabilityBands) -> Section:
     """Return the section with bands of figures by name.
 
     Parameters
     ----------
-    found : FigureBands
+    found : FigureBands or StabilityBands
     """
     return Section(heading=ensemble_heading(found), text=MEMBERS_TEXT, tables=[band_table(found, found.figures)])
 

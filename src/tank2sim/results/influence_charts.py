@@ -56,10 +56,11 @@ _ORDINALS = ("first", "second", "third", "fourth")
 
 
 def figure_label(text: str) -> str:
-    """Words for a figure, without its unit: ``advance_m@35`` is ``advance, 35 deg``."""
+    """Words for a figure without its unit: ``advance_m@35`` is ``advance, 35 deg``, ``@spin:400`` ends in ``rpm``."""
     kind, _, argument = text.partition("@")
     words = re.sub(r"^overshoot (\d)$", lambda found: f"{_ORDINALS[int(found[1]) - 1]} overshoot", in_words(kind)[0])
-    return f"{words}, {argument} deg" if argument else words
+    unit = "rpm" if ":" in argument else "deg"
+    return f"{words}, {argument} {unit}" if argument else words
 
 
 def most_influential(result: InfluenceData, row: int) -> list[int]:

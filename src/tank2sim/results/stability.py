@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
+from tank2sim.analysis.stability.craft import CraftStabilityStudy
 from tank2sim.analysis.stability.study import StabilityStudy
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Verdict, records_table, table
@@ -62,25 +63,21 @@ _CHARACTERISTIC = (
 )
 
 
+_S = TypeVar("_S", StabilityStudy, CraftStabilityStudy)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class StabilityResult(Result[StabilityStudy]):
-    """Stability, steady turning and IMO criteria of a ship.
+class ResultOnCourse(Result[_S]):
+    """Stability of a ship or craft on a straight course.
 
     Parameters
     ----------
-    study : StabilityStudy
+    study : dataclass
     ship : Ship, optional
         The ship (:class:`tank2sim.Ship`); None if the result was read from its JSON.
-
-    Examples
-    --------
-    >>> import tank2sim as t2s
-    >>> found = t2s.load("mariner").stability(spirals=False)
-    >>> found.stable
-    True
     """
 
-    study: StabilityStudy
+    study: _S
     ship: Any = None
     command: ClassVar[str] = "stability"
 
@@ -90,15 +87,45 @@ class StabilityResult(Result[StabilityStudy]):
         return self.study.ship
 
     @property
+    def notices(self) -> tuple[Notice, ...]:
+        """Notices of the study and of its ensemble."""
+        drawn: tuple[Notice, ...] = self.study.ensemble.notices if self.study.ensemble else ()
+        return tuple(dict.fromkeys([*self.study.notices, *drawn]))
+
+    @cached_property
+    def members(self) -> pd.DataFrame:
+        """The ships of the ensemble, one row each: the numbers drawn, by the dotted keys of the card and as its file
+        has them; the value of each IMO criterion, if it has a rudder; figures of the straight course; and whether the
+        ship is ``usable``.
+
+        A column "...: beyond the card" is 1 where the trial of a criterion left the card's range before its value.
+
+        Raises
+        ------
+        InputError
+            The result has no ensemble, or was read from its JSON, which has only the bands.
+        """
+        return members_frame(self.study.ensemble)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StabilityResult(ResultOnCourse[StabilityStudy]):
+    """Stability, steady turning and IMO criteria of a ship.
+
+    Parameters as of :class:`ResultOnCourse`, with the study :class:`.StabilityStudy`.
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> found = t2s.load("mariner").stability(spirals=False)
+    >>> found.stable
+    True
+    """
+
+    @property
     def subtitle(self) -> str:
         """Speed of the straight course."""
         return f"Stability and manoeuvrability, {self.study.operating_point.speed_mps:.4g} m/s"
-
-    @property
-    def notices(self) -> tuple[Notice, ...]:
-        """Those of the study, and of its ensemble."""
-        members = self.study.ensemble.notices if self.study.ensemble else ()
-        return tuple(dict.fromkeys([*self.study.notices, *members]))
 
     @property
     def stable(self) -> bool:
@@ -118,20 +145,6 @@ class StabilityResult(Result[StabilityStudy]):
         names = {"name": "criterion", "passed": "met"}
         columns = ["name", "found", "allowed", "unit", "passed", "margin_percent"]
         return pd.DataFrame(list(self.study.imo))[columns].rename(columns=names).set_index("criterion")
-
-    @cached_property
-    def members(self) -> pd.DataFrame:
-        """The ships of the ensemble, one row each: the numbers drawn, by the dotted keys of the card and as its file
-        has them; the value of each IMO criterion; figures of the straight course; and whether the ship is ``usable``.
-
-        A column "...: beyond the card" is 1 where the trial of a criterion left the card's range before its value.
-
-        Raises
-        ------
-        InputError
-            The result has no ensemble, or was read from its JSON, which has only the bands.
-        """
-        return members_frame(self.study.ensemble)
 
     @property
     def headline(self) -> tuple[str, ...]:

@@ -14,11 +14,13 @@ from tank2sim.analysis.validation.study import ComparisonOutcome, Validated, Ver
 from tank2sim.answer.charts.columns import motions
 from tank2sim.answer.charts.parts import with_unit
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Verdict, table
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Verdict, records_table, table
 from tank2sim.answer.result import Result
 from tank2sim.arrays import Columns, Number
-from tank2sim.cards import ManoeuvringCard
+from tank2sim.cards import SteeredBy, SteeredCard
 from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR
+from tank2sim.identification.craft.fit import PREDICTED_S
+from tank2sim.identification.craft.study import PredictionStudy
 from tank2sim.notices import Notice
 from tank2sim.results.imo import imo_section
 from tank2sim.results.validation_charts import COMPARISON_ERRORS, comparison_error_chart
@@ -111,6 +113,8 @@ class ValidationStudy:
         Statements on the model by item.
     coefficients : dict
         Derivatives by name.
+    steered_by : SteeredBy
+        Coefficients of a craft with thrusters are in SI, others are prime.
     propulsion : bool
         Whether the card has propulsion.
     verdict : str
@@ -123,6 +127,8 @@ class ValidationStudy:
         Figures of standard trials.
     imo : tuple of ImoCriterion
     replays : tuple of TrialReplay
+    predictions : PredictionStudy, optional
+        Trials of a craft with thrusters.
     notices : tuple of Notice
     kind : str
         Always ``validate``.
@@ -132,6 +138,7 @@ class ValidationStudy:
     source: str
     documentation: dict[str, str]
     coefficients: dict[str, CardValue]
+    steered_by: SteeredBy
     propulsion: bool
     verdict: str
     counts: dict[str, int]
@@ -141,6 +148,7 @@ class ValidationStudy:
     imo: tuple[ImoCriterion, ...]
     replays: tuple[TrialReplay, ...]
     notices: tuple[Notice, ...]
+    predictions: PredictionStudy | None = None
     kind: str = "validate"
 
 
@@ -151,14 +159,14 @@ class ValidationResult(Result[ValidationStudy]):
     Parameters
     ----------
     study : ValidationStudy
-    card : ManoeuvringCard, optional
+    card : SteeredCard, optional
         None if the result was read from its JSON; ``ship`` is its ship.
     paths : tuple of Path
         Files of the trials.
     """
 
     study: ValidationStudy
-    card: ManoeuvringCard | None = None
+    card: SteeredCard | None = None
     paths: tuple[Path, ...] = ()
     command: ClassVar[str] = "validate"
 
@@ -198,13 +206,20 @@ class ValidationResult(Result[ValidationStudy]):
     @property
     def headline(self) -> tuple[str, ...]:
         """The verdict, and the largest numerical uncertainty."""
-        verdict, shares = f"{self.study.ship}: {self.verdict}.", self._numerical_percent
-        if not shares:
-            return (verdict,)
+        shares = self._numerical_percent
+        numerical = f"Numerical uncertainty of {len(shares)} figures of standard trials: {max(shares, default=0):.2g} %"
         return (
-            verdict,
-            f"Numerical uncertainty of {len(shares)} figures of standard trials: {max(shares):.2g} % at most.",
+            f"{self.study.ship}: {self.verdict}.",
+            *([f"Rms error at the ends of predictions: {ends}."] if (ends := self._ends) else []),
+            *([f"{numerical} at most."] if shares else []),
         )
+
+    @property
+    def _ends(self) -> str:
+        """Errors of position and heading at the ends of predictions in words; empty without any."""
+        found = self.study.predictions
+        errors = {"m": found.end_distance_m, "deg": found.end_heading_deg} if found else {}
+        return " and ".join(f"{value:.3g} {unit}" for unit, value in errors.items() if value is not None)
 
     @property
     def key_figures(self) -> Sequence[KeyFigure]:
@@ -215,6 +230,15 @@ class ValidationResult(Result[ValidationStudy]):
             incomplete = Verdict.FAILED if counts[ComparisonOutcome.REFUTED.value] else Verdict.CAUTION
             verdict = Verdict.PASSED if validated == len(figures) else incomplete
             shown = [KeyFigure(label="Figures validated", value=f"{validated} of {len(figures)}", verdict=verdict)]
+        elif found := self.study.predictions:
+            shown = [
+                KeyFigure(label=f"R^2 of {name}", value=round(one, 3)) for name, one in found.determination.items()
+            ]
+            ends = {"position": (found.end_distance_m, "m"), "heading": (found.end_heading_deg, "deg")}
+            note = f"rms, after up to {PREDICTED_S:g} s"
+            for name, (value, unit) in ends.items():
+                if value is not None:
+                    shown.append(KeyFigure(label=f"Error of {name}", value=value, unit=unit, note=note))
         else:
             note = "no trial to compare with"
             shown = [KeyFigure(label="Validation", value="none", verdict=Verdict.CAUTION, note=note)]
@@ -233,7 +257,7 @@ class ValidationResult(Result[ValidationStudy]):
         """Figures, standards, replays, method, verification, documentation, coefficients, causes of errors."""
         study = self.study
         return [
-            self._comparison(),
+            _predictions(study.predictions) if study.predictions else self._comparison(),
             *([self._standards()] if study.imo else []),
             *([self._replays()] if study.replays else []),
             *([_method(study.figures)] if study.figures else []),
@@ -251,7 +275,8 @@ class ValidationResult(Result[ValidationStudy]):
     def _comparison(self) -> Section:
         figures = self.study.figures
         if not figures:
-            text = "No turning circle or zigzag was given: the model is documented and verified, and not validated."
+            given = "trial" if self.study.steered_by is SteeredBy.THRUSTERS else "turning circle or zigzag"
+            text = f"No {given} was given: the model is documented and verified, and not validated."
             return Section(heading="Validation", text=text)
         manoeuvres = {figure.trial: figure.manoeuvre for figure in figures}
         numbers = {trial: number for number, trial in enumerate(manoeuvres, start=1)}
@@ -328,18 +353,19 @@ class ValidationResult(Result[ValidationStudy]):
         return Section(heading="The simulation model", tables=tables)
 
     def _coefficients(self) -> Section:
+        prime = self.study.steered_by is SteeredBy.RUDDER
+        factor, caption = (1000, "Prime system, rudder positive to starboard, times 1000") if prime else (1, "SI")
         rows: list[list[Cell]] = [
             [
                 name,
-                1000 * row.value,
-                1000 * row.standard_error,
+                factor * row.value,
+                factor * row.standard_error,
                 100 * row.standard_error / abs(row.value),
                 "stated" if row.stated else "assumed",
             ]
             for name, row in self.study.coefficients.items()
         ]
         errors = [Column(title="standard error", digits=3), Column(title="error over value", unit="%", digits=3)]
-        caption = "Prime system, rudder positive to starboard, times 1000"
         tables = [table(caption, ["coefficient", "value", *errors, "error"], rows, on_screen=False)]
         text = f"Where the card states no standard error, {DEFAULT_RELATIVE_ERROR:.0%} of the value is assumed."
         return Section(heading="Coefficients", text=text, tables=tables)
@@ -348,6 +374,25 @@ class ValidationResult(Result[ValidationStudy]):
         causes = (*_CAUSES, *([] if self.study.propulsion else [_NO_PROPULSION]))
         tables = [table("Potential causes of errors", ("cause",), [[cause] for cause in causes], on_screen=False)]
         return Section(heading="Causes of error and sensitivity", text=_SENSITIVITY, tables=tables)
+
+
+def _predictions(found: PredictionStudy) -> Section:
+    """Root mean square errors of each trial."""
+    fields = {
+        "predictions": "",
+        "rms_u_mps": "u",
+        "rms_v_mps": "v",
+        "rms_r_degps": "r",
+        "end_distance_m": "position",
+        "end_heading_deg": "heading",
+    }
+    caption = "Rms errors of the motion, and of position and heading at the end of each prediction"
+    return Section(
+        heading="Predictions",
+        text=f"Each prediction of {PREDICTED_S:g} s is driven by the recorded revolutions. It begins in the state that "
+        "a filter has found, and uses nothing measured later.",
+        tables=[records_table(caption, found.trials, first="trial", fields=fields)],
+    )
 
 
 def _method(figures: Sequence[Validated]) -> Section:

@@ -77,8 +77,8 @@ def test_thrusters_that_cannot_steer_by_their_difference_are_refused(otter: t2s.
 
 @pytest.mark.parametrize(
     ("options", "place"),
-    [({"design": "lqr"}, "design"), ({"wind_mps": 3.0}, "wind_mps"), ({"speed_mps": -1.0}, "speed_mps"),
-     ({"course_change_deg": 0.0}, "course_change_deg")],
+    [({"design": "lqr"}, "design"), ({"rudder_weight_deg": 3.0}, "rudder_weight_deg"),
+     ({"speed_mps": -1.0}, "speed_mps"), ({"course_change_deg": 0.0}, "course_change_deg")],
 )  # fmt: skip
 def test_what_the_autopilot_of_a_craft_does_not_take_is_refused(otter: t2s.Ship, options, place) -> None:
     with pytest.raises(t2s.InputError) as raised:
@@ -93,3 +93,20 @@ def test_figures_of_a_step_by_hand() -> None:
     assert found.settling_time_s == 3.0
     assert found.rise_time_s == pytest.approx(1 + 0.8 / 1.2 - 0.2)
     assert step_figures(time, time, -1.0).rise_time_s is None
+
+
+def test_heading_errors_in_waves_are_in_proportion_to_the_waves(otter: t2s.Ship) -> None:
+    """In calm air and water small waves are the only disturbance, and the craft answers them linearly."""
+    calm = {"current_mps": 0.0, "wind_mps": 0.0, "seed": 3}
+    small, large = (otter.autopilot(**calm, wave_yaw_deg=size).study.course_keeping for size in (0.05, 0.1))
+    ratio = large.heading_error_rms_deg / small.heading_error_rms_deg
+    assert small.heading_error_rms_deg > 0.005 and ratio == pytest.approx(2.0, rel=0.02)
+
+
+def test_a_track_across_a_current_is_kept_by_the_integral(otter: t2s.Ship) -> None:
+    """Line of sight alone leaves lookahead times the tangent of the crab angle; 0.3 m/s of 1.5 m/s across the leg."""
+    weather = {"current_mps": 0.3, "wind_mps": 0.0, "wave_yaw_deg": 0.0}
+    found = otter.autopilot(track=[[0.0, 0.0], [120.0, 0.0]], **weather).cross_track
+    alone, held = (found.loc[name, "mean_error_at_end_m"] for name in ("line of sight", "with integral"))
+    assert found["finished"].all()
+    assert alone > 0.5 and abs(held) < 0.3 * alone

@@ -79,11 +79,11 @@ def test_slopes_of_a_turn_are_its_central_differences() -> None:
 
 
 def test_figures_without_a_name_are_of_what_the_craft_can_do() -> None:
-    from tank2sim.api.influence import craft_figures
+    from tank2sim.api.influence import default_figures
 
     card = read_card("otter")
     assert isinstance(card, CraftCard)
-    families = {figure.kind.family for figure in craft_figures(card)}
+    families = {figure.kind.family for figure in default_figures(card)}
     assert families == {"straight run", "turn by difference", "spin"}
 
 

@@ -5,9 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+from scipy.stats import norm
 
 import tank2sim as t2s
-from tank2sim.analysis.stability.craft import craft_stability, keeps_nearly_straight
+from tank2sim.analysis.stability.craft import CraftMotions, craft_stability, keeps_nearly_straight
 from tank2sim.cards import parse_card
 from tank2sim.errors import InputError
 from tank2sim.results.craft_stability import CraftStabilityResult
@@ -104,9 +106,35 @@ def test_a_speed_beyond_the_thrusters_is_refused(made_up):
         craft_stability(made_up, 5.0)
 
 
-def test_thrusters_at_one_side_and_ensembles_are_refused(made_up):
+def test_thrusters_at_one_side_are_refused(made_up):
     card = parse_card(CARD.replace("y_m = 0.4", "y_m = -0.4"), "made_up.toml")
     with pytest.raises(InputError, match="both sides"):
         craft_stability(card)
-    with pytest.raises(InputError, match="IMO"):
-        t2s.load("otter").stability(members=10)
+
+
+def test_bands_lie_about_the_figures_of_the_card(made_up):
+    ship = t2s.Ship(made_up)
+    found = ship.stability(members=8, seed=2)
+    run, bands = found.study.straight_run, found.study.ensemble.figures
+    assert bands["surge_time_constant_s"].p5 < run.surge_time_constant_s < bands["surge_time_constant_s"].p95
+    assert bands["highest_speed_mps"].p50 == pytest.approx(found.study.highest_speed_mps, rel=0.02)
+    assert found.study.ensemble.probability_stable == float(found.stable) and len(found.members) == 8
+
+
+@pytest.mark.slow
+def test_the_probability_of_stability_is_that_of_a_normal_number_below_its_limit(made_up):
+    """Only Nv is uncertain, by 5 kg m/s. A mode begins to grow at an Nv found by
+    bisection; the mean is one standard error on its stable side."""
+    craft = CraftMotions(made_up)
+
+    def growth(Nv: float) -> float:
+        return max(mode.real for mode in craft.drawn({"derivatives.Nv": Nv}).straight(1.0).steering_modes)
+
+    limit = brentq(growth, -100.0, 100.0)
+    stable_side = math.copysign(1.0, growth(limit - 1.0))
+    changes = {"derivatives.Nv": limit + 5.0 * stable_side, "uncertainty.Nv": 5.0}
+    exact = {f"uncertainty.{name}": 0.0 for name in made_up.derivatives if name != "Nv"}
+    thrusts = {f"thrusters.{n}.uncertainty.{key}": 0.0 for n in (0, 1) for key in ("ahead_Ns2", "astern_Ns2")}
+    ship = t2s.Ship(made_up).replace({**exact, **thrusts, **changes})
+    ensemble = ship.stability(1.0, members=200).study.ensemble
+    assert ensemble.probability_stable == pytest.approx(norm.cdf(1.0), abs=3 * math.sqrt(0.84 * 0.16 / 200))

@@ -1,17 +1,21 @@
 """The page of a craft with two thrusters: its levers, and, in a browser, that it sails as the simulation does."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import tank2sim as t2s
+from tank2sim.apps.steering.members import PAGE_MEMBERS, members_of
 from tank2sim.apps.steering.page import PageShip, steering_page
 from tank2sim.apps.steering.ship import controls, levers_of, thrusters_of
+from tank2sim.cards.covariance import Covariance
 from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.running import Running
 from tests.apps.steering.sailing import data_of, in_browser, sailed
+from tests.made_results import without_wasm
 
 RPM = 30 / math.pi
 
@@ -58,6 +62,18 @@ def test_a_ship_has_no_levers():
 def test_a_trial_with_a_rudder_is_refused_next_to_a_craft(tmp_path):
     with pytest.raises(InputError, match="has none"):
         t2s.load("otter").steering_page(ghost=tmp_path / "trial.csv")
+
+
+def test_members_drawn_from_the_covariance_of_a_craft_sail_along(otter, tmp_path):
+    card = t2s.load("otter").replace({"uncertainty.Xu": 3.0}).card
+    covariance = Covariance(("derivatives.Xu",), np.array([[9.0]]))
+    replace(card, covariance=covariance).save(tmp_path / "otter.toml")
+    ship = t2s.load(tmp_path / "otter.toml")
+    with without_wasm():
+        result = ship.steering_page()
+    assert result.study.members == PAGE_MEMBERS
+    drags = [member["derivatives.Xu"] for member in members_of(ship.card, otter, count=200)]
+    assert np.std(drags) == pytest.approx(3.0, rel=0.15)
 
 
 def test_a_craft_with_thrusters_on_one_side_alone_is_refused(tmp_path):

@@ -79,7 +79,7 @@ def test_members_have_the_spread_of_the_covariance():
     assert drawn.std(axis=0) == pytest.approx(errors, rel=0.12)
     assert np.corrcoef(drawn.T)[0, 1] == pytest.approx(stated[0, 1] / errors.prod(), abs=0.12)
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
-    assert not any(mass_fault(values | member) for member in members)
+    assert not any(mass_fault(model, values | member) for member in members)
 
 
 def test_a_card_without_covariance_has_no_members_and_says_so():

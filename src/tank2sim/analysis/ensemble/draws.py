@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.covariance import Covariance
 from tank2sim.dynamics.card_parameters import (
     CardParameter,
@@ -20,7 +20,7 @@ from tank2sim.notices import Notice
 from tank2sim.simulation.ensemble import Draws
 
 
-def draws_of(card: ManoeuvringCard, seed: int) -> tuple[Draws, list[Notice]]:
+def draws_of(card: SteeredCard, seed: int) -> tuple[Draws, list[Notice]]:
     """The draws of a card, with notices on them.
 
     Numbers in the card's covariance are correlated; all other numbers are independent, with their standard errors.
@@ -53,9 +53,7 @@ def draws_with(errors: JointErrors, seed: int) -> Draws:
     )
 
 
-def by_file_name(
-    card: ManoeuvringCard, names: Sequence[str], matrix: Array, samples: Array | None = None
-) -> Covariance:
+def by_file_name(card: SteeredCard, names: Sequence[str], matrix: Array, samples: Array | None = None) -> Covariance:
     """A covariance by the names of the card's file instead of the model's, without numbers that are not on the card.
 
     `matrix` is (k, k) and `samples`, if any, (n, k).

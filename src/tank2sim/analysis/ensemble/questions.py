@@ -17,7 +17,7 @@ from tank2sim.analysis.stability.imo import (
     manoeuvring_trials,
 )
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.reading import parse_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.card_parameters import study_model
@@ -34,7 +34,9 @@ from tank2sim.simulation.lane_figures import USUAL_PACE, LaneManoeuvre, LaneMano
 from tank2sim.simulation.manoeuvres import Manoeuvre, Stop, Turn, Zigzag
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.running import RUNAWAY
+from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, StraightRun
 from tank2sim.simulation.trajectory import Trajectory
+from tank2sim.units import from_si
 
 AskOne = Callable[[Mapping[str, float]], MemberResult]
 
@@ -51,14 +53,20 @@ ENSEMBLE_SIGNALS: Mapping[str, tuple[str, float]] = {
 
 
 def signals_with_bands(model: Model) -> Mapping[str, tuple[str, float]]:
-    """:data:`ENSEMBLE_SIGNALS`, and ``phi_deg`` of a ship that heels.
+    """The :data:`ENSEMBLE_SIGNALS` of a model, ``phi_deg`` if it heels, and ``n_<name>_rpm`` of its thrusters.
 
     Parameters
     ----------
     model : Model
     """
     heel = {"phi_deg": ("motion.phi", math.degrees(1.0))} if "motion.phi" in model else {}
-    return {**ENSEMBLE_SIGNALS, **heel}
+    revolutions = {
+        f"n_{name.split('.')[1]}_rpm": (name, from_si("n_rpm", 1.0))
+        for name in model.outputs
+        if name.startswith("thrusters.") and name.endswith(".speed")
+    }
+    usual = {signal: known for signal, known in ENSEMBLE_SIGNALS.items() if known[0] in model}
+    return {**usual, **heel, **revolutions}
 
 
 LANE_BATCH = 256
@@ -67,8 +75,10 @@ LANE_BATCH = 256
 # Only the outputs that the figures need: the others would take longer than the motion itself.
 _READ_OFF: Mapping[type, tuple[str, ...]] = {
     Turn: ("motion.beta",),
+    DifferenceTurn: ("motion.beta",),
     Zigzag: ("motion.rdot",),
     Stop: ("motion.udot",),
+    StraightRun: ("motion.udot",),
 }
 
 
@@ -80,15 +90,13 @@ class ShipText:
     source: str
 
     @classmethod
-    def of(cls, card: ManoeuvringCard) -> ShipText:
+    def of(cls, card: SteeredCard) -> ShipText:
         """The form of a card."""
         return cls(card.text, card.source)
 
-    def card(self) -> ManoeuvringCard:
+    def card(self) -> SteeredCard:
         """The card."""
-        card = parse_card(self.text, self.source)
-        assert isinstance(card, ManoeuvringCard)
-        return card
+        return parse_card(self.text, self.source).steered()
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +132,7 @@ class OfManoeuvre:
         integrator, defaults = Integrator(model), _parameters(model)
 
         def ask(values: Mapping[str, float]) -> MemberResult:
-            if fault := mass_fault(defaults | dict(values)):
+            if fault := mass_fault(model, defaults | dict(values)):
                 return MemberResult({}, trouble=fault)
             duration = self.duration_s
             try:
@@ -182,7 +190,7 @@ class OfFigures:
         names, defaults = [parameter.name for parameter in study.parameters], _parameters(study.model)
 
         def ask_one(values: Mapping[str, float]) -> MemberResult:
-            if fault := mass_fault(defaults | dict(values)):
+            if fault := mass_fault(study.model, defaults | dict(values)):
                 return MemberResult({}, trouble=fault)
             given = dict(zip(names, study.values.tolist(), strict=True)) | dict(values)
             try:
@@ -235,7 +243,7 @@ class OfCriteria:
         def ask_one(values: Mapping[str, float]) -> MemberResult:
             # What is an input (a current) is calm in these trials.
             given = {name: value for name, value in values.items() if name in parameters}
-            if fault := mass_fault(parameters | given):
+            if fault := mass_fault(model, parameters | given):
                 return MemberResult({}, trouble=fault)
             figures: Numbers = {}
             for criterion in imo_criteria(model, given, each_step):
@@ -315,7 +323,7 @@ def ships_of(model: Model, count: int, values: Mapping[str, Array]) -> tuple[Arr
     for name, value in values.items():
         if name in places:
             p[:, places[name]] = value
-    return p, mass_faults(dict(zip(model.parameter_names, p.T, strict=True)))
+    return p, mass_faults(model, dict(zip(model.parameter_names, p.T, strict=True)))
 
 
 def _with_runaways(troubles: Sequence[str], fine: Sequence[bool] | NDArray[np.bool_]) -> list[str]:

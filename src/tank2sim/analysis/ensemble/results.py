@@ -26,7 +26,7 @@ from tank2sim.analysis.ensemble.tails import Tail, tails
 from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.analysis.stability.straight_line import answering_states
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics import build
 from tank2sim.dynamics.card_parameters import card_parameters, study_model
 from tank2sim.errors import InputError
@@ -62,7 +62,7 @@ class DrawnShips:
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
     draws : Draws
     figures : mapping
         Name to the figure of each of the n ships (n,); nan where a ship does not show it.
@@ -70,7 +70,7 @@ class DrawnShips:
         False for a ship that cannot be simulated.
     """
 
-    card: ManoeuvringCard
+    card: SteeredCard
     draws: Draws
     figures: Mapping[str, Array]
     usable: NDArray[np.bool_]
@@ -190,7 +190,7 @@ class FigureBands(Members):
 
 
 def manoeuvre_bands(
-    card: ManoeuvringCard,
+    card: SteeredCard,
     manoeuvre: Manoeuvre,
     run_s: tuple[float | None, float],
     request: EnsembleRequest,
@@ -234,7 +234,7 @@ def manoeuvre_bands(
 
 
 def stability_bands(
-    card: ManoeuvringCard,
+    card: SteeredCard,
     criteria: Sequence[ImoCriterion],
     request: EnsembleRequest,
     executor: Executor | None = None,
@@ -290,8 +290,35 @@ def stability_bands(
     )
 
 
+def growth_bands(
+    card: SteeredCard, question: Question, request: EnsembleRequest, executor: Executor | None = None
+) -> StabilityBands:
+    """Bands of the figures of a `question`, and the probability that its ``growth_per_s`` (1/s) is negative.
+
+    Parameters
+    ----------
+    card : SteeredCard
+    question : Question
+        Each usable member shows ``growth_per_s``, the real part of the least damped mode.
+    request : EnsembleRequest
+    executor : Executor, optional
+    """
+    draws, messages = draws_of(card, request.seed)
+    found = _ensemble(card, question, draws, request.members, executor)
+    stable, between = _share(int(np.sum(found.figures["growth_per_s"] < 0)), found.usable)
+    return StabilityBands(
+        **_members(card, draws, found, messages),
+        figures=figure_bands(found),
+        probability_stable=stable,
+        probability_stable_interval_95=between,
+        imo=(),
+        imo_all=None,
+        curves=None,
+    )
+
+
 def named_bands(
-    card: ManoeuvringCard, figures: Sequence[str], request: EnsembleRequest, executor: Executor | None = None
+    card: SteeredCard, figures: Sequence[str], request: EnsembleRequest, executor: Executor | None = None
 ) -> FigureBands:
     """Bands of figures by name (:mod:`tank2sim.analysis.influence.figures`)."""
     draws, notices = draws_of(card, request.seed)
@@ -386,9 +413,7 @@ def _stable(straight: Ensemble) -> tuple[float, tuple[float, float]] | tuple[Non
     return _share(count, straight.usable)
 
 
-def _ensemble(
-    card: ManoeuvringCard, question: Question, draws: Draws, members: int, executor: Executor | None
-) -> Ensemble:
+def _ensemble(card: SteeredCard, question: Question, draws: Draws, members: int, executor: Executor | None) -> Ensemble:
     """The members. Raises InputError if not one of them is a ship that can be simulated."""
     found = ensemble(question, draws, members, executor)
     shown = found.histories is not None or any(np.isfinite(values).any() for values in found.figures.values())
@@ -400,7 +425,7 @@ def _ensemble(
 
 
 def _members(
-    card: ManoeuvringCard,
+    card: SteeredCard,
     draws: Draws,
     found: Ensemble,
     messages: Sequence[Notice],

@@ -72,7 +72,7 @@ class OfSteering:
         def ask(values: Mapping[str, float]) -> MemberResult:
             # What is an input (a current) is calm in these curves.
             given = {name: value for name, value in values.items() if name in known}
-            if fault := mass_fault(known | given):
+            if fault := mass_fault(model, known | given):
                 return MemberResult({}, trouble=fault)
             return self._answer(model.with_values(given))
 

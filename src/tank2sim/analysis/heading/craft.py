@@ -3,23 +3,30 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from scipy.optimize import linprog
 
 from tank2sim.analysis.heading.control import DAMPING, INTEGRAL_BAND_RAD, SLOWNESS
-from tank2sim.analysis.heading.piloted import AutopilotExport, Piloted
-from tank2sim.analysis.heading.runs import HeadingLoop, StepFigures, step_figures
+from tank2sim.analysis.heading.disturbances import (
+    angles_in_degrees,
+    in_weather,
+    wave_yaw_acceleration,
+    weather_for,
+)
+from tank2sim.analysis.heading.piloted import Piloted, PilotStudy
+from tank2sim.analysis.heading.runs import CraftKeeping, HeadingLoop, StepFigures, step_figures
+from tank2sim.analysis.heading.study import StudySettings, keep_tracks, not_held, unfinished
 from tank2sim.analysis.linearisation import OperatingPoint, jacobians
-from tank2sim.arrays import Array, Columns, ComplexNumber
-from tank2sim.cards.card import CraftCard
-from tank2sim.cards.small_craft import CRAFT_ADDED_MASSES
+from tank2sim.arrays import Array, ComplexNumber
+from tank2sim.cards.card import SteeredCard
+from tank2sim.cards.craft_terms import CRAFT_ADDED_MASSES
+from tank2sim.dynamics.autopilot_loop import YAW_DISTURBANCE
 from tank2sim.dynamics.craft_autopilot import CraftGains, craft_autopilot_model, thrust_limits
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import inertia
 from tank2sim.errors import InputError
-from tank2sim.notices import Notice
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.simulation.trial_file import histories
 
@@ -40,70 +47,64 @@ LEAST_DAMPING = 0.5
 loop has at least this relative damping (project choices): sway, which the gains leave out, turns a fast craft by the
 moment of Munk."""
 
+KEEPING_LENGTHS = 60.0
+"""Length of course keeping in L/u0, twice the others: figures are taken of its later half (project choice)."""
+
 RUN_LENGTHS = 30.0
 """Length of a run in L/u0 (project choice): several times what heading and speed need to settle."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class CraftAutopilotStudy:
-    """The autopilot of a craft, and its runs.
+class CraftAutopilotStudy(PilotStudy):
+    """The autopilot of a craft, and its runs ``course``, ``speed`` and ``keeping``.
+
+    Gains are the yaw moment (N m) by heading error and yaw rate, the surge force (N) by speed error, with their
+    integrals.
 
     Parameters
     ----------
-    ship, source : str
-        Name of the craft, and how the autopilot was found, in a sentence.
     speed_mps : float
         Speed of the design.
-    gains : dict
-        Yaw moment (N m) by heading error and yaw rate, surge force (N) by speed error, with their integrals.
     largest_moment_Nm : tuple of two floats
         Largest yaw moment to port (negative) and to starboard.
     poles : tuple of complex
         Poles of the whole closed loop at that speed, 1/s, the slowest first.
     course_change, speed_change : StepFigures
         A change of course (deg) and of speed (m/s).
+    course_keeping : CraftKeeping
+        In current, wind and waves.
     at_limit_percent : dict
         Share of the time of each run in which an order is at a limit of a thruster.
-    histories : dict
-        Columns of the runs ``course`` and ``speed``, to draw.
-    notices : tuple of Notice
-    export : AutopilotExport, optional
-        The autopilot as an FMU, if one was made.
     """
 
-    ship: str
-    source: str
     speed_mps: float
-    gains: dict[str, float]
     largest_moment_Nm: tuple[float, float]
     poles: tuple[ComplexNumber, ...]
     course_change: StepFigures
     speed_change: StepFigures
+    course_keeping: CraftKeeping
     at_limit_percent: dict[str, float]
-    histories: dict[str, Columns]
-    notices: tuple[Notice, ...] = ()
-    export: AutopilotExport | None = None
 
 
 def study_craft_autopilot(
-    card: CraftCard, model: Model, *, speed_mps: float | None, course_change_rad: float
+    card: SteeredCard, model: Model, settings: StudySettings
 ) -> tuple[CraftAutopilotStudy, Piloted]:
-    """Design the autopilot of a craft, and try a change of course and one of speed.
+    """Design the autopilot of a craft, and try changes of course and speed, weather and a track.
 
     Parameters
     ----------
-    card, model : CraftCard, Model
-    speed_mps : float, optional
-        Of the design and of the runs; by default that of the card.
-    course_change_rad : float
-        + to starboard.
+    card, model : SteeredCard, Model
+    settings : StudySettings
+        Way of design, weights and wave filter belong to a rudder, and are not used.
 
     Raises
     ------
     InputError
-        The thrusters turn, or give no yaw moment without a surge force; the speed is beyond them; the loop is unstable.
+        The thrusters turn, or give no yaw moment without a surge force; the speed is beyond them; the loop is unstable;
+        or a leg of the track is too short.
     """
-    speed = card.model.speed_mps if speed_mps is None else speed_mps
+    speed = card.model.speed_mps if settings.speed_mps is None else settings.speed_mps
+    change = settings.course_change_rad
     duration = RUN_LENGTHS * card.ship.length_m / speed
     for faster in FASTER:
         gains = craft_gains(card, speed, faster)
@@ -117,10 +118,22 @@ def study_craft_autopilot(
         problem = f"leaves a pole of the closed loop at {poles[0]:.3g} 1/s however fast the autopilot"
         raise InputError(card.source, "derivatives", problem, "check the damping of the card, or give another speed")
     runs = {
-        "course": loop.run({"speed.command": speed, "heading.command": course_change_rad}, duration, begin=steady),
+        "course": loop.run({"speed.command": speed, "heading.command": change}, duration, begin=steady),
         "speed": loop.run({"speed.command": speed, "heading.command": 0.0}, duration, begin=slower),
     }
-    course = step_figures(runs["course"].t, runs["course"]["motion.psi"], course_change_rad)
+    course = step_figures(runs["course"].t, runs["course"]["motion.psi"], change)
+    weather = weather_for(card.ship.length_m, **settings.weather)
+    outside, inputs = in_weather(model, card, weather)
+    outdoors, begin = HeadingLoop(outside, autopilot), {"initial.u": speed}
+    waves = wave_yaw_acceleration(
+        weather, outdoors.model.step_s, round(KEEPING_LENGTHS / RUN_LENGTHS * duration / outdoors.model.step_s)
+    )
+    kept = {**inputs, "speed.command": speed}
+    runs["keeping"] = outdoors.run(
+        {**kept, YAW_DISTURBANCE: waves}, len(waves) * outdoors.model.step_s, parameters=begin
+    )
+    tracks = keep_tracks(outdoors, settings.waypoints, kept)
+    keeping = _keeping(runs["keeping"], speed)
     in_degrees = {name: math.degrees(getattr(course, name)) for name in ("ordered", "overshoot")}
     reached = speed - float(runs["speed"]["motion.u"][0])
     study = CraftAutopilotStudy(
@@ -141,13 +154,31 @@ def study_craft_autopilot(
         poles=poles,
         course_change=replace(course, **in_degrees),
         speed_change=step_figures(runs["speed"].t, runs["speed"]["motion.u"], reached),
+        course_keeping=keeping,
         at_limit_percent={name: 100 * _at_limit(card, run) for name, run in runs.items()},
+        weather=angles_in_degrees(asdict(weather)),
+        track={name: track.figures for name, track in tracks.items()},
+        waypoints_m=np.zeros((0, 2)) if settings.waypoints is None else settings.waypoints,
         histories={name: histories(run) for name, run in runs.items()},
+        track_histories={name: track.histories() for name, track in tracks.items()},
+        notices=(*outside.notices, *not_held(keeping, weather, speed), *unfinished(tracks)),
     )
     return study, Piloted(model, autopilot, runs)
 
 
-def craft_gains(card: CraftCard, speed_mps: float, faster: float = 1.0) -> CraftGains:
+def _keeping(run: Trajectory, speed: float) -> CraftKeeping:
+    """Figures of the later half of a run on course 0."""
+    later = slice(len(run.t) // 2, None)
+    error, lack = np.degrees(run["motion.psi"][later]), run["motion.u"][later] - speed
+    return CraftKeeping(
+        duration_s=float(run.t[-1] - run.t[later][0]),
+        heading_error_rms_deg=float(np.sqrt(np.mean(error**2))),
+        heading_error_mean_deg=float(error.mean()),
+        speed_error_rms_mps=float(np.sqrt(np.mean(lack**2))),
+    )
+
+
+def craft_gains(card: SteeredCard, speed_mps: float, faster: float = 1.0) -> CraftGains:
     """Gains for a craft at a speed, with `faster` times the frequency of heading.
 
     Yaw, I r' = d r + N with the added inertia in I and d = Nr + Nrabsu u: poles where (s^2 + 2 z w s + w^2)(s + a) = 0,
@@ -186,7 +217,7 @@ def craft_gains(card: CraftCard, speed_mps: float, faster: float = 1.0) -> Craft
     )
 
 
-def _effectiveness(card: CraftCard) -> Array:
+def _effectiveness(card: SteeredCard) -> Array:
     """Surge force and yaw moment by the thrust of each thruster (2, m): 1, and m."""
     for place, thruster in enumerate(card.thrusters):
         if thruster.max_azimuth_rad is not None:
@@ -201,7 +232,7 @@ def _effectiveness(card: CraftCard) -> Array:
     return gives
 
 
-def _largest_moments(card: CraftCard, gives: Array, speed_mps: float) -> tuple[float, float]:
+def _largest_moments(card: SteeredCard, gives: Array, speed_mps: float) -> tuple[float, float]:
     """Largest yaw moments to port (negative) and to starboard, N m, with the surge share of the least squares."""
     bounds = [tuple(map(float, thrust_limits(thruster, speed_mps))) for thruster in card.thrusters]
     if any(high <= 0 for _, high in bounds):
@@ -238,7 +269,7 @@ def _poles(loop: HeadingLoop, state: Array, speed_mps: float) -> tuple[complex, 
     return tuple(complex(pole) for pole in sorted(np.linalg.eigvals(A), key=lambda pole: -pole.real))
 
 
-def _at_limit(card: CraftCard, run: Trajectory) -> float:
+def _at_limit(card: SteeredCard, run: Trajectory) -> float:
     """Share of the time in which the order of a thruster is at one of its limits."""
     at = np.zeros(len(run.t), dtype=bool)
     for thruster in card.thrusters:

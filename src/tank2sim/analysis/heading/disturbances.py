@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import expm, solve_discrete_lyapunov
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.autopilot_loop import with_yaw_disturbance
+from tank2sim.dynamics.effects.effect import card_for_effects
 from tank2sim.dynamics.effects.surroundings import CURRENT, WIND
 from tank2sim.dynamics.model import Model
 
@@ -56,14 +58,28 @@ def weather_for(length_m: float, **given: float | None) -> Weather:
     return replace(usual, **values)  # type: ignore[arg-type]
 
 
-def in_weather(ship: Model, card: ManoeuvringCard, weather: Weather) -> tuple[Model, dict[str, float]]:
+def angles_in_degrees(values: Mapping[str, float]) -> dict[str, float]:
+    """Numbers by name, with ``_deg`` in place of ``_rad``.
+
+    Parameters
+    ----------
+    values : mapping
+    """
+    converted: dict[str, float] = {}
+    for name, value in values.items():
+        stem, _, unit = name.rpartition("_")
+        converted |= {f"{stem}_deg": math.degrees(value)} if unit == "rad" else {name: value}
+    return converted
+
+
+def in_weather(ship: Model, card: SteeredCard, weather: Weather) -> tuple[Model, dict[str, float]]:
     """The ship with inputs for current, wind and waves, and the inputs of this weather by name.
 
     Effects that the card already has are not added; their inputs take the weather's values, too.
     """
     for effect in (CURRENT, WIND):
         if f"{effect.name}.speed" not in ship:
-            ship = effect.apply(ship, dict.fromkeys(effect.required(), 0.0), card)
+            ship = effect.apply(ship, dict.fromkeys(effect.required(), 0.0), card_for_effects(card))
     inputs = {
         "current.speed": weather.current_mps,
         "current.direction": weather.current_towards_rad,

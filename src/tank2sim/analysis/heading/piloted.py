@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from tank2sim.analysis.heading.track_keeping import TrackKeeping
+from tank2sim.arrays import Array, Columns
 from tank2sim.dynamics.model import Model
+from tank2sim.notices import Notice
 from tank2sim.simulation.trajectory import Trajectory
 
 
@@ -44,6 +47,41 @@ class AutopilotExport:
     platforms: tuple[str, ...]
     size_bytes: int
     co_simulation: CoSimulated | None = None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PilotStudy:
+    """A controller and its runs, by rudder or by thrusters.
+
+    Parameters
+    ----------
+    ship, source : str
+        Name of the ship, and how the controller was found, in a sentence.
+    gains : dict
+        Figures of the controller by name with their unit.
+    weather : dict
+        Fields of :class:`.Weather`, angles in degrees.
+    track : dict
+        Figures of the track by guidance (``line of sight``, ``with integral``); empty without waypoints.
+    waypoints_m : array (n, 2)
+        North and east; empty without a track.
+    histories, track_histories : dict
+        Columns to draw by run, and by guidance.
+    notices : tuple of Notice
+    export : AutopilotExport, optional
+        The controller as an FMU, if one was made.
+    """
+
+    ship: str
+    source: str
+    gains: dict[str, float]
+    weather: dict[str, float]
+    track: dict[str, TrackKeeping]
+    waypoints_m: Array
+    histories: dict[str, Columns]
+    track_histories: dict[str, Columns]
+    notices: tuple[Notice, ...]
+    export: AutopilotExport | None = None
 
 
 @dataclass(frozen=True, eq=False)

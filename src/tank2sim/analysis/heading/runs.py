@@ -150,6 +150,23 @@ class CourseKeeping:
     rate_limited_percent: float
 
 
+@dataclass(frozen=True, kw_only=True)
+class CraftKeeping:
+    """Figures of keeping a course and a speed through the water, over `duration_s`.
+
+    Parameters
+    ----------
+    duration_s : float
+    heading_error_rms_deg, heading_error_mean_deg, speed_error_rms_mps : float
+        Root mean squares, and the mean error of heading that remains.
+    """
+
+    duration_s: float
+    heading_error_rms_deg: float
+    heading_error_mean_deg: float
+    speed_error_rms_mps: float
+
+
 def without_anti_windup(autopilot: Model) -> dict[str, float]:
     """Parameters without anti-windup: the integral continues at the limit and over a course change; none for a PD."""
     starts = {parameter.name: parameter.start for parameter in autopilot.parameters}

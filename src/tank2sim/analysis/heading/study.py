@@ -10,7 +10,13 @@ import numpy as np
 
 from tank2sim.analysis.heading.control import LARGEST_RUDDER_RAD
 from tank2sim.analysis.heading.designs import HeadingDesign, LqrWeights, design_heading
-from tank2sim.analysis.heading.disturbances import Weather, in_weather, wave_yaw_acceleration, weather_for
+from tank2sim.analysis.heading.disturbances import (
+    Weather,
+    angles_in_degrees,
+    in_weather,
+    wave_yaw_acceleration,
+    weather_for,
+)
 from tank2sim.analysis.heading.margins import (
     LargestSteps,
     LoopMargins,
@@ -20,16 +26,17 @@ from tank2sim.analysis.heading.margins import (
     loop_margins,
     loop_response,
 )
-from tank2sim.analysis.heading.piloted import AutopilotExport, Piloted
+from tank2sim.analysis.heading.piloted import Piloted, PilotStudy
 from tank2sim.analysis.heading.runs import (
     CourseChange,
     CourseKeeping,
+    CraftKeeping,
     HeadingLoop,
     course_change,
     course_keeping,
     without_anti_windup,
 )
-from tank2sim.analysis.heading.track_keeping import Guidance, TrackKeeping, TrackRun, keep_track
+from tank2sim.analysis.heading.track_keeping import Guidance, TrackRun, keep_track
 from tank2sim.arrays import Array, Columns
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.autopilot_loop import YAW_DISTURBANCE
@@ -132,15 +139,13 @@ class ClosedLoop:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class AutopilotStudy:
-    """A heading controller, its margins and its runs.
+class AutopilotStudy(PilotStudy):
+    """A heading controller, its margins and its runs; gains in rad of rudder for rad of heading, and s.
 
     Parameters
     ----------
-    ship, design, source : str
-        Name of the ship, way of design, and how the controller was found, in a sentence.
-    gains : dict
-        Figures of the controller by name with their unit: rad of rudder for rad of heading, and s.
+    design : str
+        Way of design.
     limits : dict
         ``largest_rudder_deg``, and with an integral ``anti_windup_time_s`` and ``integral_band_deg`` (for designs with
         their own states ``integral_limit_radps``, the band times its gain).
@@ -150,35 +155,14 @@ class AutopilotStudy:
     responses : tuple of LoopResponse
         At the speed of the design, and at the slowest and the fastest of `margins`.
     closed_loop : ClosedLoop
-    weather : dict
-        Fields of :class:`Weather`, angles in degrees.
-    track : dict
-        Figures of the track by guidance (``line of sight``, ``with integral``); empty without waypoints.
-    waypoints_m : array (n, 2)
-        North and east; empty without a track.
-    histories, track_histories : dict
-        Columns to draw by run, and by guidance.
-    notices : tuple of Notice
-    export : AutopilotExport, optional
-        The controller as an FMU, if one was made.
     """
 
-    ship: str
     design: str
-    source: str
-    gains: dict[str, float]
     limits: dict[str, float]
     ship_alone: ShipAlone
     margins: tuple[LoopMargins, ...]
     responses: tuple[LoopResponse, ...]
     closed_loop: ClosedLoop
-    weather: dict[str, float]
-    track: dict[str, TrackKeeping]
-    waypoints_m: Array
-    histories: dict[str, Columns]
-    track_histories: dict[str, Columns]
-    notices: tuple[Notice, ...]
-    export: AutopilotExport | None = None
 
 
 def _limits(autopilot: Model) -> dict[str, float]:
@@ -192,7 +176,7 @@ def _limits(autopilot: Model) -> dict[str, float]:
     found = {names[one.name]: one.start for one in autopilot.parameters if one.name in names}
     if "autopilot.integral" not in autopilot:
         found.pop("anti_windup_time_s", None)
-    return _in_degrees(found)
+    return angles_in_degrees(found)
 
 
 def _histories(runs: Mapping[str, Trajectory], weather: Weather) -> dict[str, Columns]:
@@ -234,7 +218,9 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
     weathered: dict[str, float | Array] = {**inputs, YAW_DISTURBANCE: waves, "heading.command": 0.0}
     runs["keeping"] = loop.run(weathered, steps * loop.model.step_s, parameters=start)
     kept = course_keeping(runs["keeping"], 0.0, runs["keeping"].t[-1] / 2)
-    tracks = _tracks(loop, settings.waypoints, inputs)
+    tracks = keep_tracks(loop, settings.waypoints, inputs)
+    begin = len(runs["keeping"].t) // 2
+    later = {name: runs["keeping"][name][begin:] for name in ("motion.u", "rudder.angle")}
     alone = design.found
     study = AutopilotStudy(
         ship=alone.name,
@@ -256,48 +242,68 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
             course_changes=changes,
             course_keeping=kept,
         ),
-        weather=_in_degrees(asdict(weather)),
+        weather=angles_in_degrees(asdict(weather)),
         track={name: track.figures for name, track in tracks.items()},
         waypoints_m=np.zeros((0, 2)) if settings.waypoints is None else settings.waypoints,
         histories=_histories(runs, weather),
         track_histories={name: track.histories() for name, track in tracks.items()},
         notices=(
-            *_not_held(kept, weather, runs["keeping"]),
+            *not_held(kept, weather, float(np.mean(later["motion.u"])), float(np.mean(later["rudder.angle"]))),
             *outside.notices,
             *notices,
             *_begun_at(settings.speed_mps),
-            *_notices(margins, runs, changes, tracks),
+            *_notices(margins, runs, changes),
+            *unfinished(tracks),
             *_of_the_gear(ship, design, kept, weather),
         ),
     )
     return study, Piloted(ship, design.autopilot, runs)
 
 
-def _not_held(kept: CourseKeeping, weather: Weather, run: Trajectory) -> list[Notice]:
-    """Marks of a weather in which the ship leaves its course, or is carried away."""
+def not_held(
+    kept: CourseKeeping | CraftKeeping, weather: Weather, speed_mps: float, rudder_rad: float | None = None
+) -> list[Notice]:
+    """Marks of a weather in which the ship leaves its course, or is carried away.
+
+    Parameters
+    ----------
+    kept : CourseKeeping or CraftKeeping
+    weather : Weather
+    speed_mps : float
+        Mean speed through the water.
+    rudder_rad : float, optional
+        Mean rudder.
+    """
     found = []
     if max(abs(kept.heading_error_mean_deg), kept.heading_error_rms_deg) > HELD_DEG:
-        rudder = math.degrees(float(np.mean(run["rudder.angle"][len(run.t) // 2 :])))
+        steered = "" if rudder_rad is None else f", with {math.degrees(rudder_rad):.3g} deg of rudder"
         found.append(
             caution(
                 f"the ship cannot hold its course in a wind of {weather.wind_mps:.3g} m/s and a current of "
-                f"{weather.current_mps:.3g} m/s: its mean heading error is {kept.heading_error_mean_deg:.3g} deg, with "
-                f"{rudder:.3g} deg of rudder; the figures of course keeping mean nothing."
+                f"{weather.current_mps:.3g} m/s: its mean heading error is {kept.heading_error_mean_deg:.3g} deg"
+                f"{steered}; the figures of course keeping mean nothing."
             )
         )
-    speed = float(np.mean(run["motion.u"][len(run.t) // 2 :]))
-    if weather.current_mps >= abs(speed):
+    if weather.current_mps >= abs(speed_mps):
         found.append(
             caution(
-                f"the current of {weather.current_mps:.3g} m/s is faster than the ship ({speed:.3g} m/s through "
+                f"the current of {weather.current_mps:.3g} m/s is faster than the ship ({speed_mps:.3g} m/s through "
                 "the water): it may hold its heading, but cannot hold a course over the ground."
             )
         )
     return found
 
 
-def _tracks(loop: HeadingLoop, waypoints: Array | None, inputs: Mapping[str, float]) -> dict[str, TrackRun]:
-    """Runs along waypoints by guidance without and with an integral; empty without waypoints."""
+def keep_tracks(loop: HeadingLoop, waypoints: Array | None, inputs: Mapping[str, float]) -> dict[str, TrackRun]:
+    """Runs along waypoints by guidance without and with an integral; empty without waypoints.
+
+    Parameters
+    ----------
+    loop : HeadingLoop
+    waypoints : array (n, 2), optional
+    inputs : mapping
+        Inputs of the model, by name (current, wind).
+    """
     if waypoints is None:
         return {}
     shares = {"line of sight": 0.0, "with integral": INTEGRAL_SHARE}
@@ -379,7 +385,6 @@ def _notices(
     margins: tuple[LoopMargins, ...],
     runs: Mapping[str, Trajectory],
     changes: Mapping[str, CourseChange],
-    tracks: Mapping[str, TrackRun],
 ) -> list[Notice]:
     notices = [
         Notice(f"the loop is not stable at {margin.speed_mps:.4g} m/s") for margin in margins if not margin.stable
@@ -389,7 +394,18 @@ def _notices(
         for name, change in changes.items()
         if change.settling_time_s is None
     ]
-    return notices + [
+    return notices
+
+
+def unfinished(tracks: Mapping[str, TrackRun]) -> list[Notice]:
+    """Notices on tracks that were not sailed to their ends.
+
+    Parameters
+    ----------
+    tracks : mapping
+        By guidance.
+    """
+    return [
         Notice(f"the track is not finished, {name}") for name, track in tracks.items() if not track.figures.finished
     ]
 
@@ -419,11 +435,3 @@ def _begun_at(speed: float | None) -> list[Notice]:
         if speed is None
         else [Notice(f"the runs begin at {speed:g} m/s, with the engine as it is at the card's speed")]
     )
-
-
-def _in_degrees(values: Mapping[str, float]) -> dict[str, float]:
-    converted: dict[str, float] = {}
-    for name, value in values.items():
-        stem, _, unit = name.rpartition("_")
-        converted |= {f"{stem}_deg": math.degrees(value)} if unit == "rad" else {name: value}
-    return converted

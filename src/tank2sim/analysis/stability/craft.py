@@ -11,7 +11,9 @@ so that a K above 0 turns to starboard where the thrusters at port run faster.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,14 +22,18 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import root
 
-from tank2sim.analysis.linearisation import OperatingPoint, jacobians
+from tank2sim.analysis.ensemble.questions import ShipText
+from tank2sim.analysis.ensemble.results import EnsembleRequest, StabilityBands, growth_bands
+from tank2sim.analysis.linearisation import OperatingPoint
 from tank2sim.analysis.stability.straight_line import steering_constants
 from tank2sim.arrays import Array, ComplexNumber, Unbounded
-from tank2sim.cards.card import CraftCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.effects import undisturbed_inputs
+from tank2sim.dynamics.ship import mass_fault
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.notices import Notice
+from tank2sim.simulation.ensemble import Ask, MemberResult
 from tank2sim.simulation.thruster_manoeuvres import thruster_sides
 from tank2sim.units import from_si, to_si
 
@@ -116,6 +122,7 @@ class CraftStabilityStudy:
     difference_turns : tuple of SteadyCraftTurn
         To starboard, about the revolutions of the straight run.
     notices : tuple of Notice
+    ensemble : StabilityBands, optional
     """
 
     ship: str
@@ -126,14 +133,15 @@ class CraftStabilityStudy:
     highest_speed_mps: float
     difference_turns: tuple[SteadyCraftTurn, ...]
     notices: tuple[Notice, ...]
+    ensemble: StabilityBands | None = None
 
 
-def craft_stability(card: CraftCard, speed_mps: float | None = None) -> CraftStabilityStudy:
+def craft_stability(card: SteeredCard, speed_mps: float | None = None) -> CraftStabilityStudy:
     """Stability and turning of a craft, by default at its cruising speed.
 
     Parameters
     ----------
-    card : CraftCard
+    card : SteeredCard
     speed_mps : float, optional
         Surge velocity through the water, positive.
 
@@ -142,7 +150,7 @@ def craft_stability(card: CraftCard, speed_mps: float | None = None) -> CraftSta
     InputError
         The craft is not steered by fixed thrusters at both sides, or they do not hold the speed.
     """
-    craft = _Craft(card)
+    craft = CraftMotions(card)
     speed = card.model.speed_mps if speed_mps is None else speed_mps
     highest = craft.highest_speed(card.model.speed_mps)
     if not 0 < speed <= highest * (1 + 1e-9):
@@ -162,6 +170,63 @@ def craft_stability(card: CraftCard, speed_mps: float | None = None) -> CraftSta
     )
 
 
+@dataclass(frozen=True)
+class OfCraft:
+    """Straight run of the members of an ensemble at a speed, and their fastest turn.
+
+    Parameters
+    ----------
+    ship : ShipText
+    speed_mps : float
+    """
+
+    ship: ShipText
+    speed_mps: float
+
+    def prepared(self) -> Ask:
+        """See :class:`tank2sim.simulation.ensemble.Question`."""
+        card = self.ship.card()
+        craft = CraftMotions(card)
+        defaults = dict(zip(craft.model.parameter_names, craft.p.tolist(), strict=True))
+
+        def ask(values: Mapping[str, float]) -> MemberResult:
+            if fault := mass_fault(craft.model, defaults | dict(values)):
+                return MemberResult({}, trouble=fault)
+            member = craft.drawn(values)
+            try:
+                run, highest = member.straight(self.speed_mps), member.highest_speed(card.model.speed_mps)
+            except InputError as error:
+                return MemberResult({}, trouble=error.problem)
+            turn = member.fastest_turn(run)
+            return MemberResult(
+                {
+                    "growth_per_s": max(mode.real for mode in (*run.eigenvalues, *run.steering_modes)),
+                    "surge_time_constant_s": run.surge_time_constant_s or math.nan,
+                    "highest_speed_mps": highest,
+                    "steady_rate_degps": turn.yaw_rate_degps if turn else math.nan,
+                    "steady_diameter_m": turn.diameter_m if turn else math.nan,
+                }
+            )
+
+        return lambda members: [ask(values) for values in members]
+
+
+def craft_bands(
+    card: SteeredCard, speed_mps: float, request: EnsembleRequest, executor: Executor | None = None
+) -> StabilityBands:
+    """Bands of stability, speed and the fastest turn of a craft over the errors of its card.
+
+    Parameters
+    ----------
+    card : SteeredCard
+    speed_mps : float
+        Surge velocity of the straight run.
+    request : EnsembleRequest
+    executor : Executor, optional
+    """
+    return growth_bands(card, OfCraft(ShipText.of(card), speed_mps), request, executor)
+
+
 def keeps_nearly_straight(run: CraftAtSpeed, turns: Sequence[SteadyCraftTurn], length_m: float) -> bool:
     """Whether a craft, with no difference of revolutions, keeps a straight course or a loop wider than
     :data:`STRAIGHT_FROM_LENGTHS`.
@@ -178,10 +243,20 @@ def keeps_nearly_straight(run: CraftAtSpeed, turns: Sequence[SteadyCraftTurn], l
     return run.stable or (alone is not None and alone.diameter_m > STRAIGHT_FROM_LENGTHS * length_m)
 
 
-class _Craft:
-    """The accelerations of a craft by its motion and the revolutions of its sides."""
+class CraftMotions:
+    """Steady motions of a craft, by the revolutions of its sides.
 
-    def __init__(self, card: CraftCard) -> None:
+    Parameters
+    ----------
+    card : SteeredCard
+
+    Raises
+    ------
+    InputError
+        The craft is not steered by fixed thrusters at both sides.
+    """
+
+    def __init__(self, card: SteeredCard) -> None:
         # Twice the bounds, so that the slopes at the largest revolutions are those of the thrust curve.
         free = [
             thruster.model_copy(
@@ -202,25 +277,63 @@ class _Craft:
         steering = [one for one in card.thrusters if f"thrusters.{one.name}.command" in self.sides]
         self.low, self.high = max(one.lowest_radps for one in steering), min(one.max_radps for one in steering)
         self.p = model.parameter_values()
-        rates = ca.vcat([model.symbol(name) for name in _RATES])
-        self._rates = ca.Function("rates", [model.x, model.u, model.p], [model.expand(rates)])
+        self._begin = np.array(model.initial(self.p)).ravel()
+        self._calm = model.input_values(undisturbed_inputs(model))
+        self._moved = [model.state_names.index(name) for name in _MOTION]
+        self._ordered = [model.input_names.index(name) for name in self.sides]
+        rates = model.expand(ca.vcat([model.symbol(name) for name in _RATES]))
+        self._rates = ca.Function("rates", [model.x, model.u, model.p], [rates])
+        by = [ca.vcat([model.symbol(name) for name in names]) for names in (_MOTION, self.sides)]
+        slopes = [ca.jacobian(rates, symbols) for symbols in by]
+        self._jacobians = ca.Function("slopes", [model.x, model.u, model.p], slopes)
+
+    def drawn(self, values: Mapping[str, float]) -> CraftMotions:
+        """The craft with other parameters, by name; names that the model lacks (lags) do not matter here."""
+        other = copy(self)
+        known = set(self.model.parameter_names)
+        other.p = self.model.parameter_values({name: value for name, value in values.items() if name in known})
+        other._begin = np.array(self.model.initial(other.p)).ravel()
+        return other
 
     def point(self, motion: Array, mean: float, difference: float) -> OperatingPoint:
-        """Motion (3,) and revolutions (rad/s): their mean, and port less starboard."""
-        x = np.array(self.model.initial(self.p)).ravel()
-        x[[self.model.state_names.index(name) for name in _MOTION]] = motion
-        inputs = self.model.input_values(undisturbed_inputs(self.model))
-        for name, side in self.sides.items():
-            inputs[self.model.input_names.index(name)] = mean + side * difference / 2
+        """The craft in a motion with revolutions.
+
+        Parameters
+        ----------
+        motion : array (3,)
+            u, v (m/s) and r (rad/s).
+        mean, difference : float
+            Mean revolutions, and port less starboard, rad/s.
+        """
+        x, inputs = self._begin.copy(), self._calm.copy()
+        x[self._moved] = motion
+        inputs[self._ordered] = [mean + side * difference / 2 for side in self.sides.values()]
         return OperatingPoint(x, inputs, self.p)
 
     def rates(self, motion: Array, mean: float, difference: float) -> Array:
-        """du/dt, dv/dt, dr/dt (3,)."""
+        """du/dt, dv/dt, dr/dt (3,).
+
+        Parameters
+        ----------
+        motion, mean, difference
+            As of :meth:`point`.
+        """
         point = self.point(motion, mean, difference)
         return np.array(self._rates(point.x, point.u, point.p)).ravel()
 
+    def _slopes(self, point: OperatingPoint) -> tuple[Array, Array]:
+        """Accelerations by the motion (3, 3) and by the revolutions of the sides (3, m)."""
+        by_motion, by_revolutions = self._jacobians(point.x, point.u, point.p)
+        return np.array(by_motion), np.array(by_revolutions)
+
     def highest_speed(self, about: float) -> float:
-        """Speed (m/s) that the largest revolutions hold on a straight course."""
+        """Speed (m/s) that the largest revolutions hold on a straight course.
+
+        Parameters
+        ----------
+        about : float
+            A speed from which it is sought, m/s.
+        """
         ahead = self._solved(
             lambda z: self.rates(np.array([z[0], z[1], 0.0]), self.high, z[2]), np.array([about, 0.0, 0.0])
         )
@@ -232,7 +345,7 @@ class _Craft:
             lambda z: self.rates(np.array([speed, z[2], 0.0]), z[0], z[1]), np.array([0.5 * self.high, 0.0, 0.0])
         )
         point = self.point(np.array([speed, sway, 0.0]), mean, difference)
-        A, B = jacobians(self.model, point, _RATES, _MOTION, list(self.sides))
+        A, B = self._slopes(point)
         by_difference = B @ np.array([side / 2 for side in self.sides.values()])
         modes = _sorted(np.linalg.eigvals(A[1:, 1:]))
         K, total, product, T3 = map(
@@ -266,6 +379,11 @@ class _Craft:
         found = [self._turn(run, share * most) for share in shares]
         return [turn for turn in found if turn is not None]
 
+    def fastest_turn(self, run: CraftAtSpeed) -> SteadyCraftTurn | None:
+        """The steady turn to starboard by the largest difference about the revolutions of a straight run."""
+        mean = to_si("n_rpm", run.revolutions_rpm)[1]
+        return self._turn(run, 2 * min(self.high - mean, mean - self.low))
+
     def _turn(self, run: CraftAtSpeed, difference: float) -> SteadyCraftTurn | None:
         mean = to_si("n_rpm", run.revolutions_rpm)[1]
         for curvature in _CURVATURES:
@@ -275,7 +393,7 @@ class _Craft:
             u, v, r = map(float, solved.x)
             if not solved.success or u <= 0 or r <= _SMALL * rate:
                 continue
-            A, _ = jacobians(self.model, self.point(solved.x, mean, difference), _RATES, _MOTION, [])
+            A, _ = self._slopes(self.point(solved.x, mean, difference))
             if np.linalg.eigvals(A).real.max() < 0:
                 speed = math.hypot(u, v)
                 return SteadyCraftTurn(

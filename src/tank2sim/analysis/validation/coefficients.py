@@ -21,9 +21,9 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 
-from tank2sim.cards.card import CraftCard, ManoeuvringCard, MmgCard, SteeredCard
+from tank2sim.cards.card import ManoeuvringCard, MmgCard, SteeredBy, SteeredCard
+from tank2sim.cards.craft_terms import CRAFT_TERMS
 from tank2sim.cards.scaling import file_factor
-from tank2sim.cards.small_craft import CRAFT_TERMS
 from tank2sim.cards.terms import Term, known_term
 from tank2sim.dynamics import build
 from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS, ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS, polynomial
@@ -99,12 +99,18 @@ class Expansion:
     notes: tuple[Notice, ...]
 
 
-def compare_coefficients(cards: Sequence[ManoeuvringCard]) -> tuple[tuple[CoefficientRow, ...], tuple[Notice, ...]]:
+def compare_coefficients(cards: Sequence[SteeredCard]) -> tuple[tuple[CoefficientRow, ...], tuple[Notice, ...]]:
     """All coefficients of the cards of ships (the first is the reference), with notes on conversions.
 
     Between an MMG card and a polynomial the linear terms are compared: those of the straight course with propeller and
-    rudder, the mean of both sides of the flow to the rudder.
+    rudder, the mean of both sides of the flow to the rudder. Craft are compared in SI.
     """
+    if cards[0].steered_by is SteeredBy.THRUSTERS:
+        return _compare_craft(cards), ()
+    return _compare_ships([card.manoeuvring() for card in cards])
+
+
+def _compare_ships(cards: Sequence[ManoeuvringCard]) -> tuple[tuple[CoefficientRow, ...], tuple[Notice, ...]]:
     mixed = len({card.model.kind == "mmg" for card in cards}) > 1
     of_mmg = [mixed and isinstance(card, MmgCard) for card in cards]
     cards = [linear_form(card, build(card)) if mixed and isinstance(card, MmgCard) else card for card in cards]
@@ -136,7 +142,7 @@ def compare_coefficients(cards: Sequence[ManoeuvringCard]) -> tuple[tuple[Coeffi
     return tuple(rows), tuple(notes)
 
 
-def compare_craft(cards: Sequence[CraftCard]) -> tuple[CoefficientRow, ...]:
+def _compare_craft(cards: Sequence[SteeredCard]) -> tuple[CoefficientRow, ...]:
     """Rigid body and hull of craft of one size (the first is the reference), SI."""
     rows = {name: [CardCoefficient(getattr(card.rigid_body, name)) for card in cards] for name in _RIGID_BODY}
     for name in CRAFT_TERMS:

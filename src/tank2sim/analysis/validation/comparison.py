@@ -14,7 +14,6 @@ from tank2sim.analysis.validation.coefficients import (
     SAME,
     CoefficientRow,
     compare_coefficients,
-    compare_craft,
     compare_effects,
 )
 from tank2sim.analysis.validation.standard_trials import (
@@ -27,7 +26,7 @@ from tank2sim.analysis.validation.standard_trials import (
 )
 from tank2sim.arguments import VALIDATION_MEMBERS
 from tank2sim.arrays import Array
-from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, CraftCard, ManoeuvringCard, SteeredCard
+from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, SteeredBy, SteeredCard
 from tank2sim.cards.examination import doubts
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice, caution
@@ -135,7 +134,7 @@ class CardComparison:
         Coefficients in the reference's convention (those of craft in SI), and parameters of effects and thrusters, SI.
     trials : tuple of TrialComparison
     craft : bool
-        Whether the cards are those of a craft with thrusters.
+        Whether thrusters steer all of them.
     members : int
         Size of the ensembles behind the deviations of the figures.
     notices : tuple of Notice
@@ -176,13 +175,10 @@ def compare_cards(cards: Sequence[SteeredCard], count: int = VALIDATION_MEMBERS)
     """
     if len(cards) < 2:
         raise InputError("CARD", "", "is one alone", "give two cards or more; the first is the reference")
-    craft = _craft_of(cards)
+    steered_by = _refuse_unlike(cards)
     labels = labels_of(cards)
     ships = [ship_of(card) for card in cards]
-    if craft:
-        rows, notes = compare_craft(craft), tuple[Notice, ...]()
-    else:
-        rows, notes = compare_coefficients([card for card in cards if isinstance(card, ManoeuvringCard)])
+    rows, notes = compare_coefficients(cards)
     drawn = [members(ship.card, ship.model, count) for ship in ships]
     messages = [message.of(label) for label, (_, notes) in zip(labels, drawn, strict=True) for message in notes]
     notices, trials = [*_notices(cards, labels), *messages, *notes], []
@@ -200,7 +196,7 @@ def compare_cards(cards: Sequence[SteeredCard], count: int = VALIDATION_MEMBERS)
         coefficients=rows,
         effects=effects,
         trials=tuple(trials),
-        craft=bool(craft),
+        craft=steered_by is SteeredBy.THRUSTERS,
         members=count,
         notices=tuple(dict.fromkeys(notices)),
     )
@@ -219,18 +215,19 @@ def _summary(label: str, place: int, rows: Sequence[CoefficientRow]) -> CardSumm
     )
 
 
-def _craft_of(cards: Sequence[SteeredCard]) -> list[CraftCard]:
-    """The cards, if they are of craft of one size; none of ships; a mixture is refused."""
-    craft = [card for card in cards if isinstance(card, CraftCard)]
-    for card in cards if craft else ():
-        if isinstance(card, ManoeuvringCard):
+def _refuse_unlike(cards: Sequence[SteeredCard]) -> SteeredBy:
+    """What steers all cards; ships next to craft, and craft of several sizes, are refused."""
+    first = cards[0]
+    for card in cards:
+        if card.steered_by is not first.steered_by:
             remedy = "compare craft with craft, and ships with ships"
-            raise InputError(card.source, "model.kind", "is of a ship with a rudder, and another card is not", remedy)
-        length, reference = card.ship.length_m, craft[0].ship.length_m
-        if not math.isclose(length, reference, rel_tol=SAME_SIZE):
-            problem = f"is {length:g} m, and that of {craft[0].source} {reference:g} m"
-            raise InputError(card.source, "ship.length_m", problem, "compare cards of one craft")
-    return craft
+            raise card.fault("model.kind", f"is steered by {card.steered_by}, and another card is not", remedy)
+        length, reference = card.ship.length_m, first.ship.length_m
+        one_size = card.steered_by is SteeredBy.RUDDER or math.isclose(length, reference, rel_tol=SAME_SIZE)
+        if not one_size:
+            problem = f"is {length:g} m, and {first.source} has {reference:g} m"
+            raise card.fault("ship.length_m", problem, "compare cards of one craft")
+    return first.steered_by
 
 
 def labels_of(cards: Sequence[SteeredCard]) -> tuple[str, ...]:
@@ -342,7 +339,7 @@ def _numbers(run: Run | str) -> Numbers:
 def _start(reference: SteeredCard, card: SteeredCard) -> dict[str, float]:
     """Start at the reference's speed at the size of the card's ship, m/s; at the card's own if both are equal except
     for rounding. A craft starts at its own cruising speed or at rest."""
-    if isinstance(card, CraftCard):
+    if card.steered_by is SteeredBy.THRUSTERS:
         return {}
     speed = reference.model.speed_mps * math.sqrt(card.ship.length_m / reference.ship.length_m)
     return {"initial.u": card.model.speed_mps if math.isclose(speed, card.model.speed_mps, rel_tol=1e-6) else speed}
@@ -394,7 +391,7 @@ def _notices(cards: Sequence[SteeredCard], labels: Sequence[str]) -> list[Notice
             messages.append(
                 Notice(f"{label}: its effects ({effects}) are not the reference's ({expected}); the trials have them")
             )
-        engines = [ship.propulsion is None for ship in (card, reference) if isinstance(ship, ManoeuvringCard)]
+        engines = [ship.propulsion is None for ship in (card, reference)]
         if len(set(engines)) > 1:
             messages.append(Notice(f"{label}: only one of it and the reference has propulsion: no stop is compared"))
     return messages

@@ -10,7 +10,7 @@ import numpy as np
 
 from tank2sim.analysis.ensemble.draws import draws_with
 from tank2sim.analysis.stability.imo import TRIAL_RUDDER
-from tank2sim.cards.card import CraftCard, ManoeuvringCard, SteeredCard
+from tank2sim.cards.card import SteeredBy, SteeredCard
 from tank2sim.cards.small_craft import cruising_revolutions, pushes_ahead
 from tank2sim.dynamics import build
 from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
@@ -58,12 +58,6 @@ class TrialShip:
     integrator: Integrator
 
     @property
-    def manoeuvring(self) -> ManoeuvringCard:
-        """The card of a ship with a rudder."""
-        assert isinstance(self.card, ManoeuvringCard)
-        return self.card
-
-    @property
     def has_engine(self) -> bool:
         """True if the card has propulsion."""
         return "propeller.speed" in self.model.input_names
@@ -71,7 +65,7 @@ class TrialShip:
     @property
     def largest_rudder(self) -> float:
         """Rudder of the turning circles, rad: 35 deg, or the largest of the gear."""
-        gear = self.manoeuvring.steering_gear
+        gear = self.card.steering_gear
         return min(TRIAL_RUDDER, gear.max_angle_rad if gear and gear.max_angle_rad else TRIAL_RUDDER)
 
     def run(
@@ -113,9 +107,8 @@ def standard_trials(ships: Sequence[TrialShip]) -> dict[str, Manoeuvre]:
 
     For craft with thrusters see :func:`craft_trials`.
     """
-    craft = [ship.card for ship in ships if isinstance(ship.card, CraftCard)]
-    if craft:
-        return dict(craft_trials(craft))
+    if ships[0].card.steered_by is SteeredBy.THRUSTERS:
+        return dict(craft_trials([ship.card for ship in ships]))
     rudder = min(ship.largest_rudder for ship in ships)
     shown = f"{math.degrees(rudder):.3g}"
     ten, twenty = math.radians(10.0), math.radians(20.0)
@@ -130,7 +123,7 @@ def standard_trials(ships: Sequence[TrialShip]) -> dict[str, Manoeuvre]:
     return trials
 
 
-def craft_trials(cards: Sequence[CraftCard]) -> dict[str, ThrusterManoeuvre]:
+def craft_trials(cards: Sequence[SteeredCard]) -> dict[str, ThrusterManoeuvre]:
     """Name to trial of craft: full ahead from rest, turns by :data:`CRAFT_SHARE` of the largest difference, a spin.
 
     The revolutions are those that all craft reach, in tens of rpm. A craft without thrusters at both sides has the
@@ -138,7 +131,7 @@ def craft_trials(cards: Sequence[CraftCard]) -> dict[str, ThrusterManoeuvre]:
 
     Parameters
     ----------
-    cards : sequence of CraftCard
+    cards : sequence of SteeredCard
     """
     ahead = [
         [thruster for thruster, holds in zip(card.thrusters, pushes_ahead(card), strict=True) if holds]

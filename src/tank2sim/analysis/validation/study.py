@@ -68,6 +68,10 @@ _IDENTIFIED = r"identified by tank2sim \([^)]*\) from ([^;:]*)"
 """Text that ``identify`` writes into the source of its card."""
 
 
+NOTHING_VALIDATED = "not validated, for no trial can be compared"
+"""Verdict on a card without trials."""
+
+
 class ComparisonOutcome(StrEnum):
     """Outcome of the comparison of a figure."""
 
@@ -193,7 +197,7 @@ class Validation:
     def verdict(self) -> str:
         """Summary in words."""
         if not self.figures:
-            return "not validated, for no trial can be compared"
+            return NOTHING_VALIDATED
         counts = self.counts
         validated = f"{counts.pop(ComparisonOutcome.VALIDATED.value)} of {len(self.figures)} figures validated"
         others = ", ".join(f"{count} {outcome}" for outcome, count in counts.items() if count)

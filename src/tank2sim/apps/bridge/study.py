@@ -293,9 +293,9 @@ def steady_speed(ship: TrialShip, revolutions_radps: float) -> float | None:
 
 
 def _telegraph(ship: TrialShip, orders: Mapping[str, float] | None) -> tuple[Telegraph, ...]:
-    if ship.manoeuvring.propulsion is None:
+    if ship.card.propulsion is None:
         return tuple(Telegraph(order, rpm, None) for order, rpm in (orders or {}).items())
-    nominal = ship.manoeuvring.propulsion.nominal_radps / _RADIANS_PER_S
+    nominal = ship.card.propulsion.nominal_radps / _RADIANS_PER_S
     orders_and_rpm = list(orders.items()) if orders else [("", share * nominal) for share in SHARES]
     slowest, fastest = ship.card.model.speed_range_mps
     rows = []
@@ -309,7 +309,7 @@ def _telegraph(ship: TrialShip, orders: Mapping[str, float] | None) -> tuple[Tel
 
 def _depths(ship: TrialShip) -> dict[str, dict[str, float]]:
     """Inputs in deep and in shallow water; shallow only where the card has the effect and a draught."""
-    draught = mean_draught(ship.manoeuvring)
+    draught = mean_draught(ship.card)
     if "water.depth" not in ship.model.input_names or draught is None:
         return {"deep": {}}
     return {"deep": {"water.depth": DEEP * draught}, "shallow": {"water.depth": SHALLOW * draught}}

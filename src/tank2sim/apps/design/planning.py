@@ -27,7 +27,7 @@ from tank2sim.apps.design.trial_design import SENSORS, TrialDesign, design_of_tr
 from tank2sim.apps.programs.conventions import Conventions
 from tank2sim.apps.programs.languages import converted as converted_card
 from tank2sim.cards import ManoeuvringCard
-from tank2sim.cards.card import MmgCard, manoeuvring_card
+from tank2sim.cards.card import MmgCard
 from tank2sim.cards.estimates import RELATIVE_ERROR
 from tank2sim.cards.examination import doubts
 from tank2sim.cards.writing import TestedRange
@@ -284,7 +284,7 @@ def _polynomial(card: ManoeuvringCard) -> tuple[ManoeuvringCard, tuple[Notice, .
     made, notices = converted_card(card, "abkowitz", Conventions(None, None, 0.0), None)
     assert made.card is not None
     words = "the card is of the MMG method: the plan is for the polynomial that is fitted to it"
-    return manoeuvring_card(made.card), (Notice(words), *notices)
+    return made.card.manoeuvring(), (Notice(words), *notices)
 
 
 def _notices(design: CaptiveDesign, draws: int) -> tuple[Notice, ...]:

@@ -74,7 +74,7 @@ def log(
     from tank2sim.apps.logs.study import study_log
     from tank2sim.apps.logs.trial_files import cut_trials
     from tank2sim.apps.logs.voyage import make_voyage
-    from tank2sim.cards import CraftCard
+    from tank2sim.cards import SteeredBy
     from tank2sim.dynamics.vessel import as_vessel
     from tank2sim.records.csv_table import is_frame
 
@@ -90,7 +90,7 @@ def log(
     with nullcontext() if folder is None else folder_made(folder):
         stated = channels if isinstance(channels, ChannelSet) or channels is None else read_channels(Path(channels))
         craft = None if card is None else as_vessel(card)
-        if craft is not None and not isinstance(craft.card, CraftCard):
+        if craft is not None and craft.steered().steered_by is SteeredBy.RUDDER:
             remedy = "give the card of a small craft; of a ship with a rudder run identify on the trials"
             raise InputError(craft.card.source, "model.kind", f"is {craft.card.model.kind}", remedy)
         voyage = make_voyage([_read(name, file) for name, file in named.items()], stated)
@@ -118,16 +118,15 @@ def _read(name: str, file: str | Path | pd.DataFrame) -> VesselLog:
 
 def _identified(craft: Vessel, cuts: Sequence[TrialCut]) -> CraftIdentificationResult | None:
     """Coefficients of a craft from all trials; None without any."""
-    from tank2sim.api.craft_identification import identify_craft
-    from tank2sim.api.trial import craft_trials_of
-    from tank2sim.cards import CraftCard
+    from tank2sim.api.identification import identify_craft
+    from tank2sim.api.trial import trials_of
 
-    assert isinstance(craft.card, CraftCard)
-    turning = any(thruster.max_azimuth_rad is not None for thruster in craft.card.thrusters)
+    card = craft.steered()
+    turning = any(thruster.max_azimuth_rad is not None for thruster in card.thrusters)
     taken = [cut for cut in cuts if turning or not cut.steered]
     if not taken:
         return None
     with tempfile.TemporaryDirectory() as name:
         paths = [Path(name) / cut.trial.path.name for cut in taken]
         write_together({path: cut.text for path, cut in zip(paths, taken, strict=True)})
-        return identify_craft(craft.card, craft_trials_of(paths, craft.card.thrusters), [])
+        return identify_craft(card, trials_of(paths, thrusters=card.thrusters), [])

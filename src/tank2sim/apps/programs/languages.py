@@ -29,10 +29,10 @@ from tank2sim.apps.programs.robotics import (
     vrx_model,
     vrx_text,
 )
-from tank2sim.cards import Card, CraftCard, ManoeuvringCard
-from tank2sim.cards.card import MmgCard, manoeuvring_card
+from tank2sim.cards import Card, ManoeuvringCard, SteeredBy, SteeredCard
+from tank2sim.cards.card import MmgCard
+from tank2sim.cards.craft_terms import CRAFT_ADDED_MASSES
 from tank2sim.cards.reading import changed_text, craft_in_scaling, parse_card
-from tank2sim.cards.small_craft import CRAFT_ADDED_MASSES
 from tank2sim.dynamics import build
 from tank2sim.errors import ArgumentError
 from tank2sim.notices import Notice
@@ -46,7 +46,7 @@ class ConvertedText:
     """A card in another language: the text, the card if it is one, the fit and the figures that changed."""
 
     text: str
-    card: ManoeuvringCard | CraftCard | None = None
+    card: SteeredCard | None = None
     fit: PolynomialFit | None = None
     changes: tuple[FigureChange, ...] = ()
 
@@ -73,8 +73,8 @@ def converted(
     InputError
         The card cannot be had in that language.
     """
-    if isinstance(card, CraftCard):
-        return _of_craft(card, to, wanted, added_mass)
+    if card.steered().steered_by is SteeredBy.THRUSTERS:
+        return _of_craft(card.steered(), to, wanted, added_mass)
     if added_mass is not None:
         raise ArgumentError("added_mass", added_mass, "is of craft in gazebo and vrx alone", "leave it out")
     given = _of_ship(card, to)
@@ -108,11 +108,11 @@ def _of_ship(card: Card, to: str) -> ManoeuvringCard:
     """The card of a ship; raises InputError if it is none, or the language is one of small craft."""
     if to in _OF_CRAFT:
         raise card.fault("model.kind", f"is {card.model.kind}, and {to} is for small_craft", "use mss or pvs")
-    return manoeuvring_card(card)
+    return card.manoeuvring()
 
 
 def _of_craft(
-    card: CraftCard, to: str, wanted: Conventions, added_mass: AddedMass | None
+    card: SteeredCard, to: str, wanted: Conventions, added_mass: AddedMass | None
 ) -> tuple[ConvertedText, tuple[Notice, ...]]:
     if to not in _OF_CRAFT:
         problem = "is small_craft, whose damping is not a polynomial about a speed"
@@ -134,7 +134,7 @@ def _of_craft(
     return ConvertedText(text(card, added_mass), changes=changes), tuple(map(Notice, notices))
 
 
-def _lost_by(card: CraftCard, to: str, place: AddedMass) -> list[str]:
+def _lost_by(card: SteeredCard, to: str, place: AddedMass) -> list[str]:
     """What the plugin of a simulator does not have of a craft, in sentences."""
     notices = []
     if card.effects:

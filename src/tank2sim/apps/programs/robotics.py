@@ -25,8 +25,9 @@ from typing import Literal
 import numpy as np
 
 from tank2sim.apps.programs.polynomial_fit import FigureChange
-from tank2sim.cards.card import CraftCard
-from tank2sim.cards.small_craft import CRAFT_ADDED_MASSES, VELOCITY_TERMS, cruising_revolutions
+from tank2sim.cards.card import SteeredCard
+from tank2sim.cards.craft_terms import CRAFT_ADDED_MASSES, VELOCITY_TERMS
+from tank2sim.cards.small_craft import cruising_revolutions
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import added_mass_forces
@@ -90,7 +91,7 @@ ENGINE_STEP_S = 0.001
 """Step of Gazebo's engines where a world states none."""
 
 
-def growth_per_step(card: CraftCard) -> float:
+def growth_per_step(card: SteeredCard) -> float:
     """Factor by which an error of the velocity grows in a step of a plugin that takes added mass from the last step.
 
     The largest root z of ``z^2 I - z (I - dt M^-1 D - M^-1 A) - M^-1 A = 0``, with the rigid mass M and the added mass
@@ -99,7 +100,7 @@ def growth_per_step(card: CraftCard) -> float:
 
     Parameters
     ----------
-    card : CraftCard
+    card : SteeredCard
     """
     body, known = card.rigid_body, card.derivatives
     lever = body.mass * body.x_G
@@ -120,12 +121,12 @@ def growth_per_step(card: CraftCard) -> float:
     return float(np.abs(np.linalg.eigvals(step)).max())
 
 
-def place_of_added_mass(card: CraftCard, wanted: AddedMass | None) -> AddedMass:
+def place_of_added_mass(card: SteeredCard, wanted: AddedMass | None) -> AddedMass:
     """Where the added mass of a craft goes: as `wanted`, by default into the plugin where that is stable.
 
     Parameters
     ----------
-    card : CraftCard
+    card : SteeredCard
     wanted : str, optional
 
     Raises
@@ -140,7 +141,7 @@ def place_of_added_mass(card: CraftCard, wanted: AddedMass | None) -> AddedMass:
     return wanted or ("plugin" if growth < 1 else "inertial")
 
 
-def _inertial(card: CraftCard) -> list[str]:
+def _inertial(card: SteeredCard) -> list[str]:
     """The added mass of a link about its origin, positive, kg, kg m and kg m^2; what a card does not have is zero."""
     known = {name: -card.derivatives.get(name, 0.0) for name in CRAFT_ADDED_MASSES}
     coupled = (known["Yrdot"] + known["Nvdot"]) / 2 + 0.0  # the matrix of SDF is symmetric
@@ -157,12 +158,12 @@ def _inertial(card: CraftCard) -> list[str]:
     ]
 
 
-def gazebo_text(card: CraftCard, added_mass: AddedMass | None = None) -> str:
+def gazebo_text(card: SteeredCard, added_mass: AddedMass | None = None) -> str:
     """SDF of the plugins of a craft for Gazebo: hydrodynamics, and one thruster each.
 
     Parameters
     ----------
-    card : CraftCard
+    card : SteeredCard
     added_mass : str, optional
         As of :func:`place_of_added_mass`.
     """
@@ -204,12 +205,12 @@ def gazebo_text(card: CraftCard, added_mass: AddedMass | None = None) -> str:
     return "\n".join(lines) + "\n"
 
 
-def vrx_text(card: CraftCard, added_mass: AddedMass | None = None) -> str:
+def vrx_text(card: SteeredCard, added_mass: AddedMass | None = None) -> str:
     """SDF of VRX's SimpleHydrodynamics for a craft.
 
     Parameters
     ----------
-    card : CraftCard
+    card : SteeredCard
     added_mass : str, optional
         As of :func:`place_of_added_mass`.
     """
@@ -227,7 +228,7 @@ def vrx_text(card: CraftCard, added_mass: AddedMass | None = None) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _head(card: CraftCard, where: str) -> list[str]:
+def _head(card: SteeredCard, where: str) -> list[str]:
     """Comments on a craft, and its rigid body."""
     body = card.rigid_body
     # About the centre of gravity, as SDF has it.
@@ -239,12 +240,12 @@ def _head(card: CraftCard, where: str) -> list[str]:
     ]
 
 
-def vrx_model(card: CraftCard, added_mass: AddedMass | None = None) -> Model:
+def vrx_model(card: SteeredCard, added_mass: AddedMass | None = None) -> Model:
     """The model of a craft with the terms of VRX's plugin: six of damping, no effects, and C_A with the inertia alone.
 
     Parameters
     ----------
-    card : CraftCard
+    card : SteeredCard
     added_mass : str, optional
         As of :func:`place_of_added_mass`.
     """
@@ -261,12 +262,12 @@ def vrx_model(card: CraftCard, added_mass: AddedMass | None = None) -> Model:
     return model
 
 
-def gazebo_model(card: CraftCard, _: AddedMass | None = None) -> Model:
+def gazebo_model(card: SteeredCard, _: AddedMass | None = None) -> Model:
     """The model of a craft with what Gazebo's plugin has of it: the whole hull, without effects."""
     return build(replace(card, effects=()))
 
 
-def craft_changes(card: CraftCard, model: Model) -> tuple[FigureChange, ...]:
+def craft_changes(card: SteeredCard, model: Model) -> tuple[FigureChange, ...]:
     """Figures of a straight run, a turn and a spin of a card, and of another `model` of the same craft."""
     n = cruising_revolutions(card)
     before = build(card)

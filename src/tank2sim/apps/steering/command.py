@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tank2sim.api.verbs import verb
 from tank2sim.errors import ArgumentError, InputError
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from tank2sim.apps.steering.page import PageShip
     from tank2sim.apps.steering.result import SteeringPageResult
     from tank2sim.apps.steering.scenario import Scenario
-    from tank2sim.cards import CraftCard, ManoeuvringCard
     from tank2sim.dynamics.model import Model
     from tank2sim.dynamics.vessel import Vessel
 
@@ -62,40 +61,34 @@ def make_steering_page(
     from tank2sim.apps.steering import ship as page_ship
     from tank2sim.apps.steering.ghost import ghost_of
     from tank2sim.apps.steering.members import members_of
+    from tank2sim.apps.steering.page import PageShip
     from tank2sim.apps.steering.scenario import read_scenario
-    from tank2sim.cards import CraftCard, ManoeuvringCard
+    from tank2sim.cards import SteeredBy
     from tank2sim.identification.trials.problem.prepare_trials import measured
 
-    card, model = ship.card, ship.model
-    if isinstance(card, CraftCard):
-        if ghost is not None:
-            problem = "is a trial with a rudder, and a craft with thrusters has none"
-            raise ArgumentError("ghost", "", problem, "leave it out")
-        waters = read_scenario(scenario) if scenario else None
-        in_page = _page_ship(card, model)
-        return _result(in_page, None, model.notices, waters, view_3d)
-    if not isinstance(card, ManoeuvringCard):
-        remedy = "a ship (kind linear, abkowitz or mmg) or a craft (small_craft) can be steered"
-        raise InputError(card.source, "", "has no rudder", remedy)
+    card, model = ship.steered(), ship.model
+    by_rudder = card.steered_by is SteeredBy.RUDDER
+    if ghost is not None and not by_rudder:
+        problem = "is a trial with a rudder, and a craft with thrusters has none"
+        raise ArgumentError("ghost", "", problem, "leave it out")
     if ghost is not None and scenario:
         raise ArgumentError("scenario", "", "does not go with a ghost: both set the start of the ship", "leave one out")
     waters = read_scenario(scenario) if scenario else None
-    trial = None if ghost is None else measured(trials_of(ghost, "ghost"), card)
+    trial = None if ghost is None else measured(trials_of(ghost, "ghost"), card.manoeuvring())
     shown = ghost_of(trial.trials[0], model) if trial else None
     if shown and shown.by_angle:
         model = page_ship.ship_following_angle(model)
-    model, autopilot, no_autopilot = _with_autopilot(model)
+    model, autopilot, no_autopilot = _with_autopilot(model) if by_rudder else (model, "", ())
+    members = tuple(members_of(card, model))
+    in_page = PageShip(
+        model=model,
+        beam_m=card.ship.beam_m,
+        draught_m=card.ship.draught_m,
+        members=members,
+        autopilot=autopilot,
+    )
     notices = (*(trial.notices if trial else ()), *(shown.notices if shown else ()), *no_autopilot, *model.notices)
-    members = members_of(card, model)
-    in_page = _page_ship(card, model, members=tuple(members), autopilot=autopilot)
     return _result(in_page, shown, notices, waters, view_3d)
-
-
-def _page_ship(card: CraftCard | ManoeuvringCard, model: Model, **more: Any) -> PageShip:
-    from tank2sim.apps.steering.page import PageShip
-
-    known = {"members": (), "autopilot": ""} | more
-    return PageShip(model=model, beam_m=card.ship.beam_m, draught_m=card.ship.draught_m, **known)
 
 
 def _result(

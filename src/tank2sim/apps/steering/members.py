@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tank2sim.analysis.ensemble.draws import draws_of
-from tank2sim.cards import ManoeuvringCard
+from tank2sim.cards import SteeredCard
 from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.ship import mass_fault
@@ -19,7 +19,7 @@ NO_COVARIANCE = "The card has no covariance of its coefficients, so that no ship
 """Text of a page without members."""
 
 
-def members_of(card: ManoeuvringCard, model: Model, count: int = PAGE_MEMBERS, seed: int = 0) -> list[dict[str, float]]:
+def members_of(card: SteeredCard, model: Model, count: int = PAGE_MEMBERS, seed: int = 0) -> list[dict[str, float]]:
     """Parameters of the members by name, in the model's units; none for a card without a covariance.
 
     They are drawn as those of an ensemble (:func:`tank2sim.analysis.ensemble.draws.draws_of`): numbers in the
@@ -50,7 +50,7 @@ def members_of(card: ManoeuvringCard, model: Model, count: int = PAGE_MEMBERS, s
     for number in range(_TRIES * count):
         member = draws.drawn(number)
         values = {name: value for name, value in member.values.items() if name in known}
-        if not member.trouble and not mass_fault(known | values):
+        if not member.trouble and not mass_fault(model, known | values):
             found.append(values)
         if len(found) == count:
             break

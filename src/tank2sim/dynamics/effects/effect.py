@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import cast
 
 import casadi as ca
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import ManoeuvringCard, SteeredCard
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity
@@ -338,6 +339,16 @@ class Effect:
         return with_readings(
             changed, self.readings({name: model.symbol(name) for name in MEASURED_BEFOREHAND}, symbols)
         )
+
+
+def card_for_effects(card: SteeredCard) -> ManoeuvringCard:
+    """The card as effects take it: an effect that fits a craft reads nothing of a card that only ships have.
+
+    Parameters
+    ----------
+    card : SteeredCard
+    """
+    return cast(ManoeuvringCard, card)
 
 
 def sensor_fault_of(effect: Effect) -> str:

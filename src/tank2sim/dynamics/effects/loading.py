@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import ManoeuvringCard, SteeredCard
 from tank2sim.cards.estimates import CLARKE_BRACKETS
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.effects.derivatives import TRIM, hydrodynamic, inertial_parts, trimmed, with_changes
@@ -33,12 +33,12 @@ EMERGED = 0.3
 less: the blades come out of the water. Project choice."""
 
 
-def mean_draught(card: ManoeuvringCard) -> float | None:
+def mean_draught(card: SteeredCard) -> float | None:
     """Return the mean draught of a card's ship, m: that of its effect ``loading``, else its own; None without either.
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
     """
     loaded = (entry.parameters for entry in card.effects if entry.name == LOADING.name)
     return next((one["mean_draught_m"] for one in loaded), card.ship.draught_m)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from tank2sim.cards.card import CraftCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.reading import changed_text, parse_card
-from tank2sim.cards.small_craft import craft_scale, craft_scales
 from tank2sim.dynamics.small_craft import THRUSTER_PARAMETERS
 from tank2sim.errors import InputError
 from tank2sim.identification.craft.fit import CraftFit
@@ -17,13 +16,15 @@ from tank2sim.units import from_si
 _KEYS = {part: key for key, part in THRUSTER_PARAMETERS.items()}
 
 
-def identified_craft(card: CraftCard, fit: CraftFit, responses: Mapping[str, OrderResponse] | None = None) -> CraftCard:
+def identified_craft(
+    card: SteeredCard, fit: CraftFit, responses: Mapping[str, OrderResponse] | None = None
+) -> SteeredCard:
     """The card with the estimates and their standard errors, in the scaling of its own text.
 
     Parameters
     ----------
-    card : CraftCard
-        That the problem was made of; numbers that were not estimated stay.
+    card : SteeredCard
+        The card of the problem; numbers that were not estimated stay.
     fit : CraftFit
     responses : mapping, optional
         Thruster to its response to orders: lag, and dead band where it is determined.
@@ -31,7 +32,7 @@ def identified_craft(card: CraftCard, fit: CraftFit, responses: Mapping[str, Ord
     Raises
     ------
     InputError
-        The estimates are not those of a craft: its damping would drive it on.
+        With the estimates the damping of the craft would drive it on.
     """
     changes: dict[str, object] = {}
     for number, thruster in enumerate(card.thrusters):
@@ -48,31 +49,42 @@ def identified_craft(card: CraftCard, fit: CraftFit, responses: Mapping[str, Ord
         value, error = response.dead_band
         changes[f"{place}.{key}"] = float(value * unit)
         changes[f"{place}.uncertainty.{key}"] = float(error * unit)
-    scales = craft_scales(card)
-    shared = twins(card)
-    estimates = zip(fit.problem.free, fit.estimate.values, fit.estimate.standard_errors, strict=True)
-    for name, value, error in estimates:
-        first, *rest = name.split(".")
-        if first == "derivatives":
-            unit = craft_scale(rest[0], scales) if card.model.scaling == "prime" else 1.0
-            names = ["Yrdot", "Nvdot"] if rest[0] == "Yrdot" and "derivatives.Nvdot" not in fit.problem.free else rest
-            for term in names:
-                changes[f"derivatives.{term}"] = float(value / unit)
-                changes[f"uncertainty.{term}"] = float(error / abs(unit))
+    values, errors = fit.estimate.values.tolist(), fit.estimate.standard_errors.tolist()
+    for name, at in estimated_numbers(card, fit).items():
+        section, *rest = name.split(".")
+        if section == "derivatives":
+            factor = card.file_factor(rest[0])
+            changes[name] = values[at] * factor
+            changes[f"uncertainty.{rest[0]}"] = errors[at] * abs(factor)
             continue
-        for number, thruster in enumerate(card.thrusters):
-            twin = thruster.name in shared and rest[0] == card.thrusters[0].name
-            if thruster.name == rest[0] or twin:
-                key = _KEYS[rest[1]]
-                changes[f"thrusters.{number}.{key}"] = max(0.0, float(value))
-                changes[f"thrusters.{number}.uncertainty.{key}"] = float(error)
+        number = [thruster.name for thruster in card.thrusters].index(rest[0])
+        changes[f"thrusters.{number}.{_KEYS[rest[1]]}"] = max(0.0, values[at])
+        changes[f"thrusters.{number}.uncertainty.{_KEYS[rest[1]]}"] = errors[at]
     try:
-        found = parse_card(changed_text(card.text, card.source, changes, comment="identified"), card.source)
+        return parse_card(changed_text(card.text, card.source, changes, comment="identified"), card.source).steered()
     except InputError as error:
         problem = f"fitted to these trials, it {error.problem}"
         remedy = (
             "check the mass, the inertia, and places and largest revolutions of the thrusters: they are taken as exact"
         )
         raise InputError(card.source, error.place, problem, remedy) from error
-    assert isinstance(found, CraftCard)
+
+
+def estimated_numbers(card: SteeredCard, fit: CraftFit) -> dict[str, int]:
+    """Parameter of the model to the place of its estimate; twins of an estimated number have its place.
+
+    Parameters
+    ----------
+    card : SteeredCard
+        The card of the problem.
+    fit : CraftFit
+    """
+    found, free = {}, fit.problem.free
+    for place, name in enumerate(free):
+        found[name] = place
+        if name == "derivatives.Yrdot" and "derivatives.Nvdot" not in free:
+            found["derivatives.Nvdot"] = place
+        if name.startswith(f"thrusters.{card.thrusters[0].name}."):
+            key = name.rpartition(".")[2]
+            found |= {f"thrusters.{other}.{key}": place for other in twins(card)}
     return found

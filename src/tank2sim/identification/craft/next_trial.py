@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import CraftCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.identification.craft.fit import (
     IDENTIFIED_SHARE,
     TRIALS_SHARE,
@@ -72,14 +72,14 @@ def _patterns() -> dict[str, list[tuple[float, float, float]]]:
     }
 
 
-def next_trials(card: CraftCard, fit: CraftFit) -> list[CandidateTrial]:
+def next_trials(card: SteeredCard, fit: CraftFit) -> list[CandidateTrial]:
     """The candidates, the one first that determines most of the coefficients that the trials do not.
 
     Empty for a craft whose thrusters are not two.
 
     Parameters
     ----------
-    card : CraftCard
+    card : SteeredCard
     fit : CraftFit
     """
     if len(card.thrusters) != 2:
@@ -108,7 +108,7 @@ def next_trials(card: CraftCard, fit: CraftFit) -> list[CandidateTrial]:
 
 
 def _orders(
-    card: CraftCard, fit: CraftFit, steps: list[tuple[float, float, float]]
+    card: SteeredCard, fit: CraftFit, steps: list[tuple[float, float, float]]
 ) -> tuple[tuple[tuple[float, float, float], ...], Array]:
     """Orders over five minutes, and the inputs of the model (n, nu)."""
     model, step = fit.problem.model, fit.problem.runs[0].step_s

@@ -17,7 +17,7 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import lfilter
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import CraftCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.identification.craft.problem import twins
 from tank2sim.records.trials import Trial
 
@@ -67,12 +67,12 @@ class OrderResponse:
         return self.rest_radps + width / 2, width / np.sqrt(12)
 
 
-def order_responses(card: CraftCard, trials: Sequence[Trial]) -> dict[str, OrderResponse]:
+def order_responses(card: SteeredCard, trials: Sequence[Trial]) -> dict[str, OrderResponse]:
     """The response of each thruster whose orders and revolutions are in the trials; those that share numbers have one.
 
     Parameters
     ----------
-    card : CraftCard
+    card : SteeredCard
     trials : sequence of Trial
         By :func:`tank2sim.records.craft_trials.read_craft_trial`.
     """

@@ -17,8 +17,8 @@ import casadi as ca
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import CraftCard
-from tank2sim.cards.small_craft import CRAFT_ADDED_MASSES, VELOCITY_TERMS
+from tank2sim.cards.card import SteeredCard
+from tank2sim.cards.craft_terms import CRAFT_ADDED_MASSES, VELOCITY_TERMS
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model, Parameter, Quantity, State, same_symbol
@@ -73,12 +73,12 @@ OBSERVED_STEP_S = 0.2
 apart it is a whole part, and the motion is measured at the rows alone."""
 
 
-def craft_fit_model(card: CraftCard, driven_by: str = "revolutions", *, turned: bool = False) -> Model:
+def craft_fit_model(card: SteeredCard, driven_by: str = "revolutions", *, turned: bool = False) -> Model:
     """The model of a card driven by measured or ordered revolutions, with disturbances as constant states.
 
     Parameters
     ----------
-    card : CraftCard
+    card : SteeredCard
     driven_by : str
         ``revolutions``: lag and dead band of the card are left out, for both lie before the revolutions; ``orders``:
         they are in, except a lag shorter than a step.
@@ -139,7 +139,7 @@ def _felt(lag_s: float | None) -> float | None:
     return lag_s if lag_s is not None and lag_s >= OBSERVED_STEP_S else None
 
 
-def twins(card: CraftCard) -> dict[str, tuple[str, ...]]:
+def twins(card: SteeredCard) -> dict[str, tuple[str, ...]]:
     """Thruster to the parameters that it shares with the first one, because the card states the same numbers."""
     keys = {
         "ahead_Ns2": "ahead",
@@ -155,7 +155,7 @@ def twins(card: CraftCard) -> dict[str, tuple[str, ...]]:
     }
 
 
-def craft_prior(card: CraftCard, model: Model) -> dict[str, tuple[float, float]]:
+def craft_prior(card: SteeredCard, model: Model) -> dict[str, tuple[float, float]]:
     """Free parameter to its value and standard error before the trials, SI.
 
     All terms of the hull are free but the mass, the yaw inertia and its centre; thrust curves and the loss of thrust by
@@ -194,12 +194,12 @@ def craft_prior(card: CraftCard, model: Model) -> dict[str, tuple[float, float]]
     return found
 
 
-def craft_problem(card: CraftCard, trials: Sequence[Trial]) -> Problem:
+def craft_problem(card: SteeredCard, trials: Sequence[Trial]) -> Problem:
     """The problem of a card and trials.
 
     Parameters
     ----------
-    card : CraftCard
+    card : SteeredCard
     trials : sequence of Trial
         By :func:`tank2sim.records.craft_trials.read_craft_trial`.
 
@@ -229,7 +229,7 @@ def craft_problem(card: CraftCard, trials: Sequence[Trial]) -> Problem:
     return Problem(model, tuple(prior), means, errors, tuple(runs))
 
 
-def craft_driven_by(card: CraftCard, trials: Sequence[Trial]) -> str:
+def craft_driven_by(card: SteeredCard, trials: Sequence[Trial]) -> str:
     """What drives the model in all trials: ``revolutions``, which were measured, or else ``orders``.
 
     Raises

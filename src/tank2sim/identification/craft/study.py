@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from tank2sim.arrays import Array, Number
-from tank2sim.cards.card import CraftCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.examination import doubts
+from tank2sim.errors import InputError
 from tank2sim.identification.craft.fit import (
     PREDICTION_LEAD_S,
     SHORTEST_PREDICTION_S,
@@ -19,10 +20,13 @@ from tank2sim.identification.craft.fit import (
     CraftFit,
     FreePrediction,
     determination,
+    predict_by_card,
 )
 from tank2sim.identification.craft.next_trial import CandidateTrial, next_trials
 from tank2sim.identification.craft.order_response import OrderResponse
+from tank2sim.identification.craft.problem import craft_problem
 from tank2sim.notices import Notice, caution
+from tank2sim.records.trials import Trial
 from tank2sim.units import from_si
 
 NOT_ITS_OWN = (
@@ -113,8 +117,8 @@ class CraftIdentificationStudy:
 
 
 def study_craft(
-    card: CraftCard,
-    found: CraftCard,
+    card: SteeredCard,
+    found: SteeredCard,
     fit: CraftFit,
     held: Mapping[str, FreePrediction | None],
     responses: Mapping[str, OrderResponse],
@@ -124,7 +128,7 @@ def study_craft(
 
     Parameters
     ----------
-    card, found : CraftCard
+    card, found : SteeredCard
         Given and found.
     fit : CraftFit
     held : mapping
@@ -173,7 +177,7 @@ def study_craft(
     )
 
 
-def _dead_band_notices(card: CraftCard, responses: Mapping[str, OrderResponse], driven_by: str) -> list[Notice]:
+def _dead_band_notices(card: SteeredCard, responses: Mapping[str, OrderResponse], driven_by: str) -> list[Notice]:
     if not responses:
         words = "orders" if driven_by == "orders" else "revolutions"
         other = "revolutions" if driven_by == "orders" else "orders"
@@ -227,7 +231,7 @@ def prediction_r_squared(predictions: Sequence[FreePrediction]) -> dict[str, flo
 
 
 @dataclass(frozen=True, kw_only=True)
-class CraftReplay:
+class TrialPrediction:
     """Free-running predictions of a trial.
 
     Parameters
@@ -249,63 +253,66 @@ class CraftReplay:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class CraftValidationStudy:
+class PredictionStudy:
     """Free-running predictions of trials by a craft's card.
 
     Parameters
     ----------
-    ship : str
     determination : dict
         R^2 of u, v and r of all predictions, next to the motion smoothed with the card.
     end_distance_m, end_heading_deg : float or None
-        As of :class:`CraftReplay`, for all trials.
+        As of :class:`TrialPrediction`, for all trials.
     trials : dict
         Predictions by trial.
-    notices : tuple of Notice
     """
 
-    ship: str
     determination: dict[str, Number]
     end_distance_m: float | None
     end_heading_deg: float | None
-    trials: dict[str, CraftReplay]
-    notices: tuple[Notice, ...]
+    trials: dict[str, TrialPrediction]
 
 
-def study_predictions(
-    card: CraftCard, files: Sequence[str], predictions: Sequence[FreePrediction], alike: Sequence[Notice]
-) -> CraftValidationStudy:
-    """Study of predictions of trials by a card.
+def predict_trials(card: SteeredCard, trials: Sequence[Trial]) -> tuple[PredictionStudy, tuple[Notice, ...]]:
+    """Predict trials of a craft by its card and recorded revolutions, from the state of a filter after ten seconds.
 
     Parameters
     ----------
-    card : CraftCard
-    files : sequence of str
-        Files of all trials.
-    predictions : sequence of FreePrediction
-        Those of trials that are long enough.
-    alike : sequence of Notice
-        Notices of trials that are alike.
+    card : SteeredCard
+    trials : sequence of Trial
+        Trials (:func:`.read_craft_trial`).
+
+    Raises
+    ------
+    InputError
+        A file is at fault, none is long enough, or the card does not move as the trials do.
     """
-    known = {entry.run.file for entry in predictions}
-    short = [Path(file).name for file in files if file not in known]
+    problem = craft_problem(card, trials)
+    try:
+        with np.errstate(all="ignore"), threadpool_limits(limits=1, user_api="blas"):
+            predictions = predict_by_card(problem)
+    except np.linalg.LinAlgError:
+        remedy = "identify the card from trials first"
+        raise InputError(card.source, "", "does not move as the trials do, not even roughly", remedy) from None
     least = PREDICTION_LEAD_S + SHORTEST_PREDICTION_S
+    if not predictions:
+        raise InputError("trials", "", f"none is longer than {least:g} s", "give longer ones")
+    known = {entry.run.file for entry in predictions}
+    short = [trial.path.name for trial in trials if str(trial.path) not in known]
     too_short = [Notice(f"not longer than {least:g} s, and not predicted: {', '.join(short)}")] if short else []
     distance, heading = _at_ends(predictions)
-    return CraftValidationStudy(
-        ship=card.ship.name,
+    study = PredictionStudy(
         determination=prediction_r_squared(predictions),
         end_distance_m=distance,
         end_heading_deg=heading,
-        trials={entry.run.name: _replay(entry) for entry in predictions},
-        notices=(*doubts(card), *alike, *too_short, Notice(NOT_ITS_OWN)),
+        trials={entry.run.name: _predicted(entry) for entry in predictions},
     )
+    return study, (*too_short, Notice(NOT_ITS_OWN))
 
 
-def _replay(prediction: FreePrediction) -> CraftReplay:
+def _predicted(prediction: FreePrediction) -> TrialPrediction:
     rms = np.sqrt(((prediction.predicted - prediction.smoothed) ** 2).mean(axis=0))
     distance, heading = _at_ends([prediction])
-    return CraftReplay(
+    return TrialPrediction(
         predictions=len(prediction.ends),
         rms_u_mps=float(rms[0]),
         rms_v_mps=float(rms[1]),
