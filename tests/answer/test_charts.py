@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tank2sim.answer.charts.picture import VEGALITE_VERSION, TrackData, chart_png, chart_specification, track_chart
+from tank2sim.answer.charts.motion import TrackData, track_chart
+from tank2sim.answer.charts.picture import VEGALITE_VERSION, chart_png, chart_specification
 from tank2sim.answer.charts.theme import DARK_TONE, LIGHT_PALETTE, LIGHT_TONE
 from tests.answer.example import every_chart
 

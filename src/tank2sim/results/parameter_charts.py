@@ -4,9 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import altair as alt
-
-from tank2sim.answer.charts.parts import NUMBER, STACKS, Chart, ChartRecord, data, plain, series_look
+from tank2sim.answer.charts.matrix import Matrix
+from tank2sim.answer.charts.parts import plain, series_look
+from tank2sim.answer.charts.rows import RowPlot, row_layers
+from tank2sim.answer.charts.vega import (
+    STACKS,
+    ChartRecord,
+    ChartSpec,
+    Quantity,
+    Rule,
+    bare_layer,
+    heading,
+    layer,
+    layered,
+    tooltips,
+)
 from tank2sim.arrays import Array
 from tank2sim.identification.trials.assessment.identifiability import CLOSE_CORRELATION
 from tank2sim.identification.trials.study import IdentifiabilityStudy, ParameterEstimate, PosteriorStudy
@@ -19,41 +31,49 @@ def value_with_error(value: float, error: float) -> str:
     return f"{value:.5g} ± {error:.2g}"
 
 
-def parameter_chart(parameters: Mapping[str, ParameterEstimate], *, title: str = "") -> alt.HConcatChart:
+def parameter_chart(parameters: Mapping[str, ParameterEstimate], *, title: str = "") -> ChartSpec:
     """Estimates with their 95 % intervals next to the priors', in standard errors of the prior; shares next to."""
-    rows = [_parameter_row(name, parameter) for name, parameter in parameters.items()]
-    farthest = max((abs(row[key] or 0.0) for row in rows for key in ("low", "high")), default=1.0)
+    found = [_parameter_row(name, parameter) for name, parameter in parameters.items()]
+    farthest = max((abs(row[key] or 0.0) for row in found for key in ("low", "high")), default=1.0)
     # A few derivatives may move by dozens of standard errors, where the others move by one.
-    kind = {"type": "symlog", "constant": 2} if farthest > 12 else {}
-    ticks = {"values": _symmetric_ticks(farthest)} if kind else {}
-    y = alt.Y("name:N", sort=list(parameters), axis=alt.Axis(title=None, grid=True, labelLimit=200))
-    x = alt.X("v:Q", scale=alt.Scale(**kind), title="value less prior, in standard errors of the prior (-)")
-    x = x.axis(**ticks)
-    tooltip = [
-        alt.Tooltip("name:N", title="parameter"),
-        alt.Tooltip("own:N", title="found"),
-        alt.Tooltip("known:N", title="before"),
-        alt.Tooltip("share_text:N", title="from trials"),
-    ]
-    look = series_look(["estimate", "prior"], as_points=["estimate", "prior"])
-    bands = [row | {"run": "prior", "v": 0.0, "low": -_NORMAL, "high": _NORMAL} for row in rows]
-    found = [row | {"run": "estimate"} for row in rows]
-    layers = [Chart(data([{"v": 0.0}])).mark_rule(style="reference").encode(x="v:Q")]
-    for these_rows, offset in ((found, -4), (bands, 4)):
-        base = Chart(data(these_rows)).encode(y=y, color=look.colour, tooltip=tooltip)
-        layers.append(base.mark_rule(strokeWidth=1.8, yOffset=offset).encode(x=alt.X("low:Q"), x2="high:Q"))
-        layers.append(base.mark_point(size=34, yOffset=offset).encode(x=x, shape=look.shape))
-    height = 21 * len(rows)
-    bare = alt.Y("name:N", sort=list(parameters), axis=alt.Axis(title=None, labels=False, ticks=False))
-    shares = alt.X("share:Q", scale=alt.Scale(domain=[0, 100]), title="information from trials (%)")
-    bars = Chart(data(rows)).mark_bar(height=9, opacity=0.7).encode(x=shares, y=bare, tooltip=tooltip)
-    intervals = alt.layer(*layers).properties(width=400, height=height)
-    chart = alt.hconcat(intervals, bars.properties(width=150, height=height), spacing=18)
-    return chart.properties(
-        title=title,
-        description="Estimates and priors with 95 % intervals, and the share of the trials in each.",
-        usermeta=STACKS,
+    wide = farthest > 12
+    across = Quantity(
+        title="value less prior, in standard errors of the prior (-)",
+        zero=not wide,
+        scale={"type": "symlog", "constant": 2} if wide else None,
+        ticks=_symmetric_ticks(farthest) if wide else None,
     )
+    look = series_look(["estimate", "prior"], as_points=["estimate", "prior"])
+    prior = [row | {"run": "prior", "v": 0.0, "low": -_NORMAL, "high": _NORMAL} for row in found]
+    shown = {"name:N": "parameter", "own:N": "found", "known:N": "before", "share_text:N": "from trials"}
+    intervals = [
+        *row_layers(
+            RowPlot(rows=found, across=across, look=look, shown=shown, rules=[Rule(at=[0.0])]), size=34, yOffset=-4
+        ),
+        *row_layers(RowPlot(rows=prior, across=across, look=look, shown=shown), size=34, yOffset=4),
+    ]
+    shares = Quantity(title="information from trials (%)", domain=(0, 100))
+    bare = {"labels": False, "ticks": False, "grid": False}
+    bars = [{"name": row["name"], "v": row["share"]} | {key: row[key] for key in _SAID} for row in found]
+    height = 21 * len(found)
+    return {
+        "hconcat": [
+            layered(intervals, size=(400, height)),
+            layered(
+                row_layers(
+                    RowPlot(rows=bars, across=shares, shown=shown, side=bare), mark="bar", height=9, opacity=0.7
+                ),
+                size=(150, height),
+            ),
+        ],
+        "spacing": 18,
+        "title": title,
+        "description": "Estimates and priors with 95 % intervals, and the share of the trials in each.",
+        "usermeta": STACKS,
+    }
+
+
+_SAID = ("own", "known", "share_text")
 
 
 def _parameter_row(name: str, parameter: ParameterEstimate) -> ChartRecord:
@@ -62,6 +82,7 @@ def _parameter_row(name: str, parameter: ParameterEstimate) -> ChartRecord:
     error = _NORMAL * parameter.standard_error / unit
     return {
         "name": name,
+        "run": "estimate",
         "v": plain(value),
         "low": plain(value - error),
         "high": plain(value + error),
@@ -80,7 +101,7 @@ def _symmetric_ticks(farthest: float) -> list[float]:
 
 def posterior_chart(
     parameters: Mapping[str, ParameterEstimate], posterior: PosteriorStudy, *, title: str = ""
-) -> alt.LayerChart:
+) -> ChartSpec:
     """Median and intervals of 50 and 95 % of each sampled parameter, in its standard deviations from its mean.
 
     The grey band is the 95 % interval of a normal distribution.
@@ -94,27 +115,27 @@ def posterior_chart(
         rows.append(
             {"name": name, **shown, "interval": f"{low:.4g} to {high:.4g}", "found": f"{middle:.4g}", "run": "samples"}
         )
-    look = series_look(["samples"], as_points=["samples"])
-    y = alt.Y("name:N", sort=[str(row["name"]) for row in rows], axis=alt.Axis(title=None, grid=True, labelLimit=200))
-    x = alt.X("v:Q", title="value less mean, in standard deviations (-)")
-    tooltip = [
-        alt.Tooltip("name:N", title="parameter"),
-        alt.Tooltip("found:N", title="median"),
-        alt.Tooltip("interval:N", title="95 %"),
-    ]
-    normal = Chart(data([{"low": -_NORMAL, "high": _NORMAL}])).mark_rect(style="reference", opacity=0.15)
-    base = Chart(data(rows)).encode(y=y, color=look.colour, tooltip=tooltip)
-    layers = [
-        normal.encode(x=alt.X("low:Q"), x2="high:Q"),
-        base.mark_rule(strokeWidth=1.4).encode(x=alt.X("low:Q"), x2="high:Q"),
-        base.mark_rule(strokeWidth=4).encode(x=alt.X("quarter:Q"), x2="three:Q"),
-        base.mark_point(size=40).encode(x=x, shape=look.shape),
-    ]
-    description = "Medians and intervals of sampled parameters next to the 95 % interval of a normal distribution."
-    return alt.layer(*layers).properties(width=560, height=19 * len(rows), title=title, description=description)
+    across = Quantity(title="value less mean, in standard deviations (-)", zero=True)
+    shown_as = {"name:N": "parameter", "found:N": "median", "interval:N": "95 %"}
+    layers = row_layers(RowPlot(rows=rows, across=across, shown=shown_as), size=40)
+    half = {"x": across.channel("quarter"), "x2": "three", "y": layers[0]["encoding"]["y"]}
+    half["color"] = layers[0]["encoding"]["color"]
+    normal = layer(
+        "rect",
+        [{"low": -_NORMAL, "high": _NORMAL}],
+        {"x": across.channel("low"), "x2": "high"},
+        style="reference",
+        opacity=0.15,
+    )
+    return layered(
+        [normal, *layers, layer("rule", rows, half, strokeWidth=4)],
+        size=(560, 19 * len(rows)),
+        title=title,
+        description="Medians and intervals of sampled parameters next to the 95 % interval of a normal distribution.",
+    )
 
 
-def correlation_chart(known: IdentifiabilityStudy, *, title: str = "") -> alt.LayerChart:
+def correlation_chart(known: IdentifiabilityStudy, *, title: str = "") -> ChartSpec:
     """Correlation of the estimates by the trials alone, as a heat map; frames mark :data:`CLOSE_CORRELATION`."""
     names = list(known.parameters)
     step = max(8, min(24, 560 // len(names)))
@@ -123,41 +144,53 @@ def correlation_chart(known: IdentifiabilityStudy, *, title: str = "") -> alt.La
         for name, row in zip(names, known.correlation, strict=True)
         for column_name, value in zip(names, row, strict=True)
     ]
-    axis = alt.Axis(title=None, labelLimit=200, ticks=False)
-    x = alt.X("other:N", sort=names, axis=axis)
-    y = alt.Y("one:N", sort=names, axis=axis)
-    tooltip = [alt.Tooltip("one:N"), alt.Tooltip("other:N"), alt.Tooltip("c:Q", title="correlation", format=".3f")]
-    colour = alt.Color(
-        "c:Q", scale=alt.Scale(domain=[-1, 1], scheme="blueorange"), legend=alt.Legend(gradientLength=180)
+    axis = {"labelLimit": 200, "ticks": False}
+    (cells,) = Matrix(
+        colour="c",
+        rows=names,
+        columns=names,
+        names=("one", "other"),
+        scale={"domain": [-1, 1], "scheme": "blueorange"},
+        side=axis,
+        foot=axis,
+        shown={"one:N": "one", "other:N": "other", "c:Q": ("correlation", ".3f")},
+        written=False,
+    ).layers
+    close = f"datum.one !== datum.other && abs(datum.c) > {CLOSE_CORRELATION}"
+    frames = bare_layer(
+        "rect",
+        {name: cells["encoding"][name] for name in ("x", "y", "tooltip")},
+        filled=False,
+        stroke="black",
+        strokeWidth=2,
     )
-    cells = Chart(data(rows)).mark_rect().encode(x=x, y=y, color=colour, tooltip=tooltip)
-    close = [row for row in rows if row["one"] != row["other"] and abs(row["c"] or 0.0) > CLOSE_CORRELATION]
-    frames = Chart(data(close)).mark_rect(filled=False, stroke="black", strokeWidth=2)
-    layers = [cells, *([frames.encode(x=x, y=y, tooltip=tooltip)] if close else [])]
     pairs = len(known.correlated_pairs)
     text = f"Framed: {pairs} pairs above {CLOSE_CORRELATION:g} either way, which are known only together."
-    size = {"width": step * len(names), "height": step * len(names)}
-    return alt.layer(*layers).properties(
-        title=alt.Title(title, subtitle=f"Colour: correlation (-). {text}"),
+    return layered(
+        [cells, frames | {"transform": [{"filter": close}]}],
+        size=(step * len(names), step * len(names)),
+        data={"values": rows},
+        title=heading(title, f"Colour: correlation (-). {text}"),
         description=f"Correlation of {len(names)} parameters. {text}",
-        **size,
     )
 
 
-def singular_value_chart(values: Array, *, title: str = "") -> alt.LayerChart:
+def singular_value_chart(values: Array, *, title: str = "") -> ChartSpec:
     """Singular values of the sensitivities in units of the prior, falling; below 1 the prior determines more."""
     rows = [{"order": order, "v": plain(value)} for order, value in enumerate(values.tolist(), start=1) if value > 0]
-    x = alt.X(
-        "order:Q", title="direction, by the information of the trials (-)", scale=alt.Scale(nice=False, padding=10)
+    across = Quantity(
+        title="direction, by the information of the trials (-)", nice=False, padding=10, form="d", zero=True
     )
-    x = x.axis(format="d", tickMinStep=1)
-    y = alt.Y("v:Q", title="singular value (-)", scale=alt.Scale(type="log"), axis=alt.Axis(format="~g"))
-    tooltip = [alt.Tooltip("order:Q", title="direction"), alt.Tooltip("v:Q", title="singular value", format=NUMBER)]
-    line = Chart(data([{"v": 1.0}])).mark_rule(style="limit", strokeDash=[5, 3]).encode(y="v:Q")
-    points = Chart(data(rows)).mark_point(filled=True, size=45).encode(x=x, y=y, tooltip=tooltip)
-    return alt.layer(line, points).properties(
+    x, up = across.channel("order"), Quantity(title="singular value (-)", log=True, form="~g")
+    x["axis"] |= {"tickMinStep": 1}
+    place = {"x": x, "y": up.channel("v")}
+    place["tooltip"] = tooltips({"order:Q": ("direction", "d"), "v:Q": "singular value"})
+    return layered(
+        [
+            Rule(at=[1.0], style="limit", dash=(5, 3)).layer(place["y"]),
+            layer("point", rows, place, filled=True, size=45),
+        ],
+        size=(620, 220),
         title=title,
-        width=620,
-        height=220,
         description=f"{len(rows)} singular values; {sum(value < 1 for value in values)} are below 1.",
     )

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import altair as alt
 import numpy as np
 
 from tank2sim.answer.charts.motion import (
@@ -20,6 +19,7 @@ from tank2sim.answer.charts.motion import (
     track_chart,
 )
 from tank2sim.answer.charts.parts import shown_unit
+from tank2sim.answer.charts.vega import ChartSpec
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Illustration
 from tank2sim.arrays import Array
@@ -92,14 +92,14 @@ def motions(
     return drawn
 
 
-def measured_histories(columns: _Columns, title: str) -> alt.VConcatChart | None:
+def measured_histories(columns: _Columns, title: str) -> ChartSpec | None:
     """The signals of a record over time, but its positions; None without any."""
     return columns_chart({"measured": columns}, title)
 
 
 def columns_chart(
     runs: Mapping[str, _Columns], title: str, *, measured: Sequence[str] = (), height_px: int = 60
-) -> alt.VConcatChart | None:
+) -> ChartSpec | None:
     """The signals of runs over time, but their positions, `measured` ones as points; None without any."""
     if not (signals := _signals(runs)):
         return None

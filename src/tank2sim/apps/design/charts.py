@@ -7,9 +7,12 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
-import altair as alt
+import numpy as np
 
-from tank2sim.answer.charts.parts import NUMBER, Chart, ChartRecord, data, plain, series_look
+from tank2sim.answer.charts.curves import Plot, Series, curve_chart
+from tank2sim.answer.charts.parts import plain, series_look
+from tank2sim.answer.charts.rows import runs_of
+from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, Quantity, channel, layer, layered, tooltips
 from tank2sim.apps.design.study import CampaignStudy, Certainty
 from tank2sim.units import in_words
 
@@ -18,7 +21,7 @@ _HEIGHT = 240
 DESIGN, USUAL = "design", "usual"
 
 
-def run_planes(study: CampaignStudy) -> list[alt.TopLevelMixin]:
+def run_planes(study: CampaignStudy) -> list[ChartSpec]:
     """Runs in the plane of drift and rudder, and oscillations in that of frequency and amplitude; areas are numbers of
     runs."""
     steady, swinging = Counter[tuple[float, ...]](), Counter[tuple[object, ...]]()
@@ -31,7 +34,7 @@ def run_planes(study: CampaignStudy) -> list[alt.TopLevelMixin]:
             kind = f"{run.type.replace('_', ' ')} (r')"
             ratio = math.radians(run.yaw_rate_amplitude_degps or 0.0) * study.model.length_m / run.speed_mps
         swinging[kind, plain(run.frequency_radps), plain(ratio)] += 1
-    planes: list[alt.TopLevelMixin] = []
+    planes: list[ChartSpec] = []
     if swinging:
         rows = [{"run": kind, "x": x, "y": y, "runs": count} for (kind, x, y), count in swinging.items()]
         title = "Oscillations: amplitude and frequency"
@@ -42,30 +45,25 @@ def run_planes(study: CampaignStudy) -> list[alt.TopLevelMixin]:
     return planes
 
 
-def _plane(rows: Sequence[ChartRecord], title: str, across: str, up: str) -> alt.Chart:
-    kinds = list(dict.fromkeys(str(row["run"]) for row in rows))
+def _plane(rows: Sequence[ChartRecord], title: str, across: str, up: str) -> ChartSpec:
+    kinds = runs_of(rows)
     look = series_look(kinds, as_points=kinds)
     most = max(int(row["runs"]) for row in rows)
     counts = sorted({1, max(1, most // 2), most})
-    scale = alt.Scale(domain=[0, most], range=[0, 500])  # from no area for no runs: the legend has only numbers of runs
-    size = alt.Size("runs:Q", scale=scale, legend=alt.Legend(title="runs", values=counts, format="d"))
-    return (
-        Chart(data(rows))
-        .mark_point(filled=True, opacity=0.7)
-        .encode(
-            x=alt.X("x:Q", title=across, scale=alt.Scale(zero=False, padding=20)),
-            y=alt.Y("y:Q", title=up, scale=alt.Scale(padding=20)),
-            size=size,
-            color=look.colour,
-            shape=look.shape,
-            tooltip=[
-                alt.Tooltip("run:N", title="type"),
-                alt.Tooltip("x:Q", title=across, format=NUMBER),
-                alt.Tooltip("y:Q", title=up, format=NUMBER),
-                alt.Tooltip("runs:Q", title="runs"),
-            ],
-        )
-        .properties(width=2 * _WIDTH, height=_HEIGHT, title=title, description=f"{title}, by number of runs.")
+    scale = {"domain": [0, most], "range": [0, 500]}  # from no area for no runs: the legend has only numbers of runs
+    place = {
+        "x": Quantity(title=across, padding=20).channel("x"),
+        "y": Quantity(title=up, padding=20, zero=True).channel("y"),
+        "size": channel("runs:Q", scale=scale, legend={"title": "runs", "values": counts, "format": "d"}),
+        "color": look.colour,
+        "shape": look.shape,
+        "tooltip": tooltips({"run:N": "type", "x:Q": across, "y:Q": up, "runs:Q": "runs"}),
+    }
+    return layered(
+        [layer("point", rows, place, filled=True, opacity=0.7)],
+        size=(2 * _WIDTH, _HEIGHT),
+        title=title,
+        description=f"{title}, by number of runs.",
     )
 
 
@@ -76,41 +74,30 @@ def figure_words(figure: str) -> str:
     return f"{words}, {argument}{'' if '/' in argument else ' deg'}" if argument else words
 
 
-def certainty_charts(curve: Certainty, seconds: float, unit: str) -> list[alt.TopLevelMixin]:
+def certainty_charts(curve: Certainty, seconds: float, unit: str) -> list[ChartSpec]:
     """Standard error of each figure over the time in a unit of so many `seconds`, by both programmes."""
-    charts: list[alt.TopLevelMixin] = []
+    charts: list[ChartSpec] = []
     for figure in curve.design:
-        rows = [
-            {"run": kind, "x": plain(time / seconds), "y": plain(error)}
-            for kind, times, errors in (
-                (DESIGN, curve.time_s, curve.design[figure]),
-                (USUAL, curve.usual_time_s, curve.usual[figure]),
-            )
-            for time, error in zip(times, errors, strict=True)
-            if math.isfinite(error)
-        ]
-        look = series_look([DESIGN, USUAL])
-        base = Chart(data(rows)).encode(
-            x=alt.X("x:Q", title=f"time ({unit})", scale=alt.Scale(zero=False)),
-            y=alt.Y(
-                "y:Q", title=f"standard error ({in_words(figure.partition('@')[0])[1]})", scale=alt.Scale(zero=True)
-            ),
-        )
-        lines = base.mark_line().encode(color=look.colour, strokeDash=look.dash)
-        points = base.mark_point(filled=True, size=36).encode(
-            color=look.colour,
-            tooltip=[
-                alt.Tooltip("run:N", title="plan"),
-                alt.Tooltip("x:Q", title=unit, format=NUMBER),
-                alt.Tooltip("y:Q", title="standard error", format=NUMBER),
-            ],
-        )
+        plans = {DESIGN: (curve.time_s, curve.design), USUAL: (curve.usual_time_s, curve.usual)}
+        series = []
+        for kind, (times, errors) in plans.items():
+            known = np.isfinite(errors[figure])
+            time, error = np.asarray(times)[known] / seconds, np.asarray(errors[figure])[known]
+            series.append(Series(label=kind, x=time, y=error))
+        up = Quantity(title=f"standard error ({in_words(figure.partition('@')[0])[1]})", zero=True)
+        across = Quantity(title=f"time ({unit})")
+        dots = [row for each in series for row in each.rows]
+        place = {"x": across.channel("x"), "y": up.channel("v")}
+        place["color"] = series_look([DESIGN, USUAL]).colour
         charts.append(
-            alt.layer(lines, points).properties(
-                width=2 * _WIDTH,
-                height=160,
+            curve_chart(
+                Plot(series=series, up=up, height_px=160, over=[layer("point", dots, place, filled=True, size=36)]),
+                across,
                 title=f"Certainty of the {figure_words(figure)}",
-                description=f"Standard error of the {figure_words(figure)} over the time, by both programmes.",
+                width_px=2 * _WIDTH,
+                window=[],
+                described=f"Standard error of the {figure_words(figure)} over the time, by both programmes.",
+                shown={"run:N": "plan", "x:Q": unit, "v:Q": "standard error"},
             )
         )
     return charts

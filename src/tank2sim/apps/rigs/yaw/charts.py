@@ -4,10 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import altair as alt
-
 from tank2sim.answer.charts.motion import History, Signal, history_chart
-from tank2sim.answer.charts.parts import NUMBER, STACKS, Chart, ChartRecord, data, plain, series_look
+from tank2sim.answer.charts.parts import plain, series_look
+from tank2sim.answer.charts.rows import RowPlot, row_chart
+from tank2sim.answer.charts.vega import (
+    STACKS,
+    ChartRecord,
+    ChartSpec,
+    Quantity,
+    Rule,
+    channel,
+    layer,
+    layered,
+    tooltips,
+)
 from tank2sim.apps.rigs.yaw.study import EnergyBalance, EnergyResidual, YawMethodEstimate
 from tank2sim.arrays import Columns
 
@@ -19,7 +29,7 @@ _SIGNALS = (
 )
 
 
-def record_chart(name: str, columns: Columns) -> alt.VConcatChart:
+def record_chart(name: str, columns: Columns) -> ChartSpec:
     """Rate where it is evaluated next to the programme's, tracking error, and current, over the whole record."""
     time = columns["t_s"]
     columns_shown = {"rate": "rate_radps", "error": "tracking_error_rad", "current": "current_A"}
@@ -32,7 +42,7 @@ def record_chart(name: str, columns: Columns) -> alt.VConcatChart:
     return history_chart(histories, _SIGNALS, title=f"{name}: programme and record")
 
 
-def balance_chart(balance: EnergyBalance, *, width_px: int = 340) -> alt.HConcatChart:
+def balance_chart(balance: EnergyBalance) -> ChartSpec:
     """Work of the motor in each subinterval (points) and its uses (bars), means over all pairs."""
     terms = {term.replace("_", " "): parts for term, parts in balance.spent_J.items()}
     look = series_look([*terms, "motor"], as_points=["motor"])
@@ -45,100 +55,82 @@ def balance_chart(balance: EnergyBalance, *, width_px: int = 340) -> alt.HConcat
         ]
         motor = enumerate(balance.motor_J[name].tolist(), start=1)
         points = [{"part": place, "run": "motor", "v": plain(1e3 * value)} for place, value in motor]
-        x = alt.X("part:O", title=f"{name}: part of the interval", axis=alt.Axis(labelAngle=0))
-        y = alt.Y("v:Q", title="work (mJ)")
-        tooltip = [
-            alt.Tooltip("run:N", title="spent on"),
-            alt.Tooltip("part:O", title="part"),
-            alt.Tooltip("v:Q", title="work (mJ)", format=NUMBER),
+        place = {
+            "x": channel("part:O", title=f"{name}: part of the interval", axis={"labelAngle": 0}),
+            "y": Quantity(title="work (mJ)", zero=True).channel("v"),
+            "color": look.colour,
+            "tooltip": tooltips({"run:N": "spent on", "part:O": "part", "v:Q": "work (mJ)"}),
+        }
+        marks = [
+            layer("bar", bars, place, opacity=0.75),
+            layer("point", points, {**place, "shape": look.shape}, size=60, strokeWidth=2),
         ]
-        stacked = Chart(data(bars)).mark_bar(opacity=0.75).encode(x=x, y=y, color=look.colour, tooltip=tooltip)
-        motors = Chart(data(points)).mark_point(size=60, strokeWidth=2)
-        motors = motors.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip)
-        panels.append(alt.layer(stacked, motors).properties(width=width_px, height=260))
-    title = "Work of the motor and its uses"
-    description = (
-        "Energy balance of each subinterval: kinetic energy and each term of friction against the motor's work."
-    )
-    return (
-        alt.hconcat(*panels, spacing=24)
-        .resolve_scale(y="shared")
-        .properties(title=title, description=description, usermeta=STACKS)
-    )
+        panels.append(layered(marks, size=(340, 260)))
+    return {
+        "hconcat": panels,
+        "spacing": 24,
+        "resolve": {"scale": {"y": "shared"}},
+        "title": "Work of the motor and its uses",
+        "description": "Energy balance of each subinterval: kinetic energy and each term of friction against the "
+        "motor's work.",
+        "usermeta": STACKS,
+    }
 
 
-def estimates_chart(methods: Mapping[str, YawMethodEstimate], *, width_px: int = 560) -> alt.LayerChart:
+def estimates_chart(methods: Mapping[str, YawMethodEstimate]) -> ChartSpec:
     """Inertia by each method with its 95 % interval: the added one, or the total where J_zz is not known."""
     rows: list[ChartRecord] = []
-    names, kind = [], "added"
+    kind = "added"
     for method, estimate in methods.items():
         kind, value, error = estimate.inertia
         spread = _NORMAL * (error or 0.0)
-        names.append(method.replace("_", " "))
         rows.append(
-            {"name": names[-1], "v": plain(1e4 * value)}
+            {"name": method.replace("_", " "), "v": plain(1e4 * value)}
             | {"low": plain(1e4 * (value - spread)), "high": plain(1e4 * (value + spread))}
         )
     words = f"{kind} inertia"
-    scale = alt.Scale(zero=False, nice=True)
-    y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, grid=True, labelLimit=260))
-    tooltip = [
-        alt.Tooltip("name:N", title="method"),
-        alt.Tooltip("v:Q", title="10⁻⁴ kg m²", format=NUMBER),
-        alt.Tooltip("low:Q", title="from", format=NUMBER),
-        alt.Tooltip("high:Q", title="to", format=NUMBER),
-    ]
-    x = alt.X("v:Q", scale=scale, title=f"{words} (10⁻⁴ kg m²)")
-    best = Chart(data([{"v": rows[0]["v"]}])).mark_rule(style="reference", strokeDash=[4, 3]).encode(x=x)
-    base = Chart(data(rows)).encode(y=y, tooltip=tooltip)
-    bars = base.mark_rule(strokeWidth=2).encode(x=alt.X("low:Q", scale=scale), x2="high:Q")
-    points = base.mark_point(size=70, filled=True).encode(x=x)
-    return alt.layer(best, bars, points).properties(
+    return row_chart(
+        RowPlot(
+            rows=rows,
+            across=Quantity(title=f"{words} (10⁻⁴ kg m²)"),
+            rules=[Rule(at=[rows[0]["v"]], dash=(4, 3))],
+            side={"labelLimit": 260},
+            shown={"name:N": "method", "v:Q": "10⁻⁴ kg m²", "low:Q": "from", "high:Q": "to"},
+        ),
         title=f"{words.capitalize()} by method",
-        width=width_px,
-        height=34 * len(rows),
-        description=f"{words.capitalize()} by each method with its 95 % interval.",
+        described=f"{words.capitalize()} by each method with its 95 % interval.",
+        width_px=560,
+        step_px=34,
+        span_px=2,
+        filled=True,
+        size=70,
     )
 
 
-def energy_residual_chart(residuals: Sequence[EnergyResidual], *, width_px: int = 720) -> alt.LayerChart:
+def energy_residual_chart(residuals: Sequence[EnergyResidual]) -> ChartSpec:
     """Residual work of each subinterval, against the rate in its middle."""
     rows: list[ChartRecord] = [
-        {
-            "run": residual.stage,
-            "hump": residual.hump,
-            "w": plain(residual.rate_degps),
-            "v": plain(1e6 * residual.left_J),
-        }
-        for residual in residuals
+        {"run": one.stage, "hump": one.hump, "x": plain(one.rate_degps), "v": plain(1e6 * one.left_J)}
+        for one in residuals
     ]
     look = series_look(["accelerating", "braking"], as_points=["accelerating", "braking"])
-    tooltip = [
-        alt.Tooltip("run:N", title="interval"),
-        alt.Tooltip("hump:O", title="hump"),
-        alt.Tooltip("v:Q", title="left over (µJ)", format=NUMBER),
-    ]
-    zero = Chart(data([{"v": 0.0}])).mark_rule(style="reference").encode(y="v:Q")
-    points = (
-        Chart(data(rows))
-        .mark_point()
-        .encode(
-            x=alt.X("w:Q", title="mean rate of the subinterval (deg/s)", scale=alt.Scale(zero=False)),
-            y=alt.Y("v:Q", title="work left over (µJ)"),
-            color=look.colour,
-            shape=look.shape,
-            tooltip=tooltip,
-        )
-    )
-    return alt.layer(zero, points).properties(
+    up = Quantity(title="work left over (µJ)", zero=True).channel("v")
+    place = {
+        "x": Quantity(title="mean rate of the subinterval (deg/s)").channel("x"),
+        "y": up,
+        "color": look.colour,
+        "shape": look.shape,
+        "tooltip": tooltips({"run:N": "interval", "hump:O": "hump", "v:Q": "left over (µJ)"}),
+    }
+    return layered(
+        [Rule(at=[0.0]).layer(up), layer("point", rows, place)],
+        size=(720, 220),
         title="Residuals of the energy balance",
-        width=width_px,
-        height=220,
         description="Work that the energy least squares do not explain, by subinterval.",
     )
 
 
-def angle_residual_chart(residual: Columns) -> alt.VConcatChart:
+def angle_residual_chart(residual: Columns) -> ChartSpec:
     """Residual angle of the integrated equation over time."""
     history = History(
         label="integrated less measured", time_s=residual["t_s"], values={"left": residual["residual_rad"]}
