@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tank2sim.answer.charts.curves import Plot, Series, curve_chart
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart
 from tank2sim.answer.charts.motion import (
     History,
     Signal,
@@ -12,7 +12,7 @@ from tank2sim.answer.charts.motion import (
     track_chart,
 )
 from tank2sim.answer.charts.picture import chart_specification
-from tank2sim.answer.charts.vega import Quantity
+from tank2sim.answer.charts.vega import PlotAxis
 
 TIME = np.arange(0.0, 600.0, 0.1)
 HEADING = Signal(name="motion.psi", title="heading", unit="rad")
@@ -175,10 +175,10 @@ def test_series_differ_in_dashes_as_well_as_in_colour():
 
 
 def test_a_tow_shows_what_was_measured_as_points_and_the_model_as_a_line():
-    model = Series(label="tow 1", x=TIME, y=np.tanh(TIME / 9))
-    measured = Series(label="tow 1", x=[0, 5], y=[0, 0.5], points=True)
-    plot = Plot(series=[model, measured], up=Quantity(title="speed (m/s)"))
-    specification = chart_specification(curve_chart(plot, Quantity(title="time (s)")))
+    model = PlotSeries(label="tow 1", x=TIME, y=np.tanh(TIME / 9))
+    measured = PlotSeries(label="tow 1", x=[0, 5], y=[0, 0.5], points=True)
+    plot = Plot(series=[model, measured], up=PlotAxis(title="speed (m/s)"))
+    specification = chart_specification(curve_chart(plot, PlotAxis(title="time (s)")))
     line, points, _ = specification["layer"]
     assert (line["mark"]["type"], points["mark"]["type"]) == ("line", "point")
     assert [(row["x"], row["v"]) for row in rows(specification, points)] == [(0, 0), (5, 0.5)]

@@ -23,9 +23,9 @@ from tank2sim.answer.charts.analysis import (
     pole_zero_chart,
     sensitivity_chart,
 )
-from tank2sim.answer.charts.curves import Plot, Series, curve_chart
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart
 from tank2sim.answer.charts.motion import History, Signal, TrackData, history_chart, track_chart
-from tank2sim.answer.charts.vega import Quantity, Rule
+from tank2sim.answer.charts.vega import PlotAxis, Rule
 from tank2sim.answer.parts import (
     Cell,
     Illustration,
@@ -297,9 +297,9 @@ class AutopilotResult(ResultWithController[AutopilotStudy]):
             TrackData(label=label, x_m=points[:, 0], y_m=points[:, 1], time_s=np.zeros(len(points)), measured=measured)
             for label, measured in (("legs", False), ("waypoints", True))
         ]
-        errors = [Series(label=name, x=one["t_s"], y=one["cross_track_error_m"]) for name, one in runs]
-        plot = Plot(series=errors, up=Quantity(title="cross-track error (m)"), height_px=220, rules=[Rule(at=[0.0])])
-        apart = curve_chart(plot, Quantity(title="time (s)", nice=False), title="Cross-track error", window=["x"])
+        errors = [PlotSeries(label=name, x=one["t_s"], y=one["cross_track_error_m"]) for name, one in runs]
+        plot = Plot(series=errors, up=PlotAxis(title="cross-track error (m)"), height_px=220, rules=[Rule(at=[0.0])])
+        apart = curve_chart(plot, PlotAxis(title="time (s)", nice=False), title="Cross-track error", window=["x"])
         return Section(
             heading="Track keeping",
             text="Line of sight with lookahead, in the current and the wind of the course keeping. Errors leap at the "

@@ -9,13 +9,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tank2sim.answer.charts.curves import Plot, Series, curve_chart, curve_panels
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_panels
 from tank2sim.answer.charts.parts import POINT_SAMPLES, extent, plain, series_look, shown_unit, vector, with_unit
 from tank2sim.answer.charts.rows import RowPlot, row_chart
 from tank2sim.answer.charts.vega import (
     ChartRecord,
     ChartSpec,
-    Quantity,
+    PlotAxis,
     Rule,
     channel,
     heading,
@@ -57,20 +57,20 @@ def force_chart(plot: ForcePlot) -> ChartSpec:
     rules = [Rule(at=[0.0])] if low <= 0 <= high else []
     labels = ", ".join(each.label for each in plot.series)
     return curve_chart(
-        Plot(series=[*lines, *points], up=Quantity(title=plot.up), height_px=380, rules=rules),
-        Quantity(title=with_unit(plot.across, unit), padding=10),
+        Plot(series=[*lines, *points], up=PlotAxis(title=plot.up), height_px=380, rules=rules),
+        PlotAxis(title=with_unit(plot.across, unit), padding=10),
         title=plot.title,
         width_px=620,
         described=f"{plot.up} against {plot.across} of {labels}; points: measured, lines: the fit with its band.",
     )
 
 
-def _force_series(each: ForceSeries, factor: float, *, fit: bool) -> Series:
+def _force_series(each: ForceSeries, factor: float, *, fit: bool) -> PlotSeries:
     """The measured values of a series, or its fit from left to right."""
     x, value, half = (each.fit_x, each.fit_value, each.fit_half_width) if fit else (each.x, each.value, each.half_width)
     order = np.argsort(vector(x), kind="stable") if fit else np.arange(len(vector(x)))
     y, width = vector(value)[order], None if half is None else vector(half)[order]
-    return Series(
+    return PlotSeries(
         label=each.label,
         x=factor * vector(x)[order],
         y=y,
@@ -92,13 +92,13 @@ def loop_chart(plot: LoopPlot, forces: Mapping[str, str]) -> ChartSpec:
     """
     unit, factor = shown_unit(plot.unit)
     plots = [
-        Plot(series=_loops(plot.loops, force, factor), up=Quantity(title=up), height_px=260)
+        Plot(series=_loops(plot.loops, force, factor), up=PlotAxis(title=up), height_px=260)
         for force, up in forces.items()
     ]
     labels = [loop.label for loop in plot.loops]
     return curve_panels(
         plots,
-        Quantity(title=with_unit(plot.across, unit)),
+        PlotAxis(title=with_unit(plot.across, unit)),
         title=plot.title,
         width_px=560,
         described=f"Forces over {plot.across} of {', '.join(labels)}.",
@@ -107,16 +107,16 @@ def loop_chart(plot: LoopPlot, forces: Mapping[str, str]) -> ChartSpec:
     )
 
 
-def _loops(loops: Sequence[ForceLoop], force: str, factor: float) -> list[Series]:
+def _loops(loops: Sequence[ForceLoop], force: str, factor: float) -> list[PlotSeries]:
     found = []
     for loop in loops:
         if force in loop.forces:
             x, value = factor * vector(loop.motion), vector(loop.forces[force])
             kept = thin_points([value], POINT_SAMPLES)
-            found.append(Series(label=loop.label, x=x[kept], y=value[kept], points=True))
+            found.append(PlotSeries(label=loop.label, x=x[kept], y=value[kept], points=True))
         if force in loop.fitted:
             found.append(
-                Series(label=loop.label, x=factor * vector(loop.fitted_motion), y=loop.fitted[force], closed=True)
+                PlotSeries(label=loop.label, x=factor * vector(loop.fitted_motion), y=loop.fitted[force], closed=True)
             )
     if not found:
         raise ValueError(f"no loop has the force {force}")
@@ -137,9 +137,9 @@ def harmonic_chart(plot: HarmonicsPlot) -> ChartSpec:
         x = _runs_axis("run:N", [run.run for run in runs], named=order == count, bars=True)
         rows = [{"run": run.run, "v": _at(run.amplitude, order)} for run in runs]
         fits = [{"run": run.run, "v": _at(run.fitted, order)} for run in runs if run.fitted is not None]
-        size = Quantity(title=f"harmonic {order} of {up}", above=True, ticks=4, zero=True)
+        size = PlotAxis(title=f"harmonic {order} of {up}", above=True, ticks=4, zero=True)
         place = {"x": x, "y": size.channel("v")}
-        said = {"tooltip": tooltips({"run:N": "run", "v:Q": up})}
+        said: ChartSpec = {"tooltip": tooltips({"run:N": "run", "v:Q": up})}
         layers = [layer("bar", rows, place | said, opacity=0.7)]
         if fits:
             layers.append(layer("tick", fits, place, style="limit", thickness=2))
@@ -173,7 +173,7 @@ def residual_chart(residuals: Sequence[Residual], *, title: str = "") -> ChartSp
     reach = 1.1 * max(_USUAL_LIMIT, -low, high)
     panels = []
     for force in forces:
-        up = Quantity(
+        up = PlotAxis(
             title=f"{force}: residual / standard error", domain=(-reach, reach), nice=False, ticks=5, above=True
         ).channel("v")
         rows = [
@@ -181,7 +181,7 @@ def residual_chart(residuals: Sequence[Residual], *, title: str = "") -> ChartSp
             for residual in residuals
             if residual.force == force
         ]
-        marks = {"x": _runs_axis("name:N", runs, named=force == forces[-1]), "y": up}
+        marks: ChartSpec = {"x": _runs_axis("name:N", runs, named=force == forces[-1]), "y": up}
         marks |= {"color": look.colour, "shape": look.shape, "tooltip": tooltips({"name:N": "run", "v:Q": "residual"})}
         limits = Rule(at=[-_USUAL_LIMIT, 0.0, _USUAL_LIMIT], dash=(2, 3))
         panels.append(layered([limits.layer(up), layer("point", rows, marks)], size=(720, 140)))
@@ -229,7 +229,7 @@ def derivative_certainty_chart(found: Mapping[str, _Estimated], *, title: str) -
     return row_chart(
         RowPlot(
             rows=rows,
-            across=Quantity(title="standard error (% of the value)", log=True, form="~g"),
+            across=PlotAxis(title="standard error (% of the value)", log=True, form="~g"),
             shown={"name:N": "number", "run:N": "origin", "v:Q": "standard error (%)"},
             rules=[Rule(at=[100.0], style="limit")],
         ),

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from tank2sim.answer.charts.curves import Plot, Series, curve_panels
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_panels
 from tank2sim.answer.charts.motion import History, Signal, history_chart
-from tank2sim.answer.charts.vega import ChartSpec, Quantity
+from tank2sim.answer.charts.vega import ChartSpec, PlotAxis
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
@@ -346,13 +346,13 @@ def cycle_chart(runs: Mapping[str, SingleRun], *, title: str = "") -> ChartSpec:
             cycle = each.cycles[force]
             phase, mean, spread = np.degrees(cycle.phase_rad), cycle.mean, np.nan_to_num(cycle.deviation)
             series += [
-                Series(label=label, x=phase, y=cycle.fit),
-                Series(label=label, x=phase, y=mean, low=mean - spread, high=mean + spread, points=True),
+                PlotSeries(label=label, x=phase, y=cycle.fit),
+                PlotSeries(label=label, x=phase, y=mean, low=mean - spread, high=mean + spread, points=True),
             ]
-        plots.append(Plot(series=series, up=Quantity(title=up), height_px=200))
+        plots.append(Plot(series=series, up=PlotAxis(title=up), height_px=200))
     return curve_panels(
         plots,
-        Quantity(title="phase (deg)", domain=(0.0, 360.0), nice=False),
+        PlotAxis(title="phase (deg)", domain=(0.0, 360.0), nice=False),
         title=title,
         width_px=640,
         described=f"Forces over the phase of the motion of {', '.join(labels)}.",

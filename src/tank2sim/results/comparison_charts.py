@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from tank2sim.analysis.validation.coefficients import BEYOND_STANDARD_ERRORS, CoefficientRow
 from tank2sim.answer.charts.parts import plain, series_look
 from tank2sim.answer.charts.rows import RowPlot, names_of, row_chart, row_layers
-from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, Quantity, Rule, layered, stacked
+from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, Rule, layered, stacked
 
 FigurePercent = tuple[str, str, str, float, float | None]
 """Card, trial, figure in words, difference from the reference in per cent, and in standard errors."""
@@ -24,7 +24,7 @@ def errors_chart(coefficients: Sequence[CoefficientRow], labels: Sequence[str]) 
     return row_chart(
         RowPlot(
             rows=rows,
-            across=Quantity(title="difference (standard errors)", zero=True),
+            across=PlotAxis(title="difference (standard errors)", zero=True),
             look=series_look(labels[1:], as_points=labels[1:]),
             rules=[Rule(at=[-BEYOND_STANDARD_ERRORS, BEYOND_STANDARD_ERRORS], style="limit")],
             shown={"run:N": "card", "name:N": "coefficient", "v:Q": "standard errors"},
@@ -48,7 +48,7 @@ def percent_chart(percents: Sequence[FigurePercent], labels: Sequence[str], assu
             row |= {"low": plain(percent * (1 - 2 / abs(z))), "high": plain(percent * (1 + 2 / abs(z)))}
         ends += [float(row[key]) for key in ("v", "low", "high") if row.get(key) is not None]
         panels.setdefault(trial, []).append(row)
-    across = Quantity(title="", domain=(min(0.0, *ends), max(0.0, *ends)))
+    across = PlotAxis(title="", domain=(min(0.0, *ends), max(0.0, *ends)))
     look = series_look(labels[1:], as_points=labels[1:])
     shown = {"run:N": "card", "whole:N": "figure", "v:Q": "difference (%)"}
     drawn = []

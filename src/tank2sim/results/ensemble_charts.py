@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.analysis.ensemble.steering import BodeBands, CurveBand, SteeringBands, StepBands, TurningBands
-from tank2sim.answer.charts.curves import Plot, Series, curve_chart, curve_panels
-from tank2sim.answer.charts.vega import ChartSpec, Quantity
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_panels
+from tank2sim.answer.charts.vega import ChartSpec, PlotAxis
 from tank2sim.answer.parts import Illustration
 from tank2sim.arrays import Array
 
@@ -49,8 +49,8 @@ def turns_chart(turning: TurningBands, *, title: str = "") -> ChartSpec:
     if not apart.any():
         series = [_banded("stable turns", rudder, starboard)]
     return curve_chart(
-        Plot(series=series, up=Quantity(title="yaw rate (deg/s)")),
-        Quantity(title="rudder angle, starboard positive (deg)", nice=False, zero=True),
+        Plot(series=series, up=PlotAxis(title="yaw rate (deg/s)")),
+        PlotAxis(title="rudder angle, starboard positive (deg)", nice=False, zero=True),
         title=title,
         width_px=_WIDTH,
         window=["x"],
@@ -64,12 +64,12 @@ def _bode_chart(bode: BodeBands, *, title: str) -> ChartSpec:
     plots = [
         Plot(
             series=[_banded("yaw rate by rudder angle", bode.omega_radps, band)],
-            up=Quantity(title=name),
+            up=PlotAxis(title=name),
             height_px=180,
         )
         for name, band in (("magnitude (dB)", bode.magnitude_dB), ("phase (deg)", bode.phase_deg))
     ]
-    across = Quantity(title="angular frequency (rad/s)", log=True, nice=False, form="~g")
+    across = PlotAxis(title="angular frequency (rad/s)", log=True, nice=False, form="~g")
     described = "Bode diagram of yaw rate by rudder angle, with its band over an ensemble."
     return curve_panels(plots, across, title=title, width_px=_WIDTH, described=described, shown=_SHOWN)
 
@@ -78,8 +78,8 @@ def _step_chart(step: StepBands, *, title: str) -> ChartSpec:
     """Yaw rate after a step of one degree of rudder."""
     series = [_banded("yaw rate", step.time_s, step.step_per_s)]
     return curve_chart(
-        Plot(series=series, up=Quantity(title="yaw rate per degree of rudder (deg/s)"), height_px=240),
-        Quantity(title="time after the step (s)", nice=False),
+        Plot(series=series, up=PlotAxis(title="yaw rate per degree of rudder (deg/s)"), height_px=240),
+        PlotAxis(title="time after the step (s)", nice=False),
         title=title,
         width_px=_WIDTH,
         window=["x"],
@@ -88,9 +88,9 @@ def _step_chart(step: StepBands, *, title: str) -> ChartSpec:
     )
 
 
-def _banded(label: str, x: Array, band: CurveBand, shown: NDArray[np.bool_] | None = None) -> Series:
+def _banded(label: str, x: Array, band: CurveBand, shown: NDArray[np.bool_] | None = None) -> PlotSeries:
     """The line of the ship itself, in the band of the 5 and 95 % quantiles; gaps where it is not shown."""
     own, low, high = (
         values if shown is None else np.where(shown, values, np.nan) for values in (band.own, band.p5, band.p95)
     )
-    return Series(label=label, x=x, y=own, low=low, high=high)
+    return PlotSeries(label=label, x=x, y=own, low=low, high=high)

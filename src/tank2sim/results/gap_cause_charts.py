@@ -14,13 +14,14 @@ from tank2sim.answer.charts.vega import (
     STACKS,
     ChartRecord,
     ChartSpec,
-    Quantity,
+    PlotAxis,
     Rule,
     channel,
     heading,
     layer,
     layered,
     panel_title,
+    rows_where,
     tooltips,
 )
 from tank2sim.answer.numbers import format_number
@@ -89,8 +90,8 @@ def lacking_chart(lacking: Lacking, *, title: str = "") -> ChartSpec:
         )
     ]
     across, up = with_unit(words, in_words(state)[1]), with_unit(f"missing {what.words}", what.unit)
-    x = Quantity(title=across, nice=False, padding=8, ticks=6)
-    y = Quantity(title=up, zero=True, ticks=6)
+    x = PlotAxis(title=across, nice=False, padding=8, ticks=6)
+    y = PlotAxis(title=up, zero=True, ticks=6)
     place = {"x": x.channel("s"), "y": y.channel("f")}
     cloud = place | {"tooltip": tooltips({"trial:N": "trial", "s:Q": across, "f:Q": up})}
     layers = [
@@ -123,7 +124,7 @@ def when_chart(lacking: Lacking, *, title: str = "") -> ChartSpec:
     scale = {"domain": [-largest, 0, largest], "range": list(DIVERGING), "type": "linear", "clamp": True}
     legend = {"title": up, "gradientLength": 180, "titleLimit": 420}
     strips = {
-        "x": Quantity(title="time (s)", nice=False, zero=True).channel("t"),
+        "x": PlotAxis(title="time (s)", nice=False, zero=True).channel("t"),
         "x2": "to",
         "y": channel("trial:N", sort=names, title=None, axis={"labelLimit": 220}),
         "color": channel("f:Q", scale=scale, legend=legend),
@@ -146,7 +147,7 @@ def _means(rows: Sequence[ChartRecord], place: ChartSpec, low: ChartSpec) -> lis
     colour = {"color": channel("run:N", legend=None)}
     x, y = place["x"], place["y"]
     said = tooltips({"s:Q": x["title"], "f:Q": f"mean {y['title']}", "trials:Q": "trials in the bin"})
-    ends = [row for row in drawn if row["low"] is not None]
+    ends = rows_where(drawn, lambda row: row["low"] is not None)
     marks = {**place, **colour, "tooltip": said}
     return [
         layer("line", drawn, {**place, **colour}, strokeWidth=1.4, clip=True),
@@ -181,7 +182,7 @@ def _bars(
     # Room on the right for the number at the end of the longest bar.
     end = 140 if percent else farthest * (12 if symlog else 1.25)
     powers = [step for step in (0, 10, 100, 1e3, 1e4, 1e5, 1e6) if step <= end]
-    across = Quantity(
+    across = PlotAxis(
         title=across_title,
         domain=(0, end),
         nice=False,
@@ -279,7 +280,7 @@ def _agreement_panel(study: GapStudy, name: str, trials: Mapping[str, TrialEstim
     ends += [] if middle is None else [middle - band, middle + band]
     low, high = extent(np.array(ends, dtype=float))
     margin = 0.05 * (high - low) or 1.0
-    across = Quantity(title=with_unit(words, unit), domain=(low - margin, high + margin), nice=False, ticks=5)
+    across = PlotAxis(title=with_unit(words, unit), domain=(low - margin, high + margin), nice=False, ticks=5)
     names = [trial_name(trial) for trial in held if trial in trials]
     side = {"labelLimit": 220} | ({} if named else {"labels": False, "ticks": False})
     shown = {"name:N": "trial", "v:Q": "estimate", "low:Q": "from", "high:Q": "to"}
@@ -288,10 +289,10 @@ def _agreement_panel(study: GapStudy, name: str, trials: Mapping[str, TrialEstim
         RowPlot(rows=rows, across=across, look=look, names=names, side=side, shown=shown), size=36, clip=True
     )
     if middle is not None:
-        span = [{"low": plain(middle - band), "high": plain(middle + band)}]
-        ends = {"x": across.channel("low"), "x2": "high"}
-        estimate = Rule(at=[middle], upright=True).layer(across.channel("v"))
-        layers = [layer("rect", span, ends, style="reference", opacity=0.25), estimate, *layers]
+        strip = [{"low": plain(middle - band), "high": plain(middle + band)}]
+        edges = {"x": across.channel("low"), "x2": "high"}
+        together = Rule(at=[middle], upright=True).layer(across.channel("v"))
+        layers = [layer("rect", strip, edges, style="reference", opacity=0.25), together, *layers]
     title = panel_title(f"{effect.replace('_', ' ')}: {words}")
     return layered(layers, size=(230, 22 * len(names)), title=title)
 

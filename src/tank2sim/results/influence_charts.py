@@ -12,7 +12,7 @@ from tank2sim.analysis.tuning.result import TunedStudy
 from tank2sim.answer.charts.matrix import Matrix
 from tank2sim.answer.charts.parts import plain, series_look
 from tank2sim.answer.charts.rows import RowPlot, row_chart, row_layers
-from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, Quantity, Rule, layered
+from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, Rule, layered
 from tank2sim.arrays import Array
 from tank2sim.units import in_words
 
@@ -89,7 +89,7 @@ def _bars(result: InfluenceData, row: int) -> ChartSpec:
         for run, sizes in values.items()
     }
     look = series_look([EXACT, DIFFERENCE], as_points=[EXACT, DIFFERENCE])
-    across = Quantity(title="K (%)", zero=True, ticks=4)
+    across = PlotAxis(title="K (%)", zero=True, ticks=4)
     exact = RowPlot(
         rows=both[EXACT],
         across=across,
@@ -152,7 +152,7 @@ def moves_chart(tuned: TunedStudy) -> ChartSpec:
     return row_chart(
         RowPlot(
             rows=rows,
-            across=Quantity(title="move (standard errors of the card)", zero=True),
+            across=PlotAxis(title="move (standard errors of the card)", zero=True),
             side={"labelLimit": 170},
             rules=[Rule(at=[0.0]), Rule(at=[-within, within], style="limit", dash=(5, 3))],
             shown={

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-from tank2sim.answer.charts.curves import Series
-from tank2sim.answer.charts.vega import ChartSpec, Quantity, layer, layered, tooltips
+from tank2sim.answer.charts.curves import PlotSeries
+from tank2sim.answer.charts.vega import ChartSpec, PlotAxis, layer, layered, tooltips
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
 from tank2sim.cards import Card
@@ -214,9 +214,9 @@ def computed_chart(name: str, readings: ChannelReadings, *, size_px: int = 300) 
     """
     unit = readings.unit.replace(".", " ")
     ends = [float(readings.measured.min()), float(readings.measured.max())]
-    equal = Series(label="equal", x=ends, y=ends)
-    both = Series(label="", x=readings.measured, y=readings.computed, points=True)
-    across, up = (Quantity(title=f"{name} {kind} ({unit})", zero=True) for kind in ("measured", "computed"))
+    equal = PlotSeries(label="equal", x=ends, y=ends)
+    both = PlotSeries(label="", x=readings.measured, y=readings.computed, points=True)
+    across, up = (PlotAxis(title=f"{name} {kind} ({unit})", zero=True) for kind in ("measured", "computed"))
     place = {"x": across.channel("x"), "y": up.channel("v")}
     shown = tooltips({"x:Q": "measured", "v:Q": "computed"})
     return layered(

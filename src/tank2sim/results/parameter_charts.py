@@ -11,7 +11,7 @@ from tank2sim.answer.charts.vega import (
     STACKS,
     ChartRecord,
     ChartSpec,
-    Quantity,
+    PlotAxis,
     Rule,
     bare_layer,
     heading,
@@ -37,7 +37,7 @@ def parameter_chart(parameters: Mapping[str, ParameterEstimate], *, title: str =
     farthest = max((abs(row[key] or 0.0) for row in found for key in ("low", "high")), default=1.0)
     # A few derivatives may move by dozens of standard errors, where the others move by one.
     wide = farthest > 12
-    across = Quantity(
+    across = PlotAxis(
         title="value less prior, in standard errors of the prior (-)",
         zero=not wide,
         scale={"type": "symlog", "constant": 2} if wide else None,
@@ -52,7 +52,7 @@ def parameter_chart(parameters: Mapping[str, ParameterEstimate], *, title: str =
         ),
         *row_layers(RowPlot(rows=prior, across=across, look=look, shown=shown), size=34, yOffset=4),
     ]
-    shares = Quantity(title="information from trials (%)", domain=(0, 100))
+    shares = PlotAxis(title="information from trials (%)", domain=(0, 100))
     bare = {"labels": False, "ticks": False, "grid": False}
     bars = [{"name": row["name"], "v": row["share"]} | {key: row[key] for key in _SAID} for row in found]
     height = 21 * len(found)
@@ -115,7 +115,7 @@ def posterior_chart(
         rows.append(
             {"name": name, **shown, "interval": f"{low:.4g} to {high:.4g}", "found": f"{middle:.4g}", "run": "samples"}
         )
-    across = Quantity(title="value less mean, in standard deviations (-)", zero=True)
+    across = PlotAxis(title="value less mean, in standard deviations (-)", zero=True)
     shown_as = {"name:N": "parameter", "found:N": "median", "interval:N": "95 %"}
     layers = row_layers(RowPlot(rows=rows, across=across, shown=shown_as), size=40)
     half = {"x": across.channel("quarter"), "x2": "three", "y": layers[0]["encoding"]["y"]}
@@ -178,12 +178,12 @@ def correlation_chart(known: IdentifiabilityStudy, *, title: str = "") -> ChartS
 def singular_value_chart(values: Array, *, title: str = "") -> ChartSpec:
     """Singular values of the sensitivities in units of the prior, falling; below 1 the prior determines more."""
     rows = [{"order": order, "v": plain(value)} for order, value in enumerate(values.tolist(), start=1) if value > 0]
-    across = Quantity(
+    across = PlotAxis(
         title="direction, by the information of the trials (-)", nice=False, padding=10, form="d", zero=True
     )
-    x, up = across.channel("order"), Quantity(title="singular value (-)", log=True, form="~g")
+    x, up = across.channel("order"), PlotAxis(title="singular value (-)", log=True, form="~g")
     x["axis"] |= {"tickMinStep": 1}
-    place = {"x": x, "y": up.channel("v")}
+    place: ChartSpec = {"x": x, "y": up.channel("v")}
     place["tooltip"] = tooltips({"order:Q": ("direction", "d"), "v:Q": "singular value"})
     return layered(
         [

@@ -14,10 +14,10 @@ from tank2sim.analysis.stability.study import Spirals
 from tank2sim.analysis.turning.characteristic import SteeringCharacteristic
 from tank2sim.analysis.turning.diagram import TurningDiagram
 from tank2sim.answer.charts.analysis import FrequencyResponse, PolesZeros, bode_chart, pole_zero_chart
-from tank2sim.answer.charts.curves import Plot, Series, curve_chart, curve_panels, gapped
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_panels, gapped
 from tank2sim.answer.charts.parts import plain
 from tank2sim.answer.charts.rows import RowPlot, row_chart, row_layers
-from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, Quantity, Rule, layered
+from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, Rule, layered
 from tank2sim.answer.numbers import format_number
 from tank2sim.arrays import Array
 
@@ -33,7 +33,7 @@ def steering_diagram(turning: TurningDiagram, spirals: Spirals, *, title: str = 
     """Yaw rate, speed, drift and heel of steady turns against the rudder; unstable turns dashed, spirals as points."""
     points = turning.points
     runs = [
-        Series(label=name, x=spiral.rudder_deg, y=spiral.yaw_rate_degps, points=True)
+        PlotSeries(label=name, x=spiral.rudder_deg, y=spiral.yaw_rate_degps, points=True)
         for name, spiral in ((DIRECT, spirals.direct), (REVERSE, spirals.reverse))
         if spiral
     ]
@@ -47,19 +47,19 @@ def steering_diagram(turning: TurningDiagram, spirals: Spirals, *, title: str = 
     plots = [
         Plot(
             series=[*_branches(turning, values), *(runs if place == 0 else [])],
-            up=Quantity(title=name),
+            up=PlotAxis(title=name),
             height_px=height,
             rules=[Rule(at=[0.0], upright=True)],
         )
         for place, (name, (values, height)) in enumerate(shown.items())
     ]
     described = "Steady yaw rate, speed and drift against the rudder angle."
-    across = Quantity(title=_RUDDER, nice=False, padding=8)
+    across = PlotAxis(title=_RUDDER, nice=False, padding=8)
     said = {"run:N": "branch", "x:Q": "rudder (deg)"}
     return curve_panels(plots, across, title=title, width_px=_WIDTH, described=described, shown=said)
 
 
-def _branches(turning: TurningDiagram, values: Array) -> list[Series]:
+def _branches(turning: TurningDiagram, values: Array) -> list[PlotSeries]:
     """Stable and unstable turns; between two folds (or changes of stability) a branch is one line."""
     points, stable = turning.points, turning.points.stable
     rudder, rate = points.rudder_deg, points.yaw_rate_degps
@@ -77,25 +77,33 @@ def _branches(turning: TurningDiagram, values: Array) -> list[Series]:
     for first, last in itertools.pairwise(ends):
         parts[STABLE if stable[(first + last + 1) // 2] else UNSTABLE].append(slice(first, last + 1))
     return [
-        Series(label=label, x=gapped([rudder[kept] for kept in slices]), y=gapped([values[kept] for kept in slices]))
+        PlotSeries(
+            label=label, x=gapped([rudder[kept] for kept in slices]), y=gapped([values[kept] for kept in slices])
+        )
         for label, slices in parts.items()
         if slices
     ]
 
 
 def _curves(
-    series: Sequence[Series], axes: tuple[str, str], *, title: str, described: str, height: int = 260, zero: bool = True
+    series: Sequence[PlotSeries],
+    axes: tuple[str, str],
+    *,
+    title: str,
+    described: str,
+    height: int = 260,
+    zero: bool = True,
 ) -> ChartSpec:
     """Lines, with a line at zero below them; the titles of the axes are those across and up."""
     rules = [Rule(at=[0.0])] if zero else []
-    plot = Plot(series=series, up=Quantity(title=axes[1]), height_px=height, rules=rules)
-    axis = Quantity(title=axes[0], nice=False)
+    plot = Plot(series=series, up=PlotAxis(title=axes[1]), height_px=height, rules=rules)
+    axis = PlotAxis(title=axes[0], nice=False)
     return curve_chart(plot, axis, title=title, width_px=_WIDTH, window=["x"], described=described)
 
 
 def step_chart(responses: Sequence[SteeringResponse], *, title: str = "") -> ChartSpec:
     """Yaw rate after a step of one degree of rudder (or of its order), deg/s."""
-    series = [Series(label=one.label, x=one.time_s, y=one.step_per_s) for one in responses]
+    series = [PlotSeries(label=one.label, x=one.time_s, y=one.step_per_s) for one in responses]
     up, described = "yaw rate per degree of rudder (deg/s)", "Yaw rate over time after a step of the rudder."
     return _curves(series, ("time after the step (s)", up), title=title, described=described, zero=False)
 
@@ -122,7 +130,7 @@ def influence_chart(margins: Margin, *, title: str = "") -> ChartSpec:
     return row_chart(
         RowPlot(
             rows=rows,
-            across=Quantity(title="change of C′ when the coefficient grows by 10 % (% of |C′|)", zero=True),
+            across=PlotAxis(title="change of C′ when the coefficient grows by 10 % (% of |C′|)", zero=True),
             rules=[Rule(at=[0.0])],
             shown={"name:N": "coefficient", "v:Q": "change of C′ (%)"},
         ),
@@ -138,7 +146,7 @@ def influence_chart(margins: Margin, *, title: str = "") -> ChartSpec:
 
 def criterion_by_speed_chart(speed: CriterionBySpeed, *, title: str = "") -> ChartSpec:
     """C' over speed."""
-    series = [Series(label="C′", x=speed.speed_mps, y=1e5 * speed.C_prime)]
+    series = [PlotSeries(label="C′", x=speed.speed_mps, y=1e5 * speed.C_prime)]
     described = "Stability criterion over speed."
     return _curves(series, ("speed (m/s)", "C′ · 10⁵"), title=title, described=described, height=200)
 
@@ -167,7 +175,7 @@ def criteria_chart(criteria: Sequence[ImoCriterion], *, title: str = "") -> Char
     bars, limit = row_layers(
         RowPlot(
             rows=rows,
-            across=Quantity(title="per cent of the limit", domain=(0.0, 1.05 * longest), nice=False),
+            across=PlotAxis(title="per cent of the limit", domain=(0.0, 1.05 * longest), nice=False),
             shown={"name:N": "criterion"},
             rules=[Rule(at=[100.0], style="limit")],
             side=_TWO_LINES,
@@ -192,7 +200,7 @@ def trim_chart(trim: TrimEffect, *, title: str = "") -> ChartSpec:
     values = {"Inoue et al.": criteria}
     for name, reading in trim.paper_7_5_percent.items():
         values[f"7.5 % of {name}"] = base + per_cent * (reading.more - reading.less) / 2
-    series = [Series(label=label, x=per_cent, y=1e5 * value) for label, value in values.items()]
+    series = [PlotSeries(label=label, x=per_cent, y=1e5 * value) for label, value in values.items()]
     across, described = "trim by the stern (% of length)", "Stability criterion over trim, estimated."
     return _curves(series, (across, "C′ · 10⁵"), title=title, described=described, height=220)
 
@@ -211,6 +219,6 @@ def characteristic_chart(found: SteeringCharacteristic, *, title: str = "") -> C
         "Bech, nearest cubic": cubic(found.bech.coefficients),
         "Norrbin, slope kept": cubic(found.norrbin.coefficients) / found.norrbin.K_per_s,
     }
-    series = [Series(label=label, x=rate, y=value) for label, value in values.items()]
+    series = [PlotSeries(label=label, x=rate, y=value) for label, value in values.items()]
     across, described = "yaw rate, starboard positive (deg/s)", "Rudder angle against steady yaw rate."
     return _curves(series, (across, "rudder angle (deg)"), title=title, described=described)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from tank2sim.analysis.validation.study import Validated
 from tank2sim.answer.charts.rows import RowPlot, names_of, row_layers
-from tank2sim.answer.charts.vega import SIDE, ChartSpec, Quantity, Rule, channel, layer, layered
+from tank2sim.answer.charts.vega import SIDE, ChartSpec, PlotAxis, Rule, channel, layer, layered
 from tank2sim.units import in_words
 
 COMPARISON_ERRORS = (
@@ -33,7 +33,7 @@ def comparison_error_chart(figures: Sequence[Validated], numbers: Mapping[str, i
         for figure in figures
         if figure.error is not None and figure.measured
     ]
-    across = Quantity(title="per cent of the measured figure", zero=True)
+    across = PlotAxis(title="per cent of the measured figure", zero=True)
     y = channel("name:N", sort=names_of(rows), title=None, axis=SIDE | {"labelLimit": 170})
     bars = layer("bar", rows, {"x": across.channel("least"), "x2": "most", "y": y}, style="uncertainty", height=14)
     shown = {"trial:N": "trial", "name:N": "figure", "v:Q": "E (%)", "most:Q": "U_val (%)"}

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tank2sim.answer.charts.curves import Plot, Series, curve_chart, curve_panels
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_panels
 from tank2sim.answer.charts.parts import equal_frame, extent, plain, series_look, vector
 from tank2sim.answer.charts.theme import CROSS
 from tank2sim.answer.charts.vega import (
     ChartRecord,
     ChartSpec,
-    Quantity,
+    PlotAxis,
     Rule,
     bare_layer,
     channel,
@@ -24,7 +24,7 @@ from tank2sim.answer.charts.vega import (
     tooltips,
 )
 
-_FREQUENCY = Quantity(title="angular frequency (rad/s)", log=True, nice=False, form="~g")
+_FREQUENCY = PlotAxis(title="angular frequency (rad/s)", log=True, nice=False, form="~g")
 _SHOWN = {"run:N": "system", "x:Q": "frequency (rad/s)"}
 
 _HALF = 2.5
@@ -43,7 +43,8 @@ class FrequencyResponse:
     @property
     def decibel(self) -> NDArray[np.float64]:
         """Magnitude, dB."""
-        return 20 * np.log10(np.abs(np.asarray(self.response, dtype=complex)))
+        found: NDArray[np.float64] = 20 * np.log10(np.abs(np.asarray(self.response, dtype=complex)))
+        return found
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,13 +78,15 @@ def bode_chart(
     responses: Sequence[FrequencyResponse], *, title: str = "", width_px: int = 720, height_px: int = 200
 ) -> ChartSpec:
     """Magnitude (dB) and phase (deg, unwrapped) against angular frequency (rad/s, logarithmic); sizes of one panel."""
-    magnitudes = [Series(label=one.label, x=one.omega_radps, y=one.decibel) for one in responses]
+    magnitudes = [PlotSeries(label=one.label, x=one.omega_radps, y=one.decibel) for one in responses]
     phases = [np.rad2deg(np.unwrap(np.angle(np.asarray(one.response, dtype=complex)))) for one in responses]
-    turned = [Series(label=one.label, x=one.omega_radps, y=phase) for one, phase in zip(responses, phases, strict=True)]
+    turned = [
+        PlotSeries(label=one.label, x=one.omega_radps, y=phase) for one, phase in zip(responses, phases, strict=True)
+    ]
     ticks = _phase_ticks(np.concatenate(phases))
     plots = [
-        Plot(series=magnitudes, up=Quantity(title="magnitude (dB)"), height_px=height_px),
-        Plot(series=turned, up=Quantity(title="phase (deg)", ticks=ticks), height_px=height_px),
+        Plot(series=magnitudes, up=PlotAxis(title="magnitude (dB)"), height_px=height_px),
+        Plot(series=turned, up=PlotAxis(title="phase (deg)", ticks=ticks), height_px=height_px),
     ]
     names = ", ".join(response.label for response in responses)
     described = f"Bode diagram of {names}: magnitude and phase."
@@ -95,8 +98,8 @@ def sensitivity_chart(responses: Sequence[FrequencyResponse], *, title: str = ""
     series = []
     for one in responses:
         shown = one.decibel > -60
-        series.append(Series(label=one.label, x=vector(one.omega_radps)[shown], y=one.decibel[shown]))
-    plot = Plot(series=series, up=Quantity(title="magnitude (dB)"), rules=[Rule(at=[0.0])])
+        series.append(PlotSeries(label=one.label, x=vector(one.omega_radps)[shown], y=one.decibel[shown]))
+    plot = Plot(series=series, up=PlotAxis(title="magnitude (dB)"), rules=[Rule(at=[0.0])])
     described = f"Magnitude over frequency of {', '.join(response.label for response in responses)}."
     shown_as = {**_SHOWN, "run:N": "function"}
     return curve_chart(plot, _FREQUENCY, title=title, window=["x"], described=described, shown=shown_as)
@@ -119,11 +122,11 @@ def nyquist_chart(
         value = np.asarray(loop.response, dtype=complex)
         near = np.abs(value + 1) < 3 * _HALF
         value, omega = value[near], vector(loop.omega_radps)[near]
-        series.append(Series(label=loop.label, x=value.real, y=value.imag, closed=True, more={"w": omega}))
-    across = Quantity(title="real part of L (-)", domain=(-1 - _HALF, -1 + _HALF), nice=False, ticks=6)
-    up = Quantity(title="imaginary part of L (-)", domain=(-_HALF, _HALF), nice=False, ticks=6)
+        series.append(PlotSeries(label=loop.label, x=value.real, y=value.imag, closed=True, more={"w": omega}))
+    across = PlotAxis(title="real part of L (-)", domain=(-1 - _HALF, -1 + _HALF), nice=False, ticks=6)
+    up = PlotAxis(title="imaginary part of L (-)", domain=(-_HALF, _HALF), nice=False, ticks=6)
     turn = np.linspace(0, 2 * math.pi, 121)
-    circle = Series(
+    circle = PlotSeries(
         label="", x=-1 + np.cos(turn) / sensitivity_peak, y=np.sin(turn) / sensitivity_peak, closed=True
     ).rows
     place = {"x": across.channel("x"), "y": up.channel("v")}
@@ -183,13 +186,18 @@ def error_chart(errors: Sequence[OutputError], *, title: str = "", width_px: int
     low, high = 10.0 ** math.floor(math.log10(min(sizes)) - 0.01), 10.0 ** math.ceil(math.log10(max(sizes)) + 0.01)
     decades = round(math.log10(high / low))
     powers = [float(f"{low * 10.0**power:.6g}") for power in range(0, decades + 1, 1 + decades // 5)]
-    across = Quantity(
+    across = PlotAxis(
         title="largest error (line: limit)", log=True, domain=(low, high), nice=False, ticks=powers, form=".0e"
     )
     y = channel("output:N", title=None, sort=outputs, axis={"grid": True, "labelLimit": 220})
     verdict = channel("verdict:N", scale={"domain": _VERDICTS})
     shape = channel("verdict:N", scale={"domain": _VERDICTS, "range": ["circle", CROSS]})
-    shown = {"kind:N": "check", "output:N": "output", "error:N": "largest error", "limit:Q": ("limit", ".2~e")}
+    shown: dict[str, str | tuple[str, str]] = {
+        "kind:N": "check",
+        "output:N": "output",
+        "error:N": "largest error",
+        "limit:Q": ("limit", ".2~e"),
+    }
     point = {"x": across.channel("e"), "y": y, "color": verdict, "shape": shape}
     tick = {"orient": "vertical", "height": {"band": 1.0}, "thickness": 2}
     panel = [

@@ -22,11 +22,12 @@ from tank2sim.answer.charts.theme import BAND_OPACITY
 from tank2sim.answer.charts.vega import (
     ChartRecord,
     ChartSpec,
-    Quantity,
+    PlotAxis,
     Rule,
-    Shown,
+    TooltipFields,
     layer,
     layered,
+    rows_where,
     stacked,
     tooltips,
 )
@@ -34,7 +35,7 @@ from tank2sim.records.thinning import thin_line
 
 
 @dataclass(frozen=True, kw_only=True)
-class Series:
+class PlotSeries:
     """Values `y` (n,) over `x` (n,) under one name: a line, or points (measured); NaN leaves a gap.
 
     Parameters
@@ -80,22 +81,22 @@ class Plot:
 
     Parameters
     ----------
-    series : sequence of Series
-    up : Quantity
+    series : sequence of PlotSeries
+    up : PlotAxis
     height_px : int
     rules : sequence of Rule
     over : sequence of ChartSpec
         Layers drawn over the series.
     """
 
-    series: Sequence[Series]
-    up: Quantity
+    series: Sequence[PlotSeries]
+    up: PlotAxis
     height_px: int = 300
     rules: Sequence[Rule] = ()
     over: Sequence[ChartSpec] = ()
 
 
-def look_of(series: Sequence[Series]) -> SeriesLook:
+def look_of(series: Sequence[PlotSeries]) -> SeriesLook:
     """Return the look of series, each name once; those that have points are points in the legend."""
     labels = list(dict.fromkeys(each.label for each in series))
     return series_look(labels, as_points={each.label for each in series if each.points})
@@ -103,10 +104,10 @@ def look_of(series: Sequence[Series]) -> SeriesLook:
 
 def curve_layers(
     plot: Plot,
-    across: Quantity,
+    across: PlotAxis,
     look: SeriesLook,
     *,
-    shown: Shown | None = None,
+    shown: TooltipFields | None = None,
     point_px: int | None = None,
     shaded: bool = False,
 ) -> list[ChartSpec]:
@@ -115,9 +116,9 @@ def curve_layers(
     Parameters
     ----------
     plot : Plot
-    across : Quantity
+    across : PlotAxis
     look : SeriesLook
-    shown : Shown, optional
+    shown : TooltipFields, optional
         Further fields of the tooltip, or other titles.
     point_px : int, optional
         Area of a point.
@@ -138,8 +139,8 @@ def curve_layers(
     if lines:
         found.append(layer("line", lines, {**place, "strokeDash": look.dash, "order": "i:Q"}, clip=True))
     edges = plot.up.channel("low")
-    intervals = [row for row in points if "low" in row]
-    if banded := [row for row in (points if shaded else lines) if "low" in row]:
+    intervals = rows_where(points, lambda row: "low" in row)
+    if banded := rows_where(points if shaded else lines, lambda row: "low" in row):
         band = {"x": x, "y": edges, "y2": "high", "color": look.pale}
         found.append(layer("area", banded, band, opacity=BAND_OPACITY, clip=True))
     if intervals and not shaded:
@@ -157,7 +158,7 @@ def curve_layers(
 
 def curve_chart(
     plot: Plot,
-    across: Quantity,
+    across: PlotAxis,
     *,
     title: str | ChartSpec = "",
     width_px: int = 720,
@@ -170,7 +171,7 @@ def curve_chart(
     Parameters
     ----------
     plot : Plot
-    across : Quantity
+    across : PlotAxis
         Horizontal axis.
     title : str or title with a line below
     width_px : int
@@ -195,7 +196,7 @@ def curve_chart(
 
 def curve_panels(
     plots: Sequence[Plot],
-    across: Quantity,
+    across: PlotAxis,
     *,
     title: str | ChartSpec = "",
     width_px: int = 720,

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tank2sim.answer.charts.curves import Plot, Series, curve_chart, curve_panels
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_panels
 from tank2sim.answer.charts.labels import label_layers, spots_about, spots_along
 from tank2sim.answer.charts.parts import LINE_SAMPLES, Frame, equal_frame, every, free_frame, plain, records, vector
 from tank2sim.answer.charts.vega import (
     ChartRecord,
     ChartSpec,
-    Quantity,
+    PlotAxis,
     Rule,
     channel,
     heading,
@@ -288,8 +288,8 @@ def zigzag_chart(
     angles = [motion.heading_deg, motion.rudder_deg, np.array([-heading_deg, heading_deg]), vector(beyond), *edges[1:]]
     times = np.concatenate([motion.time_s, *edges[:1]])
     frame = free_frame(times, np.concatenate(angles), width_px=680, height_px=340, margins_px=(0.0, 22.0))
-    across = Quantity(title="time (s)", domain=frame.across, nice=False)
-    up = Quantity(title="heading and rudder, + to starboard (deg)", domain=frame.up, nice=False)
+    across = PlotAxis(title="time (s)", domain=frame.across, nice=False)
+    up = PlotAxis(title="heading and rudder, + to starboard (deg)", domain=frame.up, nice=False)
     place, over = {"x": across.channel("x"), "y": up.channel("v")}, []
     if edges:
         area = records("heading", dict(zip(("x", "low", "high"), edges, strict=True)))
@@ -306,8 +306,8 @@ def zigzag_chart(
         drawn = [(motion.time_s, motion.heading_deg), (motion.time_s, motion.rudder_deg)]
         over += label_layers(labels, frame, place, drawn)
     series = [
-        Series(label="heading", x=motion.time_s, y=motion.heading_deg),
-        Series(label="rudder", x=motion.time_s, y=motion.rudder_deg),
+        PlotSeries(label="heading", x=motion.time_s, y=motion.heading_deg),
+        PlotSeries(label="rudder", x=motion.time_s, y=motion.rudder_deg),
     ]
     rules = [Rule(at=[heading_deg, -heading_deg], style="dimension")]
     sizes = ", ".join(str(peak["text"]) for peak in peaks)
@@ -350,16 +350,16 @@ def pull_out_chart(sides: Mapping[str, Motion], neutral_deg: float, *, title: st
     title : str
     """
     series = [
-        Series(label=label, x=motion.time_s - pull_out_time(motion, neutral_deg), y=motion.rate_degps)
+        PlotSeries(label=label, x=motion.time_s - pull_out_time(motion, neutral_deg), y=motion.rate_degps)
         for label, motion in sides.items()
     ]
     longest = max(float(np.max(one.x)) for one in series)
-    across = Quantity(
+    across = PlotAxis(
         title=f"time from the order of the neutral rudder, {format_number(neutral_deg, _ROUND)}° (s)",
         domain=(-0.1 * longest, longest),
         nice=False,
     )
-    up = Quantity(title="yaw rate, + to starboard (deg/s)", zero=True)
+    up = PlotAxis(title="yaw rate, + to starboard (deg/s)", zero=True)
     rules = [Rule(at=[0.0]), Rule(at=[0.0], upright=True, style="dimension")]
     return curve_chart(
         Plot(series=series, up=up, height_px=320, rules=rules),
@@ -386,13 +386,13 @@ def stop_speed_chart(motion: Motion, *, title: str = "") -> ChartSpec:
         panels["revolutions (rpm)"] = motion.revolutions_rpm
     plots = [
         Plot(
-            series=[Series(label="run", x=motion.way_m, y=values, closed=True, more={"t": motion.time_s})],
-            up=Quantity(title=name, zero=True),
+            series=[PlotSeries(label="run", x=motion.way_m, y=values, closed=True, more={"t": motion.time_s})],
+            up=PlotAxis(title=name, zero=True),
             height_px=200 if not place else 110,
         )
         for place, (name, values) in enumerate(panels.items())
     ]
-    across = Quantity(title="distance along the track (m)", nice=False)
+    across = PlotAxis(title="distance along the track (m)", nice=False)
     described = "Speed over the distance along the track of the stop."
     shown = {"t:Q": "time (s)"}
     return curve_panels(plots, across, title=title, width_px=640, described=described, shown=shown)

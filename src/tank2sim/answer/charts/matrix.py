@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from tank2sim.answer.charts.vega import ChartSpec, Shown, bare_layer, channel, tooltips
+from tank2sim.answer.charts.vega import ChartSpec, TooltipFields, bare_layer, channel, tooltips
 
 ROW_PX = 21
 """Height of a row, px."""
@@ -32,7 +32,7 @@ class Matrix:
         Field of the data that colours a cell.
     rows, columns : sequence of str
         In their order.
-    shown : Shown
+    shown : TooltipFields
         Fields of the tooltip.
     names : pair of str
         Fields of the data with the row and the column.
@@ -47,7 +47,7 @@ class Matrix:
     colour: str
     rows: Sequence[str]
     columns: Sequence[str]
-    shown: Shown
+    shown: TooltipFields
     names: tuple[str, str] = ("trial", "signal")
     scale: Mapping[str, Any] = field(default_factory=lambda: LOG_BLUES)
     legend: Mapping[str, Any] = field(default_factory=lambda: {"gradientLength": 180})

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tank2sim.answer.charts.curves import Plot, Series, curve_chart, curve_panels
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_panels
 from tank2sim.answer.charts.labels import label_layers, spots_along
 from tank2sim.answer.charts.parts import (
     LINE_SAMPLES,
@@ -27,7 +27,7 @@ from tank2sim.answer.charts.parts import (
 from tank2sim.answer.charts.vega import (
     ChartRecord,
     ChartSpec,
-    Quantity,
+    PlotAxis,
     Rule,
     layer,
     layered,
@@ -182,7 +182,7 @@ def history_chart(
         Places to tint.
     """
     span = np.concatenate([vector(run.time_s) for run in runs])
-    across = Quantity(title="time (s)", domain=(float(np.nanmin(span)), float(np.nanmax(span))), nice=False)
+    across = PlotAxis(title="time (s)", domain=(float(np.nanmin(span)), float(np.nanmax(span))), nice=False)
     look = series_look([run.label for run in runs], as_points={run.label for run in runs if run.measured})
     plots = [_signal_plot(runs, signal, height_px, across, marks) for signal in signals]
     names = ", ".join(signal.title for signal in signals)
@@ -207,14 +207,14 @@ def spiral_chart(
     degree = shown_unit("rad")[1]
     drawn = [(degree * vector(one.rudder_rad), degree * vector(one.yaw_rate_radps)) for one in spirals]
     series = [
-        Series(label=spiral.label, x=rudder, y=rate, points=points, closed=True)
+        PlotSeries(label=spiral.label, x=rudder, y=rate, points=points, closed=True)
         for points in (False, True)
         for spiral, (rudder, rate) in zip(spirals, drawn, strict=True)
     ]
     left, up = (np.concatenate([[0.0], *(line[axis] for line in drawn)]) for axis in (0, 1))
     frame = free_frame(left, up, width_px=620, height_px=400, margins_px=(24.0, 24.0))
-    across = Quantity(title="rudder angle, starboard positive (deg)", domain=frame.across, nice=False)
-    rate = Quantity(title="yaw rate, starboard positive (deg/s)", domain=frame.up, nice=False)
+    across = PlotAxis(title="rudder angle, starboard positive (deg)", domain=frame.across, nice=False)
+    rate = PlotAxis(title="yaw rate, starboard positive (deg/s)", domain=frame.up, nice=False)
     over = _loop_layers(degree * vector(loop_rad), across, rate, frame, drawn) if loop_rad else []
     rules = [Rule(at=[0.0], upright=True), Rule(at=[0.0])]
     return curve_chart(
@@ -232,7 +232,7 @@ _HOVER_SAMPLES = 90
 
 
 def _loop_layers(
-    rudders: Array, across: Quantity, up: Quantity, frame: Frame, lines: Sequence[tuple[Array, Array]]
+    rudders: Array, across: PlotAxis, up: PlotAxis, frame: Frame, lines: Sequence[tuple[Array, Array]]
 ) -> list[ChartSpec]:
     """The width of a loop along the line of zero yaw rate, in deg."""
     low, high = sorted(rudders.tolist())
@@ -258,19 +258,19 @@ def _track_rows(track: TrackData, x: Array, y: Array) -> list[ChartRecord]:
 
 
 def _signal_plot(
-    runs: Sequence[History], signal: Signal, height_px: int, across: Quantity, marks: Sequence[TimeMark]
+    runs: Sequence[History], signal: Signal, height_px: int, across: PlotAxis, marks: Sequence[TimeMark]
 ) -> Plot:
     """The panel of one signal."""
     if not any(signal.name in run.values for run in runs):
         raise ValueError(f"no run has the signal {signal.name}")
     unit, factor = shown_unit(signal.unit, signal.display_unit)
     series, over = [], []
-    x, up = across.channel("x"), Quantity(title=with_unit(signal.title, unit))
+    x, up = across.channel("x"), PlotAxis(title=with_unit(signal.title, unit))
     for run in runs:
         if signal.name in run.values:
             time, value = vector(run.time_s), factor * vector(run.values[signal.name])
             kept = thin_points([value], POINT_SAMPLES) if run.measured else slice(None)
-            series.append(Series(label=run.label, x=time[kept], y=value[kept], points=run.measured))
+            series.append(PlotSeries(label=run.label, x=time[kept], y=value[kept], points=run.measured))
         for band in run.bands:
             if band.signal == signal.name:
                 edges = {"low": factor * vector(band.low), "high": factor * vector(band.high)}

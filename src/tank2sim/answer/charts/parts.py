@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tank2sim.answer.charts.theme import DASHES, SHAPES, STROKE
-from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, Quantity
+from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis
 from tank2sim.arrays import Array
 from tank2sim.units import UNITS
 
@@ -163,7 +163,7 @@ class Frame:
 
         def axis(domain: tuple[float, float], size_px: int, field: str, title: str) -> ChartSpec:
             ticks = max(2, round(size_px / 70))
-            return Quantity(title=title, domain=domain, nice=False, ticks=ticks).channel(field)
+            return PlotAxis(title=title, domain=domain, nice=False, ticks=ticks).channel(field)
 
         return {"x": axis(self.across, self.width_px, *across), "y": axis(self.up, self.height_px, *up)}
 

@@ -26,7 +26,7 @@ def chart_specification(chart: ChartSpec | alt.TopLevelMixin) -> ChartSpec:
     """The Vega-Lite specification of a chart, without its looks; the same chart gives the same specification."""
     if isinstance(chart, dict):
         named: dict[int, tuple[str, list[ChartRecord]]] = {}
-        specification = {"$schema": f"https://vega.github.io/schema/vega-lite/v{VEGALITE_VERSION}.0.json"}
+        specification: ChartSpec = {"$schema": f"https://vega.github.io/schema/vega-lite/v{VEGALITE_VERSION}.0.json"}
         specification |= _with_named_data(chart, named)
         specification["datasets"] = dict(named.values())
     else:

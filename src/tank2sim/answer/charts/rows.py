@@ -11,12 +11,13 @@ from tank2sim.answer.charts.vega import (
     SIDE,
     ChartRecord,
     ChartSpec,
-    Quantity,
+    PlotAxis,
     Rule,
-    Shown,
+    TooltipFields,
     channel,
     layer,
     layered,
+    rows_where,
     tooltips,
 )
 
@@ -42,8 +43,8 @@ class RowPlot:
     ----------
     rows : sequence of ChartRecord
         ``name`` and ``v`` (None: no mark) each; ``run`` (series), ``low``, ``high``, and what the tooltip shows.
-    across : Quantity
-    shown : Shown, optional
+    across : PlotAxis
+    shown : TooltipFields, optional
         Fields of the tooltip; by default the name and the value.
     look : SeriesLook, optional
         By default of the series of the rows, in their order.
@@ -58,8 +59,8 @@ class RowPlot:
     """
 
     rows: Sequence[ChartRecord]
-    across: Quantity
-    shown: Shown | None = None
+    across: PlotAxis
+    shown: TooltipFields | None = None
     look: SeriesLook | None = None
     names: Sequence[str] = ()
     rules: Sequence[Rule] = ()
@@ -92,11 +93,11 @@ def row_layers(
     if plot.apart:
         common["yOffset"] = channel("run:N", sort=runs)
     found = [replace(rule, upright=True).layer(x) for rule in plot.rules]
-    if spans := [row for row in rows if row.get("low") is not None and row.get("high") is not None]:
+    if spans := rows_where(rows, lambda row: row.get("low") is not None and row.get("high") is not None):
         span = {**common, "x": plot.across.channel("low"), "x2": "high"}
         offset = {"yOffset": style["yOffset"]} if "yOffset" in style else {}
         found.append(layer("rule", spans, span, strokeWidth=span_px, clip=True, **offset))
-    drawn = [row for row in rows if row.get("v") is not None]
+    drawn = rows_where(rows, lambda row: row.get("v") is not None)
     if not drawn:
         return found
     if mark == "bar":

@@ -6,7 +6,7 @@ makes an Altair object of it for those who want to change it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -37,11 +37,11 @@ def channel(field: str, **options: Any) -> ChartSpec:
     return {"field": name, **({"type": _KINDS[kind]} if kind else {}), **options}
 
 
-Shown = Mapping[str, str | tuple[str, str]]
+TooltipFields = Mapping[str, str | tuple[str, str]]
 """Fields of a tooltip (``v:Q``) with their titles; a quantity may have its format, too."""
 
 
-def tooltips(shown: Shown) -> list[ChartSpec]:
+def tooltips(shown: TooltipFields) -> list[ChartSpec]:
     """Return tooltips; quantities are written with four digits or in their format."""
     found = []
     for field, title in shown.items():
@@ -51,7 +51,7 @@ def tooltips(shown: Shown) -> list[ChartSpec]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Quantity:
+class PlotAxis:
     """An axis with its scale.
 
     Parameters
@@ -139,6 +139,12 @@ def layer(mark: str, rows: Sequence[ChartRecord], encoding: Mapping[str, Any], *
         if value is not None
     }
     return {"data": {"values": rows}, "mark": {"type": mark, **look}, "encoding": channels}
+
+
+def rows_where(rows: Sequence[ChartRecord], test: Callable[[ChartRecord], bool]) -> Sequence[ChartRecord]:
+    """Return the rows that pass a test; where all do, the same list, which a chart has once."""
+    passing = [row for row in rows if test(row)]
+    return rows if len(passing) == len(rows) else passing
 
 
 def bare_layer(mark: str, encoding: Mapping[str, Any], **look: Any) -> ChartSpec:

@@ -26,6 +26,7 @@ from tank2sim.fmu.manoeuvre import InputSequence
 from tank2sim.fmu.running import replay
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import Run, simulate
+from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.simulation.trial_file import trial_csv
 from tank2sim.units import in_words
 
@@ -81,7 +82,7 @@ def _in_fmu(model: Model, path: Path, run: Run) -> dict[str, Array]:
 
 def _manoeuvre_section(workshop: Workshop, name: str, text: str, run: dict[str, Run], fmu: dict[str, Array]) -> Section:
     third, first = run[THIRD].trajectory, run[FIRST].trajectory
-    motions = {THIRD: third, IN_FMU: fmu, FIRST: first}
+    motions: dict[str, Trajectory | dict[str, Array]] = {THIRD: third, IN_FMU: fmu, FIRST: first}
     tracks = track_chart(
         [
             TrackData(label=label, x_m=motion["motion.x"], y_m=motion["motion.y"], time_s=third.t)

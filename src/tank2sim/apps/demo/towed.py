@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from tank2sim.answer.charts.curves import Plot, Series, curve_chart
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart
 from tank2sim.answer.charts.picture import chart_png
-from tank2sim.answer.charts.vega import ChartSpec, Quantity
+from tank2sim.answer.charts.vega import ChartSpec, PlotAxis
 from tank2sim.answer.parts import Column, Illustration, KeyFigure, Section, Table, Verdict
 from tank2sim.answer.study import study_values
 from tank2sim.apps.demo.fmu_helpers import DemoOutcome, Workshop, error_words, largest_error
@@ -69,11 +69,14 @@ def _towed_again(model: Model, fmu: Path, tows: Tows, force_N: float) -> tuple[A
 
 def _chart(tows: Tows, times: Array, speed: Array) -> ChartSpec:
     measured = [
-        Series(label=f"tow {k + 1}", x=tows.time_s, y=column, points=True) for k, column in enumerate(tows.speed_mps.T)
+        PlotSeries(label=f"tow {k + 1}", x=tows.time_s, y=column, points=True)
+        for k, column in enumerate(tows.speed_mps.T)
     ]
     return curve_chart(
-        Plot(series=[Series(label="FMU", x=times, y=speed), *measured], up=Quantity(title="speed (m/s)", zero=True)),
-        Quantity(title="time (s)", nice=False, zero=True),
+        Plot(
+            series=[PlotSeries(label="FMU", x=times, y=speed), *measured], up=PlotAxis(title="speed (m/s)", zero=True)
+        ),
+        PlotAxis(title="time (s)", nice=False, zero=True),
         title="Speed of the vehicle: five tows, and the FMU under the same force",
         described="Speed over time of five tows; points were measured, the line is the FMU.",
         shown={"run:N": "tow"},

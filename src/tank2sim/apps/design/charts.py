@@ -9,10 +9,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tank2sim.answer.charts.curves import Plot, Series, curve_chart
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart
 from tank2sim.answer.charts.parts import plain, series_look
 from tank2sim.answer.charts.rows import runs_of
-from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, Quantity, channel, layer, layered, tooltips
+from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, channel, layer, layered, tooltips
 from tank2sim.apps.design.study import CampaignStudy, Certainty
 from tank2sim.units import in_words
 
@@ -52,8 +52,8 @@ def _plane(rows: Sequence[ChartRecord], title: str, across: str, up: str) -> Cha
     counts = sorted({1, max(1, most // 2), most})
     scale = {"domain": [0, most], "range": [0, 500]}  # from no area for no runs: the legend has only numbers of runs
     place = {
-        "x": Quantity(title=across, padding=20).channel("x"),
-        "y": Quantity(title=up, padding=20, zero=True).channel("y"),
+        "x": PlotAxis(title=across, padding=20).channel("x"),
+        "y": PlotAxis(title=up, padding=20, zero=True).channel("y"),
         "size": channel("runs:Q", scale=scale, legend={"title": "runs", "values": counts, "format": "d"}),
         "color": look.colour,
         "shape": look.shape,
@@ -83,9 +83,9 @@ def certainty_charts(curve: Certainty, seconds: float, unit: str) -> list[ChartS
         for kind, (times, errors) in plans.items():
             known = np.isfinite(errors[figure])
             time, error = np.asarray(times)[known] / seconds, np.asarray(errors[figure])[known]
-            series.append(Series(label=kind, x=time, y=error))
-        up = Quantity(title=f"standard error ({in_words(figure.partition('@')[0])[1]})", zero=True)
-        across = Quantity(title=f"time ({unit})")
+            series.append(PlotSeries(label=kind, x=time, y=error))
+        up = PlotAxis(title=f"standard error ({in_words(figure.partition('@')[0])[1]})", zero=True)
+        across = PlotAxis(title=f"time ({unit})")
         dots = [row for each in series for row in each.rows]
         place = {"x": across.channel("x"), "y": up.channel("v")}
         place["color"] = series_look([DESIGN, USUAL]).colour

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from tank2sim.answer.charts.parts import series_look
 from tank2sim.answer.charts.rows import RowPlot, row_chart
-from tank2sim.answer.charts.vega import Quantity, Rule
+from tank2sim.answer.charts.vega import PlotAxis, Rule
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Link, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.fleet.summary import REPORT_FILE, FleetStudy, ShipSummary
@@ -175,7 +175,7 @@ def _misfits(found: Sequence[ShipSummary]) -> list[Illustration]:
     chart = row_chart(
         RowPlot(
             rows=rows,
-            across=Quantity(title="misfit (standard deviations of the noise)", log=True),
+            across=PlotAxis(title="misfit (standard deviations of the noise)", log=True),
             look=series_look([_BEFORE, _AFTER], as_points=[_BEFORE, _AFTER]),
             names=[ship.folder for ship in found],
             rules=[Rule(at=[1.0], style="limit")],

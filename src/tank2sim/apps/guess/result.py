@@ -10,7 +10,7 @@ import numpy as np
 
 from tank2sim.answer.charts.parts import series_look
 from tank2sim.answer.charts.rows import RowPlot, names_of, row_layers, runs_of
-from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, Quantity, layered
+from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, layered
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, records_table, table
 from tank2sim.answer.result import Result
@@ -192,7 +192,7 @@ def figures_chart(study: GuessStudy) -> ChartSpec:
     kinds = [*runs_of(rows), *runs_of(points)]
     bars = RowPlot(
         rows=rows,
-        across=Quantity(title="times the median", log=True, nice=False, form="~g"),
+        across=PlotAxis(title="times the median", log=True, nice=False, form="~g"),
         shown={"name:N": "figure", "run:N": "it is"},
         look=series_look(kinds, as_points=kinds),
         side={"labelExpr": "split(datum.label, ': ')"},

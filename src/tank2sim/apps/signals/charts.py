@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tank2sim.answer.charts.curves import Plot, Series, curve_chart, curve_panels
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_panels
 from tank2sim.answer.charts.parts import LINE_SAMPLES, POINT_SAMPLES, with_unit
-from tank2sim.answer.charts.vega import ChartSpec, Quantity, Rule
+from tank2sim.answer.charts.vega import ChartSpec, PlotAxis, Rule
 from tank2sim.arrays import Array
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.signals.correlation import Autocorrelation, Correlation
@@ -25,10 +25,10 @@ _DOTTED = (2, 3)
 def density_chart(name: SignalName, density: Density, *, title: str = "") -> ChartSpec:
     """Probability density of a signal next to the normal one."""
     curves = {"estimated": density.density, "normal": density.normal}
-    series = [Series(label=label, x=density.values, y=curve) for label, curve in curves.items()]
-    up = Quantity(title=with_unit("probability density", f"1/({name.unit})"), zero=True)
+    series = [PlotSeries(label=label, x=density.values, y=curve) for label, curve in curves.items()]
+    up = PlotAxis(title=with_unit("probability density", f"1/({name.unit})"), zero=True)
     return curve_chart(
-        Plot(series=series, up=up), Quantity(title=with_unit(name.words, name.unit), nice=False), title=title
+        Plot(series=series, up=up), PlotAxis(title=with_unit(name.words, name.unit), nice=False), title=title
     )
 
 
@@ -53,9 +53,9 @@ def _correlation(
         Rule(at=levels, dash=_DOTTED),
         Rule(at=[mark_s], upright=True, style="limit", dash=_DOTTED),
     ]
-    series = [Series(label=label, x=found.lag_s, y=found.coefficient)]
-    up = Quantity(title="correlation coefficient", domain=(-1.0, 1.0))
-    across = Quantity(title="lag (s)", nice=False)
+    series = [PlotSeries(label=label, x=found.lag_s, y=found.coefficient)]
+    up = PlotAxis(title="correlation coefficient", domain=(-1.0, 1.0))
+    across = PlotAxis(title="lag (s)", nice=False)
     return curve_chart(Plot(series=series, up=up, rules=rules), across, title=title, described=described)
 
 
@@ -63,17 +63,17 @@ def spectrum_chart(name: SignalName, spectrum: Spectrum, *, title: str = "") -> 
     """Power spectral density with its 95 % confidence band, both axes logarithmic."""
     kept = thin_line([np.log10(np.maximum(spectrum.density, np.finfo(float).tiny))], LINE_SAMPLES)
     kept = kept[spectrum.low[kept] > 0]  # what is exactly zero has no place on a logarithmic scale
-    series = Series(
+    series = PlotSeries(
         label=name.words,
         x=spectrum.frequency_hz[kept],
         y=spectrum.density[kept],
         low=spectrum.low[kept],
         high=spectrum.high[kept],
     )
-    up = Quantity(title=f"power density (({name.unit})²/Hz)", log=True, form=".0e", ticks=8)
+    up = PlotAxis(title=f"power density (({name.unit})²/Hz)", log=True, form=".0e", ticks=8)
     return curve_chart(
         Plot(series=[series], up=up),
-        Quantity(title="frequency (Hz)", log=True, nice=False, form="~g"),
+        PlotAxis(title="frequency (Hz)", log=True, nice=False, form="~g"),
         title=title,
         described=f"Power spectral density of {name.words} with its 95 % confidence band.",
     )
@@ -90,23 +90,23 @@ def transfer_chart(source: SignalName, result: SignalName, transfer: Transfer, *
     gain, phase, half = gain[kept], np.rad2deg(phase[kept]), np.rad2deg(error)
     label = f"{source.words} to {result.words}"
 
-    def points(values: Array, low: Array, high: Array) -> list[Series]:
-        return [Series(label=label, x=frequency[kept], y=values, low=low, high=high, points=True)]
+    def points(values: Array, low: Array, high: Array) -> list[PlotSeries]:
+        return [PlotSeries(label=label, x=frequency[kept], y=values, low=low, high=high, points=True)]
 
     plots = [
         Plot(
             series=points(gain, gain * np.exp(-error), gain * np.exp(error)),
-            up=Quantity(title=with_unit("gain", "1/s"), log=True, form="~g"),
+            up=PlotAxis(title=with_unit("gain", "1/s"), log=True, form="~g"),
             height_px=150,
         ),
         Plot(
             series=points(phase, phase - half, phase + half),
-            up=Quantity(title=_PHASE, domain=(-180.0, 180.0), ticks=[-180, -90, 0, 90, 180]),
+            up=PlotAxis(title=_PHASE, domain=(-180.0, 180.0), ticks=[-180, -90, 0, 90, 180]),
             height_px=150,
         ),
         Plot(
-            series=[Series(label=label, x=frequency, y=coherence)],
-            up=Quantity(title="coherence; dotted: by chance", domain=(0.0, 1.0)),
+            series=[PlotSeries(label=label, x=frequency, y=coherence)],
+            up=PlotAxis(title="coherence; dotted: by chance", domain=(0.0, 1.0)),
             height_px=150,
             rules=[Rule(at=[transfer.coherence_by_chance], style="limit", dash=_DOTTED)],
         ),
@@ -122,13 +122,13 @@ def effect_chart(label: str, effect: FilterEffect, *, title: str = "") -> ChartS
     # Where nothing passes, the phase is that of rounding.
     phase = np.where(decibel > _LEAST_DECIBEL, np.rad2deg(phase), np.nan)
     plots = [
-        Plot(series=[Series(label=label, x=frequency, y=curve)], up=Quantity(title=up), height_px=130)
+        Plot(series=[PlotSeries(label=label, x=frequency, y=curve)], up=PlotAxis(title=up), height_px=130)
         for up, curve in {"gain (dB)": decibel, _PHASE: phase, "group delay (s)": delay}.items()
     ]
     described = f"Gain, phase and group delay of {label}."
     return curve_panels(plots, _frequency(frequency), title=title, described=described)
 
 
-def _frequency(values: Array) -> Quantity:
+def _frequency(values: Array) -> PlotAxis:
     span = float(values[0]), float(values[-1])
-    return Quantity(title="frequency (Hz)", log=True, domain=span, nice=False, form="~g")
+    return PlotAxis(title="frequency (Hz)", log=True, domain=span, nice=False, form="~g")

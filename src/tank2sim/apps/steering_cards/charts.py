@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from tank2sim.answer.charts.curves import Plot, Series, curve_chart
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart
 from tank2sim.answer.charts.parts import plain
 from tank2sim.answer.charts.rows import RowPlot, names_of, row_chart, runs_of
 from tank2sim.answer.charts.theme import SHAPES
-from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, Quantity, Rule, channel, layer, tooltips
+from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, Rule, channel, layer, tooltips
 from tank2sim.apps.steering_cards.comparison import SteeringDiagrams
 
 
@@ -20,7 +20,7 @@ def steering_diagram_chart(diagrams: SteeringDiagrams) -> ChartSpec:
     diagrams : SteeringDiagrams
     """
     series = [
-        Series(label=label, x=line.rudder_deg, y=line.yaw_rate_degpmin, closed=True)
+        PlotSeries(label=label, x=line.rudder_deg, y=line.yaw_rate_degpmin, closed=True)
         for label, line in diagrams.models.items()
     ]
     points: list[ChartRecord] = [
@@ -28,8 +28,8 @@ def steering_diagram_chart(diagrams: SteeringDiagrams) -> ChartSpec:
         for one in diagrams.points
     ]
     marked = runs_of(points)
-    across = Quantity(title="rudder, starboard positive (deg)", padding=12)
-    up = Quantity(title="yaw rate, starboard positive (deg/min)", zero=True)
+    across = PlotAxis(title="rudder, starboard positive (deg)", padding=12)
+    up = PlotAxis(title="yaw rate, starboard positive (deg/min)", zero=True)
     shown = {"run:N": "of", "x:Q": "rudder (deg)", "v:Q": "yaw rate (deg/min)"}
     # Next to the lines these names would be too wide for the page.
     below = {"title": None, "orient": "bottom"}
@@ -59,7 +59,7 @@ def influence_bars(models: Mapping[str, Mapping[str, float]]) -> ChartSpec:
     return row_chart(
         RowPlot(
             rows=rows,
-            across=Quantity(title="change of the radius for 10 % more (%)", zero=True),
+            across=PlotAxis(title="change of the radius for 10 % more (%)", zero=True),
             apart=True,
             rules=[Rule(at=[0.0])],
             side={"labelLimit": 160},

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tank2sim.answer.charts.curves import Plot, Series, curve_chart, look_of
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, look_of
 from tank2sim.answer.charts.motion import History, Signal, history_chart
 from tank2sim.answer.charts.parts import equal_frame, vector
-from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, Quantity, layer, layered
+from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, layer, layered
 from tank2sim.apps.rigs.glider.quasi_steady_error import SwingError
 from tank2sim.apps.rigs.glider.study import GlideState, PathPlace, TransientPath
 from tank2sim.apps.rigs.glider.transient import ProgrammeError
@@ -91,7 +91,7 @@ def _arms(length: float) -> list[ChartRecord]:
 
 def polar_chart(polar: Columns, marked: Mapping[str, GlideState], *, title: str = "") -> ChartSpec:
     """The polar: speed down against speed over the ground, with marked glides."""
-    line = Series(
+    line = PlotSeries(
         label="polar",
         x=polar["horizontal_speed_mps"],
         y=-polar["climb_mps"],
@@ -99,7 +99,7 @@ def polar_chart(polar: Columns, marked: Mapping[str, GlideState], *, title: str 
         more={"angle": np.abs(polar["path_angle_deg"])},
     )
     glides = [
-        Series(
+        PlotSeries(
             label=label,
             x=[glide.horizontal_speed_mps],
             y=[-glide.climb_mps],
@@ -109,8 +109,8 @@ def polar_chart(polar: Columns, marked: Mapping[str, GlideState], *, title: str 
         for label, glide in marked.items()
     ]
     best = max(marked.values(), key=lambda glide: glide.horizontal_speed_mps / -glide.climb_mps)
-    across = Quantity(title="speed over the ground (m/s)", zero=True)
-    up = Quantity(title="speed down (m/s)", zero=True, scale={"reverse": True})
+    across = PlotAxis(title="speed over the ground (m/s)", zero=True)
+    up = PlotAxis(title="speed down (m/s)", zero=True, scale={"reverse": True})
     tangent = [{"x": 0.0, "v": 0.0}, {"x": best.horizontal_speed_mps, "v": -best.climb_mps}]
     over = [layer("line", tangent, {"x": across.channel("x"), "y": up.channel("v")}, style="reference")]
     return curve_chart(
@@ -157,9 +157,9 @@ def swing_chart(errors: Sequence[SwingError], *, title: str = "") -> ChartSpec:
 
 def _errors(series: Sequence[tuple[str, Array, Array]], titles: tuple[str, str], *, title: str) -> ChartSpec:
     """Shares in per cent against times, both logarithmic."""
-    curves = [Series(label=label, x=time, y=100 * share) for label, time, share in series]
-    across = Quantity(title=titles[0], log=True, nice=False, padding=12, form="~g")
-    up = Quantity(title=titles[1], log=True, form="~g")
+    curves = [PlotSeries(label=label, x=time, y=100 * share) for label, time, share in series]
+    across = PlotAxis(title=titles[0], log=True, nice=False, padding=12, form="~g")
+    up = PlotAxis(title=titles[1], log=True, form="~g")
     text = ", ".join(label for label, _, _ in series)
     place = {"x": across.channel("x"), "y": up.channel("v"), "color": look_of(curves).colour}
     dots = layer("point", [row for curve in curves for row in curve.rows], place, clip=True, filled=True)
@@ -194,7 +194,7 @@ def _plane(
     place = frame.axes(across=("x", titles[0]), up=("v", titles[1]))
     if arms:
         place = {name: axis | {"axis": None} for name, axis in place.items()}
-    series = [Series(label=label, x=x, y=y, closed=True) for label, x, y in drawn]
+    series = [PlotSeries(label=label, x=x, y=y, closed=True) for label, x, y in drawn]
     look = look_of(series)
     rows = [row for each in series for row in each.rows]
     marks = {**place, "color": look.colour, "strokeDash": look.dash, "order": "i:Q"}

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from tank2sim.answer.charts.curves import Plot, Series, curve_chart, curve_layers, look_of
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_layers, look_of
 from tank2sim.answer.charts.motion import History, Signal, history_chart
 from tank2sim.answer.charts.parts import plain, series_look
 from tank2sim.answer.charts.rows import RowPlot, row_layers
-from tank2sim.answer.charts.vega import STACKS, ChartRecord, ChartSpec, Quantity, Rule, layered
+from tank2sim.answer.charts.vega import STACKS, ChartRecord, ChartSpec, PlotAxis, Rule, layered
 from tank2sim.apps.rigs.tow.model_selection import FittedModel, TowByTow
 from tank2sim.apps.rigs.tow.study import Ellipse, TowSpeeds
 from tank2sim.apps.rigs.tow.theory import DragPolynomial, TowedBody
@@ -49,11 +49,17 @@ def drag_chart(drags: Mapping[str, DragPolynomial], body: TowedBody, top_speed_m
     """C referred to L^2 against speed, and C referred to V^(2/3) against Reynolds number."""
     speeds = np.linspace(0.0, top_speed_mps, 121)
     panels = []
-    shown = {"run:N": "by", "speed:Q": "v (m/s)", "re:Q": ("Re", ",.3~s"), "c:Q": "C by L²", "cv:Q": "C by V^(2/3)"}
+    shown: dict[str, str | tuple[str, str]] = {
+        "run:N": "by",
+        "speed:Q": "v (m/s)",
+        "re:Q": ("Re", ",.3~s"),
+        "c:Q": "C by L²",
+        "cv:Q": "C by V^(2/3)",
+    }
     for across, values, name, factor in (
-        (Quantity(title="speed (m/s)", nice=False), speeds, "C referred to L²", 1.0),
+        (PlotAxis(title="speed (m/s)", nice=False), speeds, "C referred to L²", 1.0),
         (
-            Quantity(title="Reynolds number v L / ν", nice=False, form="~s"),
+            PlotAxis(title="Reynolds number v L / ν", nice=False, form="~s"),
             body.reynolds(speeds),
             "C referred to V^(2/3)",
             body.area_ratio,
@@ -63,8 +69,8 @@ def drag_chart(drags: Mapping[str, DragPolynomial], body: TowedBody, top_speed_m
         for label, drag in drags.items():
             both = {"c": drag.at(speeds), "cv": drag.times(body.area_ratio).at(speeds)}
             more = {"speed": speeds, "re": body.reynolds(speeds), **both}
-            series.append(Series(label=label, x=values, y=drag.times(factor).at(speeds), more=more))
-        up = Quantity(title=name, domain=_frame(drags, speeds, factor))
+            series.append(PlotSeries(label=label, x=values, y=drag.times(factor).at(speeds), more=more))
+        up = PlotAxis(title=name, domain=_frame(drags, speeds, factor))
         plot = Plot(series=series, up=up, rules=[Rule(at=[0.0])])
         layers = curve_layers(plot, across, look_of(series), shown=shown)
         panels.append(layered(layers, size=(330, 300)))
@@ -89,7 +95,7 @@ def _frame(drags: Mapping[str, DragPolynomial], speeds: Array, factor: float) ->
 def ellipse_chart(ellipses: Sequence[Ellipse], by_tow: Mapping[str, TowByTow]) -> ChartSpec:
     """Joint 95 % regions of M and B3 from all tows, and each tow by itself as a point."""
     series = [
-        Series(label=f"95 %: {ellipse.label}", x=ellipse.mass_kg, y=ellipse.B3_kgpm, closed=True)
+        PlotSeries(label=f"95 %: {ellipse.label}", x=ellipse.mass_kg, y=ellipse.B3_kgpm, closed=True)
         for ellipse in ellipses
     ]
     for name, way in by_tow.items():
@@ -98,10 +104,10 @@ def ellipse_chart(ellipses: Sequence[Ellipse], by_tow: Mapping[str, TowByTow]) -
             if len(known):
                 mass, drag = np.asarray(way.alone)[known, :2].T
                 label, more = f"each tow: {', '.join(way.unknowns)}", {"tow": known + 1.0}
-                series.append(Series(label=label, x=mass, y=drag, points=True, more=more))
+                series.append(PlotSeries(label=label, x=mass, y=drag, points=True, more=more))
     return curve_chart(
-        Plot(series=series, up=Quantity(title="B3 (kg/m)"), height_px=360),
-        Quantity(title="M (kg)"),
+        Plot(series=series, up=PlotAxis(title="B3 (kg/m)"), height_px=360),
+        PlotAxis(title="M (kg)"),
         title="M and B3 together",
         width_px=620,
         described="Joint 95 % regions of M and B3 with and without a start delay, and the estimates of each tow.",
@@ -135,14 +141,14 @@ def model_chart(models: Sequence[FittedModel]) -> ChartSpec:
     }
     mass_rows = RowPlot(
         rows=rows,
-        across=Quantity(title="M with its 95 % interval (kg)"),
+        across=PlotAxis(title="M with its 95 % interval (kg)"),
         shown=shown,
         look=series_look(verdicts, as_points=verdicts),
     )
     rank_rows = replace(
         mass_rows,
         rows=[row | {"v": row["aic"], "low": None} for row in rows],
-        across=Quantity(title="AIC above the lowest", zero=True),
+        across=PlotAxis(title="AIC above the lowest", zero=True),
         side={"labels": False},
     )
     masses, ranks = (row_layers(each, span_px=2, size=70, strokeWidth=2) for each in (mass_rows, rank_rows))

@@ -11,7 +11,7 @@ from tank2sim.answer.charts.vega import (
     STACKS,
     ChartRecord,
     ChartSpec,
-    Quantity,
+    PlotAxis,
     Rule,
     channel,
     layer,
@@ -57,7 +57,7 @@ def balance_chart(balance: EnergyBalance) -> ChartSpec:
         points = [{"part": place, "run": "motor", "v": plain(1e3 * value)} for place, value in motor]
         place = {
             "x": channel("part:O", title=f"{name}: part of the interval", axis={"labelAngle": 0}),
-            "y": Quantity(title="work (mJ)", zero=True).channel("v"),
+            "y": PlotAxis(title="work (mJ)", zero=True).channel("v"),
             "color": look.colour,
             "tooltip": tooltips({"run:N": "spent on", "part:O": "part", "v:Q": "work (mJ)"}),
         }
@@ -92,7 +92,7 @@ def estimates_chart(methods: Mapping[str, YawMethodEstimate]) -> ChartSpec:
     return row_chart(
         RowPlot(
             rows=rows,
-            across=Quantity(title=f"{words} (10⁻⁴ kg m²)"),
+            across=PlotAxis(title=f"{words} (10⁻⁴ kg m²)"),
             rules=[Rule(at=[rows[0]["v"]], dash=(4, 3))],
             side={"labelLimit": 260},
             shown={"name:N": "method", "v:Q": "10⁻⁴ kg m²", "low:Q": "from", "high:Q": "to"},
@@ -114,9 +114,9 @@ def energy_residual_chart(residuals: Sequence[EnergyResidual]) -> ChartSpec:
         for one in residuals
     ]
     look = series_look(["accelerating", "braking"], as_points=["accelerating", "braking"])
-    up = Quantity(title="work left over (µJ)", zero=True).channel("v")
+    up = PlotAxis(title="work left over (µJ)", zero=True).channel("v")
     place = {
-        "x": Quantity(title="mean rate of the subinterval (deg/s)").channel("x"),
+        "x": PlotAxis(title="mean rate of the subinterval (deg/s)").channel("x"),
         "y": up,
         "color": look.colour,
         "shape": look.shape,
