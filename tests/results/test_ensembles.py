@@ -12,8 +12,7 @@ from tank2sim.analysis.ensemble.tails import Tail
 from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.answer.parts import Section
-from tank2sim.results.ensemble_charts import curve_charts, turns_chart
-from tank2sim.results.ensembles import chance_sentences, stability_section
+from tank2sim.results.ensembles import chance_sentences, curve_charts, stability_section, turns_chart
 from tank2sim.simulation.bands import Band
 
 X = np.linspace(-0.6, 0.6, 13)

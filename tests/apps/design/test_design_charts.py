@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from tank2sim.apps.design.charts import run_planes
+from tank2sim.apps.design.result import run_planes
 
 
 @pytest.mark.parametrize("repeats", [1, 2, 5])
