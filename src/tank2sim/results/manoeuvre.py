@@ -12,7 +12,6 @@ import numpy as np
 
 from tank2sim.analysis.ensemble.results import ManoeuvreBands
 from tank2sim.analysis.manoeuvre import ManoeuvreStudy, OtherSide
-from tank2sim.answer.charts.columns import varying_histories
 from tank2sim.answer.charts.manoeuvre import (
     Motion,
     along_course,
@@ -24,7 +23,7 @@ from tank2sim.answer.charts.manoeuvre import (
     way_chart,
     zigzag_chart,
 )
-from tank2sim.answer.charts.motion import SpiralData, spiral_chart
+from tank2sim.answer.charts.motion import SpiralData, spiral_chart, varying_histories
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result

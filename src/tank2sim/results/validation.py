@@ -11,7 +11,7 @@ import numpy as np
 
 from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.analysis.validation.study import ComparisonOutcome, Validated, Verified
-from tank2sim.answer.charts.columns import motions
+from tank2sim.answer.charts.motion import motions
 from tank2sim.answer.charts.parts import with_unit
 from tank2sim.answer.charts.rows import RowPlot, names_of, row_layers
 from tank2sim.answer.charts.vega import SIDE, ChartSpec, PlotAxis, Rule, channel, layer, layered
