@@ -20,7 +20,7 @@ from tank2sim.units import in_words
 if TYPE_CHECKING:
     import pandas as pd
 
-FigurePercent = tuple[str, str, str, float, float | None]
+_FigurePercent = tuple[str, str, str, float, float | None]
 """Card, trial, figure in words, difference from the reference in per cent, and in standard errors."""
 
 
@@ -178,7 +178,7 @@ class ComparisonResult(Result[CardComparison]):
     def _others(self) -> list[tuple[int, str]]:
         return list(enumerate(self.labels))[1:]
 
-    def _percents(self) -> list[FigurePercent]:
+    def _percents(self) -> list[_FigurePercent]:
         """Differences of the figures that both cards show."""
         return [
             (label, trial.name, in_words(name)[0], 100 * apart / abs(first), z)
@@ -203,7 +203,7 @@ class ComparisonResult(Result[CardComparison]):
         percents = self._percents()
         if not percents:
             return []
-        chart = percent_chart(
+        chart = _percent_chart(
             percents, self.labels, ", standard errors assumed" * any(card.assumed_errors for card in self.study.cards)
         )
         drawn = Illustration(chart=chart, caption=_PERCENT, name="figures_of_manoeuvres")
@@ -253,7 +253,7 @@ class ComparisonResult(Result[CardComparison]):
         charts = []
         if any(summary.compared for summary in study.summary):
             caption = f"Lines at {BEYOND_STANDARD_ERRORS:g} standard errors."
-            chart = errors_chart(study.rows, self.labels)
+            chart = _errors_chart(study.rows, self.labels)
             charts.append(Illustration(chart=chart, caption=caption, name="coefficients"))
         return Section(heading="Coefficients", text="\n\n".join(texts), tables=tables, charts=charts)
 
@@ -320,7 +320,7 @@ def _with_deviations(row: ComparedFigure) -> list[str | None]:
     ]
 
 
-def errors_chart(coefficients: Sequence[CoefficientRow], labels: Sequence[str]) -> ChartSpec:
+def _errors_chart(coefficients: Sequence[CoefficientRow], labels: Sequence[str]) -> ChartSpec:
     """Differences of all coefficients in standard errors, a row each, a shape and colour for each card."""
     rows = [
         {"name": row.name, "v": difference.standard_errors, "run": label}
@@ -343,7 +343,7 @@ def errors_chart(coefficients: Sequence[CoefficientRow], labels: Sequence[str]) 
     )
 
 
-def percent_chart(percents: Sequence[FigurePercent], labels: Sequence[str], assumed: str) -> ChartSpec:
+def _percent_chart(percents: Sequence[_FigurePercent], labels: Sequence[str], assumed: str) -> ChartSpec:
     """Differences in per cent of the reference's figure: a panel a manoeuvre, a row a figure, a shape and colour for
     each card. `assumed` is added to the title."""
     panels: dict[str, list[ChartRecord]] = {}

@@ -253,8 +253,8 @@ class IdentificationResult(Result[IdentificationStudy]):
         rows: list[list[Cell]] = [
             [
                 name,
-                value_with_error(entry.value, entry.standard_error),
-                value_with_error(entry.before, entry.before_standard_error),
+                _value_with_error(entry.value, entry.standard_error),
+                _value_with_error(entry.before, entry.before_standard_error),
                 f"{100 * entry.share_from_trials:.0f} %",
             ]
             for name, entry in study.parameters.items()
@@ -265,16 +265,16 @@ class IdentificationResult(Result[IdentificationStudy]):
             tables.append(self._bootstrap(study.bootstrap))
         title = "Parameters: estimate and prior with 95 % intervals"
         in_errors = "In standard errors of the prior, as the fit took it."
-        correlation = correlation_chart(known, title="Correlation of the parameters, by the trials alone")
+        correlation = _correlation_chart(known, title="Correlation of the parameters, by the trials alone")
         information = "Information of the trials: singular values"
-        singular = singular_value_chart(known.singular_values, title=information)
+        singular = _singular_value_chart(known.singular_values, title=information)
         return Section(
             heading="Parameters",
             text=_PARAMETERS + _widened(study.prior_scale),
             tables=tables,
             charts=[
                 Illustration(
-                    chart=parameter_chart(study.parameters, title=title), caption=in_errors, name="parameters"
+                    chart=_parameter_chart(study.parameters, title=title), caption=in_errors, name="parameters"
                 ),
                 Illustration(chart=correlation, name="correlation"),
                 Illustration(chart=singular, caption=_SINGULAR, name="singular_values"),
@@ -300,7 +300,7 @@ class IdentificationResult(Result[IdentificationStudy]):
             for name, entry in posterior.parameters.items()
         ]
         title = "Samples of the posterior, next to a normal distribution"
-        chart = posterior_chart(self.study.parameters, posterior, title=title)
+        chart = _posterior_chart(self.study.parameters, posterior, title=title)
         text = _POSTERIOR.format(
             draws=posterior.draws,
             chains=posterior.chains,
@@ -412,12 +412,12 @@ def _figure_row(figure: PredictedFigure, word: str, ending: str) -> list[Cell]:
     return [figure.trial, word, name, *numbers, None if np.isnan(error) else text, expected]
 
 
-def value_with_error(value: float, error: float) -> str:
+def _value_with_error(value: float, error: float) -> str:
     """Value and standard error in words: ``-0.0035 ± 0.00012``."""
     return f"{value:.5g} ± {error:.2g}"
 
 
-def parameter_chart(parameters: Mapping[str, ParameterEstimate], *, title: str = "") -> ChartSpec:
+def _parameter_chart(parameters: Mapping[str, ParameterEstimate], *, title: str = "") -> ChartSpec:
     """Estimates with their 95 % intervals next to the priors', in standard errors of the prior; shares next to."""
     found = [_parameter_row(name, parameter) for name, parameter in parameters.items()]
     farthest = max((abs(row[key] or 0.0) for row in found for key in ("low", "high")), default=1.0)
@@ -470,8 +470,8 @@ def _parameter_row(name: str, parameter: ParameterEstimate) -> ChartRecord:
         "low": plain(value - error),
         "high": plain(value + error),
         "share": plain(share),
-        "own": value_with_error(parameter.value, parameter.standard_error),
-        "known": value_with_error(parameter.before, unit),
+        "own": _value_with_error(parameter.value, parameter.standard_error),
+        "known": _value_with_error(parameter.before, unit),
         "share_text": f"{share:.0f} %",
     }
 
@@ -482,7 +482,7 @@ def _symmetric_ticks(farthest: float) -> list[float]:
     return [-step for step in reversed(positive)] + [0.0, *positive]
 
 
-def posterior_chart(
+def _posterior_chart(
     parameters: Mapping[str, ParameterEstimate], posterior: PosteriorStudy, *, title: str = ""
 ) -> ChartSpec:
     """Median and intervals of 50 and 95 % of each sampled parameter, in its standard deviations from its mean.
@@ -518,7 +518,7 @@ def posterior_chart(
     )
 
 
-def correlation_chart(known: IdentifiabilityStudy, *, title: str = "") -> ChartSpec:
+def _correlation_chart(known: IdentifiabilityStudy, *, title: str = "") -> ChartSpec:
     """Correlation of the estimates by the trials alone, as a heat map; frames mark :data:`CLOSE_CORRELATION`."""
     names = list(known.parameters)
     step = max(8, min(24, 560 // len(names)))
@@ -558,7 +558,7 @@ def correlation_chart(known: IdentifiabilityStudy, *, title: str = "") -> ChartS
     )
 
 
-def singular_value_chart(values: Array, *, title: str = "") -> ChartSpec:
+def _singular_value_chart(values: Array, *, title: str = "") -> ChartSpec:
     """Singular values of the sensitivities in units of the prior, falling; below 1 the prior determines more."""
     rows = [{"order": order, "v": plain(value)} for order, value in enumerate(values.tolist(), start=1) if value > 0]
     across = PlotAxis(

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tank2sim.analysis.influence.card_influence import InfluenceStudy
+from tank2sim.analysis.influence.figures import figure_label
 from tank2sim.analysis.tuning.result import TunedStudy
 from tank2sim.answer.charts.matrix import Matrix
 from tank2sim.answer.charts.parts import plain, series_look
 from tank2sim.answer.charts.rows import RowPlot, row_chart, row_layers
 from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, Rule, layered
 from tank2sim.arrays import Array
-from tank2sim.units import in_words
 
 EXACT, DIFFERENCE = "exact slope", "10 % difference"
 
@@ -51,16 +50,6 @@ class InfluenceData:
             difference=np.array([[cell.difference for cell in row] for row in rows]),
             shares=np.array(shares),
         )
-
-
-_ORDINALS = ("first", "second", "third", "fourth")
-
-
-def figure_label(text: str) -> str:
-    """Words for a figure, without its unit: ``advance_m@35`` is ``advance, 35 deg``."""
-    kind, _, argument = text.partition("@")
-    words = re.sub(r"^overshoot (\d)$", lambda found: f"{_ORDINALS[int(found[1]) - 1]} overshoot", in_words(kind)[0])
-    return f"{words}, {argument} deg" if argument else words
 
 
 def most_influential(result: InfluenceData, row: int) -> list[int]:

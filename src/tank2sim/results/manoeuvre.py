@@ -41,7 +41,7 @@ from tank2sim.units import in_words
 if TYPE_CHECKING:
     import pandas as pd
 
-SIDE_NAMES = {1: "starboard", -1: "port"}
+_SIDE_NAMES = {1: "starboard", -1: "port"}
 
 
 _FIRST: Mapping[str, tuple[str, ...]] = {
@@ -97,12 +97,12 @@ class ManoeuvreResult(Result[ManoeuvreStudy]):
     @property
     def title(self) -> str:
         """The ship, and the manoeuvre in words."""
-        return f"{self.study.ship}: {manoeuvre_title(self.study)}"
+        return f"{self.study.ship}: {_manoeuvre_title(self.study)}"
 
     @property
     def subtitle(self) -> str:
         """The manoeuvre as it was ordered, and the ensemble."""
-        members = f", {members_text(self.study.ensemble)}" if self.study.ensemble else ""
+        members = f", {_members_text(self.study.ensemble)}" if self.study.ensemble else ""
         return f"Simulated manoeuvre {self.study.manoeuvre}{members}"
 
     @property
@@ -219,7 +219,7 @@ class ManoeuvreResult(Result[ManoeuvreStudy]):
         elif limit is not None:
             verdict = Verdict.PASSED if value <= limit else Verdict.FAILED
         if name == "side_reach_m":
-            notes.append(f"to {SIDE_NAMES[-1 if value < 0 else 1]}")
+            notes.append(f"to {_SIDE_NAMES[-1 if value < 0 else 1]}")
             value = abs(value)
         label = label[:1].upper() + label[1:]
         return KeyFigure(label=label, value=value, unit=unit, verdict=verdict, note="; ".join(notes), limit=limit)
@@ -242,8 +242,8 @@ class ManoeuvreResult(Result[ManoeuvreStudy]):
                 "is zero at the neutral rudder; on an unstable ship they remain apart."
             )
         sections = [
-            Section(heading="The manoeuvre", text=text, charts=manoeuvre_charts(self.study)),
-            Section(heading="Time histories", charts=history_charts(self.study)),
+            Section(heading="The manoeuvre", text=text, charts=_manoeuvre_charts(self.study)),
+            Section(heading="Time histories", charts=_history_charts(self.study)),
             Section(heading="Figures", tables=self._tables()),
         ]
         return [section for section in sections if section.charts or section.tables]
@@ -319,15 +319,10 @@ def _pull_outs(*sides: Mapping[str, Any]) -> str:
     return "The yaw rates from both sides stay apart: the ship is unstable on a straight course, or very slow."
 
 
-def manoeuvre_title(study: ManoeuvreStudy) -> str:
-    """Return the manoeuvre in words: ``turning circle, 35° of rudder to starboard``.
-
-    Parameters
-    ----------
-    study : ManoeuvreStudy
-    """
+def _manoeuvre_title(study: ManoeuvreStudy) -> str:
+    """Return the manoeuvre in words: ``turning circle, 35° of rudder to starboard``."""
     argument = study.argument
-    side, size = SIDE_NAMES[-1 if argument.startswith("-") else 1], argument.lstrip("+-")
+    side, size = _SIDE_NAMES[-1 if argument.startswith("-") else 1], argument.lstrip("+-")
     titles = {
         "turn": f"turning circle, {size}° of rudder to {side}",
         "zigzag": f"zigzag {size}, first to {side}",
@@ -341,36 +336,26 @@ def manoeuvre_title(study: ManoeuvreStudy) -> str:
     return titles.get(study.kind, study.manoeuvre)
 
 
-def members_text(ensemble: ManoeuvreBands) -> str:
-    """Return the members in words: how many ships, and with which errors.
-
-    Parameters
-    ----------
-    ensemble : ManoeuvreBands
-    """
+def _members_text(ensemble: ManoeuvreBands) -> str:
+    """Return the members in words: how many ships, and with which errors."""
     errors = "assumed errors" if ensemble.assumed_errors else "the errors of the card"
     return f"{ensemble.usable} ships within {errors}"
 
 
-def manoeuvre_charts(study: ManoeuvreStudy) -> list[Illustration]:
-    """Return the charts special to the manoeuvre, empty without a position or a yaw rate.
-
-    Parameters
-    ----------
-    study : ManoeuvreStudy
-    """
+def _manoeuvre_charts(study: ManoeuvreStudy) -> list[Illustration]:
+    """Return the charts special to the manoeuvre, empty without a position or a yaw rate."""
     try:
         motion = motion_of(study.histories, study.length_m, study.beam_m)
     except KeyError:  # a craft or a file without a position or a yaw rate
         return []
     figures = single_figures(study.figures)
-    title = manoeuvre_title(study)
+    title = _manoeuvre_title(study)
     title = title[:1].upper() + title[1:]
     bands, shaded = {}, ""
     if study.ensemble:
         title += ", standard errors assumed" * study.ensemble.assumed_errors
         bands = study.ensemble.figures
-        shaded = f"Shaded: nine of ten of {members_text(study.ensemble)}. Bars: nine of ten of each figure."
+        shaded = f"Shaded: nine of ten of {_members_text(study.ensemble)}. Bars: nine of ten of each figure."
     match study.kind:
         case "turn" | "difference":
             chart = turn_chart(motion, figures, bands=bands, edges_m=_track_edges(study), title=title)
@@ -397,13 +382,8 @@ def manoeuvre_charts(study: ManoeuvreStudy) -> list[Illustration]:
     return [Illustration(chart=way_chart(motion, [], title="Track"), caption=shaded)]
 
 
-def history_charts(study: ManoeuvreStudy) -> list[Illustration]:
-    """Return the chart of the signals that change over time, with the bands of an ensemble; empty without any.
-
-    Parameters
-    ----------
-    study : ManoeuvreStudy
-    """
+def _history_charts(study: ManoeuvreStudy) -> list[Illustration]:
+    """Return the chart of the signals that change over time, with the bands of an ensemble; empty without any."""
     bands = study.ensemble.histories if study.ensemble else {}
     drawn = varying_histories(study.histories, bands, study.ensemble.t_s if study.ensemble else np.zeros(0))
     return [drawn] if drawn else []
@@ -415,7 +395,7 @@ def _pull_out(study: ManoeuvreStudy, motion: Motion, title: str) -> Illustration
     sides = {1 if motion.rudder_deg[1] > neutral else -1: motion}
     if study.other_side:
         sides[-next(iter(sides))] = motion_of(study.other_side.histories)
-    named = {f"from a turn to {SIDE_NAMES[side]}": sides[side] for side in sorted(sides, reverse=True)}
+    named = {f"from a turn to {_SIDE_NAMES[side]}": sides[side] for side in sorted(sides, reverse=True)}
     return Illustration(chart=pull_out_chart(named, neutral, title=title))
 
 

@@ -26,7 +26,7 @@ from tank2sim.answer.charts.vega import (
     tooltips,
 )
 from tank2sim.arrays import Array
-from tank2sim.identification.trials.study import PredictedFigure, TrialErrors, TrialMotions, WindowError
+from tank2sim.identification.trials.study import PredictedFigure, TrialErrors, TrialMotions
 from tank2sim.records.thinning import Indices, thin_points
 from tank2sim.units import in_words
 
@@ -174,16 +174,12 @@ def window_chart(sets: Mapping[str, Sequence[TrialErrors]], *, title: str = "") 
     }
 
 
-def _errors_of(trial: TrialErrors, label: str) -> dict[str, WindowError]:
-    return trial.before if label == BEFORE else trial.found
-
-
 def _window_map(
     trials: Sequence[TrialErrors], label: str, signals: Sequence[str], title: str, *, named: bool
 ) -> ChartSpec:
     rows = []
     for trial in trials:
-        for name, errors in _errors_of(trial, label).items():
+        for name, errors in (trial.before if label == BEFORE else trial.found).items():
             share, error = 100 * errors.relative, errors.rms_error
             rows.append(
                 {"trial": trial.trial, "signal": SYMBOLS.get(name, name), "share": plain(share)}

@@ -28,7 +28,7 @@ from tank2sim.units import in_words
 if TYPE_CHECKING:
     import pandas as pd
 
-COMPARISON_ERRORS = (
+_COMPARISON_ERRORS = (
     "Points: error E of the simulation. Bars: plus and minus its uncertainty U_val; a point within its bar is "
     "validated, if the bar is short enough. The number names the trial."
 )
@@ -284,7 +284,7 @@ class ValidationResult(Result[ValidationStudy]):
             ],
             charts=[
                 Illustration(
-                    chart=comparison_error_chart(figures, numbers), caption=COMPARISON_ERRORS, name="validation"
+                    chart=_comparison_error_chart(figures, numbers), caption=_COMPARISON_ERRORS, name="validation"
                 )
             ],
         )
@@ -372,7 +372,7 @@ def _digits(value: float | None, digits: int = 4) -> str | None:
     return None if value is None else format_number(value, digits)
 
 
-def comparison_error_chart(figures: Sequence[Validated], numbers: Mapping[str, int]) -> ChartSpec:
+def _comparison_error_chart(figures: Sequence[Validated], numbers: Mapping[str, int]) -> ChartSpec:
     """E of each figure next to plus and minus U_val, in per cent of D.
 
     `numbers` are those of the trials by name.

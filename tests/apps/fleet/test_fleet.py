@@ -11,8 +11,17 @@ from pathlib import Path
 
 import pytest
 
-from tank2sim.apps.fleet.run import NEW, RUN, fleet_run_record, stale, with_results
-from tank2sim.apps.fleet.search import Fault, ShipTask, find_at_once, find_in_turn
+from tank2sim.apps.fleet.run import (
+    NEW,
+    RUN,
+    Fault,
+    ShipTask,
+    find_at_once,
+    find_in_turn,
+    fleet_run_record,
+    stale,
+    with_results,
+)
 from tank2sim.apps.fleet.ships import ShipFolder, fleet_in, ship_alone, ship_in
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.errors import InputError
@@ -195,7 +204,7 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> None:
             raise ZeroDivisionError("by zero")
         return f"gap of {card.source}"
 
-    monkeypatch.setattr("tank2sim.apps.fleet.search.run_gap_workflow", find_gap)
+    monkeypatch.setattr("tank2sim.apps.fleet.run.run_gap_workflow", find_gap)
 
 
 def test_a_bad_ship_does_not_stop_the_others(mariner_card: ManoeuvringCard, failing) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 import numpy as np
 
+from tank2sim.analysis.influence.figures import figure_label
 from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart
 from tank2sim.answer.charts.parts import plain, series_look
 from tank2sim.answer.charts.rows import runs_of
@@ -52,10 +52,10 @@ class DesignResult(Result[_S]):
         return pd.DataFrame.from_dict(rows, orient="index").dropna(axis=1, how="all").rename_axis("figure")
 
     def _certainty(self, text: str, seconds: float, unit: str) -> Section:
-        charts = certainty_charts(self.study.certainty, seconds, unit)
+        charts = _certainty_charts(self.study.certainty, seconds, unit)
         rows: list[list[Cell]] = [
             [
-                figure_words(name),
+                figure_label(name),
                 one.value,
                 one.before,
                 one.design,
@@ -90,7 +90,7 @@ class DesignResult(Result[_S]):
             ),
         ]
         for name, one in self.study.figures.items():
-            label = figure_words(name)
+            label = figure_label(name)
             note = f"± {one.design:.2g}; usual programme ± {one.usual:.2g}"
             figure_unit = in_words(name.partition("@")[0])[1]
             cards.append(KeyFigure(label=label[:1].upper() + label[1:], value=one.value, unit=figure_unit, note=note))
@@ -213,7 +213,7 @@ class CampaignDesignResult(DesignResult[CampaignStudy]):
         largest: list[list[Cell]] = [
             [name, one.value, one.design, one.usual, 100 * one.largest_share] for name, one in ordered[:_ON_SCREEN]
         ]
-        words = [f"{figure_words(figure)} (%)" for figure in names]
+        words = [f"{figure_label(figure)} (%)" for figure in names]
         return (
             table("Coefficients that matter (prime)", [*heads, "largest share of a variance (%)"], largest, digits=3),
             table("Coefficients and their shares of the variances", [*heads, *words], rows, digits=3, on_screen=False),
@@ -398,14 +398,7 @@ def _plane(rows: Sequence[ChartRecord], title: str, across: str, up: str) -> Cha
     )
 
 
-def figure_words(figure: str) -> str:
-    """A figure as a reader sees it: ``advance_m@35`` is ``advance, 35 deg``."""
-    kind, _, argument = figure.partition("@")
-    words = re.sub(r"(?<=[a-z])(?=\d)", " ", in_words(kind)[0])
-    return f"{words}, {argument}{'' if '/' in argument else ' deg'}" if argument else words
-
-
-def certainty_charts(curve: Certainty, seconds: float, unit: str) -> list[ChartSpec]:
+def _certainty_charts(curve: Certainty, seconds: float, unit: str) -> list[ChartSpec]:
     """Standard error of each figure over the time in a unit of so many `seconds`, by both programmes."""
     charts: list[ChartSpec] = []
     for figure in curve.design:
@@ -424,10 +417,10 @@ def certainty_charts(curve: Certainty, seconds: float, unit: str) -> list[ChartS
             curve_chart(
                 Plot(series=series, up=up, height_px=160, over=[layer("point", dots, place, filled=True, size=36)]),
                 across,
-                title=f"Certainty of the {figure_words(figure)}",
+                title=f"Certainty of the {figure_label(figure)}",
                 width_px=2 * _WIDTH,
                 window=[],
-                described=f"Standard error of the {figure_words(figure)} over the time, by both programmes.",
+                described=f"Standard error of the {figure_label(figure)} over the time, by both programmes.",
                 shown={"run:N": "plan", "x:Q": unit, "v:Q": "standard error"},
             )
         )

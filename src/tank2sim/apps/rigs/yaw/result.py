@@ -252,11 +252,12 @@ class YawResult(Result[YawStudy]):
     def sections(self) -> Sequence[Section]:
         """Estimates, energy balance, records, residuals, theory."""
         study = self.study
-        estimates = _chart(estimates_chart(study.methods), "Dashed: the energy least squares.", "estimates_by_method")
-        balance = _chart(balance_chart(study.energy_balance), "The mean over all pairs.", "energy_balance")
-        residuals = _chart(energy_residual_chart(study.energy_residuals), "", "energy_balance")
+        estimates = _chart(_estimates_chart(study.methods), "Dashed: the energy least squares.", "estimates_by_method")
+        balance = _chart(_balance_chart(study.energy_balance), "The mean over all pairs.", "energy_balance")
+        residuals = _chart(_energy_residual_chart(study.energy_residuals), "", "energy_balance")
         records = [
-            _chart(record_chart(name, columns), "", "record_and_programme") for name, columns in study.histories.items()
+            _chart(_record_chart(name, columns), "", "record_and_programme")
+            for name, columns in study.histories.items()
         ]
         sections = [
             Section(
@@ -268,7 +269,7 @@ class YawResult(Result[YawStudy]):
             Section(heading="Record and programme", text="The rate is shown where it is evaluated.", charts=records),
         ]
         if study.angle_residual is not None:
-            chart = _chart(angle_residual_chart(study.angle_residual), "", "nonlinear_least_squares")
+            chart = _chart(_angle_residual_chart(study.angle_residual), "", "nonlinear_least_squares")
             sections.append(Section(heading="Nonlinear least squares", text=_ANGLE, charts=[chart]))
         if study.theory:
             rows: list[list[Cell]] = [
@@ -333,7 +334,7 @@ def _friction(methods: Mapping[str, YawMethodEstimate]) -> Table:
     return table("Friction and water, times 10⁴", heads, rows, folded=True)
 
 
-def record_chart(name: str, columns: Columns) -> ChartSpec:
+def _record_chart(name: str, columns: Columns) -> ChartSpec:
     """Rate where it is evaluated next to the programme's, tracking error, and current, over the whole record."""
     time = columns["t_s"]
     columns_shown = {"rate": "rate_radps", "error": "tracking_error_rad", "current": "current_A"}
@@ -346,7 +347,7 @@ def record_chart(name: str, columns: Columns) -> ChartSpec:
     return history_chart(histories, _SIGNALS, title=f"{name}: programme and record")
 
 
-def balance_chart(balance: EnergyBalance) -> ChartSpec:
+def _balance_chart(balance: EnergyBalance) -> ChartSpec:
     """Work of the motor in each subinterval (points) and its uses (bars), means over all pairs."""
     terms = {term.replace("_", " "): parts for term, parts in balance.spent_J.items()}
     look = series_look([*terms, "motor"], as_points=["motor"])
@@ -381,7 +382,7 @@ def balance_chart(balance: EnergyBalance) -> ChartSpec:
     }
 
 
-def estimates_chart(methods: Mapping[str, YawMethodEstimate]) -> ChartSpec:
+def _estimates_chart(methods: Mapping[str, YawMethodEstimate]) -> ChartSpec:
     """Inertia by each method with its 95 % interval: the added one, or the total where J_zz is not known."""
     rows: list[ChartRecord] = []
     kind = "added"
@@ -411,7 +412,7 @@ def estimates_chart(methods: Mapping[str, YawMethodEstimate]) -> ChartSpec:
     )
 
 
-def energy_residual_chart(residuals: Sequence[EnergyResidual]) -> ChartSpec:
+def _energy_residual_chart(residuals: Sequence[EnergyResidual]) -> ChartSpec:
     """Residual work of each subinterval, against the rate in its middle."""
     rows: list[ChartRecord] = [
         {"run": one.stage, "hump": one.hump, "x": plain(one.rate_degps), "v": plain(1e6 * one.left_J)}
@@ -434,7 +435,7 @@ def energy_residual_chart(residuals: Sequence[EnergyResidual]) -> ChartSpec:
     )
 
 
-def angle_residual_chart(residual: Columns) -> ChartSpec:
+def _angle_residual_chart(residual: Columns) -> ChartSpec:
     """Residual angle of the integrated equation over time."""
     history = History(
         label="integrated less measured", time_s=residual["t_s"], values={"left": residual["residual_rad"]}
