@@ -14,8 +14,8 @@ from tank2sim.answer.charts.vega import ChartRecord, ChartSpec
 if TYPE_CHECKING:
     import altair as alt
 
-VEGALITE_VERSION = "6.1"
-"""Version of Vega-Lite in which charts are written and drawn; that of Altair."""
+VEGALITE_VERSION = "6.4"
+"""Version of Vega-Lite in which charts are written and drawn: the newest that vl-convert 1.9 has, and that of Altair 6.3."""
 
 CHECKED_AGAINST_SCHEMA = False
 """Whether each chart is compared with the schema of Vega-Lite. No chart's form depends on what a user gives: the tests
@@ -26,7 +26,7 @@ def chart_specification(chart: ChartSpec | alt.TopLevelMixin) -> ChartSpec:
     """The Vega-Lite specification of a chart, without its looks; the same chart gives the same specification."""
     if isinstance(chart, dict):
         named: dict[int, tuple[str, list[ChartRecord]]] = {}
-        specification: ChartSpec = {"$schema": f"https://vega.github.io/schema/vega-lite/v{VEGALITE_VERSION}.0.json"}
+        specification: ChartSpec = {"$schema": f"https://vega.github.io/schema/vega-lite/v{VEGALITE_VERSION}.json"}
         specification |= _with_named_data(chart, named)
         specification["datasets"] = dict(named.values())
     else:
