@@ -28,8 +28,8 @@ from sphinx.util import logging
 import tank2sim
 from tank2sim.api.results import commands_with_results, json_schema
 from tank2sim.apps.design import tank_form
+from tank2sim.apps.rigs import kinds as rig_kinds
 from tank2sim.apps.rigs.glider import card as glider_card
-from tank2sim.apps.rigs.tow import card as tow_card
 from tank2sim.apps.rigs.yaw import card as yaw_card
 from tank2sim.cards import form, read_card
 from tank2sim.cli import COMMANDS
@@ -42,7 +42,7 @@ from tank2sim.records import campaign_form
 
 SOURCES = Path(tank2sim.__file__).parent
 
-FORMS = (form, campaign_form, tank_form, glider_card, tow_card, yaw_card)
+FORMS = (form, campaign_form, tank_form, glider_card, rig_kinds, yaw_card)
 """Modules with the sections and keys of cards and campaigns."""
 
 _CHOICE = re.compile(r"project\s+choice", re.IGNORECASE)

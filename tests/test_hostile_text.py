@@ -256,11 +256,8 @@ def test_pictures_stay_in_their_folder(tmp_path: Path, monkeypatch: pytest.Monke
         title = ""
         headline, sections = (), ()
 
-        def charts(self) -> dict[str, object]:
-            return dict.fromkeys(["../../MARK", "/MARK", "10/10 zigzag", "a\nb", ".."])
-
-        def picture(self, name: str | None = None, *, ending: str = ".png") -> bytes:
-            return b"\x89PNG"
+        def pictures(self) -> dict[str, bytes]:
+            return dict.fromkeys(["../../MARK", "/MARK", "10/10 zigzag", "a\nb", ".."], b"\x89PNG")
 
         def page(self) -> str:
             return "<!doctype html>"

@@ -30,6 +30,6 @@ def panels(chart: Any) -> dict[str, list[dict[str, Any]]]:
     specification = chart_specification(chart)
     found = {}
     for panel in specification["vconcat"]:
-        title = panel["layer"][0]["encoding"]["y"]["axis"]["title"]
+        title = panel["layer"][0]["encoding"]["y"]["title"]
         found[title] = specification["datasets"][panel["layer"][0]["data"]["name"]]
     return found

@@ -2,23 +2,25 @@
 
 import numpy as np
 
-from tank2sim.answer.charts.picture import (
+from tank2sim.answer.charts.analysis import (
     FrequencyResponse,
-    History,
     OutputError,
     PolesZeros,
-    Signal,
-    SpiralData,
-    Tow,
-    TrackData,
     bode_chart,
     error_chart,
-    history_chart,
     pole_zero_chart,
+)
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart
+from tank2sim.answer.charts.motion import (
+    History,
+    Signal,
+    SpiralData,
+    TrackData,
+    history_chart,
     spiral_chart,
-    tow_chart,
     track_chart,
 )
+from tank2sim.answer.charts.vega import PlotAxis
 from tank2sim.answer.page import Page
 from tank2sim.answer.parts import Column, Illustration, KeyFigure, Section, Table, Verdict
 
@@ -34,12 +36,15 @@ def circle(label: str, radius_m: float = 300.0, measured: bool = False) -> Track
 def every_chart():
     heading = Signal(name="motion.psi", title="heading", unit="rad")
     run = History(label="simulated", time_s=TIME, values={"motion.psi": HEADING})
-    tow = Tow(label="tow 1", time_s=[0, 5], speed_mps=[0, 0.5], model_time_s=TIME, model_speed_mps=np.tanh(TIME / 10))
+    model = PlotSeries(label="tow 1", x=TIME, y=np.tanh(TIME / 10))
+    tow = Plot(
+        series=[model, PlotSeries(label="tow 1", x=[0, 5], y=[0, 0.5], points=True)], up=PlotAxis(title="speed (m/s)")
+    )
     omega = np.logspace(-3, 1, 50)
     return {
         "track": track_chart([circle("simulated"), circle("trial", 310.0, measured=True)], title="Turning circle"),
         "history": history_chart([run], [heading], title="Heading"),
-        "tow": tow_chart([tow], title="Tows"),
+        "tow": curve_chart(tow, PlotAxis(title="time (s)"), title="Tows"),
         "bode": bode_chart(
             [FrequencyResponse(label="yaw", omega_radps=omega, response=1 / (1j * omega))], title="Bode"
         ),

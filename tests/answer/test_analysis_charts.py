@@ -3,15 +3,15 @@ import math
 import numpy as np
 import pytest
 
-from tank2sim.answer.charts.picture import (
+from tank2sim.answer.charts.analysis import (
     FrequencyResponse,
     OutputError,
     PolesZeros,
     bode_chart,
-    chart_specification,
     error_chart,
     pole_zero_chart,
 )
+from tank2sim.answer.charts.picture import chart_specification
 
 
 def rows(specification, layer):
@@ -23,7 +23,7 @@ def bode_of(response):
     system = FrequencyResponse(label="system", omega_radps=omega, response=response(1j * omega))
     specification = chart_specification(bode_chart([system]))
     panels = [panel["layer"][0] for panel in specification["vconcat"]]
-    at = [{round(row["w"], 6): row["v"] for row in rows(specification, panel)} for panel in panels]
+    at = [{round(row["x"], 6): row["v"] for row in rows(specification, panel)} for panel in panels]
     return specification, at[0], at[1]
 
 
@@ -51,9 +51,9 @@ def test_phase_is_ticked_in_parts_of_a_right_angle_around_all_of_it():
 def test_bode_axes_name_their_units_and_the_frequency_is_logarithmic():
     specification, _, _ = bode_of(lambda s: 1 / s)
     upper, lower = (panel["layer"][0]["encoding"] for panel in specification["vconcat"])
-    assert upper["y"]["axis"]["title"] == "magnitude (dB)"
-    assert lower["y"]["axis"]["title"] == "phase (deg)"
-    assert lower["x"]["axis"]["title"] == "angular frequency (rad/s)"
+    assert upper["y"]["title"] == "magnitude (dB)"
+    assert lower["y"]["title"] == "phase (deg)"
+    assert lower["x"]["title"] == "angular frequency (rad/s)"
     assert {upper["x"]["scale"]["type"], lower["x"]["scale"]["type"]} == {"log"}
 
 

@@ -7,8 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from tank2sim.answer.charts.analysis import FrequencyResponse
-from tank2sim.answer.charts.loops import CrossTrack, cross_track_chart, nyquist_chart, sensitivity_chart
+from tank2sim.answer.charts.analysis import FrequencyResponse, nyquist_chart, sensitivity_chart
 from tank2sim.answer.charts.picture import chart_png, chart_specification
 
 OMEGA = np.logspace(-2, 2, 400)
@@ -23,7 +22,7 @@ def rows_of(chart: object, layer: int) -> list[dict[str, float]]:
 def test_the_nyquist_curve_touches_the_circle_of_its_peak() -> None:
     peak = float(1 / np.abs(1 + LOOP).min())
     chart = nyquist_chart([FrequencyResponse(label="L", omega_radps=OMEGA, response=LOOP)], peak)
-    circle, curve = (np.array([complex(row["re"], row["im"]) for row in rows_of(chart, n)]) for n in (2, 3))
+    circle, curve = (np.array([complex(row["x"], row["v"]) for row in rows_of(chart, n)]) for n in (4, 2))
     np.testing.assert_allclose(np.abs(circle + 1), 1 / peak, rtol=1e-4)
     assert np.abs(curve + 1).min() == pytest.approx(1 / peak, rel=2e-3)
     assert chart_png(chart, scale=0.2)[:4] == b"\x89PNG"
@@ -33,12 +32,6 @@ def test_sensitivities_are_in_decibel_over_frequency() -> None:
     chart = sensitivity_chart([FrequencyResponse(label="S", omega_radps=OMEGA, response=1 / (1 + LOOP))])
     rows = rows_of(chart, 1)
     for row in rows[:: len(rows) // 7]:
-        s = 1j * row["w"]
+        s = 1j * row["x"]
         wanted = 20 * math.log10(abs(s * (s + 1) / (s * (s + 1) + 2)))
         assert row["v"] == pytest.approx(wanted, abs=1e-3)
-
-
-def test_cross_track_errors_are_drawn_as_given() -> None:
-    chart = cross_track_chart([CrossTrack(label="one", time_s=[0.0, 1.0, 2.0], error_m=[3.0, -1.0, 0.5])])
-    rows = rows_of(chart, 1)
-    assert [(row["t"], row["v"]) for row in rows] == [(0.0, 3.0), (1.0, -1.0), (2.0, 0.5)]

@@ -48,8 +48,8 @@ setTimeout(async () => {
 
 def test_a_switch_is_at_all_together_and_one_model_needs_none() -> None:
     (two,), (three,) = (switch(words) for words in (["before", "after"], ["before", "after", "black box"]))
-    assert two.to_dict()["value"] == BOTH and three.to_dict()["value"] == ALL
-    assert two.to_dict()["bind"]["options"] == ["before", "after", BOTH]
+    assert two["value"] == BOTH and three["value"] == ALL
+    assert two["bind"]["options"] == ["before", "after", BOTH]
     assert switch(["before"]) == [] and before_after_switch({"before": "card before"}) == "true"
 
 

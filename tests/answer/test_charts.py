@@ -1,10 +1,13 @@
 import io
 
+import altair as alt
 import numpy as np
 import pytest
 from PIL import Image
 
-from tank2sim.answer.charts.picture import VEGALITE_VERSION, TrackData, chart_png, chart_specification, track_chart
+from tank2sim.answer.charts.motion import TrackData, track_chart
+from tank2sim.answer.charts.parts import series_look
+from tank2sim.answer.charts.picture import VEGALITE_VERSION, altair_chart, chart_png, chart_specification
 from tank2sim.answer.charts.theme import DARK_TONE, LIGHT_PALETTE, LIGHT_TONE
 from tests.answer.example import every_chart
 
@@ -55,6 +58,25 @@ def test_the_same_data_give_the_same_specification(charts):
 
 def test_charts_are_drawn_in_the_version_of_vega_lite_they_are_written_in(charts):
     assert f"/v{VEGALITE_VERSION}" in chart_specification(charts["track"])["$schema"]
+    assert alt.SCHEMA_VERSION.startswith(f"v{VEGALITE_VERSION}.")
+
+
+def test_a_chart_as_an_object_of_altair_is_the_same_and_can_be_changed(charts):
+    for chart in charts.values():
+        assert chart_specification(altair_chart(chart)) == chart_specification(chart)
+    assert chart_specification(altair_chart(charts["track"]).properties(width=99))["width"] == 99
+
+
+def test_measured_and_simulated_look_the_same_whatever_is_on_the_chart_with_them():
+    def looks(*labels):
+        look = series_look(labels, as_points=["measured"])
+        names, dashes = look.colour["scale"]["domain"], look.dash["scale"]["range"]
+        return {label: (names.index(label), dashes[names.index(label)]) for label in labels}
+
+    both, more = looks("measured", "simulated"), looks("other", "simulated", "measured", "card before")
+    assert {label: more[label] for label in both} == both
+    assert len({place for place, _ in more.values()}) == 4
+    assert series_look(["measured", "simulated"]).colour["legend"]["values"] == ["measured", "simulated"]
 
 
 @pytest.mark.parametrize("tone", [LIGHT_TONE, DARK_TONE], ids=["light", "dark"])

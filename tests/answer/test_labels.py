@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-import altair as alt
 import numpy as np
 import pytest
 
 import tank2sim as t2s
 from tank2sim.answer.charts.labels import Spot, label_layers, place_labels, spots_about, spots_along
 from tank2sim.answer.charts.parts import Frame
+from tank2sim.answer.charts.vega import ChartSpec, layer, layered
 from tests.made_results import OWN_DOCUMENTS, RESULTS, marked
 
 from .written import faults, written_texts
 
 FRAME = Frame(across=(0.0, 400.0), up=(0.0, 200.0), width_px=400, height_px=200)
-POSITION = {
-    "x": alt.X("x:Q", scale=alt.Scale(domain=[0, 400], nice=False)),
-    "y": alt.Y("y:Q", scale=alt.Scale(domain=[0, 200], nice=False)),
-}
+POSITION = FRAME.axes(across=("x", "across"), up=("y", "up"))
 
 
-def drawn(
-    labels: list[tuple[str, list[Spot]]], lines: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
-) -> alt.LayerChart:
-    layers = label_layers(labels, FRAME, POSITION, ("x", "y"), lines)
-    return alt.layer(*layers).properties(width=400, height=200)
+def drawn(labels: list[tuple[str, list[Spot]]], lines: tuple[tuple[np.ndarray, np.ndarray], ...] = ()) -> ChartSpec:
+    return layered(label_layers(labels, FRAME, POSITION, lines), size=(400, 200))
 
 
 @pytest.mark.parametrize(
@@ -71,7 +65,8 @@ def test_labels_of_one_place_are_moved_apart() -> None:
 
 def test_labels_of_one_place_without_a_choice_are_seen_as_a_fault_and_the_second_is_left_out() -> None:
     spot = Spot(at=(200.0, 100.0))
-    over = alt.layer(*(drawn([(text, [spot])]) for text in ("advance 570 m", "tactical diameter 1029 m")))
+    one, other = (drawn([(text, [spot])]) for text in ("advance 570 m", "tactical diameter 1029 m"))
+    over = one | {"layer": [*one["layer"], *other["layer"]]}
     assert faults(over) == ["'advance 570 m' on 'tactical diameter 1029 m'"]
     assert [text for text, _ in place_labels([("advance 570 m", [spot]), ("transfer", [spot])], FRAME)] == [
         "advance 570 m"
@@ -79,11 +74,8 @@ def test_labels_of_one_place_without_a_choice_are_seen_as_a_fault_and_the_second
 
 
 def test_a_label_does_not_leave_the_plot() -> None:
-    edge = alt.layer(
-        alt.Chart(alt.InlineData(values=[{"x": 395, "y": 100, "t": "advance 570 m"}]))
-        .mark_text()
-        .encode(**POSITION, text="t:N")
-    ).properties(width=400, height=200)
+    row = {"x": 395, "y": 100, "t": "advance 570 m"}
+    edge = layered([layer("text", [row], {**POSITION, "text": "t:N"})], size=(400, 200))
     assert "'advance 570 m' leaves its axes" in faults(edge)
     for corner in ((0.0, 0.0), (400.0, 0.0), (0.0, 200.0), (400.0, 200.0)):
         assert faults(drawn([("7.78°", spots_about(corner))])) == []

@@ -17,7 +17,8 @@ from tank2sim.answer.charts.manoeuvre import (
     turn_dimensions,
     zigzag_chart,
 )
-from tank2sim.answer.charts.picture import SpiralData, chart_specification, spiral_chart
+from tank2sim.answer.charts.motion import SpiralData, spiral_chart
+from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.answer.parts import Verdict
 from tank2sim.notices import caution
 from tank2sim.results.manoeuvre import ManoeuvreResult
@@ -114,8 +115,8 @@ def test_overshoots_reach_from_the_heading_of_the_order_to_the_peak(side):
     figures = {"overshoots_deg": [7.0, 7.0], "execute_times_s": [10.0, 60.0], "overshoot_times_s": [15.0, 15.0]}
     bands = {"overshoot_2_deg": Band(6.0, 7.0, 9.0, 1.0, 20)}
     first, second = overshoot_marks(motion, figures, 10.0, bands)
-    assert (first["t"], first["from"], first["v"]) == pytest.approx((25.0, side * 10.0, side * 17.0))
-    assert (second["t"], second["from"], second["v"]) == pytest.approx((75.0, -side * 10.0, -side * 17.0))
+    assert (first["x"], first["from"], first["v"]) == pytest.approx((25.0, side * 10.0, side * 17.0))
+    assert (second["x"], second["from"], second["v"]) == pytest.approx((75.0, -side * 10.0, -side * 17.0))
     assert (second["low"], second["high"]) == (-side * 16.0, -side * 19.0) and "low" not in first
     drawn = in_style(chart_specification(zigzag_chart(motion, figures, 10.0)), "overshoot")
     assert [row["v"] for row in drawn] == pytest.approx([max(side * psi) * side, -max(side * psi) * side], rel=1e-4)
@@ -127,9 +128,9 @@ def test_both_pull_outs_begin_at_their_order_and_show_the_neutral_rudder():
     motion = motion_of(columns(time, time, 0 * time, time, r_degps=rates, delta_deg=rudder))
     assert pull_out_time(motion, -1.5) == 40.0
     specification = chart_specification(pull_out_chart({"from a turn to starboard": motion}, -1.5))
-    drawn = {row["t"]: row["v"] for row in rows(specification, specification["layer"][0])}
+    drawn = {row["x"]: row["v"] for row in rows(specification, specification["layer"][2])}
     assert drawn[0.0] == 0.8 and drawn[10.0] == pytest.approx(0.8 / np.e, rel=1e-4)
-    assert "−1.5°" in specification["layer"][0]["encoding"]["x"]["title"]
+    assert "−1.5°" in specification["layer"][2]["encoding"]["x"]["title"]
 
 
 def test_a_pull_out_is_simulated_to_both_sides():
@@ -137,7 +138,7 @@ def test_a_pull_out_is_simulated_to_both_sides():
     assert found.figures["steady_rate_degps"] > 0 > found.other_side.figures["steady_rate_degps"]
     (chart, *_) = found.charts().values()
     specification = chart_specification(chart)
-    assert {row["run"] for row in rows(specification, specification["layer"][0])} == {
+    assert {row["run"] for row in rows(specification, specification["layer"][2])} == {
         "from a turn to starboard",
         "from a turn to port",
     }
@@ -156,8 +157,8 @@ def test_a_stop_shows_speed_and_revolutions_over_the_distance_along_the_track():
     way = 5.0 * time - 0.25 * time**2  # 5 m/s, slowing by 0.5 m/s²
     motion = motion_of(columns(time, 0.6 * way, 0.8 * way, 0 * time, u_mps=5.0 - 0.5 * time, n_rpm=60.0 - 12.0 * time))
     drawn = chart_specification(stop_speed_chart(motion))
-    speed, revolutions = (rows(drawn, panel)[-1] for panel in drawn["vconcat"])
-    assert (speed["s"], speed["v"]) == pytest.approx((25.0, 0.0), abs=1e-6)
+    speed, revolutions = (rows(drawn, panel["layer"][0])[-1] for panel in drawn["vconcat"])
+    assert (speed["x"], speed["v"]) == pytest.approx((25.0, 0.0), abs=1e-6)
     assert revolutions["v"] == -60.0
 
 
@@ -166,7 +167,7 @@ def test_the_loop_of_a_spiral_is_marked_between_its_rudders_of_no_yaw_rate():
     spiral = SpiralData(label="spiral", rudder_rad=rudder, yaw_rate_radps=np.radians([0.5, 0.2, -0.5, -0.2, 0.5]))
     specification = chart_specification(spiral_chart([spiral], loop_rad=(np.radians(-2.0), np.radians(2.5))))
     (mark,) = in_style(specification, "overshoot")
-    assert (mark["d"], mark["to"], mark["r"]) == (-2.0, 2.5, 0.0)
+    assert (mark["x"], mark["to"], mark["v"]) == (-2.0, 2.5, 0.0)
 
 
 def test_limits_are_those_of_the_trials_of_the_standard():

@@ -1,18 +1,18 @@
 import numpy as np
 import pytest
 
-from tank2sim.answer.charts.picture import (
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart
+from tank2sim.answer.charts.motion import (
     History,
     Signal,
     SpiralData,
-    Tow,
     TrackData,
-    chart_specification,
     history_chart,
     spiral_chart,
-    tow_chart,
     track_chart,
 )
+from tank2sim.answer.charts.picture import chart_specification
+from tank2sim.answer.charts.vega import PlotAxis
 
 TIME = np.arange(0.0, 600.0, 0.1)
 HEADING = Signal(name="motion.psi", title="heading", unit="rad")
@@ -105,9 +105,9 @@ def test_angles_are_shown_in_degrees():
     run = History(label="run", time_s=[0, 1], values={"motion.psi": [0, np.pi / 2], "motion.r": [0, -np.pi / 180]})
     specification = chart_specification(history_chart([run], signals))
     heading, rate = (panel["layer"][0] for panel in specification["vconcat"])
-    assert heading["encoding"]["y"]["axis"]["title"] == "heading (deg)"
+    assert heading["encoding"]["y"]["title"] == "heading (deg)"
     assert rows(specification, heading)[-1]["v"] == 90.0
-    assert rate["encoding"]["y"]["axis"]["title"] == "yaw rate (deg/s)"
+    assert rate["encoding"]["y"]["title"] == "yaw rate (deg/s)"
     assert rows(specification, rate)[-1]["v"] == -1.0
 
 
@@ -120,7 +120,7 @@ def test_other_units_are_shown_as_they_are_or_as_asked():
     values = {"motion.u": [7.5], "propeller.speed": [84 * 2 * np.pi / 60], "validity": [1.0]}
     specification = chart_specification(history_chart([History(label="run", time_s=[0], values=values)], signals))
     layers = [panel["layer"][0] for panel in specification["vconcat"]]
-    titles = [layer["encoding"]["y"]["axis"]["title"] for layer in layers]
+    titles = [layer["encoding"]["y"]["title"] for layer in layers]
     assert titles == ["surge speed (m/s)", "revolutions (rpm)", "validity"]
     assert [rows(specification, layer)[0]["v"] for layer in layers] == [7.5, 84.0, 1.0]
 
@@ -175,19 +175,15 @@ def test_series_differ_in_dashes_as_well_as_in_colour():
 
 
 def test_a_tow_shows_what_was_measured_as_points_and_the_model_as_a_line():
-    tow = Tow(
-        label="tow 1",
-        time_s=[0, 5, 10],
-        speed_mps=[0, 0.5, np.nan],
-        model_time_s=TIME,
-        model_speed_mps=np.tanh(TIME / 9),
-    )
-    specification = chart_specification(tow_chart([tow]))
-    line, points = specification["layer"]
+    model = PlotSeries(label="tow 1", x=TIME, y=np.tanh(TIME / 9))
+    measured = PlotSeries(label="tow 1", x=[0, 5], y=[0, 0.5], points=True)
+    plot = Plot(series=[model, measured], up=PlotAxis(title="speed (m/s)"))
+    specification = chart_specification(curve_chart(plot, PlotAxis(title="time (s)")))
+    line, points, _ = specification["layer"]
     assert (line["mark"]["type"], points["mark"]["type"]) == ("line", "point")
-    assert [(row["t"], row["v"]) for row in rows(specification, points)] == [(0, 0), (5, 0.5)]
+    assert [(row["x"], row["v"]) for row in rows(specification, points)] == [(0, 0), (5, 0.5)]
     assert line["encoding"]["order"]["field"] == "i"
-    drawn = [row["t"] for row in sorted(rows(specification, line), key=lambda row: row["i"])]
+    drawn = [row["x"] for row in sorted(rows(specification, line), key=lambda row: row["i"])]
     assert drawn == sorted(drawn) and drawn[-1] == pytest.approx(TIME[-1])
     assert rows(specification, line)[-1]["v"] == pytest.approx(1.0, abs=1e-6)
     assert "(s)" in line["encoding"]["x"]["title"] and "(m/s)" in line["encoding"]["y"]["title"]

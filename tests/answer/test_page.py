@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tank2sim.answer.charts.picture import TrackData, track_chart
+from tank2sim.answer.charts.motion import TrackData, track_chart
 from tank2sim.answer.page import Page, render_page
 from tank2sim.answer.parts import Column, Illustration, KeyFigure, Section, Table, Verdict
 from tank2sim.notices import caution

@@ -7,8 +7,8 @@ from html import escape, unescape
 import altair as alt
 import pytest
 
-from tank2sim.answer.charts.parts import STACKS
-from tank2sim.answer.charts.picture import TrackData, track_chart
+from tank2sim.answer.charts.motion import TrackData, track_chart
+from tank2sim.answer.charts.vega import STACKS
 from tank2sim.answer.page import Page, render_page
 from tank2sim.answer.parts import Illustration, Section
 from tests.answer.opened_page import CHROMIUM, opened

@@ -10,8 +10,8 @@ from itertools import chain
 import pytest
 from pydantic import BaseModel
 
+from tank2sim.apps.rigs import kinds as rig_kinds
 from tank2sim.apps.rigs.glider import card as glider_card
-from tank2sim.apps.rigs.tow import card as tow_card
 from tank2sim.apps.rigs.yaw import card as yaw_card
 from tank2sim.cards import form
 from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS
@@ -23,7 +23,7 @@ from .examples import MANUAL
 TEXT = "\n".join(page.read_text(encoding="utf-8") for page in (MANUAL / "formats").glob("*.md"))
 SECTIONS = [
     one
-    for one in chain(*(vars(module).values() for module in (form, campaign_form, glider_card, tow_card, yaw_card)))
+    for one in chain(*(vars(module).values() for module in (form, campaign_form, glider_card, rig_kinds, yaw_card)))
     if isinstance(one, type) and issubclass(one, BaseModel) and one.__module__.startswith("tank2sim")
 ]
 

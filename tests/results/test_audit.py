@@ -59,7 +59,7 @@ def test_places_of_findings_are_marked_in_the_panel_of_their_column_and_those_of
     for panel in specification["vconcat"]:
         layers = [layer for layer in panel["layer"] if layer["mark"].get("style") == "region"]
         rows = [specification["datasets"][layer["data"]["name"]] for layer in layers]
-        marked.append([(row["t"], row["end"], row["text"]) for one in rows for row in one])
+        marked.append([(row["x"], row["end"], row["text"]) for one in rows for row in one])
     assert marked == [[(1.0, 1.0, "2 spikes"), (2.0, 3.0, "1 gaps")], [(2.0, 3.0, "1 gaps")]]
 
 

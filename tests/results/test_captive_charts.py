@@ -99,7 +99,7 @@ def test_a_loop_keeps_the_order_of_time_and_its_forces_their_panels():
     assert line["encoding"]["order"]["field"] == "i"
     (points,) = layers_of(yaw, "point")
     assert [row["v"] for row in rows(specification, points)] == [5, 6, 7, 8]
-    assert points["encoding"]["x"]["axis"]["title"] == "sway velocity (m/s)"
+    assert points["encoding"]["x"]["title"] == "sway velocity (m/s)"
     assert not layers_of(yaw, "line")
 
 
@@ -127,7 +127,7 @@ def test_harmonics_are_bars_in_the_order_of_the_runs_with_the_fit_next_to_them()
     assert rows(specification, ticks) == [{"run": "yaw_01", "v": 2.1}]
     assert bars["encoding"]["x"]["scale"]["domain"] == ["yaw_01", "sway_00"]
     assert bars["encoding"]["y"]["scale"]["zero"] is True
-    assert bars["encoding"]["y"]["axis"]["title"] == "harmonic 3 of Y (N)"
+    assert bars["encoding"]["y"]["title"] == "harmonic 3 of Y (N)"
 
 
 def test_residuals_of_all_forces_have_one_symmetric_scale_that_shows_all():

@@ -295,7 +295,7 @@ def test_each_probability_says_of_what_it_is() -> None:
     assert "Probability that current alone is all that is missing, among the explanations compared: 55 %." in text
     (card,) = (figure for figure in page.key_figures if figure.label.startswith("Probability"))
     assert card.note == "alone or with another effect"
-    assert "as a whole" in json.dumps(rival_chart(gap_study(gap)).to_dict(validate=False))
+    assert "as a whole" in json.dumps(rival_chart(gap_study(gap)))
 
 
 def test_what_the_others_would_be_is_reported_and_they_do_not_hide() -> None:

@@ -221,7 +221,7 @@ def test_parameters_are_in_standard_errors_of_the_prior(found) -> None:
 def test_figures_stand_with_their_errors_in_percent(found) -> None:
     result, _, charts = found
     rows = [
-        row for rows in chart_specification(charts["figures"])["datasets"].values() for row in rows if "measured" in row
+        row for rows in chart_specification(charts["figures"])["datasets"].values() for row in rows if "name" in row
     ]
     advance = next(one for one in result.before_holdout.figures if one.name == "advance_m")
     (shown,) = (row for row in rows if row["run"] == BEFORE and row["name"] == "turn · advance")

@@ -71,7 +71,7 @@ def test_a_tuning_shows_its_target_its_moves_and_the_agreed_variation(study: Inf
         [key, one.before, one.after] for key, one in study.tuned.parameters.items()
     ]
     drawn = [row for row in rows_of(result.plot(name="what_tuning_changed")) if "name" in row]
-    assert drawn[0]["z"] == pytest.approx(next(iter(study.tuned.parameters.values())).standard_errors, rel=1e-5)
+    assert drawn[0]["v"] == pytest.approx(next(iter(study.tuned.parameters.values())).standard_errors, rel=1e-5)
     (changes,) = tables(result, "Change of the figures")
     first = study.agreed.figures["criterion_C"]
     assert changes.rows[0][1:] == [first.foretold_exact, first.foretold_difference, first.direct]

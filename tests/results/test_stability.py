@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import replace
 from typing import Any
 
@@ -50,12 +49,14 @@ def test_the_page_holds_every_part_and_is_read_back(study: StabilityStudy) -> No
 def test_the_branches_of_the_diagram_meet_in_the_folds(study: StabilityStudy) -> None:
     assert study.steady_turning is not None
     specification = chart_specification(steering_diagram(study.steady_turning, Spirals()))
-    rows = drawn(specification, specification["vconcat"][0]["layer"][0])
-    parts = [[row for row in rows if row["part"] == part] for part in range(3)]
-    assert [part[0]["run"] for part in parts] == [STABLE, UNSTABLE, STABLE]
-    assert all(before[-1]["d"] == after[0]["d"] for before, after in itertools.pairwise(parts))
+    rows = drawn(specification, specification["vconcat"][0]["layer"][1])
+    gap = next(place for place, row in enumerate(rows) if row["v"] is None)
+    first, last = rows[:gap], [row for row in rows[gap + 1 :] if row["run"] == STABLE]
+    middle = [row for row in rows if row["run"] == UNSTABLE]
+    assert {row["run"] for row in first} == {STABLE}
+    assert (first[-1]["x"], last[0]["x"]) == (middle[0]["x"], middle[-1]["x"])
     folds = [fold.rudder_deg for fold in study.steady_turning.folds]
-    assert [parts[1][0]["d"], parts[1][-1]["d"]] == pytest.approx(folds, rel=1e-5)
+    assert [middle[0]["x"], middle[-1]["x"]] == pytest.approx(folds, rel=1e-5)
 
 
 def test_spirals_are_points_in_the_panel_of_the_yaw_rate_alone(study: StabilityStudy) -> None:
@@ -63,8 +64,8 @@ def test_spirals_are_points_in_the_panel_of_the_yaw_rate_alone(study: StabilityS
     points = SpiralPoints(np.array([10.0]), np.array([1.5]), (True,), np.zeros(1))
     specification = chart_specification(steering_diagram(study.steady_turning, Spirals(direct=points)))
     panels = specification["vconcat"]
-    (point,) = drawn(specification, panels[0]["layer"][-1])
-    assert (point["run"], point["d"], point["v"]) == (DIRECT, 10, 1.5)
+    (point,) = drawn(specification, panels[0]["layer"][2])
+    assert (point["run"], point["x"], point["v"]) == (DIRECT, 10, 1.5)
     assert len(panels[0]["layer"]) == len(panels[1]["layer"]) + 1
 
 
@@ -72,7 +73,7 @@ def test_influences_and_trims_are_drawn_as_they_were_found(study: StabilityStudy
     charts = StabilityResult(study).charts()
     bars = [row for row in rows_of(charts["influence_on_c"]) if "name" in row]
     strongest = study.margins.derivatives[0]
-    assert bars[0]["name"] == strongest.short_name and bars[0]["y"] == pytest.approx(strongest.percent, rel=1e-5)
+    assert bars[0]["name"] == strongest.short_name and bars[0]["v"] == pytest.approx(strongest.percent, rel=1e-5)
     assert len({row["run"] for row in rows_of(charts["trim_estimate"]) if "run" in row}) == 3
 
 
@@ -86,7 +87,7 @@ def test_criteria_are_shares_of_their_limits_and_have_no_verdict_beyond_the_card
         ]
     )
     bars = [row for row in rows_of(section.charts[0].chart) if "name" in row]
-    assert [(row["percent"], row["beyond"]) for row in bars] == [
+    assert [(row["v"], row["beyond"]) for row in bars] == [
         (pytest.approx(100 * 3.0 / 4.5, rel=1e-5), False),
         (pytest.approx(120.0), True),
         (pytest.approx(104.0), False),

@@ -65,7 +65,7 @@ def test_each_figure_has_its_verdict() -> None:
     first = result.key_figures[0]
     assert first.value == "1 of 3" and first.verdict is Verdict.FAILED
     drawn = chart_specification(result.charts()["validation"])["datasets"].values()
-    assert sorted(row["e"] for data in drawn for row in data if "e" in row)[:1] == [2.0]
+    assert sorted(row["v"] for data in drawn for row in data if "most" in row)[:1] == [2.0]
     assert tables["Prime system, rudder positive to starboard, times 1000"]["value"].to_list() == [-10.0]
 
 

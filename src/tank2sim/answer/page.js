@@ -31,11 +31,17 @@
     tip.style.top = `${Math.max(4, top)}px`;
   }
 
-  // A narrower chart keeps the size of its letters; where both axes have one scale its height shrinks alike.
+  // A narrower chart keeps the size of its letters; where both axes have one scale its height and its labels shrink.
+  const LEAST_LABEL_PX = 8;
+
   function shrunk(node, factor, height) {
     const copy = { ...node };
     if (typeof copy.width === "number") copy.width *= factor;
     if (height && typeof copy.height === "number") copy.height *= factor;
+    if (height && factor < 1 && ["rim", "words"].includes(copy.mark?.style)) {
+      const fontSize = Math.max(LEAST_LABEL_PX, factor * light.style.words.fontSize);
+      copy.mark = { ...copy.mark, fontSize };
+    }
     for (const key of ["layer", "vconcat", "hconcat", "concat"]) {
       if (copy[key]) copy[key] = copy[key].map((part) => shrunk(part, factor, height));
     }

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
+from tank2sim.answer.charts.vega import ChartSpec
 from tank2sim.answer.numbers import format_number, is_number_text, without_exponents
 from tank2sim.notices import Notice
 from tank2sim.units import in_words
@@ -294,7 +295,8 @@ class Illustration:
 
     Parameters
     ----------
-    chart : alt.TopLevelMixin
+    chart : ChartSpec
+        Or a chart of Altair.
     caption : str
     half : bool
         Where the page is wide, two such charts that follow each other are side by side.
@@ -302,7 +304,7 @@ class Illustration:
         Name in ``charts()`` and of its picture; by default from the title of the chart or the heading of its section.
     """
 
-    chart: alt.TopLevelMixin
+    chart: ChartSpec | alt.TopLevelMixin
     caption: str = ""
     half: bool = False
     name: str = ""
@@ -310,6 +312,9 @@ class Illustration:
     @property
     def title(self) -> str:
         """Title of the chart; empty if it has none."""
+        if isinstance(self.chart, dict):
+            title = self.chart.get("title", "")
+            return str(title["text"] if isinstance(title, dict) else title)
         title = getattr(self.chart, "title", "")
         text = getattr(title, "text", title)
         return text if isinstance(text, str) else ""

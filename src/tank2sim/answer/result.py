@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, get_args, get_origin
 
+from tank2sim.answer.charts.vega import ChartSpec
 from tank2sim.answer.parts import KeyFigure, Section, Table, notices_section
 from tank2sim.files import json_text, schema_name, write_together
 from tank2sim.notices import Level, Notice, foremost
@@ -144,8 +145,14 @@ class Result(ABC, Generic[_S]):
         return text
 
     def charts(self) -> dict[str, alt.TopLevelMixin]:
-        """Charts of all sections by name, the main one first; empty where there are none."""
-        charts: dict[str, alt.TopLevelMixin] = {}
+        """Charts of all sections by name (Altair), the main one first; empty where there are none."""
+        from tank2sim.answer.charts.picture import altair_chart
+
+        return {name: altair_chart(chart) for name, chart in self._charts().items()}
+
+    def _charts(self) -> dict[str, ChartSpec | alt.TopLevelMixin]:
+        """Charts of all sections by name, as the sections have them."""
+        charts: dict[str, ChartSpec | alt.TopLevelMixin] = {}
         for section in self.sections:
             for illustration in section.charts:
                 stem = _slug(illustration.name) or _slug(illustration.title or section.heading).lower()
@@ -169,20 +176,31 @@ class Result(ABC, Generic[_S]):
         LookupError
             The chart does not exist.
         """
-        charts = self.charts()
+        from tank2sim.answer.charts.picture import altair_chart
+
+        if path is not None:
+            write_together({Path(path): self.picture(name, ending=Path(path).suffix)})
+        return altair_chart(self._chart(name))
+
+    def _chart(self, name: str | None) -> ChartSpec | alt.TopLevelMixin:
+        charts = self._charts()
         if not charts or (name is not None and name not in charts):
             raise LookupError(
                 f"no chart {name or ''} of {type(self).__name__}; there are: {', '.join(charts) or 'none'}"
             )
-        if path is not None:
-            write_together({Path(path): self.picture(name, ending=Path(path).suffix)})
         return charts[name] if name is not None else next(iter(charts.values()))
 
     def picture(self, name: str | None = None, *, ending: str = ".png") -> bytes:
         """One chart of the result as PNG, or as SVG or PDF if that is the `ending` of its file's name."""
         from tank2sim.answer.charts.picture import chart_picture
 
-        return chart_picture(self.plot(name=name), ending)
+        return chart_picture(self._chart(name), ending)
+
+    def pictures(self) -> dict[str, bytes]:
+        """All charts by name as PNG."""
+        from tank2sim.answer.charts.picture import chart_png
+
+        return {name: chart_png(chart) for name, chart in self._charts().items()}
 
     def layout(self) -> Page:
         """Return the page of the result, before it is HTML."""
@@ -230,7 +248,7 @@ class Result(ABC, Generic[_S]):
 
     def _repr_html_(self) -> str:
         parts = [f"<p>{html.escape(line)}</p>" for line in self._first_lines]
-        if self.charts():
+        if self._charts():
             picture = base64.b64encode(self.picture()).decode("ascii")
             parts.append(f'<img alt="{html.escape(" ".join(self.headline))}" src="data:image/png;base64,{picture}">')
         for table in self.screen_tables:

@@ -114,12 +114,13 @@ def write_outputs(
     if page:
         contents[page] = result.page()
     if plot and plot.suffix.lower() in PICTURE:
-        if not result.charts():
-            raise ArgumentError("plot", "", "there is no chart to draw", "leave it out")
-        contents[plot] = result.picture(ending=plot.suffix)
+        try:
+            contents[plot] = result.picture(ending=plot.suffix)
+        except LookupError:
+            raise ArgumentError("plot", "", "there is no chart to draw", "leave it out") from None
     elif plot:
         writable_folder(plot)
-        contents |= {plot / f"{file_name(name)}.png": result.picture(name) for name in result.charts()}
+        contents |= {plot / f"{file_name(name)}.png": picture for name, picture in result.pictures().items()}
         contents[plot / "report.html"] = result.page()
     write_together(contents, inputs=inputs, outputs=[path for path in (*files, page, plot, json) if path in contents])
     return [path for path in contents if path is not STANDARD_OUTPUT]

@@ -7,8 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from tank2sim.answer.charts.columns import motions, stem_of
-from tank2sim.answer.charts.motion import TimeMark
+from tank2sim.answer.charts.motion import TimeMark, motions, stem_of
 from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
 from tank2sim.notices import Notice

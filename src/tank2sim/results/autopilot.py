@@ -15,9 +15,17 @@ from tank2sim.analysis.heading.craft import CraftAutopilotStudy
 from tank2sim.analysis.heading.margins import LoopResponse
 from tank2sim.analysis.heading.piloted import AutopilotExport, Piloted
 from tank2sim.analysis.heading.study import HELD_DEG, AutopilotStudy
-from tank2sim.answer.charts.analysis import FrequencyResponse, PolesZeros, bode_chart, pole_zero_chart
-from tank2sim.answer.charts.loops import CrossTrack, cross_track_chart, nyquist_chart, sensitivity_chart
+from tank2sim.answer.charts.analysis import (
+    FrequencyResponse,
+    PolesZeros,
+    bode_chart,
+    nyquist_chart,
+    pole_zero_chart,
+    sensitivity_chart,
+)
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart
 from tank2sim.answer.charts.motion import History, Signal, TrackData, history_chart, track_chart
+from tank2sim.answer.charts.vega import PlotAxis, Rule
 from tank2sim.answer.parts import (
     Cell,
     Illustration,
@@ -166,7 +174,9 @@ class ResultWithController(Result[_S]):
             TrackData(label=label, x_m=points[:, 0], y_m=points[:, 1], time_s=np.zeros(len(points)), measured=measured)
             for label, measured in (("legs", False), ("waypoints", True))
         ]
-        errors = [CrossTrack(label=name, time_s=one["t_s"], error_m=one["cross_track_error_m"]) for name, one in runs]
+        errors = [PlotSeries(label=name, x=one["t_s"], y=one["cross_track_error_m"]) for name, one in runs]
+        plot = Plot(series=errors, up=PlotAxis(title="cross-track error (m)"), height_px=220, rules=[Rule(at=[0.0])])
+        apart = curve_chart(plot, PlotAxis(title="time (s)", nice=False), title="Cross-track error", window=["x"])
         section = Section(
             heading="Track keeping",
             text="Line of sight with lookahead, in the current and the wind of the course keeping. Errors leap at the "
@@ -178,7 +188,7 @@ class ResultWithController(Result[_S]):
             ],
             charts=[
                 Illustration(chart=track_chart([*sailed, *wanted], title="Track and its legs")),
-                Illustration(chart=cross_track_chart(errors, title="Cross-track error")),
+                Illustration(chart=apart),
             ],
         )
         return [section]

@@ -10,12 +10,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-import altair as alt
 import numpy as np
 
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_panels
 from tank2sim.answer.charts.motion import History, Signal, history_chart
-from tank2sim.answer.charts.parts import NUMBER, Chart, axis_above, data, records, series_look, stacked
-from tank2sim.answer.charts.theme import BAND_OPACITY
+from tank2sim.answer.charts.vega import ChartSpec, PlotAxis
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
@@ -330,7 +329,7 @@ def _words(kind: str) -> str:
     return kind.replace("_", " ")
 
 
-def cycle_chart(runs: Mapping[str, SingleRun], *, title: str = "", height_px: int = 200) -> alt.VConcatChart:
+def cycle_chart(runs: Mapping[str, SingleRun], *, title: str = "") -> ChartSpec:
     """Averaged cycles over the phase of the motion, one panel a force, in bands of one standard deviation.
 
     Parameters
@@ -339,35 +338,24 @@ def cycle_chart(runs: Mapping[str, SingleRun], *, title: str = "", height_px: in
         Label to the run, in one colour each.
     title : str
         Title of the chart.
-    height_px : int
-        Height of one panel.
     """
-    labels = list(runs)
-    look = series_look(labels, as_points=labels)
-    panels = []
-    for place, (force, up) in enumerate(_FORCES.items()):
-        last = place == len(_FORCES) - 1
-        axis = alt.Axis(title="phase (deg)") if last else alt.Axis(title=None, labels=False, ticks=False)
-        x = alt.X("x:Q", scale=alt.Scale(domain=[0, 360], nice=False), axis=axis)
-        y = alt.Y("v:Q", scale=alt.Scale(zero=False), axis=axis_above(up))
-        points, lines = [], []
+    labels, plots = list(runs), []
+    for force, up in _FORCES.items():
+        series = []
         for label, each in runs.items():
             cycle = each.cycles[force]
             phase, mean, spread = np.degrees(cycle.phase_rad), cycle.mean, np.nan_to_num(cycle.deviation)
-            points += records(label, {"x": phase, "v": mean, "low": mean - spread, "high": mean + spread})
-            lines += records(label, {"x": phase, "v": cycle.fit})
-        area = Chart(data(points)).mark_area(opacity=BAND_OPACITY, clip=True)
-        colour = look.colour.copy()
-        if len(runs) > 1:
-            colour.legend = alt.Legend(title=None, symbolOpacity=1)  # it is shared, and would be as faint as the band
-        band = area.encode(x=x, y=alt.Y("low:Q", axis=axis_above(up)), y2="high:Q", color=colour)
-        line = Chart(data(lines)).mark_line(clip=True).encode(x=x, y=y, color=look.colour, order="i:Q")
-        tooltip = [
-            alt.Tooltip("run:N", title="run"),
-            alt.Tooltip("x:Q", title="phase (deg)", format=NUMBER),
-            alt.Tooltip("v:Q", title=up, format=NUMBER),
-        ]
-        mark = Chart(data(points)).mark_point(clip=True, size=14)
-        dots = mark.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip)
-        panels.append(alt.layer(band, line, dots).properties(width=640, height=height_px))
-    return stacked(panels, title=title, description=f"Forces over the phase of the motion of {', '.join(labels)}.")
+            series += [
+                PlotSeries(label=label, x=phase, y=cycle.fit),
+                PlotSeries(label=label, x=phase, y=mean, low=mean - spread, high=mean + spread, points=True),
+            ]
+        plots.append(Plot(series=series, up=PlotAxis(title=up), height_px=200))
+    return curve_panels(
+        plots,
+        PlotAxis(title="phase (deg)", domain=(0.0, 360.0), nice=False),
+        title=title,
+        width_px=640,
+        described=f"Forces over the phase of the motion of {', '.join(labels)}.",
+        point_px=14,
+        shaded=True,
+    )

@@ -9,15 +9,20 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from tank2sim.analysis.validation.coefficients import BEYOND_STANDARD_ERRORS, CoefficientRow, Difference
 from tank2sim.analysis.validation.comparison import CardComparison, CardSummary, ComparedFigure, TrialComparison
 from tank2sim.answer.charts.motion import TrackData, track_chart
-from tank2sim.answer.charts.parts import with_unit
+from tank2sim.answer.charts.parts import plain, series_look, with_unit
+from tank2sim.answer.charts.rows import RowPlot, names_of, row_chart, row_layers
+from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, Rule, layered, stacked
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
-from tank2sim.results.comparison_charts import FigurePercent, errors_chart, percent_chart
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_FigurePercent = tuple[str, str, str, float, float | None]
+"""Card, trial, figure in words, difference from the reference in per cent, and in standard errors."""
+
 
 _MOST = 10
 """Coefficients of each card on the screen; JSON and page have all. Project choice: they fit a screen."""
@@ -173,7 +178,7 @@ class ComparisonResult(Result[CardComparison]):
     def _others(self) -> list[tuple[int, str]]:
         return list(enumerate(self.labels))[1:]
 
-    def _percents(self) -> list[FigurePercent]:
+    def _percents(self) -> list[_FigurePercent]:
         """Differences of the figures that both cards show."""
         return [
             (label, trial.name, in_words(name)[0], 100 * apart / abs(first), z)
@@ -198,7 +203,7 @@ class ComparisonResult(Result[CardComparison]):
         percents = self._percents()
         if not percents:
             return []
-        chart = percent_chart(
+        chart = _percent_chart(
             percents, self.labels, ", standard errors assumed" * any(card.assumed_errors for card in self.study.cards)
         )
         drawn = Illustration(chart=chart, caption=_PERCENT, name="figures_of_manoeuvres")
@@ -248,7 +253,7 @@ class ComparisonResult(Result[CardComparison]):
         charts = []
         if any(summary.compared for summary in study.summary):
             caption = f"Lines at {BEYOND_STANDARD_ERRORS:g} standard errors."
-            chart = errors_chart(study.rows, self.labels)
+            chart = _errors_chart(study.rows, self.labels)
             charts.append(Illustration(chart=chart, caption=caption, name="coefficients"))
         return Section(heading="Coefficients", text="\n\n".join(texts), tables=tables, charts=charts)
 
@@ -313,3 +318,55 @@ def _with_deviations(row: ComparedFigure) -> list[str | None]:
         else f"{format_number(value)} ({format_number(deviation, 2)})"
         for value, deviation in zip(row.values, row.standard_deviations, strict=True)
     ]
+
+
+def _errors_chart(coefficients: Sequence[CoefficientRow], labels: Sequence[str]) -> ChartSpec:
+    """Differences of all coefficients in standard errors, a row each, a shape and colour for each card."""
+    rows = [
+        {"name": row.name, "v": difference.standard_errors, "run": label}
+        for row in coefficients
+        for label, difference in zip(labels[1:], row.differences, strict=True)
+        if difference.standard_errors is not None
+    ]
+    return row_chart(
+        RowPlot(
+            rows=rows,
+            across=PlotAxis(title="difference (standard errors)", zero=True),
+            look=series_look(labels[1:], as_points=labels[1:]),
+            rules=[Rule(at=[-BEYOND_STANDARD_ERRORS, BEYOND_STANDARD_ERRORS], style="limit")],
+            shown={"run:N": "card", "name:N": "coefficient", "v:Q": "standard errors"},
+        ),
+        title="Differences in standard errors",
+        described=f"Differences of {len(names_of(rows))} coefficients from {labels[0]} in standard errors.",
+        step_px=15,
+        filled=True,
+    )
+
+
+def _percent_chart(percents: Sequence[_FigurePercent], labels: Sequence[str], assumed: str) -> ChartSpec:
+    """Differences in per cent of the reference's figure: a panel a manoeuvre, a row a figure, a shape and colour for
+    each card. `assumed` is added to the title."""
+    panels: dict[str, list[ChartRecord]] = {}
+    ends = []
+    for label, name, figure, percent, z in percents:
+        trial = name.replace(" deg to", "")
+        row: ChartRecord = {"run": label, "name": figure, "whole": f"{trial}: {figure}", "v": plain(percent)}
+        if z:
+            row |= {"low": plain(percent * (1 - 2 / abs(z))), "high": plain(percent * (1 + 2 / abs(z)))}
+        ends += [float(row[key]) for key in ("v", "low", "high") if row.get(key) is not None]
+        panels.setdefault(trial, []).append(row)
+    across = PlotAxis(title="", domain=(min(0.0, *ends), max(0.0, *ends)))
+    look = series_look(labels[1:], as_points=labels[1:])
+    shown = {"run:N": "card", "whole:N": "figure", "v:Q": "difference (%)"}
+    drawn = []
+    for trial, rows in panels.items():
+        layers = row_layers(
+            RowPlot(rows=rows, across=across, look=look, shown=shown, rules=[Rule(at=[0.0])]), filled=True
+        )
+        title = {"text": trial, "anchor": "start", "fontSize": 11}
+        drawn.append(layered(layers, size=(560, {"step": 16}), title=title))
+    return stacked(
+        drawn,
+        title=f"Difference of the figures from {labels[0]}, %{assumed}",
+        description=f"Differences of {len(percents)} figures from {labels[0]} in per cent.",
+    )

@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
+from tank2sim.answer.charts.vega import ChartSpec
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
@@ -63,7 +64,6 @@ from tank2sim.results.gap_text import (
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
-    import altair as alt
     import pandas as pd
 
 NO_TRIALS = Measured((), "angle", ())
@@ -450,7 +450,7 @@ def improved_files(card: Card, text: str, path: Path) -> tuple[GapFiles, list[No
         return {path: not_referring(text)}, [Notice(f"{path.name} has no covariance: {error}")]
 
 
-def _drawn(name: str, chart: alt.TopLevelMixin | None) -> list[Illustration]:
+def _drawn(name: str, chart: ChartSpec | None) -> list[Illustration]:
     return [] if chart is None else [Illustration(chart=chart, caption=_CAPTIONS.get(name, ""), name=name)]
 
 

@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import altair as alt
 import numpy as np
 
-from tank2sim.answer.charts.parts import (
-    NUMBER,
+from tank2sim.answer.charts.parts import extent, plain, series_look, with_unit
+from tank2sim.answer.charts.rows import RowPlot, row_layers
+from tank2sim.answer.charts.vega import (
     STACKS,
-    Chart,
     ChartRecord,
-    data,
-    extent,
+    ChartSpec,
+    PlotAxis,
+    Rule,
+    channel,
+    heading,
+    layer,
+    layered,
     panel_title,
-    plain,
-    series_look,
-    with_unit,
+    rows_where,
+    tooltips,
 )
 from tank2sim.answer.numbers import format_number
 from tank2sim.arrays import Array
@@ -65,7 +68,7 @@ def _missing(lacking: Lacking) -> _Missing:
     return _Missing(words, prefix + unit, scale)
 
 
-def lacking_chart(lacking: Lacking, *, title: str = "") -> alt.HConcatChart:
+def lacking_chart(lacking: Lacking, *, title: str = "") -> ChartSpec:
     """The missing force or signal over the state that explains most of it, and how much of it each state explains.
 
     Points are single instants of all trials, thinned. Squares are means of bins; their bars are 95 % by the spread
@@ -87,26 +90,25 @@ def lacking_chart(lacking: Lacking, *, title: str = "") -> alt.HConcatChart:
         )
     ]
     across, up = with_unit(words, in_words(state)[1]), with_unit(f"missing {what.words}", what.unit)
-    x = alt.X("s:Q", title=across, scale=alt.Scale(zero=False, nice=False, padding=8), axis=alt.Axis(tickCount=6))
-    y = alt.Y("f:Q", title=up, axis=alt.Axis(tickCount=6))
-    tooltip = [
-        alt.Tooltip("trial:N"),
-        alt.Tooltip("s:Q", title=across, format=NUMBER),
-        alt.Tooltip("f:Q", title=up, format=NUMBER),
+    x = PlotAxis(title=across, nice=False, padding=8, ticks=6)
+    y = PlotAxis(title=up, zero=True, ticks=6)
+    place = {"x": x.channel("s"), "y": y.channel("f")}
+    cloud = place | {"tooltip": tooltips({"trial:N": "trial", "s:Q": across, "f:Q": up})}
+    layers = [
+        Rule(at=[0.0], dash=(4, 3)).layer(place["y"]),
+        layer("point", cloud_rows, cloud, style="reference", size=12, opacity=0.45, clip=True),
+        *_means(mean_rows, place, y.channel("low")),
     ]
-    cloud = Chart(data(cloud_rows)).mark_point(style="reference", size=12, opacity=0.45, clip=True)
-    zero = Chart(data([{"f": 0.0}])).mark_rule(style="reference", strokeDash=[4, 3]).encode(y="f:Q")
-    layers = [zero, cloud.encode(x=x, y=y, tooltip=tooltip), *_means(mean_rows, across, up)]
-    main = alt.layer(*layers).properties(width=400, height=280)
-    shares = alt.hconcat(main, _explained(lacking), spacing=24)
-    return shares.properties(
-        title=title,
-        description=f"Missing {what.words} over {words}, and what each state explains.",
-        usermeta=STACKS,
-    )
+    return {
+        "hconcat": [layered(layers, size=(400, 280)), _explained(lacking)],
+        "spacing": 24,
+        "title": title,
+        "description": f"Missing {what.words} over {words}, and what each state explains.",
+        "usermeta": STACKS,
+    }
 
 
-def when_chart(lacking: Lacking, *, title: str = "") -> alt.LayerChart:
+def when_chart(lacking: Lacking, *, title: str = "") -> ChartSpec:
     """What is missing over time, a strip a trial: the colour is its size to either side."""
     what = _missing(lacking)
     names = [trial_name(trial) for trial in lacking.over_time]
@@ -119,45 +121,42 @@ def when_chart(lacking: Lacking, *, title: str = "") -> alt.LayerChart:
     ]
     largest = float(np.quantile(np.abs([row["f"] or 0.0 for row in rows]), 0.98)) or 1.0 if rows else 1.0
     up = with_unit(f"missing {what.words}", what.unit)
-    scale = alt.Scale(domain=[-largest, 0, largest], range=list(DIVERGING), type="linear", clamp=True)
-    base = Chart(data(rows)).encode(
-        x=alt.X("t:Q", title="time (s)", scale=alt.Scale(nice=False)),
-        x2="to:Q",
-        y=alt.Y("trial:N", sort=names, axis=alt.Axis(title=None, labelLimit=220)),
-        color=alt.Color("f:Q", scale=scale, legend=alt.Legend(title=up, gradientLength=180, titleLimit=420)),
-        tooltip=[
-            alt.Tooltip("trial:N"),
-            alt.Tooltip("t:Q", title="from (s)", format=NUMBER),
-            alt.Tooltip("to:Q", title="to (s)", format=NUMBER),
-            alt.Tooltip("f:Q", title=up, format=NUMBER),
-        ],
+    scale = {"domain": [-largest, 0, largest], "range": list(DIVERGING), "type": "linear", "clamp": True}
+    legend = {"title": up, "gradientLength": 180, "titleLimit": 420}
+    strips = {
+        "x": PlotAxis(title="time (s)", nice=False, zero=True).channel("t"),
+        "x2": "to",
+        "y": channel("trial:N", sort=names, title=None, axis={"labelLimit": 220}),
+        "color": channel("f:Q", scale=scale, legend=legend),
+        "tooltip": tooltips({"trial:N": "trial", "t:Q": "from (s)", "to:Q": "to (s)", "f:Q": up}),
+    }
+    return layered(
+        [layer("rect", rows, strips)],
+        size=(520, 20 * max(1, len(names))),
+        title=title,
+        description=f"Missing {what.words} over time, by trial.",
     )
-    chart = alt.layer(base.mark_rect()).properties(width=520, height=20 * max(1, len(names)))
-    return chart.properties(title=title, description=f"Missing {what.words} over time, by trial.")
 
 
 DIVERGING = ("#D55E00", "#f7f7f7", "#0072B2")
 """Colours of a size to either side: two of the palette that any eye distinguishes."""
 
 
-def _means(rows: Sequence[ChartRecord], across: str, up: str) -> list[alt.Chart]:
-    tooltip = [
-        alt.Tooltip("s:Q", title=across, format=NUMBER),
-        alt.Tooltip("f:Q", title=f"mean {up}", format=NUMBER),
-        alt.Tooltip("trials:Q", title="trials in the bin"),
-    ]
+def _means(rows: Sequence[ChartRecord], place: ChartSpec, low: ChartSpec) -> list[ChartSpec]:
     drawn = [row | {"run": "mean of a bin"} for row in rows]
-    colour = alt.Color("run:N", legend=None)
-    bars = Chart(data([row for row in drawn if row["low"] is not None])).mark_rule(strokeWidth=1.6, clip=True)
-    marks = Chart(data(drawn))
+    colour = {"color": channel("run:N", legend=None)}
+    x, y = place["x"], place["y"]
+    said = tooltips({"s:Q": x["title"], "f:Q": f"mean {y['title']}", "trials:Q": "trials in the bin"})
+    ends = rows_where(drawn, lambda row: row["low"] is not None)
+    marks = {**place, **colour, "tooltip": said}
     return [
-        marks.mark_line(strokeWidth=1.4, clip=True).encode(x="s:Q", y="f:Q", color=colour),
-        bars.encode(x="s:Q", y="low:Q", y2="high:Q", color=colour),
-        marks.mark_point(shape="square", filled=True, size=44).encode(x="s:Q", y="f:Q", color=colour, tooltip=tooltip),
+        layer("line", drawn, {**place, **colour}, strokeWidth=1.4, clip=True),
+        layer("rule", ends, {"x": x, "y": low, "y2": "high", **colour}, strokeWidth=1.6, clip=True),
+        layer("point", drawn, marks, shape="square", filled=True, size=44),
     ]
 
 
-def _explained(lacking: Lacking) -> alt.LayerChart:
+def _explained(lacking: Lacking) -> ChartSpec:
     rows: list[ChartRecord] = [
         {"name": _STATE_WORDS.get(name, name), "v": plain(100 * share), "text": f"{100 * share:.0f} %"}
         for name, share in sorted(lacking.explained.items(), key=lambda item: -item[1])
@@ -170,25 +169,35 @@ _LINES = r"split(replace(datum.label, / \+ /g, '|+ '), '|')"
 
 
 def _bars(
-    rows: Sequence[ChartRecord], across: str, *, width: int, kind: str = "linear", percent: bool = False
-) -> alt.LayerChart:
-    names = [row["name"] for row in rows]
+    rows: Sequence[ChartRecord],
+    across_title: str,
+    *,
+    width: int,
+    symlog: bool = False,
+    percent: bool = False,
+    **more: Any,
+) -> ChartSpec:
+    """Bars with their number at the end."""
     farthest = max((row["v"] for row in rows if row["v"] is not None), default=0.0) or 1.0
     # Room on the right for the number at the end of the longest bar.
-    ends = [0, 140 if percent else farthest * (12 if kind == "symlog" else 1.25)]
-    scale_options = {"constant": 10} if kind == "symlog" else {}
-    x = alt.X("v:Q", title=across, scale=alt.Scale(type=kind, domain=ends, nice=False, **scale_options))
-    ticks = [0, 50, 100] if percent else [step for step in (0, 10, 100, 1e3, 1e4, 1e5, 1e6) if step <= ends[1]]
-    x = x.axis(**({"values": ticks} if percent or kind == "symlog" else {"tickCount": 4}))
-    y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, labelExpr=_LINES, labelLimit=150, ticks=False))
-    base = Chart(data(rows)).encode(x=x, y=y)
-    bars = base.mark_bar(height=11, opacity=0.75, clip=True)
-    texts = base.mark_text(align="left", dx=5, fontSize=10.5, style="reference").encode(text="text:N")
-    lines = max((name.count(" + ") + 1 for name in names), default=1)
-    return alt.layer(bars, texts).properties(width=width, height=(10 + 12 * lines) * max(1, len(rows)))
+    end = 140 if percent else farthest * (12 if symlog else 1.25)
+    powers = [step for step in (0, 10, 100, 1e3, 1e4, 1e5, 1e6) if step <= end]
+    across = PlotAxis(
+        title=across_title,
+        domain=(0, end),
+        nice=False,
+        scale={"type": "symlog", "constant": 10} if symlog else None,
+        ticks=[0, 50, 100] if percent else powers if symlog else 4,
+    )
+    side = {"labelExpr": _LINES, "labelLimit": 150, "ticks": False, "grid": False}
+    (bars,) = row_layers(RowPlot(rows=rows, across=across, side=side), mark="bar", height=11, clip=True)
+    place = {name: bars["encoding"][name] for name in ("x", "y")}
+    texts = layer("text", rows, {**place, "text": "text:N"}, align="left", dx=5, fontSize=10.5, style="reference")
+    lines = max((row["name"].count(" + ") + 1 for row in rows), default=1)
+    return layered([bars, texts], size=(width, (10 + 12 * lines) * max(1, len(rows))), **more)
 
 
-def rival_chart(study: GapStudy, *, title: str = "") -> alt.LayerChart | None:
+def rival_chart(study: GapStudy, *, title: str = "") -> ChartSpec | None:
     """Explanations that were compared, with their loss of score to the best; None without any."""
     ranked = sorted(study.rivals, key=lambda rival: rival.loss)
     shown, none = ranked[:MOST_RIVALS], [rival for rival in ranked[MOST_RIVALS:] if not rival.effects]
@@ -203,11 +212,9 @@ def rival_chart(study: GapStudy, *, title: str = "") -> alt.LayerChart | None:
         for rival in (*shown, *none)
     ]
     across = "worse than the best by, -2 log likelihood"
-    kind = "symlog" if max(row["v"] or 0.0 for row in rows) > 100 else "linear"
-    return _bars(rows, across, width=430, kind=kind).properties(
-        title=alt.Title(title, subtitle=_COMPARED),
-        description="Explanations by their loss of score.",
-    )
+    symlog = max(row["v"] or 0.0 for row in rows) > 100
+    described = "Explanations by their loss of score."
+    return _bars(rows, across, width=430, symlog=symlog, title=heading(title, _COMPARED), description=described)
 
 
 _COMPARED = (
@@ -217,18 +224,18 @@ _COMPARED = (
 )
 
 
-def expected_chart(test: DecidingTest, *, title: str = "") -> alt.LayerChart | None:
+def expected_chart(test: DecidingTest, *, title: str = "") -> ChartSpec | None:
     """How far apart the explanations would be in each manoeuvre that was considered; None without any."""
     best = sorted(test.expected.items(), key=lambda item: -item[1])[:MOST_RIVALS]
     sizes = [(name, math.sqrt(max(score, 0.0))) for name, score in best]  # of a score: a difference in noise units
     rows: list[ChartRecord] = [{"name": name, "v": plain(size), "text": format_number(size, 2)} for name, size in sizes]
     if not rows:
         return None
-    chart = _bars(rows, "expected difference (noise units)", width=430)
-    return chart.properties(title=title, description="Expected difference in each manoeuvre.")
+    described = "Expected difference in each manoeuvre."
+    return _bars(rows, "expected difference (noise units)", width=430, title=title, description=described)
 
 
-def agreement_chart(study: GapStudy, *, title: str = "") -> alt.HConcatChart | None:
+def agreement_chart(study: GapStudy, *, title: str = "") -> ChartSpec | None:
     """What each trial alone would have each parameter of the effect, with 95 % intervals; None without any.
 
     The grey band is the 95 % interval of all fitting trials together.
@@ -239,15 +246,17 @@ def agreement_chart(study: GapStudy, *, title: str = "") -> alt.HConcatChart | N
     ]
     if not panels:
         return None
-    chart = alt.hconcat(*panels, spacing=20).resolve_scale(color="shared", shape="shared")
-    return chart.properties(
-        title=title,
-        description="Each trial's own estimate of the parameters, with 95 % intervals.",
-        usermeta=STACKS,
-    )
+    return {
+        "hconcat": panels,
+        "spacing": 20,
+        "resolve": {"scale": {"color": "shared", "shape": "shared"}},
+        "title": title,
+        "description": "Each trial's own estimate of the parameters, with 95 % intervals.",
+        "usermeta": STACKS,
+    }
 
 
-def _agreement_panel(study: GapStudy, name: str, trials: Mapping[str, TrialEstimate], *, named: bool) -> alt.LayerChart:
+def _agreement_panel(study: GapStudy, name: str, trials: Mapping[str, TrialEstimate], *, named: bool) -> ChartSpec:
     effect, _, parameter = name.rpartition(".")
     words, unit = in_words(parameter)
     whole = next((entry for entry in study.effects if entry.name == effect and parameter in entry.parameters), None)
@@ -271,28 +280,21 @@ def _agreement_panel(study: GapStudy, name: str, trials: Mapping[str, TrialEstim
     ends += [] if middle is None else [middle - band, middle + band]
     low, high = extent(np.array(ends, dtype=float))
     margin = 0.05 * (high - low) or 1.0
-    scale = alt.Scale(domain=[low - margin, high + margin], nice=False, zero=False)
-    x = alt.X("v:Q", title=with_unit(words, unit), scale=scale, axis=alt.Axis(tickCount=5))
-    side = {} if named else {"labels": False, "ticks": False}
+    across = PlotAxis(title=with_unit(words, unit), domain=(low - margin, high + margin), nice=False, ticks=5)
     names = [trial_name(trial) for trial in held if trial in trials]
-    y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, grid=True, labelLimit=220, **side))
+    side = {"labelLimit": 220} | ({} if named else {"labels": False, "ticks": False})
+    shown = {"name:N": "trial", "v:Q": "estimate", "low:Q": "from", "high:Q": "to"}
     look = series_look(list(SETS), as_points=list(SETS))
-    tooltip = [
-        alt.Tooltip("name:N", title="trial"),
-        *(alt.Tooltip(f"{key}:Q", format=NUMBER) for key in ("v", "low", "high")),
-    ]
-    base = Chart(data(rows)).encode(y=y, color=look.colour, tooltip=tooltip)
-    layers = [
-        base.mark_rule(strokeWidth=1.6, clip=True).encode(x=alt.X("low:Q", scale=scale), x2="high:Q"),
-        base.mark_point(size=36, clip=True).encode(x=x, shape=look.shape),
-    ]
+    layers = row_layers(
+        RowPlot(rows=rows, across=across, look=look, names=names, side=side, shown=shown), size=36, clip=True
+    )
     if middle is not None:
-        span = {"low": plain(middle - band), "high": plain(middle + band), "v": plain(middle)}
-        estimated = Chart(data([span]))
-        shade = estimated.mark_rect(style="reference", opacity=0.25).encode(x=alt.X("low:Q", scale=scale), x2="high:Q")
-        layers = [shade, estimated.mark_rule(style="reference").encode(x=alt.X("v:Q", scale=scale)), *layers]
+        strip = [{"low": plain(middle - band), "high": plain(middle + band)}]
+        edges = {"x": across.channel("low"), "x2": "high"}
+        together = Rule(at=[middle], upright=True).layer(across.channel("v"))
+        layers = [layer("rect", strip, edges, style="reference", opacity=0.25), together, *layers]
     title = panel_title(f"{effect.replace('_', ' ')}: {words}")
-    return alt.layer(*layers).properties(title=title, width=230, height=22 * len(names))
+    return layered(layers, size=(230, 22 * len(names)), title=title)
 
 
 def _prefix(values: Array) -> tuple[str, float]:

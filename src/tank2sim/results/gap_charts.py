@@ -5,24 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-import altair as alt
 import numpy as np
 
-from tank2sim.answer.charts.before_after import before_after_switch, misfit_maps, switch
-from tank2sim.answer.charts.parts import (
-    NUMBER,
-    Chart,
-    ChartRecord,
-    SeriesLook,
-    axis_above,
-    data,
-    extent,
-    panel_title,
-    plain,
-    records,
-    series_look,
-    with_unit,
-)
+from tank2sim.answer.charts.before_after import before_after_switch, misfit_maps
+from tank2sim.answer.charts.parts import SeriesLook, extent, plain, records, series_look, with_unit
+from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, heading, layer, layered, panel_title, tooltips
 from tank2sim.gap.outcome.study import GapReplay, GapStudy, TrialMisfit
 from tank2sim.gap.result import MisfitPlace
 from tank2sim.records.signals.columns import SignalName
@@ -33,9 +20,11 @@ from tank2sim.results.trial_charts import (
     BEFORE,
     MEASURED,
     MODEL_SERIES,
-    PANELS_PER_ROW,
     history_grid,
+    panel_grid,
+    place_over_time,
     track_grid,
+    whole_range,
 )
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 from tank2sim.units import to_si
@@ -92,7 +81,7 @@ def shown_models(study: GapStudy) -> tuple[str, ...]:
     return ("before", "after") if changes_simulation(study) else ("before",)
 
 
-def gap_tracks(study: GapStudy, *, held_out: bool, title: str = "") -> alt.ConcatChart | None:
+def gap_tracks(study: GapStudy, *, held_out: bool, title: str = "") -> ChartSpec | None:
     """Tracks as measured, by the card before and by the card found, a panel a trial; None without any.
 
     Of many trials those with the largest misfit before are shown.
@@ -100,13 +89,13 @@ def gap_tracks(study: GapStudy, *, held_out: bool, title: str = "") -> alt.Conca
     return track_grid(_worst(study, lambda trial: trial.held_out == held_out), title=title)
 
 
-def worst_tracks(study: GapStudy, *, title: str = "") -> alt.ConcatChart | None:
+def worst_tracks(study: GapStudy, *, title: str = "") -> ChartSpec | None:
     """Tracks of the few trials with the largest misfit before, held-out ones where there are any; None without."""
     held_out = any(trial.held_out for trial in study.trials)
     return track_grid(_worst(study, lambda trial: trial.held_out == held_out, FEW_TRIALS), title=title)
 
 
-def gap_histories(study: GapStudy, *, held_out: bool, title: str = "") -> list[alt.ConcatChart]:
+def gap_histories(study: GapStudy, *, held_out: bool, title: str = "") -> list[ChartSpec]:
     """Motions over time as measured, by the card before and by the card found, a column a trial, in sheets.
 
     Of many trials those with the largest misfit before are shown.
@@ -140,7 +129,7 @@ def shown_places(study: GapStudy) -> list[MisfitPlace]:
     return sorted(first.values(), key=places.index)[:MOST_PLACES]
 
 
-def place_chart(study: GapStudy, *, title: str = "") -> alt.ConcatChart | None:
+def place_chart(study: GapStudy, *, title: str = "") -> ChartSpec | None:
     """Signals over time where the misfit is worst, above; simulated less measured and the band of the noise, below.
 
     The shaded time is that of the place. None without any measurement.
@@ -150,15 +139,14 @@ def place_chart(study: GapStudy, *, title: str = "") -> alt.ConcatChart | None:
     panels = [_place_panels(replays[place.trial], place, noise[place.signal].sigma) for place in shown_places(study)]
     if not panels:
         return None
-    grid = alt.concat(*panels, columns=PANELS_PER_ROW, spacing=26, params=switch(list(MODEL_SERIES)))
-    shared = grid.resolve_scale(color="shared", strokeDash="shared", shape="shared")
-    return shared.properties(
-        title=alt.Title(title, subtitle="Above: the signal. Below: simulated less measured; grey: 95 % of the noise."),
-        description="Time histories of the worst places, and what is left next to the noise.",
+    return panel_grid(
+        panels,
+        heading(title, "Above: the signal. Below: simulated less measured; grey: 95 % of the noise."),
+        "Time histories of the worst places, and what is left next to the noise.",
     )
 
 
-def _place_panels(replay: GapReplay, place: MisfitPlace, sigma: float) -> alt.VConcatChart:
+def _place_panels(replay: GapReplay, place: MisfitPlace, sigma: float) -> ChartSpec:
     name, look = signal_of(place.signal), series_look([AFTER, BEFORE, MEASURED], as_points=[MEASURED])
     time_s, measured = replay.measured["t_s"], replay.measured[name.file]
     models = {BEFORE: replay.before[name.file], AFTER: replay.found[name.file]}
@@ -171,54 +159,40 @@ def _place_panels(replay: GapReplay, place: MisfitPlace, sigma: float) -> alt.VC
         rows += records(label, {"t": time_s[kept], "v": values[kept]})
         kept = known[thin_points([(values - measured)[known]], SHOWN_SAMPLES)]
         residuals += records(label, {"t": time_s[kept], "v": (values - measured)[kept]})
-    band = NOISE_BAND * sigma
-    times = extent(time_s)
-    above = _over_time(rows, times, with_unit(name.words, name.unit), look, labelled=False)
-    below = _over_time(
-        residuals, times, with_unit("simulated − measured", name.unit), look, labelled=True, included=(-band, band)
-    )
-    noise = Chart(data([{"low": plain(-band), "high": plain(band)}])).mark_rect(style="reference", opacity=0.3)
-    begin, end = place.t_start_s, place.t_end_s
-    spans = Chart(data([{"from": plain(begin), "to": plain(end)}])).mark_rect(style="region", clip=True)
-    when = spans.encode(x="from:Q", x2="to:Q")
-    behind = [when] if (begin, end) != times else []
-    return alt.vconcat(
-        alt.layer(*behind, *above).properties(width=200, height=86),
-        alt.layer(*behind, noise.encode(y="low:Q", y2="high:Q"), *below).properties(width=200, height=66),
-        spacing=16,
-    ).properties(title=panel_title(f"{trial_name(place.trial)} · {name.words}"))
+    band, times = NOISE_BAND * sigma, extent(time_s)
+    up = with_unit(name.words, name.unit)
+    place_above = place_over_time(times, whole_range(rows, "v"), up, "v", labelled=False)
+    left = with_unit("simulated − measured", name.unit)
+    place_below = place_over_time(times, whole_range(residuals, "v", (-band, band)), left, "v", labelled=True)
+    strip = {"y": place_below["y"] | {"field": "low"}, "y2": "high"}
+    noise = layer("rect", [{"low": plain(-band), "high": plain(band)}], strip, style="reference", opacity=0.3)
+    spans = [{"t": plain(place.t_start_s), "to": plain(place.t_end_s)}]
+
+    def behind(axes: ChartSpec) -> list[ChartSpec]:
+        if (place.t_start_s, place.t_end_s) == times:
+            return []
+        return [layer("rect", spans, {"x": axes["x"], "x2": "to"}, style="region", clip=True)]
+
+    above = [*behind(place_above), *_over_time(rows, place_above, up, look)]
+    below = [*behind(place_below), noise, *_over_time(residuals, place_below, left, look)]
+    return {
+        "vconcat": [layered(above, size=(200, 86)), layered(below, size=(200, 66))],
+        "spacing": 16,
+        "title": panel_title(f"{trial_name(place.trial)} · {name.words}"),
+    }
 
 
-def _over_time(
-    rows: Sequence[ChartRecord],
-    times: tuple[float, float],
-    up: str,
-    look: SeriesLook,
-    *,
-    labelled: bool,
-    included: Sequence[float] = (),
-) -> list[alt.Chart]:
-    axis = alt.Axis(title="time (s)", tickCount=4) if labelled else alt.Axis(title=None, labels=False, ticks=False)
-    x = alt.X("t:Q", scale=alt.Scale(domain=list(times), nice=False, zero=False), axis=axis)
-    # The scale is reported: it stays when the switch takes a line away.
-    ends = [row["v"] for row in rows if row["v"] is not None] + list(included)
-    scale = alt.Scale(domain=list(extent(np.array(ends, dtype=float))), nice=True, zero=False)
-    y = alt.Y("v:Q", scale=scale, axis=axis_above(up, tickCount=3))
-    tooltip = [
-        alt.Tooltip("run:N", title="by"),
-        alt.Tooltip("t:Q", title="time (s)", format=NUMBER),
-        alt.Tooltip("v:Q", title=up, format=NUMBER),
-    ]
-    lines = Chart(data([row for row in rows if row["run"] != MEASURED])).mark_line(clip=True, strokeWidth=1.5)
-    lines = lines.transform_filter(before_after_switch(MODEL_SERIES))
-    drawn = [lines.encode(x=x, y=y, color=look.colour, strokeDash=look.dash, order="i:Q", tooltip=tooltip)]
-    if points := [row for row in rows if row["run"] == MEASURED]:
-        marks = Chart(data(points)).mark_point(clip=True, size=14, strokeWidth=1)
-        drawn.insert(0, marks.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip))
-    return drawn
+def _over_time(rows: Sequence[ChartRecord], place: ChartSpec, up: str, look: SeriesLook) -> list[ChartSpec]:
+    common = place | {"color": look.colour, "tooltip": tooltips({"run:N": "by", "t:Q": "time (s)", "v:Q": up})}
+    points, lines = ([row for row in rows if (row["run"] == MEASURED) == measured] for measured in (True, False))
+    drawn = []
+    if points:
+        drawn.append(layer("point", points, {**common, "shape": look.shape}, clip=True, size=14, strokeWidth=1))
+    line = layer("line", lines, {**common, "strokeDash": look.dash, "order": "i:Q"}, clip=True, strokeWidth=1.5)
+    return [*drawn, line | {"transform": [{"filter": before_after_switch(MODEL_SERIES)}]}]
 
 
-def misfit_chart(study: GapStudy, *, title: str = "") -> alt.VConcatChart:
+def misfit_chart(study: GapStudy, *, title: str = "") -> ChartSpec:
     """Misfit of each signal in each trial in noise units, to switch between before, after and both side by side."""
     measured = {name for trial in study.trials for name in trial.signals}
     ordered = [SignalName(name).file for name in OBSERVED_SIGNALS]

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from tank2sim.analysis.influence.card_influence import FigureErrors, InfluenceStudy
+from tank2sim.analysis.influence.figures import figure_label
 from tank2sim.analysis.tuning.result import FEWEST, TunedStudy, TunedTarget
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
@@ -22,7 +23,6 @@ from tank2sim.notices import Notice
 from tank2sim.results.ensembles import figures_section, members_frame
 from tank2sim.results.influence_charts import (
     InfluenceData,
-    figure_label,
     influence_charts,
     most_influential,
     moves_chart,

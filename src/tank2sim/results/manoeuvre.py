@@ -8,28 +8,41 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+
+from tank2sim.analysis.ensemble.results import ManoeuvreBands
 from tank2sim.analysis.manoeuvre import ManoeuvreStudy, OtherSide
+from tank2sim.answer.charts.manoeuvre import (
+    Motion,
+    along_course,
+    motion_of,
+    pull_out_chart,
+    stop_dimensions,
+    stop_speed_chart,
+    turn_chart,
+    way_chart,
+    zigzag_chart,
+)
+from tank2sim.answer.charts.motion import SpiralData, spiral_chart, varying_histories
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.parts import Cell, Column, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
+from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
 from tank2sim.notices import Notice
 from tank2sim.results.ensembles import band_table, members_frame
-from tank2sim.results.manoeuvre_charts import (
-    SIDE_NAMES,
-    history_charts,
-    manoeuvre_charts,
-    manoeuvre_title,
-    members_text,
-)
 from tank2sim.simulation.card_range import entry_name, single_figures
+from tank2sim.simulation.figures import zero_rate_rudders
 from tank2sim.simulation.run import Run
 from tank2sim.simulation.trial_file import trial_columns, trial_csv
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_SIDE_NAMES = {1: "starboard", -1: "port"}
+
 
 _FIRST: Mapping[str, tuple[str, ...]] = {
     "turn": ("advance_m", "transfer_m", "tactical_diameter_m"),
@@ -84,12 +97,12 @@ class ManoeuvreResult(Result[ManoeuvreStudy]):
     @property
     def title(self) -> str:
         """The ship, and the manoeuvre in words."""
-        return f"{self.study.ship}: {manoeuvre_title(self.study)}"
+        return f"{self.study.ship}: {_manoeuvre_title(self.study)}"
 
     @property
     def subtitle(self) -> str:
         """The manoeuvre as it was ordered, and the ensemble."""
-        members = f", {members_text(self.study.ensemble)}" if self.study.ensemble else ""
+        members = f", {_members_text(self.study.ensemble)}" if self.study.ensemble else ""
         return f"Simulated manoeuvre {self.study.manoeuvre}{members}"
 
     @property
@@ -206,7 +219,7 @@ class ManoeuvreResult(Result[ManoeuvreStudy]):
         elif limit is not None:
             verdict = Verdict.PASSED if value <= limit else Verdict.FAILED
         if name == "side_reach_m":
-            notes.append(f"to {SIDE_NAMES[-1 if value < 0 else 1]}")
+            notes.append(f"to {_SIDE_NAMES[-1 if value < 0 else 1]}")
             value = abs(value)
         label = label[:1].upper() + label[1:]
         return KeyFigure(label=label, value=value, unit=unit, verdict=verdict, note="; ".join(notes), limit=limit)
@@ -229,8 +242,8 @@ class ManoeuvreResult(Result[ManoeuvreStudy]):
                 "is zero at the neutral rudder; on an unstable ship they remain apart."
             )
         sections = [
-            Section(heading="The manoeuvre", text=text, charts=manoeuvre_charts(self.study)),
-            Section(heading="Time histories", charts=history_charts(self.study)),
+            Section(heading="The manoeuvre", text=text, charts=_manoeuvre_charts(self.study)),
+            Section(heading="Time histories", charts=_history_charts(self.study)),
             Section(heading="Figures", tables=self._tables()),
         ]
         return [section for section in sections if section.charts or section.tables]
@@ -304,3 +317,106 @@ def _pull_outs(*sides: Mapping[str, Any]) -> str:
     if abs(first_left - second_left) <= _MEET * abs(first - second):
         return "The ship is stable on a straight course: the yaw rates from both sides meet."
     return "The yaw rates from both sides stay apart: the ship is unstable on a straight course, or very slow."
+
+
+def _manoeuvre_title(study: ManoeuvreStudy) -> str:
+    """Return the manoeuvre in words: ``turning circle, 35° of rudder to starboard``."""
+    argument = study.argument
+    side, size = _SIDE_NAMES[-1 if argument.startswith("-") else 1], argument.lstrip("+-")
+    titles = {
+        "turn": f"turning circle, {size}° of rudder to {side}",
+        "zigzag": f"zigzag {size}, first to {side}",
+        "pullout": f"pull-out from {size}° of rudder",
+        "spiral": "direct spiral",
+        "difference": f"turning circle to {side}, {size} rpm between the sides",
+        "spin": f"turn on the spot to {side}, {size} rpm",
+        "straight": f"straight course from rest, {argument} rpm",
+        "stop": f"stop with {argument} rpm" if argument else "full astern stop",
+    }
+    return titles.get(study.kind, study.manoeuvre)
+
+
+def _members_text(ensemble: ManoeuvreBands) -> str:
+    """Return the members in words: how many ships, and with which errors."""
+    errors = "assumed errors" if ensemble.assumed_errors else "the errors of the card"
+    return f"{ensemble.usable} ships within {errors}"
+
+
+def _manoeuvre_charts(study: ManoeuvreStudy) -> list[Illustration]:
+    """Return the charts special to the manoeuvre, empty without a position or a yaw rate."""
+    try:
+        motion = motion_of(study.histories, study.length_m, study.beam_m)
+    except KeyError:  # a craft or a file without a position or a yaw rate
+        return []
+    figures = single_figures(study.figures)
+    title = _manoeuvre_title(study)
+    title = title[:1].upper() + title[1:]
+    bands, shaded = {}, ""
+    if study.ensemble:
+        title += ", standard errors assumed" * study.ensemble.assumed_errors
+        bands = study.ensemble.figures
+        shaded = f"Shaded: nine of ten of {_members_text(study.ensemble)}. Bars: nine of ten of each figure."
+    match study.kind:
+        case "turn" | "difference":
+            chart = turn_chart(motion, figures, bands=bands, edges_m=_track_edges(study), title=title)
+            return [Illustration(chart=chart, caption=shaded)]
+        case "zigzag":
+            heading = float(study.argument.partition("/")[2])
+            overshoots = {name: value for name, value in study.figures.items() if isinstance(value, list)}
+            edges = _heading_edges(study)
+            chart = zigzag_chart(motion, overshoots, heading, bands=bands, edges_deg=edges, title=title)
+            return [Illustration(chart=chart, caption=f"Red: the overshoots. {shaded}".strip())]
+        case "pullout":
+            return [_pull_out(study, motion, title)]
+        case "spiral":
+            return [_spiral(study, title)]
+        case "stop":
+            revolutions, held = motion.revolutions_rpm, ""
+            if revolutions is not None and np.ptp(revolutions) == 0:
+                held = f"Revolutions: {format_number(float(revolutions[-1]), 4)} rpm from the order on."
+            way = way_chart(motion, stop_dimensions(motion, figures), title="Track of the stop")
+            return [
+                Illustration(chart=stop_speed_chart(motion, title="Speed over distance"), caption=held),
+                Illustration(chart=way, caption=shaded),
+            ]
+    return [Illustration(chart=way_chart(motion, [], title="Track"), caption=shaded)]
+
+
+def _history_charts(study: ManoeuvreStudy) -> list[Illustration]:
+    """Return the chart of the signals that change over time, with the bands of an ensemble; empty without any."""
+    bands = study.ensemble.histories if study.ensemble else {}
+    drawn = varying_histories(study.histories, bands, study.ensemble.t_s if study.ensemble else np.zeros(0))
+    return [drawn] if drawn else []
+
+
+def _pull_out(study: ManoeuvreStudy, motion: Motion, title: str) -> Illustration:
+    neutral = study.figures["neutral_rudder_deg"]
+    assert isinstance(neutral, float)
+    sides = {1 if motion.rudder_deg[1] > neutral else -1: motion}
+    if study.other_side:
+        sides[-next(iter(sides))] = motion_of(study.other_side.histories)
+    named = {f"from a turn to {_SIDE_NAMES[side]}": sides[side] for side in sorted(sides, reverse=True)}
+    return Illustration(chart=pull_out_chart(named, neutral, title=title))
+
+
+def _spiral(study: ManoeuvreStudy, title: str) -> Illustration:
+    figures = study.figures
+    rudder, rate = (np.radians(np.asarray(figures[name], dtype=float)) for name in ("rudder_deg", "rate_degps"))
+    spiral = SpiralData(label="spiral", rudder_rad=rudder, yaw_rate_radps=rate)
+    loop = zero_rate_rudders(rudder, rate) if figures.get("loop_width_deg") else None
+    return Illustration(chart=spiral_chart([spiral], loop_rad=loop, title=title))
+
+
+def _track_edges(study: ManoeuvreStudy) -> tuple[Array, Array] | None:
+    track = study.ensemble.track if study.ensemble else None
+    if track is None:
+        return None
+    return along_course(study.histories, track.low_m), along_course(study.histories, track.high_m)
+
+
+def _heading_edges(study: ManoeuvreStudy) -> tuple[Array, Array, Array] | None:
+    heading = study.ensemble.histories.get("psi_deg") if study.ensemble else None
+    if study.ensemble is None or heading is None:
+        return None
+    course = study.histories["psi_deg"][0]
+    return study.ensemble.t_s, heading.p5 - course, heading.p95 - course

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-import altair as alt
-
-from tank2sim.answer.charts.parts import NUMBER, Chart, data
+from tank2sim.answer.charts.curves import PlotSeries
+from tank2sim.answer.charts.vega import ChartSpec, PlotAxis, layer, layered, tooltips
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
 from tank2sim.cards import Card
@@ -202,7 +201,7 @@ class MmgReductionResult(Result[MmgStudy]):
         return table("Shares of the variance", columns, rows, on_screen=False)
 
 
-def computed_chart(name: str, readings: ChannelReadings, *, size_px: int = 300) -> alt.LayerChart:
+def computed_chart(name: str, readings: ChannelReadings, *, size_px: int = 300) -> ChartSpec:
     """Computed over measured readings of one channel, with the line on which both are the same.
 
     Parameters
@@ -213,17 +212,19 @@ def computed_chart(name: str, readings: ChannelReadings, *, size_px: int = 300) 
     size_px : int
         Width and height.
     """
-    points = [{"m": m, "c": c} for m, c in zip(readings.measured.tolist(), readings.computed.tolist(), strict=True)]
     unit = readings.unit.replace(".", " ")
-    x = alt.X("m:Q", title=f"{name} measured ({unit})")
-    y = alt.Y("c:Q", title=f"{name} computed ({unit})")
-    tooltip = [alt.Tooltip("m:Q", title="measured", format=NUMBER), alt.Tooltip("c:Q", title="computed", format=NUMBER)]
     ends = [float(readings.measured.min()), float(readings.measured.max())]
-    line = Chart(data([{"m": end, "c": end} for end in ends])).mark_line(opacity=0.5).encode(x=x, y=y)
-    dots = Chart(data(points)).mark_circle(size=36, opacity=0.7).encode(x=x, y=y, tooltip=tooltip)
-    return alt.layer(line, dots).properties(
+    equal = PlotSeries(label="equal", x=ends, y=ends)
+    both = PlotSeries(label="", x=readings.measured, y=readings.computed, points=True)
+    across, up = (PlotAxis(title=f"{name} {kind} ({unit})", zero=True) for kind in ("measured", "computed"))
+    place = {"x": across.channel("x"), "y": up.channel("v")}
+    shown = tooltips({"x:Q": "measured", "v:Q": "computed"})
+    return layered(
+        [
+            layer("line", equal.rows, place, opacity=0.5),
+            layer("circle", both.rows, {**place, "tooltip": shown}, size=36, opacity=0.7),
+        ],
+        size=(size_px, size_px),
         title=_CHANNELS[name].capitalize(),
-        width=size_px,
-        height=size_px,
         description=f"Computed and measured {_CHANNELS[name]}.",
     )

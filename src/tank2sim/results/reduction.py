@@ -8,8 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
-import altair as alt
-
+from tank2sim.answer.charts.vega import ChartSpec
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
 from tank2sim.cards import Card, parse_card
@@ -309,7 +308,7 @@ class ReductionResult(Result[ReductionStudy]):
         )
 
 
-def _plot_chart(plot: ReductionPlot) -> alt.TopLevelMixin:
+def _plot_chart(plot: ReductionPlot) -> ChartSpec:
     if isinstance(plot, HarmonicsPlot):
         return harmonic_chart(plot)
     return force_chart(plot) if isinstance(plot, ForcePlot) else loop_chart(plot, _LOOPS)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
@@ -11,8 +11,10 @@ import numpy as np
 
 from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.analysis.validation.study import ComparisonOutcome, Validated, Verified
-from tank2sim.answer.charts.columns import motions
+from tank2sim.answer.charts.motion import motions
 from tank2sim.answer.charts.parts import with_unit
+from tank2sim.answer.charts.rows import RowPlot, names_of, row_layers
+from tank2sim.answer.charts.vega import SIDE, ChartSpec, PlotAxis, Rule, channel, layer, layered
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Verdict, records_table, table
 from tank2sim.answer.result import Result
@@ -23,11 +25,17 @@ from tank2sim.identification.craft.fit import PREDICTED_S
 from tank2sim.identification.craft.study import PredictionStudy
 from tank2sim.notices import Notice
 from tank2sim.results.imo import imo_section
-from tank2sim.results.validation_charts import COMPARISON_ERRORS, comparison_error_chart
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_COMPARISON_ERRORS = (
+    "Points: error E of the simulation. Bars: plus and minus its uncertainty U_val; a point within its bar is "
+    "validated, if the bar is short enough. The number names the trial."
+)
+"""Caption of the chart of comparison errors."""
+
 
 _METHOD = (
     "E = S − D is the simulated less the measured figure. U_val = 2 √(u_num² + u_input² + u_D²) is the uncertainty by "
@@ -301,7 +309,7 @@ class ValidationResult(Result[ValidationStudy]):
             ],
             charts=[
                 Illustration(
-                    chart=comparison_error_chart(figures, numbers), caption=COMPARISON_ERRORS, name="validation"
+                    chart=_comparison_error_chart(figures, numbers), caption=_COMPARISON_ERRORS, name="validation"
                 )
             ],
         )
@@ -407,3 +415,36 @@ def _method(figures: Sequence[Validated]) -> Section:
 def _digits(value: float | None, digits: int = 4) -> str | None:
     """A number for a column of many units, whose numbers share no decimals."""
     return None if value is None else format_number(value, digits)
+
+
+def _comparison_error_chart(figures: Sequence[Validated], numbers: Mapping[str, int]) -> ChartSpec:
+    """E of each figure next to plus and minus U_val, in per cent of D.
+
+    `numbers` are those of the trials by name.
+    """
+    rows = [
+        {
+            "name": f"{numbers[figure.trial]}: {in_words(figure.name)[0]}",
+            "trial": figure.trial,
+            "v": 100 * figure.error / abs(figure.measured),
+            "least": -(figure.level_percent or 0.0),
+            "most": figure.level_percent or 0.0,
+            "run": figure.outcome.value,
+        }
+        for figure in figures
+        if figure.error is not None and figure.measured
+    ]
+    across = PlotAxis(title="per cent of the measured figure", zero=True)
+    y = channel("name:N", sort=names_of(rows), title=None, axis=SIDE | {"labelLimit": 170})
+    bars = layer("bar", rows, {"x": across.channel("least"), "x2": "most", "y": y}, style="uncertainty", height=14)
+    shown = {"trial:N": "trial", "name:N": "figure", "v:Q": "E (%)", "most:Q": "U_val (%)"}
+    side = {"labelLimit": 170}
+    points = row_layers(
+        RowPlot(rows=rows, across=across, shown=shown, side=side, rules=[Rule(at=[0.0])]), filled=True, size=80
+    )
+    return layered(
+        [bars, *points],
+        size=(520, {"step": 24}),
+        title="Comparison error and validation uncertainty",
+        description=f"Comparison error of {len(rows)} figures next to the validation uncertainty.",
+    )

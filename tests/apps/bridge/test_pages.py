@@ -11,7 +11,7 @@ import pytest
 
 from tank2sim.apps.bridge.boxes import OUTSIDE, draughts, particulars, steering, stopping, telegraph, turning, zigzags
 from tank2sim.apps.bridge.drawings import circles_drawing, clock, knots
-from tank2sim.apps.bridge.pages import pilot_card_page, poster_page
+from tank2sim.apps.bridge.result import pilot_card_page, poster_page
 from tank2sim.apps.bridge.study import Bridge, bridge_of
 from tank2sim.cards import read_card
 from tests.answer.browser import browser, measured_in_browser

@@ -11,8 +11,17 @@ from pathlib import Path
 
 import pytest
 
-from tank2sim.apps.fleet.run_record import NEW, RUN, fleet_run_record, stale, with_results
-from tank2sim.apps.fleet.search import Fault, ShipTask, find_at_once, find_in_turn
+from tank2sim.apps.fleet.run import (
+    NEW,
+    RUN,
+    Fault,
+    ShipTask,
+    find_at_once,
+    find_in_turn,
+    fleet_run_record,
+    stale,
+    with_results,
+)
 from tank2sim.apps.fleet.ships import ShipFolder, fleet_in, ship_alone, ship_in
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.errors import InputError
@@ -169,7 +178,7 @@ def test_options_that_change_the_result_make_it_stale_and_others_do_not(
     assert stale(fleet_run_record(ship, GapOptions(effects=("current",), workers=7)), out) == ""
     for options in (GapOptions(), GapOptions(("current",), ("wind",)), GapOptions(("current",), max_effects=1)):
         assert stale(fleet_run_record(ship, options), out) == "the options were changed"
-    monkeypatch.setattr("tank2sim.apps.fleet.run_record.__version__", "99")
+    monkeypatch.setattr("tank2sim.apps.fleet.run.__version__", "99")
     assert stale(fleet_run_record(ship, GapOptions(effects=("current",))), out) == "computed by another version"
 
 
@@ -195,7 +204,7 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> None:
             raise ZeroDivisionError("by zero")
         return f"gap of {card.source}"
 
-    monkeypatch.setattr("tank2sim.apps.fleet.search.run_gap_workflow", find_gap)
+    monkeypatch.setattr("tank2sim.apps.fleet.run.run_gap_workflow", find_gap)
 
 
 def test_a_bad_ship_does_not_stop_the_others(mariner_card: ManoeuvringCard, failing) -> None:

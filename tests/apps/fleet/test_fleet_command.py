@@ -78,7 +78,7 @@ def finding(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[str]]:
             gap = replace(made_up.missing(), card=card, base=card, improved=improved, effects=(CURRENT,), passed=passed)
             return replace(gap, missing_force=None, agreement={}, figures_before=())
 
-        monkeypatch.setattr("tank2sim.apps.fleet.search.run_gap_workflow", find_gap)
+        monkeypatch.setattr("tank2sim.apps.fleet.run.run_gap_workflow", find_gap)
         monkeypatch.setattr("tank2sim.api.gap_search.run_gap_workflow", find_gap)
         return calls
 

@@ -57,9 +57,8 @@ def test_ships_stand_in_a_table_with_what_they_lack() -> None:
 
 def test_the_chart_has_each_ship_before_and_after() -> None:
     (chart,) = fleet(LOST, ONE).sections[0].charts
-    drawn = chart.chart.to_dict()
-    rows = drawn["datasets"][drawn["layer"][1]["data"]["name"]]
-    assert [(one["ship"], one["misfit"]) for one in rows] == [("gamma ray #1", 9.0), ("gamma ray #1", 1.23)]
+    rows = chart.chart["layer"][1]["data"]["values"]
+    assert [(one["name"], one["v"]) for one in rows] == [("gamma ray #1", 9.0), ("gamma ray #1", 1.23)]
 
 
 def test_all_that_an_ambiguous_ship_may_lack_is_reported() -> None:

@@ -86,7 +86,7 @@ def test_gain_and_phase_of_the_ship_are_drawn_where_they_are_sure():
     steered = trial(series(rate).time_s, delta_rad=rudder, r_radps=rate)
     steering = analyse(steered, SignalSettings()).rudder_to_yaw_rate
     specification, drawn = panels(transfer_chart(RUDDER, YAW, steering.transfer))
-    titles = [panel["layer"][0]["encoding"]["y"]["axis"]["title"] for panel in drawn]
+    titles = [panel["layer"][0]["encoding"]["y"]["title"] for panel in drawn]
     assert titles == ["gain (1/s)", "phase (deg), below zero: later", "coherence; dotted: by chance"]
     gains, _ = rows(specification, drawn[0], "point")
     assert gains[0]["v"] == pytest.approx(found.gain[0], rel=1e-5)
@@ -100,7 +100,7 @@ def test_gain_and_phase_of_the_ship_are_drawn_where_they_are_sure():
 def test_what_a_filter_does_is_drawn_in_decibel_degrees_and_seconds(rate):
     effect = butterworth(rate, FilterType.LOW, [0.5], causal=True).effect
     specification, drawn = panels(effect_chart("lowpass:0.5,causal", effect))
-    titles = [panel["layer"][0]["encoding"]["y"]["axis"]["title"] for panel in drawn]
+    titles = [panel["layer"][0]["encoding"]["y"]["title"] for panel in drawn]
     assert titles == ["gain (dB)", "phase (deg), below zero: later", "group delay (s)"]
     gain, phase, delay = (rows(specification, panel, "line")[0] for panel in drawn)
     place = int(np.argmin(np.abs(effect.frequency_hz - 0.5)))

@@ -33,9 +33,9 @@ def test_the_steering_diagram_shows_models_and_trials(found: SteeringComparison)
     specification = chart_specification(steering_diagram_chart(found.diagrams))
     lines, points = _rows(specification, 0), _rows(specification, -1)
     last = {row["run"]: row for row in lines}
-    assert last["Japanese model, 9 m"]["r"] == pytest.approx(84.8, abs=0.1)
-    assert last["through the two trial points"]["r"] == pytest.approx(61.0, abs=0.01)
-    trials = [(row["d"], row["r"]) for row in points if row["run"].startswith("trials")]
+    assert last["Japanese model, 9 m"]["v"] == pytest.approx(84.8, abs=0.1)
+    assert last["through the two trial points"]["v"] == pytest.approx(61.0, abs=0.01)
+    trials = [(row["x"], row["v"]) for row in points if row["run"].startswith("trials")]
     assert trials == [
         pytest.approx(point, abs=1e-3) for point in ((15, 47), (35, 61), (20, 60 * math.degrees(7.7 / 424)))
     ]
@@ -43,7 +43,7 @@ def test_the_steering_diagram_shows_models_and_trials(found: SteeringComparison)
 
 def test_the_bars_are_the_influence_of_each_model(found: SteeringComparison) -> None:
     rows = rows_of(SteeringModelsResult(found).charts()["influence_of_each_coefficient"])
-    japanese = {row["name"]: row["K"] for row in rows if row.get("run") == "Japanese model, 9 m"}
+    japanese = {row["name"]: row["v"] for row in rows if row.get("run") == "Japanese model, 9 m"}
     assert japanese["C_m_b"] == pytest.approx(-5.81, abs=0.01)
     assert len(japanese) == 12
 

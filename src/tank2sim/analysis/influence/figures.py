@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from tank2sim.errors import ArgumentError
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, Spin, StraightRun
-from tank2sim.units import to_si
+from tank2sim.units import in_words, to_si
 
 STRAIGHT, STEADY, TURN, ZIGZAG = "straight course", "steady turn", "turning circle", "zigzag"
 """Origin of a figure: a linearised straight course, an equilibrium, or a simulated manoeuvre."""
@@ -182,3 +182,14 @@ def _craft_figure(text: str, name: str, value: str, argument: str) -> InfluenceF
     if not rpm or not math.isfinite(rpm):
         raise ArgumentError(argument, text, "cannot be read", f"give revolutions in rpm, as {name}@{word}:400")
     return InfluenceFigure(text, kinds[name], (to_si("n_rpm", rpm)[1],))
+
+
+_ORDINALS = ("first", "second", "third", "fourth")
+
+
+def figure_label(text: str) -> str:
+    """Words for a figure without its unit: ``advance_m@35`` is ``advance, 35 deg``, ``@spin:400`` ends in ``rpm``."""
+    kind, _, argument = text.partition("@")
+    words = re.sub(r"^overshoot (\d)$", lambda found: f"{_ORDINALS[int(found[1]) - 1]} overshoot", in_words(kind)[0])
+    unit = "" if "/" in argument else " rpm" if ":" in argument else " deg"
+    return f"{words}, {argument}{unit}" if argument else words

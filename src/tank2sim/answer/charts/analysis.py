@@ -1,4 +1,4 @@
-"""Charts of what was worked out: frequency responses, poles and zeros, the errors of a check."""
+"""Charts of linear systems and of a check: Bode and Nyquist diagrams, poles and zeros, errors next to their limits."""
 
 from __future__ import annotations
 
@@ -6,30 +6,30 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import altair as alt
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tank2sim.answer.charts.parts import (
-    LINE_SAMPLES,
-    NUMBER,
-    Chart,
-    ChartRecord,
-    SeriesLook,
-    axis_above,
-    data,
-    equal_frame,
-    every,
-    extent,
-    pan_zoom,
-    plain,
-    records,
-    series_look,
-    stacked,
-    vector,
-)
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_panels
+from tank2sim.answer.charts.parts import equal_frame, extent, plain, series_look, vector
 from tank2sim.answer.charts.theme import CROSS
-from tank2sim.records.thinning import thin_line
+from tank2sim.answer.charts.vega import (
+    ChartRecord,
+    ChartSpec,
+    PlotAxis,
+    Rule,
+    bare_layer,
+    channel,
+    layer,
+    layered,
+    tooltips,
+)
+
+_FREQUENCY = PlotAxis(title="angular frequency (rad/s)", log=True, nice=False, form="~g")
+_SHOWN = {"run:N": "system", "x:Q": "frequency (rad/s)"}
+
+_HALF = 2.5
+"""Half of the height of a Nyquist chart: what lies farther from the critical point endangers nothing (project
+choice)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,6 +39,12 @@ class FrequencyResponse:
     label: str
     omega_radps: ArrayLike
     response: ArrayLike
+
+    @property
+    def decibel(self) -> NDArray[np.float64]:
+        """Magnitude, dB."""
+        found: NDArray[np.float64] = 20 * np.log10(np.abs(np.asarray(self.response, dtype=complex)))
+        return found
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,67 +76,105 @@ class OutputError:
 
 def bode_chart(
     responses: Sequence[FrequencyResponse], *, title: str = "", width_px: int = 720, height_px: int = 200
-) -> alt.VConcatChart:
+) -> ChartSpec:
     """Magnitude (dB) and phase (deg, unwrapped) against angular frequency (rad/s, logarithmic); sizes of one panel."""
-    look = series_look([response.label for response in responses])
-    magnitude: list[ChartRecord] = []
-    phase: list[ChartRecord] = []
-    for response in responses:
-        omega, value = vector(response.omega_radps), np.asarray(response.response, dtype=complex)
-        decibel, degree = 20 * np.log10(np.abs(value)), np.rad2deg(np.unwrap(np.angle(value)))
-        kept = thin_line([decibel, degree], LINE_SAMPLES)
-        magnitude += records(response.label, {"w": omega[kept], "v": decibel[kept]})
-        phase += records(response.label, {"w": omega[kept], "v": degree[kept]})
-    panels = [
-        _bode_panel(magnitude, look, axis_above("magnitude (dB)"), None),
-        _bode_panel(phase, look, axis_above("phase (deg)", values=_phase_ticks(phase)), "angular frequency (rad/s)"),
+    magnitudes = [PlotSeries(label=one.label, x=one.omega_radps, y=one.decibel) for one in responses]
+    phases = [np.rad2deg(np.unwrap(np.angle(np.asarray(one.response, dtype=complex)))) for one in responses]
+    turned = [
+        PlotSeries(label=one.label, x=one.omega_radps, y=phase) for one, phase in zip(responses, phases, strict=True)
+    ]
+    ticks = _phase_ticks(np.concatenate(phases))
+    plots = [
+        Plot(series=magnitudes, up=PlotAxis(title="magnitude (dB)"), height_px=height_px),
+        Plot(series=turned, up=PlotAxis(title="phase (deg)", ticks=ticks), height_px=height_px),
     ]
     names = ", ".join(response.label for response in responses)
-    return stacked(
-        [panel.properties(width=width_px, height=height_px) for panel in panels],
+    described = f"Bode diagram of {names}: magnitude and phase."
+    return curve_panels(plots, _FREQUENCY, title=title, width_px=width_px, described=described, shown=_SHOWN)
+
+
+def sensitivity_chart(responses: Sequence[FrequencyResponse], *, title: str = "") -> ChartSpec:
+    """Magnitudes (dB) against angular frequency, logarithmic: S and T of a loop, at one speed or several."""
+    series = []
+    for one in responses:
+        shown = one.decibel > -60
+        series.append(PlotSeries(label=one.label, x=vector(one.omega_radps)[shown], y=one.decibel[shown]))
+    plot = Plot(series=series, up=PlotAxis(title="magnitude (dB)"), rules=[Rule(at=[0.0])])
+    described = f"Magnitude over frequency of {', '.join(response.label for response in responses)}."
+    shown_as = {**_SHOWN, "run:N": "function"}
+    return curve_chart(plot, _FREQUENCY, title=title, window=["x"], described=described, shown=shown_as)
+
+
+def nyquist_chart(
+    loops: Sequence[FrequencyResponse], sensitivity_peak: float, *, title: str = "", size_px: int = 460
+) -> ChartSpec:
+    """Nyquist curves near the critical point (cross), with the circle of radius 1/Ms that the first one touches.
+
+    Parameters
+    ----------
+    loops : sequence of FrequencyResponse
+        Loop transfer L; 1 + L is what feedback divides by.
+    sensitivity_peak : float
+        Ms of the first.
+    """
+    series = []
+    for loop in loops:
+        value = np.asarray(loop.response, dtype=complex)
+        near = np.abs(value + 1) < 3 * _HALF
+        value, omega = value[near], vector(loop.omega_radps)[near]
+        series.append(PlotSeries(label=loop.label, x=value.real, y=value.imag, closed=True, more={"w": omega}))
+    across = PlotAxis(title="real part of L (-)", domain=(-1 - _HALF, -1 + _HALF), nice=False, ticks=6)
+    up = PlotAxis(title="imaginary part of L (-)", domain=(-_HALF, _HALF), nice=False, ticks=6)
+    turn = np.linspace(0, 2 * math.pi, 121)
+    circle = PlotSeries(
+        label="", x=-1 + np.cos(turn) / sensitivity_peak, y=np.sin(turn) / sensitivity_peak, closed=True
+    ).rows
+    place = {"x": across.channel("x"), "y": up.channel("v")}
+    over = [
+        layer("line", circle, {**place, "order": "i:Q"}, style="limit", clip=True, strokeWidth=1.2),
+        layer("point", [{"x": -1.0, "v": 0.0}], place, style="limit", shape=CROSS, size=90, strokeWidth=2, clip=True),
+    ]
+    rules = [Rule(at=[0.0], upright=True), Rule(at=[0.0])]
+    return curve_chart(
+        Plot(series=series, up=up, height_px=size_px, rules=rules, over=over),
+        across,
         title=title,
-        description=f"Bode diagram of {names}: magnitude and phase.",
+        width_px=size_px,
+        described=f"Nyquist curves of {', '.join(loop.label for loop in loops)} near -1.",
+        usermeta={"equal_scales": True},
+        shown={"run:N": "loop", "w:Q": "frequency (rad/s)", "x:Q": "real part", "v:Q": "imaginary part"},
     )
 
 
 def pole_zero_chart(
     systems: Sequence[PolesZeros], *, title: str = "", width_px: int = 560, height_px: int = 420
-) -> alt.LayerChart:
+) -> ChartSpec:
     """Poles (crosses) and zeros (circles) in the complex plane, both axes in one scale, the unstable half tinted."""
     rows = [row for system in systems for row in _pole_zero_rows(system)]
     real, imaginary = (np.array([row[key] for row in rows] + [0.0]) for key in ("re", "im"))
     frame = equal_frame(real, np.concatenate([imaginary, -imaginary]), width_px=width_px, height_px=height_px)
-    position = frame.axes(across=("re:Q", "real part (1/s)"), up=("im:Q", "imaginary part (1/s)"))
-    x, y = position["x"], position["y"]
-    look = series_look([system.label for system in systems], as_points=[system.label for system in systems])
-    kind = alt.Shape("kind:N", scale=alt.Scale(domain=["pole", "zero"], range=[CROSS, "circle"]), legend=alt.Legend())
-    tooltip = [
-        alt.Tooltip("run:N", title="system"),
-        alt.Tooltip("kind:N", title="kind"),
-        *(alt.Tooltip(f"{key}:Q", title=name, format=NUMBER) for key, name in _POLE_TOOLTIP.items()),
-    ]
-    edge = alt.value(frame.width_px)
-    unstable = Chart(data([{"re": 0.0}])).mark_rect(style="region", clip=True).encode(x=x, x2=edge)
-    axes = [
-        Chart(data([{"re": 0.0}])).mark_rule(style="reference", clip=True).encode(x=x),
-        Chart(data([{"im": 0.0}])).mark_rule(style="reference", clip=True).encode(y=y),
-    ]
-    points = (
-        Chart(data(rows))
-        .mark_point(size=110, strokeWidth=2, clip=True)
-        .encode(x=x, y=y, color=look.colour, shape=kind, tooltip=tooltip)
-    )
-    layers = [unstable, *axes, points.properties(name="plot")]
-    return alt.layer(*layers, params=[pan_zoom("x", "y", views=["plot"])]).properties(
+    place = frame.axes(across=("re", "real part (1/s)"), up=("im", "imaginary part (1/s)"))
+    names = [system.label for system in systems]
+    kinds = {"scale": {"domain": ["pole", "zero"], "range": [CROSS, "circle"]}, "legend": {}}
+    marks = place | {"color": series_look(names, as_points=names).colour, "shape": channel("kind:N", **kinds)}
+    marks["tooltip"] = tooltips({"run:N": "system", "kind:N": "kind", **_POLE_TOOLTIP})
+    edge = {"value": frame.width_px}
+    return layered(
+        [
+            layer("rect", [{"re": 0.0}], {"x": place["x"], "x2": edge}, style="region", clip=True),
+            Rule(at=[0.0], upright=True).layer(place["x"]),
+            Rule(at=[0.0]).layer(place["y"]),
+            layer("point", rows, marks, size=110, strokeWidth=2, clip=True),
+        ],
+        size=(frame.width_px, frame.height_px),
+        window=["x", "y"],
         title=title,
-        width=frame.width_px,
-        height=frame.height_px,
-        description="Poles and zeros in the complex plane of " + ", ".join(system.label for system in systems) + ".",
+        description=f"Poles and zeros in the complex plane of {', '.join(names)}.",
         usermeta={"equal_scales": True},
     )
 
 
-def error_chart(errors: Sequence[OutputError], *, title: str = "", width_px: int = 720) -> alt.FacetChart:
+def error_chart(errors: Sequence[OutputError], *, title: str = "", width_px: int = 720) -> ChartSpec:
     """Largest error of every output on a logarithmic scale next to its limit, one panel a kind of check.
 
     An error of exactly 0 (or one that is not finite) has no place on a logarithmic scale: it is drawn at the left
@@ -140,72 +184,53 @@ def error_chart(errors: Sequence[OutputError], *, title: str = "", width_px: int
     outputs = list(dict.fromkeys(error.output for error in errors))
     sizes = [size for error in errors for size in (error.error, error.limit) if math.isfinite(size) and size > 0]
     low, high = 10.0 ** math.floor(math.log10(min(sizes)) - 0.01), 10.0 ** math.ceil(math.log10(max(sizes)) + 0.01)
-    rows = [_error_row(error, low, high) for error in errors]
     decades = round(math.log10(high / low))
-    powers = [plain(low * 10.0**power) for power in range(0, decades + 1, 1 + decades // 5)]
-    scale = alt.Scale(type="log", domain=[low, high], nice=False)
-    x = alt.X("e:Q", title="largest error (line: limit)", scale=scale, axis=alt.Axis(values=powers, format=".0e"))
-    y = alt.Y("output:N", title=None, sort=outputs, axis=alt.Axis(grid=True, labelLimit=220))
-    verdict = alt.Color("verdict:N", scale=alt.Scale(domain=_VERDICTS))
-    shape = alt.Shape("verdict:N", scale=alt.Scale(domain=_VERDICTS, range=["circle", CROSS]))
-    tooltip = [
-        alt.Tooltip("kind:N", title="check"),
-        alt.Tooltip("output:N", title="output"),
-        alt.Tooltip("error:N", title="largest error"),
-        alt.Tooltip("limit:Q", title="limit", format=".2~e"),
-    ]
-    base = Chart().encode(y=y)
-    stem = base.mark_rule(style="stem").encode(x=x, x2=alt.value(0), color=verdict)
-    point = base.mark_point(size=70, strokeWidth=2).encode(x=x, color=verdict, shape=shape, tooltip=tooltip)
-    limit = base.mark_tick(style="limit", orient="vertical", height=alt.RelativeBandSize(1.0), thickness=2)
-    limit = limit.encode(x="limit:Q")
-    exceeded = sorted({error.output for error in errors if not error.within})
-    panels = alt.layer(stem, limit, point).properties(width=max(110, width_px // len(kinds) - 20), height=alt.Step(19))
-    header = alt.Header(title=None, labelAnchor="start")
-    facet = alt.Facet("kind:N", sort=kinds, header=header)
-    return panels.facet(facet, data=data(rows), columns=len(kinds), spacing=20).properties(
-        title=title,
-        description=f"Largest error of {len(outputs)} outputs in {', '.join(kinds)}. "
-        + (f"Above the limit: {', '.join(exceeded)}." if exceeded else "All are within their limits."),
+    powers = [float(f"{low * 10.0**power:.6g}") for power in range(0, decades + 1, 1 + decades // 5)]
+    across = PlotAxis(
+        title="largest error (line: limit)", log=True, domain=(low, high), nice=False, ticks=powers, form=".0e"
     )
+    y = channel("output:N", title=None, sort=outputs, axis={"grid": True, "labelLimit": 220})
+    verdict = channel("verdict:N", scale={"domain": _VERDICTS})
+    shape = channel("verdict:N", scale={"domain": _VERDICTS, "range": ["circle", CROSS]})
+    shown: dict[str, str | tuple[str, str]] = {
+        "kind:N": "check",
+        "output:N": "output",
+        "error:N": "largest error",
+        "limit:Q": ("limit", ".2~e"),
+    }
+    point = {"x": across.channel("e"), "y": y, "color": verdict, "shape": shape}
+    tick = {"orient": "vertical", "height": {"band": 1.0}, "thickness": 2}
+    panel = [
+        bare_layer("rule", {"x": across.channel("e"), "x2": {"value": 0}, "y": y, "color": verdict}, style="stem"),
+        bare_layer("tick", {"x": across.channel("limit"), "y": y}, style="limit", **tick),
+        bare_layer("point", {**point, "tooltip": tooltips(shown)}, size=70, strokeWidth=2),
+    ]
+    exceeded = sorted({error.output for error in errors if not error.within})
+    over = f"Above the limit: {', '.join(exceeded)}." if exceeded else "All are within their limits."
+    return {
+        "data": {"values": [_error_row(error, low, high) for error in errors]},
+        "facet": channel("kind:N", sort=kinds, header={"title": None, "labelAnchor": "start"}),
+        "columns": len(kinds),
+        "spacing": 20,
+        "spec": {"layer": panel, "width": max(110, width_px // len(kinds) - 20), "height": {"step": 19}},
+        "title": title,
+        "description": f"Largest error of {len(outputs)} outputs in {', '.join(kinds)}. {over}",
+    }
 
 
 _VERDICTS = ["within the limit", "above the limit"]
 
 _POLE_TOOLTIP = {
-    "re": "real part (1/s)",
-    "im": "imaginary part (1/s)",
-    "wn": "natural frequency (rad/s)",
-    "zeta": "damping ratio",
+    "re:Q": "real part (1/s)",
+    "im:Q": "imaginary part (1/s)",
+    "wn:Q": "natural frequency (rad/s)",
+    "zeta:Q": "damping ratio",
 }
 
 
-def _bode_panel(rows: list[ChartRecord], look: SeriesLook, y: alt.Axis, frequency: str | None) -> alt.LayerChart:
-    shown = frequency is not None
-    position = {
-        "x": alt.X(
-            "w:Q",
-            scale=alt.Scale(type="log", nice=False),
-            axis=alt.Axis(title=frequency, labels=shown, ticks=shown, format="~g"),
-        ),
-        "y": alt.Y("v:Q", axis=y, scale=alt.Scale(zero=False)),
-    }
-    tooltip = [
-        alt.Tooltip("run:N", title="system"),
-        alt.Tooltip("w:Q", title="frequency (rad/s)", format=NUMBER),
-        alt.Tooltip("v:Q", title=y.title, format=NUMBER),
-    ]
-    line = Chart(data(rows)).mark_line(clip=True)
-    unseen = Chart(data(every(rows, 200))).mark_point(opacity=0, filled=True, size=110, clip=True)
-    return alt.layer(
-        line.encode(**position, color=look.colour, strokeDash=look.dash, order="i:Q"),
-        unseen.encode(**position, tooltip=tooltip),
-    )
-
-
-def _phase_ticks(rows: list[ChartRecord]) -> list[float]:
+def _phase_ticks(phase: NDArray[np.float64]) -> list[float]:
     # Engineers read phase in parts of a right angle, which no automatic ticks give.
-    low, high = extent(np.array([row["v"] for row in rows], dtype=float))
+    low, high = extent(phase)
     step = next((step for step in (5, 15, 30, 45, 90) if high - low <= 7 * step), 180)
     return [float(tick) for tick in range(step * math.floor(low / step), step * math.ceil(high / step) + 1, step)]
 

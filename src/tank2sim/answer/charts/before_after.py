@@ -6,10 +6,8 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 
-import altair as alt
-
-from tank2sim.answer.charts.matrix import DARKEST, ROW_PX, matrix_layers
-from tank2sim.answer.charts.parts import STACKS, ChartRecord, data
+from tank2sim.answer.charts.matrix import DARKEST, ROW_PX, Matrix
+from tank2sim.answer.charts.vega import STACKS, ChartRecord, ChartSpec, channel, heading
 
 BOTH, ALL = "both", "all"
 """The first setting of a switch, and that on paper: two series together, or more of them."""
@@ -17,13 +15,13 @@ BOTH, ALL = "both", "all"
 _NAME = "shown"
 
 
-def switch(words: Sequence[str]) -> list[alt.VariableParameter]:
+def switch(words: Sequence[str]) -> list[ChartSpec]:
     """The parameter of a chart by which its reader takes one of `words`, or them together; none for less than two."""
     if len(words) < 2:
         return []
     together = BOTH if len(words) == 2 else ALL
-    choice = alt.BindRadioSelect(input="radio", options=[*words, together], name="Show: ")
-    return [alt.VariableParameter(name=_NAME, bind=choice, value=together)]
+    choice = {"input": "radio", "options": [*words, together], "name": "Show: "}
+    return [{"name": _NAME, "bind": choice, "value": together}]
 
 
 def before_after_switch(series: Mapping[str, str], field: str = "run") -> str:
@@ -42,7 +40,7 @@ def before_after_switch(series: Mapping[str, str], field: str = "run") -> str:
     return f"!{of}[{_NAME}] || datum.{field} === {of}[{_NAME}] || indexof({names}, datum.{field}) < 0"
 
 
-def misfit_maps(rows: Sequence[ChartRecord], models: Sequence[str], *, title: str = "") -> alt.VConcatChart:
+def misfit_maps(rows: Sequence[ChartRecord], models: Sequence[str], *, title: str = "") -> ChartSpec:
     """Misfit of each signal in each trial in noise units, in one scale of colours, to switch between models.
 
     Parameters
@@ -56,16 +54,18 @@ def misfit_maps(rows: Sequence[ChartRecord], models: Sequence[str], *, title: st
     """
     groups = list(dict.fromkeys(row["group"] for row in rows))
     signals = list(dict.fromkeys(row["signal"] for row in rows))
-    maps = [_maps([row for row in rows if row["group"] == group], signals, models) for group in groups]
     subtitle = "Number and colour: root mean square of simulated less measured, in standard deviations of the noise."
-    return alt.vconcat(*maps, spacing=18, params=switch(models)).properties(
-        title=alt.Title(title, subtitle=subtitle),
-        description=f"Misfit by trial and signal in noise units, {' and '.join(models)}.",
-        usermeta=STACKS,
-    )
+    return {
+        "vconcat": [_maps([row for row in rows if row["group"] == group], signals, models) for group in groups],
+        "spacing": 18,
+        "params": switch(models),
+        "title": heading(title, subtitle),
+        "description": f"Misfit by trial and signal in noise units, {' and '.join(models)}.",
+        "usermeta": STACKS,
+    }
 
 
-def _maps(rows: Sequence[ChartRecord], signals: Sequence[str], models: Sequence[str]) -> alt.FacetChart:
+def _maps(rows: Sequence[ChartRecord], signals: Sequence[str], models: Sequence[str]) -> ChartSpec:
     heads = {model: f"{rows[0]['group']}, {model}".removeprefix(", ") for model in models}
     cells = [
         {"trial": row["trial"], "signal": row["signal"], "model": row["model"], "head": heads[row["model"]]}
@@ -73,21 +73,23 @@ def _maps(rows: Sequence[ChartRecord], signals: Sequence[str], models: Sequence[
         for row in rows
     ]
     trials = list(dict.fromkeys(row["trial"] for row in rows))
-    layers = matrix_layers(
-        "misfit",
-        trials,
-        signals,
-        side=alt.Axis(title=None, labelLimit=230),
-        legend=alt.Legend(title="misfit (noise units)", gradientLength=180),  # of all maps alike, which makes it one
-        tooltip=[alt.Tooltip("text:N", title="misfit (noise units)")],
-    )
-    both = alt.layer(*layers, data=data(cells))
-    both = both.properties(width=_cell_width(signals) * len(signals), height=ROW_PX * len(trials))
-    head = alt.Header(title=None, labelFontSize=11, labelAnchor="start", labelLimit=260)
-    columns = alt.Column("head:N", sort=list(heads.values()), header=head)
-    return both.transform_filter(before_after_switch({model: model for model in models}, "model")).facet(
-        column=columns, spacing=16
-    )
+    layers = Matrix(
+        colour="misfit",
+        rows=trials,
+        columns=signals,
+        side={"labelLimit": 230},
+        foot={"title": "signal", "orient": "bottom", "labelAngle": 0},
+        legend={"title": "misfit (noise units)", "gradientLength": 180},
+        shown={"trial:N": "trial", "signal:N": "signal", "text:N": "misfit (noise units)"},
+    ).layers
+    head = {"title": None, "labelFontSize": 11, "labelAnchor": "start", "labelLimit": 260}
+    return {
+        "data": {"values": cells},
+        "transform": [{"filter": before_after_switch({model: model for model in models}, "model")}],
+        "facet": {"column": channel("head:N", sort=list(heads.values()), header=head)},
+        "spec": {"layer": layers, "width": _cell_width(signals) * len(signals), "height": ROW_PX * len(trials)},
+        "spacing": 16,
+    }
 
 
 def _cell_width(signals: Sequence[str]) -> int:

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-import altair as alt
 import numpy as np
 
-from tank2sim.answer.charts.parts import Chart, ChartRecord, Frame, data, plain
+from tank2sim.answer.charts.parts import Frame, plain
 from tank2sim.answer.charts.theme import LABEL_PX
+from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, layer
 from tank2sim.arrays import Array
 
 GAP_PX = 3.0
@@ -104,10 +104,9 @@ def place_labels(
 def label_layers(
     labels: Sequence[Label],
     frame: Frame,
-    position: Mapping[str, object],
-    fields: tuple[str, str],
+    position: Mapping[str, ChartSpec],
     lines: Sequence[tuple[Array, Array]] = (),
-) -> list[alt.Chart]:
+) -> list[ChartSpec]:
     """Return labels in their places, over a rim in the colour of the paper that keeps them legible.
 
     Parameters
@@ -116,18 +115,17 @@ def label_layers(
         As of :func:`place_labels`.
     position : mapping
         The channels ``x`` and ``y``.
-    fields : pair of str
-        Fields of these channels.
     """
+    fields = [position[axis]["field"] for axis in ("x", "y")]
     groups: dict[tuple[float, float, str], list[ChartRecord]] = {}
     for text, spot in place_labels(labels, frame, lines):
         row = {name: plain(value) for name, value in zip(fields, spot.at, strict=True)}
         groups.setdefault((spot.dx, spot.dy, spot.align), []).append(row | {"text": text})
-    layers = []
-    for (dx, dy, align), rows in groups.items():
-        base = Chart(data(rows)).encode(**position, text="text:N")
-        layers += [base.mark_text(style=style, dx=dx, dy=dy, align=align) for style in ("rim", "words")]
-    return layers
+    return [
+        layer("text", rows, {**position, "text": "text:N"}, style=style, dx=dx, dy=dy, align=align)
+        for (dx, dy, align), rows in groups.items()
+        for style in ("rim", "words")
+    ]
 
 
 def _text_width(text: str) -> float:

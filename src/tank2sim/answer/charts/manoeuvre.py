@@ -11,28 +11,22 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import altair as alt
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_panels
 from tank2sim.answer.charts.labels import label_layers, spots_about, spots_along
-from tank2sim.answer.charts.parts import (
-    LINE_SAMPLES,
-    NUMBER,
-    Chart,
+from tank2sim.answer.charts.parts import LINE_SAMPLES, Frame, equal_frame, every, free_frame, plain, records, vector
+from tank2sim.answer.charts.vega import (
     ChartRecord,
-    Frame,
-    axis_above,
-    data,
-    equal_frame,
-    every,
-    free_frame,
-    pan_zoom,
-    plain,
-    records,
-    series_look,
-    stacked,
-    vector,
+    ChartSpec,
+    PlotAxis,
+    Rule,
+    channel,
+    heading,
+    layer,
+    layered,
+    tooltips,
 )
 from tank2sim.answer.numbers import format_number
 from tank2sim.arrays import Array
@@ -158,41 +152,20 @@ def turn_dimensions(motion: Motion, figures: Mapping[str, float | None], bands: 
     side = math.copysign(1.0, float(motion.heading_deg[-1]))
     advance, transfer = figures.get("advance_m"), figures.get("transfer_m")
     tactical, half = figures.get("tactical_diameter_m"), figures.get("time_180_s")
+
+    def dimension(name: str, size_m: float, point: Callable[[float], tuple[float, float]]) -> Dimension:
+        band = bands.get(f"{name.replace(' ', '_')}_m")
+        low, high = (point(band.p5), point(band.p95)) if band else (None, None)
+        text = _sized(name, size_m, motion.length_m)
+        return Dimension(text=text, begin=point(0.0), end=point(size_m), low=low, high=high)
+
     found: list[Dimension] = []
     if advance is not None and transfer is not None:
-        across = side * transfer
-        low, high = _ends(bands.get("advance_m"), lambda size: (across, size))
-        found.append(
-            Dimension(
-                text=_sized("advance", advance, motion.length_m),
-                begin=(across, 0.0),
-                end=(across, advance),
-                low=low,
-                high=high,
-            )
-        )
-        low, high = _ends(bands.get("transfer_m"), lambda size: (side * size, advance))
-        found.append(
-            Dimension(
-                text=_sized("transfer", transfer, motion.length_m),
-                begin=(0.0, advance),
-                end=(across, advance),
-                low=low,
-                high=high,
-            )
-        )
+        found.append(dimension("advance", advance, lambda size: (side * transfer, size)))
+        found.append(dimension("transfer", transfer, lambda size: (side * size, advance)))
     if tactical is not None and half is not None:
         ahead = motion.place(half)[1]
-        low, high = _ends(bands.get("tactical_diameter_m"), lambda size: (side * size, ahead))
-        found.append(
-            Dimension(
-                text=_sized("tactical diameter", tactical, motion.length_m),
-                begin=(0.0, ahead),
-                end=(side * tactical, ahead),
-                low=low,
-                high=high,
-            )
-        )
+        found.append(dimension("tactical diameter", tactical, lambda size: (side * size, ahead)))
     return found
 
 
@@ -203,7 +176,7 @@ def turn_chart(
     bands: NamedBands | None = None,
     edges_m: tuple[Array, Array] | None = None,
     title: str = "",
-) -> alt.LayerChart:
+) -> ChartSpec:
     """A turning circle with advance, transfer and tactical diameter, and the ship at equal times.
 
     Parameters
@@ -230,7 +203,7 @@ def way_chart(
     *,
     edges_m: tuple[Array, Array] | None = None,
     title: str = "",
-) -> alt.LayerChart:
+) -> ChartSpec:
     """The track of a manoeuvre, both axes in one scale, with figures on it and the ship at equal times.
 
     Parameters
@@ -258,32 +231,28 @@ def way_chart(
         width_px=640,
         height_px=540,
     )
-    position = frame.axes(across=("y:Q", "to starboard (m)"), up=("x:Q", "ahead (m)"))
+    place = frame.axes(across=("y", "to starboard (m)"), up=("x", "ahead (m)"))
     kept = thin_line([motion.ahead_m, motion.starboard_m], LINE_SAMPLES)
     rows = records("track", {"x": motion.ahead_m[kept], "y": motion.starboard_m[kept], "t": motion.time_s[kept]})
-    tooltip = [
-        alt.Tooltip("t:Q", title="time (s)", format=NUMBER),
-        alt.Tooltip("x:Q", title="ahead (m)", format=NUMBER),
-        alt.Tooltip("y:Q", title="to starboard (m)", format=NUMBER),
-    ]
-    line = Chart(data(rows)).mark_line(clip=True).encode(**position, color=_ONE, order="i:Q")
-    hover = Chart(data(every(rows, 90))).mark_point(opacity=0, filled=True, size=110, clip=True)
-    layers = [line.properties(name="plot")]
+    tooltip = tooltips({"t:Q": "time (s)", "x:Q": "ahead (m)", "y:Q": "to starboard (m)"})
+    layers = [layer("line", rows, {**place, "color": _ONE, "order": "i:Q"}, clip=True)]
+    closed = {"interpolate": "linear-closed", "clip": True}
     if len(polygon):
         corners = records("band", {"x": polygon[:, 0], "y": polygon[:, 1]})
-        band = Chart(data(corners)).mark_line(style="band", interpolate="linear-closed", strokeWidth=0, clip=True)
-        layers.append(band.encode(**position, order="i:Q"))
+        layers.append(layer("line", corners, {**place, "order": "i:Q"}, style="band", strokeWidth=0, **closed))
     if outlines:
-        hull = Chart(data(outlines)).mark_line(style="hull", interpolate="linear-closed", clip=True)
-        layers.append(hull.encode(**position, order="i:Q", detail="hull:N"))
+        layers.append(layer("line", outlines, {**place, "order": "i:Q", "detail": "hull:N"}, style="hull", **closed))
     lines = [(motion.starboard_m, motion.ahead_m), *_outline_lines(outlines)]
-    layers += [*_dimension_layers(dimensions, position, frame, lines), hover.encode(**position, tooltip=tooltip)]
+    layers += _dimension_layers(dimensions, place, frame, lines)
+    hover = {**place, "tooltip": tooltip}
+    layers.append(layer("point", every(rows, 90), hover, opacity=0, filled=True, size=110, clip=True))
     described = "; ".join(dimension.text for dimension in dimensions)
     outlined = f" The ship every {step:g} s." if outlines else ""
-    return alt.layer(*layers, params=[pan_zoom("x", "y", views=["plot"])]).properties(
-        title=alt.Title(title, subtitle=outlined.strip()) if title else "",
-        width=frame.width_px,
-        height=frame.height_px,
+    return layered(
+        layers,
+        size=(frame.width_px, frame.height_px),
+        window=["x", "y"],
+        title=heading(title, outlined.strip()) if title else "",
         description=f"Track of the manoeuvre, the first course up the page. {described}.{outlined}",
         usermeta={"equal_scales": True},
     )
@@ -297,7 +266,7 @@ def zigzag_chart(
     bands: NamedBands | None = None,
     edges_deg: tuple[Array, Array, Array] | None = None,
     title: str = "",
-) -> alt.LayerChart:
+) -> ChartSpec:
     """Heading and rudder of a zigzag over time, each overshoot marked from the heading of the order to the peak.
 
     Parameters
@@ -313,50 +282,43 @@ def zigzag_chart(
         Times (s), and the edges of the band of the heading (deg).
     title : str
     """
-    look = series_look(["heading", "rudder"])
-    rows: list[ChartRecord] = []
-    for label, values in (("heading", motion.heading_deg), ("rudder", motion.rudder_deg)):
-        kept = thin_line([values], LINE_SAMPLES)
-        rows += records(label, {"t": motion.time_s[kept], "v": values[kept]})
     peaks = overshoot_marks(motion, figures, heading_deg, bands or {})
     beyond = [peak[name] for peak in peaks for name in ("v", "low", "high") if name in peak]
-    edges = [vector(edge) for edge in edges_deg[1:]] if edges_deg is not None else []
-    angles = [motion.heading_deg, motion.rudder_deg, np.array([-heading_deg, heading_deg]), vector(beyond), *edges]
-    times = motion.time_s if edges_deg is None else np.concatenate([motion.time_s, vector(edges_deg[0])])
+    edges = [vector(edge) for edge in edges_deg] if edges_deg is not None else []
+    angles = [motion.heading_deg, motion.rudder_deg, np.array([-heading_deg, heading_deg]), vector(beyond), *edges[1:]]
+    times = np.concatenate([motion.time_s, *edges[:1]])
     frame = free_frame(times, np.concatenate(angles), width_px=680, height_px=340, margins_px=(0.0, 22.0))
-    x = alt.X("t:Q", title="time (s)", scale=alt.Scale(nice=False, domain=list(frame.across)))
-    scale = alt.Scale(nice=False, domain=list(frame.up))
-    y = alt.Y("v:Q", title="heading and rudder, + to starboard (deg)", scale=scale)
-    tooltip = [
-        alt.Tooltip("run:N", title=""),
-        alt.Tooltip("t:Q", title="time (s)", format=NUMBER),
-        alt.Tooltip("v:Q", title="angle (deg)", format=NUMBER),
-    ]
-    base = Chart(data(rows)).encode(x=x, y=y, color=look.colour)
-    lines = base.mark_line(clip=True).encode(strokeDash=look.dash, order="i:Q").properties(name="plot")
-    targets = Chart(data([{"v": heading_deg}, {"v": -heading_deg}])).mark_rule(style="dimension").encode(y="v:Q")
-    layers = [lines, targets]
-    if edges_deg is not None:
-        columns = dict(zip(("t", "low", "high"), (vector(part) for part in edges_deg), strict=True))
-        area = Chart(data(records("heading", columns))).mark_area(style="band", clip=True)
-        layers.append(area.encode(x=x, y=alt.Y("low:Q"), y2="high:Q"))
+    across = PlotAxis(title="time (s)", domain=frame.across, nice=False)
+    up = PlotAxis(title="heading and rudder, + to starboard (deg)", domain=frame.up, nice=False)
+    place, over = {"x": across.channel("x"), "y": up.channel("v")}, []
+    if edges:
+        area = records("heading", dict(zip(("x", "low", "high"), edges, strict=True)))
+        over.append(
+            layer("area", area, {"x": place["x"], "y": up.channel("low"), "y2": "high"}, style="band", clip=True)
+        )
     if peaks:
-        marked = Chart(data(peaks)).encode(x="t:Q")
-        intervals = [peak for peak in peaks if "low" in peak]
-        if intervals:
-            interval = Chart(data(intervals)).mark_rule(style="interval", clip=True)
-            layers.append(interval.encode(x="t:Q", y="low:Q", y2="high:Q"))
-        layers.append(marked.mark_rule(style="overshoot", clip=True).encode(y="from:Q", y2="v:Q"))
-        labels = [(str(peak["text"]), spots_about((peak["t"], peak["v"]), up=peak["v"] > 0)) for peak in peaks]
+        if intervals := [peak for peak in peaks if "low" in peak]:
+            bar = {"x": place["x"], "y": up.channel("low"), "y2": "high"}
+            over.append(layer("rule", intervals, bar, style="interval", clip=True))
+        rise = {"x": place["x"], "y": up.channel("from"), "y2": "v"}
+        over.append(layer("rule", peaks, rise, style="overshoot", clip=True))
+        labels = [(str(peak["text"]), spots_about((peak["x"], peak["v"]), up=peak["v"] > 0)) for peak in peaks]
         drawn = [(motion.time_s, motion.heading_deg), (motion.time_s, motion.rudder_deg)]
-        layers += label_layers(labels, frame, {"x": alt.X("t:Q"), "y": alt.Y("v:Q")}, ("t", "v"), drawn)
-    layers.append(base.mark_point(opacity=0, filled=True, size=90, clip=True).encode(tooltip=tooltip))
+        over += label_layers(labels, frame, place, drawn)
+    series = [
+        PlotSeries(label="heading", x=motion.time_s, y=motion.heading_deg),
+        PlotSeries(label="rudder", x=motion.time_s, y=motion.rudder_deg),
+    ]
+    rules = [Rule(at=[heading_deg, -heading_deg], style="dimension")]
     sizes = ", ".join(str(peak["text"]) for peak in peaks)
-    return alt.layer(*layers, params=[pan_zoom("x", views=["plot"])]).properties(
+    return curve_chart(
+        Plot(series=series, up=up, height_px=frame.height_px, rules=rules, over=over),
+        across,
         title=title,
-        width=frame.width_px,
-        height=frame.height_px,
-        description=f"Heading and rudder over time. Overshoots: {sizes or 'none'}.",
+        width_px=frame.width_px,
+        window=["x"],
+        described=f"Heading and rudder over time. Overshoots: {sizes or 'none'}.",
+        shown={"run:N": "", "v:Q": "angle (deg)"},
     )
 
 
@@ -369,14 +331,14 @@ def overshoot_marks(
     for number, (overshoot, execute, later) in enumerate(zip(*lists, strict=False), start=1):
         at = execute + later
         side = math.copysign(1.0, float(np.interp(at, motion.time_s, motion.heading_deg)))
-        mark = {"t": plain(at), "from": side * heading_deg, "v": plain(side * (heading_deg + overshoot))}
+        mark = {"x": plain(at), "from": side * heading_deg, "v": plain(side * (heading_deg + overshoot))}
         if band := bands.get(f"overshoot_{number}_deg"):
             mark |= {"low": plain(side * (heading_deg + band.p5)), "high": plain(side * (heading_deg + band.p95))}
         marks.append(mark | {"text": f"{format_number(overshoot, _ROUND)}°"})
     return marks
 
 
-def pull_out_chart(sides: Mapping[str, Motion], neutral_deg: float, *, title: str = "") -> alt.LayerChart:
+def pull_out_chart(sides: Mapping[str, Motion], neutral_deg: float, *, title: str = "") -> ChartSpec:
     """Yaw rate of pull-outs over the time from the order of the neutral rudder; both sides of a stable ship meet.
 
     Parameters
@@ -387,34 +349,26 @@ def pull_out_chart(sides: Mapping[str, Motion], neutral_deg: float, *, title: st
         The neutral rudder.
     title : str
     """
-    look = series_look(list(sides))
-    rows: list[ChartRecord] = []
-    for label, motion in sides.items():
-        since = motion.time_s - pull_out_time(motion, neutral_deg)
-        kept = thin_line([motion.rate_degps], LINE_SAMPLES)
-        rows += records(label, {"t": since[kept], "v": motion.rate_degps[kept]})
-    longest = max(row["t"] for row in rows)
-    x = alt.X(
-        "t:Q",
-        title=f"time from the order of the neutral rudder, {format_number(neutral_deg, _ROUND)}° (s)",
-        scale=alt.Scale(nice=False, domain=[-0.1 * longest, longest]),
-    )
-    y = alt.Y("v:Q", title="yaw rate, + to starboard (deg/s)", scale=alt.Scale(zero=True))
-    tooltip = [
-        alt.Tooltip("run:N", title=""),
-        alt.Tooltip("t:Q", title="time (s)", format=NUMBER),
-        alt.Tooltip("v:Q", title="yaw rate (deg/s)", format=NUMBER),
+    series = [
+        PlotSeries(label=label, x=motion.time_s - pull_out_time(motion, neutral_deg), y=motion.rate_degps)
+        for label, motion in sides.items()
     ]
-    base = Chart(data(rows)).encode(x=x, y=y, color=look.colour)
-    zero = Chart(data([{"v": 0.0}])).mark_rule(style="reference").encode(y="v:Q")
-    order = Chart(data([{"t": 0.0}])).mark_rule(style="dimension").encode(x="t:Q")
-    lines = base.mark_line(clip=True).encode(strokeDash=look.dash, order="i:Q").properties(name="plot")
-    hover = base.mark_point(opacity=0, filled=True, size=90, clip=True).encode(tooltip=tooltip)
-    return alt.layer(lines, zero, order, hover, params=[pan_zoom("x", views=["plot"])]).properties(
+    longest = max(float(np.max(one.x)) for one in series)
+    across = PlotAxis(
+        title=f"time from the order of the neutral rudder, {format_number(neutral_deg, _ROUND)}° (s)",
+        domain=(-0.1 * longest, longest),
+        nice=False,
+    )
+    up = PlotAxis(title="yaw rate, + to starboard (deg/s)", zero=True)
+    rules = [Rule(at=[0.0]), Rule(at=[0.0], upright=True, style="dimension")]
+    return curve_chart(
+        Plot(series=series, up=up, height_px=320, rules=rules),
+        across,
         title=title,
-        width=680,
-        height=320,
-        description=f"Yaw rate after the rudder is put to neutral, of {', '.join(sides)}.",
+        width_px=680,
+        window=["x"],
+        described=f"Yaw rate after the rudder is put to neutral, of {', '.join(sides)}.",
+        shown={"run:N": "", "x:Q": "time (s)", "v:Q": "yaw rate (deg/s)"},
     )
 
 
@@ -425,30 +379,23 @@ def pull_out_time(motion: Motion, neutral_deg: float) -> float:
     return float(motion.time_s[held[-1]])
 
 
-def stop_speed_chart(motion: Motion, *, title: str = "") -> alt.VConcatChart:
+def stop_speed_chart(motion: Motion, *, title: str = "") -> ChartSpec:
     """Speed, and revolutions where they change, over the distance along the track of a stop."""
     panels = {"speed (m/s)": motion.speed_mps}
     if motion.revolutions_rpm is not None and np.ptp(motion.revolutions_rpm) > 0:
         panels["revolutions (rpm)"] = motion.revolutions_rpm
-    drawn: list[alt.LayerChart] = []
-    for title_of_axis, values in panels.items():
-        last = title_of_axis == list(panels)[-1]
-        kept = thin_line([values, motion.way_m], LINE_SAMPLES)
-        rows = records("run", {"s": motion.way_m[kept], "v": values[kept], "t": motion.time_s[kept]})
-        axis = alt.Axis(title="distance along the track (m)" if last else None, labels=last, ticks=last)
-        base = Chart(data(rows)).encode(
-            x=alt.X("s:Q", scale=alt.Scale(nice=False), axis=axis),
-            y=alt.Y("v:Q", axis=axis_above(title_of_axis), scale=alt.Scale(zero=True)),
+    plots = [
+        Plot(
+            series=[PlotSeries(label="run", x=motion.way_m, y=values, closed=True, more={"t": motion.time_s})],
+            up=PlotAxis(title=name, zero=True),
+            height_px=200 if not place else 110,
         )
-        tooltip = [
-            alt.Tooltip("t:Q", title="time (s)", format=NUMBER),
-            alt.Tooltip("s:Q", title="distance (m)", format=NUMBER),
-            alt.Tooltip("v:Q", title=title_of_axis, format=NUMBER),
-        ]
-        line = base.mark_line(clip=True).encode(color=_ONE, order="i:Q")
-        hover = base.mark_point(opacity=0, filled=True, size=90, clip=True).encode(tooltip=tooltip)
-        drawn.append(alt.layer(line, hover).properties(width=640, height=200 if not drawn else 110))
-    return stacked(drawn, title=title, description="Speed over the distance along the track of the stop.")
+        for place, (name, values) in enumerate(panels.items())
+    ]
+    across = PlotAxis(title="distance along the track (m)", nice=False)
+    described = "Speed over the distance along the track of the stop."
+    shown = {"t:Q": "time (s)"}
+    return curve_panels(plots, across, title=title, width_px=640, described=described, shown=shown)
 
 
 def stop_dimensions(motion: Motion, figures: Mapping[str, float | None]) -> list[Dimension]:
@@ -491,18 +438,12 @@ def hull_rows(motion: Motion) -> tuple[float, list[ChartRecord]]:
 
 
 # One series takes the first colour of the palette, which is another on a dark screen.
-_ONE = alt.Color("run:N", legend=None)
+_ONE = channel("run:N", legend=None)
 
 
 def _sized(name: str, size_m: float, length_m: float | None) -> str:
     lengths = f" ({format_number(size_m / length_m, _ROUND)} L)" if length_m else ""
     return f"{name} {format_number(size_m, _ROUND)} m{lengths}"
-
-
-def _ends(
-    band: Band | None, point: Callable[[float], tuple[float, float]]
-) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
-    return (point(band.p5), point(band.p95)) if band else (None, None)
 
 
 def _polygon(edges: tuple[Array, Array]) -> Array:
@@ -513,24 +454,24 @@ def _polygon(edges: tuple[Array, Array]) -> Array:
 
 def _dimension_layers(
     dimensions: Sequence[Dimension],
-    position: Mapping[str, object],
+    place: Mapping[str, ChartSpec],
     frame: Frame,
     lines: Sequence[tuple[Array, Array]],
-) -> list[alt.Chart]:
-    rules, bars = [], []
-    for dimension in dimensions:
-        (y, x), (y2, x2) = dimension.begin, dimension.end
-        rules.append({"y": plain(y), "x": plain(x), "y2": plain(y2), "x2": plain(x2), "text": dimension.text})
-        if dimension.low and dimension.high:
-            (y, x), (y2, x2) = dimension.low, dimension.high
-            bars.append({"y": plain(y), "x": plain(x), "y2": plain(y2), "x2": plain(x2)})
+) -> list[ChartSpec]:
+    """Lines from end to end of each figure, bars of an ensemble, and their words."""
+    found = []
+    bars = [(one.low, one.high, "") for one in dimensions if one.low and one.high]
+    rules = [(one.begin, one.end, one.text) for one in dimensions]
+    for style, ends in (("interval", bars), ("dimension", rules)):
+        rows = [
+            {"y": plain(y), "x": plain(x), "y2": plain(y2), "x2": plain(x2), "text": text}
+            for (y, x), (y2, x2), text in ends
+        ]
+        if rows:
+            found.append(layer("rule", rows, {**place, "x2": "y2", "y2": "x2"}, style=style, clip=True))
     labels = [(one.text, spots_along(one.begin, one.end, frame)) for one in dimensions]
-    ends = [np.array([one.begin, one.end]).T for one in dimensions]
-    return [
-        *([_rules(bars, "interval", position)] if bars else []),
-        *([_rules(rules, "dimension", position)] if rules else []),
-        *label_layers(labels, frame, position, ("y", "x"), [*lines, *((end[0], end[1]) for end in ends)]),
-    ]
+    drawn = [np.array([one.begin, one.end]).T for one in dimensions]
+    return [*found, *label_layers(labels, frame, place, [*lines, *((line[0], line[1]) for line in drawn)])]
 
 
 def _outline_lines(outlines: Sequence[ChartRecord]) -> list[tuple[Array, Array]]:
@@ -539,7 +480,3 @@ def _outline_lines(outlines: Sequence[ChartRecord]) -> list[tuple[Array, Array]]
     for row in outlines:
         corners.setdefault(row["hull"], []).append((row["y"], row["x"]))
     return [(closed[:, 0], closed[:, 1]) for hull in corners.values() if len(closed := np.array([*hull, hull[0]]))]
-
-
-def _rules(rows: Sequence[ChartRecord], style: str, position: Mapping[str, object]) -> alt.Chart:
-    return Chart(data(rows)).mark_rule(style=style, clip=True).encode(**position, x2="y2:Q", y2="x2:Q")

@@ -1,12 +1,12 @@
-"""A matrix: a number in a coloured cell for each trial and signal."""
+"""A matrix: coloured cells for pairs of names, with their numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
-import altair as alt
-
-from tank2sim.answer.charts.parts import Chart
+from tank2sim.answer.charts.vega import ChartSpec, TooltipFields, bare_layer, channel, tooltips
 
 ROW_PX = 21
 """Height of a row, px."""
@@ -18,41 +18,57 @@ any doubt, and an error of so many per cent is as large as the signal."""
 _DARK = 18
 """Number above which a cell is dark: it is written in white there."""
 
+LOG_BLUES = {"type": "log", "domain": [1, DARKEST], "scheme": "blues", "clamp": True}
+"""Scale of sizes from 1 to :data:`DARKEST`."""
 
-def matrix_layers(
-    field: str,
-    trials: Sequence[str],
-    signals: Sequence[str],
-    *,
-    side: alt.Axis,
-    legend: alt.Legend,
-    tooltip: Sequence[alt.Tooltip],
-) -> list[alt.Chart]:
-    """Return the cells and the numbers of a matrix, without data.
 
-    The data have ``trial``, ``signal``, `field` (number that colours the cell) and ``text`` (number as written).
+@dataclass(frozen=True, kw_only=True)
+class Matrix:
+    """Cells of a matrix, and their numbers; the data are those of the chart that they are in.
 
     Parameters
     ----------
-    field : str
-    trials, signals : sequence of str
-        Rows and columns in their order.
-    side : Axis
-        Axis of the trials.
-    legend : Legend
-    tooltip : sequence of Tooltip
-        Besides the trial and the signal.
+    colour : str
+        Field of the data that colours a cell.
+    rows, columns : sequence of str
+        In their order.
+    shown : TooltipFields
+        Fields of the tooltip.
+    names : pair of str
+        Fields of the data with the row and the column.
+    scale, legend : mapping
+        Scale of the colours, and their legend.
+    side, foot : mapping
+        Words of Vega-Lite for the axes of rows and columns.
+    written : bool
+        Whether the field ``text`` is written in each cell.
     """
-    base = Chart().encode(
-        x=alt.X("signal:N", sort=list(signals), scale=alt.Scale(domain=list(signals))).axis(
-            title="signal", orient="bottom", labelAngle=0
-        ),
-        y=alt.Y("trial:N", sort=list(trials), axis=side),
-        tooltip=[alt.Tooltip("trial:N"), alt.Tooltip("signal:N"), *tooltip],
-    )
-    colours = alt.Scale(type="log", domain=[1, DARKEST], scheme="blues", clamp=True)
-    ink = alt.condition(f"datum.{field} > {_DARK}", alt.value("white"), alt.value("black"))  # whatever the page is
-    return [
-        base.mark_rect().encode(color=alt.Color(f"{field}:Q", scale=colours, legend=legend)),
-        base.mark_text(fontSize=10.5).encode(text="text:N", color=ink),
-    ]
+
+    colour: str
+    rows: Sequence[str]
+    columns: Sequence[str]
+    shown: TooltipFields
+    names: tuple[str, str] = ("trial", "signal")
+    scale: Mapping[str, Any] = field(default_factory=lambda: LOG_BLUES)
+    legend: Mapping[str, Any] = field(default_factory=lambda: {"gradientLength": 180})
+    side: Mapping[str, Any] = field(default_factory=dict)
+    foot: Mapping[str, Any] = field(default_factory=dict)
+    written: bool = True
+
+    @property
+    def layers(self) -> list[ChartSpec]:
+        """The layers of the chart."""
+        down, across = (f"{name}:N" for name in self.names)
+        columns = {"sort": list(self.columns), "scale": {"domain": list(self.columns)}}
+        place = {
+            "x": channel(across, title=None, axis=dict(self.foot), **columns),
+            "y": channel(down, title=None, axis=dict(self.side), sort=list(self.rows)),
+            "tooltip": tooltips(self.shown),
+        }
+        fill = channel(f"{self.colour}:Q", scale=dict(self.scale), legend=dict(self.legend))
+        cells = bare_layer("rect", {**place, "color": fill})
+        if not self.written:
+            return [cells]
+        # Whatever the page is.
+        ink = {"condition": {"test": f"datum.{self.colour} > {_DARK}", "value": "white"}, "value": "black"}
+        return [cells, bare_layer("text", {**place, "text": "text:N", "color": ink}, fontSize=10.5)]

@@ -1,42 +1,79 @@
-"""Charts of what a ship did: its track, its motions over time, tows, the spiral."""
+"""Charts of the motion of a ship: tracks, time histories, spirals."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import altair as alt
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_panels
 from tank2sim.answer.charts.labels import label_layers, spots_along
 from tank2sim.answer.charts.parts import (
-    HOVER_SAMPLES,
     LINE_SAMPLES,
-    NUMBER,
     POINT_SAMPLES,
-    Chart,
-    ChartRecord,
     Frame,
-    Position,
-    SeriesLook,
-    axis_above,
-    data,
     equal_frame,
     every,
     free_frame,
-    pan_zoom,
     plain,
     records,
     series_look,
     shown_unit,
-    stacked,
     vector,
     with_unit,
 )
+from tank2sim.answer.charts.vega import (
+    ChartRecord,
+    ChartSpec,
+    PlotAxis,
+    Rule,
+    layer,
+    layered,
+    tooltips,
+)
 from tank2sim.answer.numbers import format_number
+from tank2sim.answer.parts import Illustration
 from tank2sim.arrays import Array
 from tank2sim.records.thinning import thin_line, thin_points
+from tank2sim.simulation.bands import BandOverTime
+from tank2sim.units import in_words, to_si
+
+_Columns = Mapping[str, Sequence[float | None] | Array]
+
+LOW, MIDDLE, HIGH = "5 %", "50 %", "95 %"
+"""Labels of the quantiles of an ensemble."""
+
+# The order of the panels, and the words where the name itself is none for a reader.
+_TITLES = {
+    "delta_order": "rudder ordered",
+    "delta": "rudder, + to starboard",
+    "n": "revolutions",
+    "psi": "heading",
+    "r": "yaw rate",
+    "u": "surge velocity",
+    "v": "sway velocity, + to starboard",
+    "u_ground": "surge velocity over ground",
+    "v_ground": "sway velocity over ground",
+    "sog": "speed over ground",
+    "cog": "course over ground",
+    "phi": "heel",
+}
+_UNITS = {
+    "m": "m",
+    "s": "s",
+    "mps": "m/s",
+    "mps2": "m/s2",
+    "rad": "rad",
+    "radps": "rad/s",
+    "kg": "kg",
+    "N": "N",
+    "Nm": "N.m",
+    "A": "A",
+}
+_TRACK = ("x_m", "y_m")
+_ORDER, _ANGLE = "delta_order", "delta"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,17 +136,6 @@ class TimeMark:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tow:
-    """Speed over time of one tow, as measured and as a model gives it; s and m/s, NaN where nothing was measured."""
-
-    label: str
-    time_s: ArrayLike
-    speed_mps: ArrayLike
-    model_time_s: ArrayLike
-    model_speed_mps: ArrayLike
-
-
-@dataclass(frozen=True, kw_only=True)
 class SpiralData:
     """Steady yaw rate (rad/s) against rudder angle (rad, positive to starboard), in the order they were run."""
 
@@ -120,7 +146,7 @@ class SpiralData:
 
 def track_chart(
     tracks: Sequence[TrackData], *, title: str = "", width_px: int = 720, height_px: int = 540
-) -> alt.LayerChart:
+) -> ChartSpec:
     """Tracks over each other, x north up and y east to the right, both axes in one scale (also when zoomed).
 
     Parameters
@@ -139,16 +165,31 @@ def track_chart(
         width_px=width_px,
         height_px=height_px,
     )
-    rows = [(track.measured, _track_rows(track, x, y)) for track, x, y in paths]
-    position = frame.axes(across=("y:Q", "east y (m)"), up=("x:Q", "north x (m)"))
-    starts = [row[0] for measured, row in rows if not measured] or [row[0] for _, row in rows]
-    start = Chart(data(starts)).mark_point(style="start", shape="diamond", tooltip="start", clip=True)
-    layers = _lines_and_points(rows, position, _look(tracks), _track_tooltip(tracks))
-    return _in_window(
-        [layers[0].properties(name="plot"), *layers[1:], start.encode(**position)],
+    place = frame.axes(across=("y", "east y (m)"), up=("x", "north x (m)"))
+    look = series_look([track.label for track in tracks], as_points={track.label for track in tracks if track.measured})
+    rows = {track.label: _track_rows(track, x, y) for track, x, y in paths}
+    lines, points = (
+        [row for track in tracks if track.measured == measured for row in rows[track.label]]
+        for measured in (False, True)
+    )
+    timed = {"t:Q": "time (s)"} if all(track.time_s is not None for track in tracks) else {}
+    said = {"tooltip": tooltips({"run:N": "run", **timed, "x:Q": "north (m)", "y:Q": "east (m)"})}
+    marks = place | {"color": look.colour}
+    layers = []
+    if lines:
+        layers.append(layer("line", lines, {**marks, "strokeDash": look.dash, "order": "i:Q"}, clip=True))
+    if points:
+        layers.append(layer("point", points, {**marks, "shape": look.shape, **said}, clip=True))
+    if lines:
+        hover = [row for track in tracks if not track.measured for row in every(rows[track.label], _HOVER_SAMPLES)]
+        layers.append(layer("point", hover, {**place, **said}, clip=True, opacity=0, filled=True, size=110))
+    starts = [rows[track.label][0] for track in tracks if not (lines and track.measured)]
+    layers.append(layer("point", starts, place, style="start", shape="diamond", tooltip="start", clip=True))
+    return layered(
+        layers,
+        size=(frame.width_px, frame.height_px),
+        window=["x", "y"],
         title=title,
-        width=frame.width_px,
-        height=frame.height_px,
         description=f"Tracks of {_listed(tracks)}; north is up, both axes have one scale.",
         usermeta={"equal_scales": True},
     )
@@ -162,7 +203,7 @@ def history_chart(
     width_px: int = 720,
     height_px: int = 120,
     marks: Sequence[TimeMark] = (),
-) -> alt.VConcatChart:
+) -> ChartSpec:
     """Signals over each other with one time axis, the runs overlaid in each; angles in degrees.
 
     Parameters
@@ -178,61 +219,19 @@ def history_chart(
     marks : sequence of TimeMark
         Places to tint.
     """
-    look = _look(runs)
     span = np.concatenate([vector(run.time_s) for run in runs])
-    time_scale = alt.Scale(domain=[float(np.nanmin(span)), float(np.nanmax(span))], nice=False, zero=False)
-    panels = []
-    for place, signal in enumerate(signals):
-        last = place == len(signals) - 1
-        axis = alt.Axis(title="time (s)") if last else alt.Axis(title=None, labels=False, ticks=False)
-        x = alt.X("t:Q", scale=time_scale, axis=axis)
-        shaded = [_shaded(band, signal, x) for run in runs for band in run.bands if band.signal == signal.name]
-        layers = [*_history_layers(runs, signal, look, x), *shaded, *_marked(marks, signal, x)]
-        panels.append(alt.layer(*layers).properties(width=width_px, height=height_px))
+    across = PlotAxis(title="time (s)", domain=(float(np.nanmin(span)), float(np.nanmax(span))), nice=False)
+    look = series_look([run.label for run in runs], as_points={run.label for run in runs if run.measured})
+    plots = [_signal_plot(runs, signal, height_px, across, marks) for signal in signals]
     names = ", ".join(signal.title for signal in signals)
-    return stacked(panels, title=title, description=f"Time histories of {names}, of {_listed(runs)}.")
-
-
-def tow_chart(tows: Sequence[Tow], *, title: str = "", width_px: int = 720, height_px: int = 380) -> alt.LayerChart:
-    """Speeds of several tows against time: what was measured as points, what the model gives as lines."""
-    labels = [tow.label for tow in tows]
-    look = series_look(labels, as_points=labels)
-    measured, modelled = [], []
-    for tow in tows:
-        time, speed = vector(tow.model_time_s), vector(tow.model_speed_mps)
-        kept = thin_line([speed], LINE_SAMPLES)
-        modelled += records(tow.label, {"t": time[kept], "v": speed[kept]})
-        measured += records(tow.label, {"t": vector(tow.time_s), "v": vector(tow.speed_mps)})
-    x = alt.X("t:Q", title="time (s)", scale=alt.Scale(nice=False))
-    y = alt.Y("v:Q", title="speed (m/s)", scale=alt.Scale(zero=True))
-    tooltip = [
-        alt.Tooltip("run:N", title="tow"),
-        alt.Tooltip("t:Q", title="time (s)", format=NUMBER),
-        alt.Tooltip("v:Q", title="measured (m/s)", format=NUMBER),
-    ]
-    lines = Chart(data(modelled), name="plot").mark_line(clip=True).encode(x=x, y=y, color=look.colour, order="i:Q")
-    points = (
-        Chart(data([row for row in measured if row["v"] is not None]))
-        .mark_point(clip=True)
-        .encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip)
-    )
-    return _in_window(
-        [lines, points],
-        title=alt.Title(title, subtitle="Points: measured. Lines: model.") if title else "",
-        width=width_px,
-        height=height_px,
-        description=f"Speed over time of {_listed(tows)}; points were measured, lines are the model.",
-    )
+    described = f"Time histories of {names}, of {_listed(runs)}."
+    shown = {"run:N": "run"}
+    return curve_panels(plots, across, title=title, width_px=width_px, described=described, look=look, shown=shown)
 
 
 def spiral_chart(
-    spirals: Sequence[SpiralData],
-    *,
-    loop_rad: tuple[float, float] | None = None,
-    title: str = "",
-    width_px: int = 620,
-    height_px: int = 400,
-) -> alt.LayerChart:
+    spirals: Sequence[SpiralData], *, loop_rad: tuple[float, float] | None = None, title: str = ""
+) -> ChartSpec:
     """Yaw rate against rudder angle, in degrees, the points joined in the order they were run.
 
     Parameters
@@ -242,78 +241,52 @@ def spiral_chart(
         Rudder angles between which the ship has two steady turns, rad: the width of the loop is marked.
     title : str
         Title of the chart.
-    width_px, height_px : int
-        Size of the plot.
     """
-    labels = [spiral.label for spiral in spirals]
-    look = series_look(labels, as_points=labels)
     degree = shown_unit("rad")[1]
-    rows: list[ChartRecord] = []
-    for spiral in spirals:
-        rudder, rate = degree * vector(spiral.rudder_rad), degree * vector(spiral.yaw_rate_radps)
-        rows += records(spiral.label, {"d": rudder, "r": rate})
-    drawn = [(degree * vector(spiral.rudder_rad), degree * vector(spiral.yaw_rate_radps)) for spiral in spirals]
-    across, up = (np.concatenate([[0.0], *(line[axis] for line in drawn)]) for axis in (0, 1))
-    frame = free_frame(across, up, width_px=width_px, height_px=height_px, margins_px=(24.0, 24.0))
-    scales = [alt.Scale(nice=False, domain=list(domain)) for domain in (frame.across, frame.up)]
-    x = alt.X("d:Q", title="rudder angle, starboard positive (deg)", scale=scales[0])
-    y = alt.Y("r:Q", title="yaw rate, starboard positive (deg/s)", scale=scales[1])
-    tooltip = [
-        alt.Tooltip("run:N", title="run"),
-        alt.Tooltip("d:Q", title="rudder (deg)", format=NUMBER),
-        alt.Tooltip("r:Q", title="yaw rate (deg/s)", format=NUMBER),
+    drawn = [(degree * vector(one.rudder_rad), degree * vector(one.yaw_rate_radps)) for one in spirals]
+    series = [
+        PlotSeries(label=spiral.label, x=rudder, y=rate, points=points, closed=True)
+        for points in (False, True)
+        for spiral, (rudder, rate) in zip(spirals, drawn, strict=True)
     ]
-    base = Chart(data(rows)).encode(x=x, y=y, color=look.colour, order="i:Q")
-    zero = [
-        Chart(data([{"d": 0.0}])).mark_rule(style="reference").encode(x="d:Q"),
-        Chart(data([{"r": 0.0}])).mark_rule(style="reference").encode(y="r:Q"),
-    ]
-    lines = base.mark_line(clip=True).properties(name="plot")
-    points = base.mark_point(clip=True).encode(shape=look.shape, tooltip=tooltip)
-    loop = _loop_layers(degree * vector(loop_rad), {"x": x, "y": y}, frame, drawn) if loop_rad else []
-    return _in_window(
-        [*zero, lines, points, *loop],
+    left, up = (np.concatenate([[0.0], *(line[axis] for line in drawn)]) for axis in (0, 1))
+    frame = free_frame(left, up, width_px=620, height_px=400, margins_px=(24.0, 24.0))
+    across = PlotAxis(title="rudder angle, starboard positive (deg)", domain=frame.across, nice=False)
+    rate = PlotAxis(title="yaw rate, starboard positive (deg/s)", domain=frame.up, nice=False)
+    over = _loop_layers(degree * vector(loop_rad), across, rate, frame, drawn) if loop_rad else []
+    rules = [Rule(at=[0.0], upright=True), Rule(at=[0.0])]
+    return curve_chart(
+        Plot(series=series, up=rate, height_px=frame.height_px, rules=rules, over=over),
+        across,
         title=title,
-        width=width_px,
-        height=height_px,
-        description=f"Steady yaw rate against rudder angle of {_listed(spirals)}.",
+        width_px=frame.width_px,
+        described=f"Steady yaw rate against rudder angle of {_listed(spirals)}.",
+        shown={"run:N": "run"},
     )
 
 
+_HOVER_SAMPLES = 90
+"""Places along one line that answer to the pointer."""
+
+
 def _loop_layers(
-    rudders: Array, position: Position, frame: Frame, lines: Sequence[tuple[Array, Array]]
-) -> list[alt.Chart]:
+    rudders: Array, across: PlotAxis, up: PlotAxis, frame: Frame, lines: Sequence[tuple[Array, Array]]
+) -> list[ChartSpec]:
     """The width of a loop along the line of zero yaw rate, in deg."""
     low, high = sorted(rudders.tolist())
     text = f"loop {format_number(high - low, 3)}°"
-    row = {"d": plain(low), "to": plain(high), "r": 0.0, "text": text}
-    width = Chart(data([row])).mark_rule(style="overshoot", clip=True).encode(**position, x2="to:Q")
+    place = {"x": across.channel("x"), "y": up.channel("v")}
+    row = {"x": plain(low), "to": plain(high), "v": 0.0, "text": text}
     label = text, spots_along((low, 0.0), (high, 0.0), frame)
     zero = [(vector(frame.across), np.zeros(2)), (np.zeros(2), vector(frame.up))]
-    return [width, *label_layers([label], frame, position, ("d", "r"), [*lines, *zero])]
-
-
-def _listed(series: Sequence[TrackData] | Sequence[History] | Sequence[Tow] | Sequence[SpiralData]) -> str:
-    return ", ".join(series_shown.label for series_shown in series)
-
-
-def _look(runs: Sequence[TrackData] | Sequence[History]) -> SeriesLook:
-    return series_look([run.label for run in runs], as_points={run.label for run in runs if run.measured})
-
-
-def _in_window(layers: Sequence[alt.Chart], **properties: object) -> alt.LayerChart:
-    # Pans and zooms both axes by one factor, so that equal scales stay equal; one of the layers is named "plot".
-    return alt.layer(*layers, params=[pan_zoom("x", "y", views=["plot"])]).properties(**properties)
-
-
-def _track_tooltip(tracks: Sequence[TrackData]) -> list[alt.Tooltip]:
-    timed = all(track.time_s is not None for track in tracks)
     return [
-        alt.Tooltip("run:N", title="run"),
-        *([alt.Tooltip("t:Q", title="time (s)", format=NUMBER)] if timed else []),
-        alt.Tooltip("x:Q", title="north (m)", format=NUMBER),
-        alt.Tooltip("y:Q", title="east (m)", format=NUMBER),
+        layer("rule", [row], {**place, "x2": "to"}, style="overshoot", clip=True),
+        *label_layers([label], frame, place, [*lines, *zero]),
     ]
+
+
+def _listed(series: Sequence[TrackData] | Sequence[History] | Sequence[SpiralData]) -> str:
+    return ", ".join(each.label for each in series)
 
 
 def _track_rows(track: TrackData, x: Array, y: Array) -> list[ChartRecord]:
@@ -322,64 +295,146 @@ def _track_rows(track: TrackData, x: Array, y: Array) -> list[ChartRecord]:
     return records(track.label, {"x": x[kept], "y": y[kept]} | time)
 
 
-def _history_layers(runs: Sequence[History], signal: Signal, look: SeriesLook, x: alt.X) -> list[alt.Chart]:
+def _signal_plot(
+    runs: Sequence[History], signal: Signal, height_px: int, across: PlotAxis, marks: Sequence[TimeMark]
+) -> Plot:
+    """The panel of one signal."""
     if not any(signal.name in run.values for run in runs):
         raise ValueError(f"no run has the signal {signal.name}")
     unit, factor = shown_unit(signal.unit, signal.display_unit)
-    title = with_unit(signal.title, unit)
-    rows = []
+    series, over = [], []
+    x, up = across.channel("x"), PlotAxis(title=with_unit(signal.title, unit))
     for run in runs:
-        if signal.name not in run.values:
-            continue
-        time, value = vector(run.time_s), factor * vector(run.values[signal.name])
-        kept = thin_points([value], POINT_SAMPLES) if run.measured else thin_line([value], LINE_SAMPLES)
-        rows.append((run.measured, records(run.label, {"t": time[kept], "v": value[kept]})))
-    tooltip = [
-        alt.Tooltip("run:N", title="run"),
-        alt.Tooltip("t:Q", title="time (s)", format=NUMBER),
-        alt.Tooltip("v:Q", title=title, format=NUMBER),
+        if signal.name in run.values:
+            time, value = vector(run.time_s), factor * vector(run.values[signal.name])
+            kept = thin_points([value], POINT_SAMPLES) if run.measured else slice(None)
+            series.append(PlotSeries(label=run.label, x=time[kept], y=value[kept], points=run.measured))
+        for band in run.bands:
+            if band.signal == signal.name:
+                edges = {"low": factor * vector(band.low), "high": factor * vector(band.high)}
+                rows = records("band", {"x": vector(band.time_s)} | edges)
+                over.append(
+                    layer("area", rows, {"x": x, "y": up.channel("low"), "y2": "high"}, style="band", clip=True)
+                )
+    spans = [{"x": mark.begin_s, "end": mark.end_s, "text": mark.text} for mark in marks if mark.signal == signal.name]
+    if spans:  # each with a line where it begins, for the shortest are no wider than that
+        place = {"x": x, "tooltip": tooltips({"text:N": "found", "x:Q": "from (s)"})}
+        over.append(layer("rect", spans, {**place, "x2": "end"}, style="region", clip=True))
+        over.append(layer("rule", spans, place, style="limit", clip=True, strokeWidth=1.2))
+    return Plot(series=series, up=up, height_px=height_px, over=over)
+
+
+def motions(
+    title: str, runs: Mapping[str, _Columns], measured: Sequence[str] = (), marks: Sequence[TimeMark] = ()
+) -> list[Illustration]:
+    """The tracks of some runs in one chart, where positions are known, and their time histories in another.
+
+    Parameters
+    ----------
+    title : str
+        What the runs are.
+    runs : mapping
+        Label to columns; those in `measured` are drawn as points.
+    marks : sequence of TimeMark
+        By the name of the column without its unit.
+    """
+    tables = {label: _in_si(columns) for label, columns in runs.items()}
+    drawn = []
+    if tracks := [_track(label, table, label in measured) for label, table in tables.items() if _moves(table)]:
+        drawn.append(Illustration(chart=track_chart(tracks, title=f"Track: {title}")))
+    signals = _signals(runs)
+    if signals:
+        histories = [
+            History(label=label, time_s=table["t_s"], values=_by_stem(table), measured=label in measured)
+            for label, table in tables.items()
+        ]
+        height = 110 if len(signals) <= 6 else 80
+        chart = history_chart(histories, signals, title=f"Histories: {title}", height_px=height, marks=marks)
+        drawn.append(Illustration(chart=chart))
+    return drawn
+
+
+def measured_histories(columns: _Columns, title: str) -> ChartSpec | None:
+    """The signals of a record over time, but its positions; None without any."""
+    return columns_chart({"measured": columns}, title)
+
+
+def columns_chart(
+    runs: Mapping[str, _Columns], title: str, *, measured: Sequence[str] = (), height_px: int = 60
+) -> ChartSpec | None:
+    """The signals of runs over time, but their positions, `measured` ones as points; None without any."""
+    if not (signals := _signals(runs)):
+        return None
+    tables = {label: _in_si(columns) for label, columns in runs.items()}
+    histories = [
+        History(label=label, time_s=table["t_s"], values=_by_stem(table), measured=label in measured)
+        for label, table in tables.items()
     ]
-    y = alt.Y("v:Q", scale=alt.Scale(zero=False), axis=axis_above(title))
-    return _lines_and_points(rows, {"x": x, "y": y}, look, tooltip)
+    return history_chart(histories, signals, title=title, height_px=height_px)
 
 
-def _shaded(band: HistoryBand, signal: Signal, x: alt.X) -> alt.Chart:
-    factor = shown_unit(signal.unit, signal.display_unit)[1]
-    columns = {"t": vector(band.time_s), "low": factor * vector(band.low), "high": factor * vector(band.high)}
-    area = Chart(data(records("band", columns))).mark_area(style="band", clip=True)
-    return area.encode(x=x, y=alt.Y("low:Q"), y2="high:Q")
+def varying_histories(columns: _Columns, bands: Mapping[str, BandOverTime], band_t_s: Array) -> Illustration | None:
+    """The signals of a run that change, over time, with bands at `band_t_s` (n,); the others in the caption."""
+    table = _by_stem(_in_si(columns))
+    signals = [signal for signal in _signals({"run": columns}) if not (signal.name == _ORDER and _ANGLE in table)]
+    constant = [signal for signal in signals if np.nanmax(table[signal.name]) == np.nanmin(table[signal.name])]
+    shown = [signal for signal in signals if signal not in constant]
+    if not shown:
+        return None
+    shaded = [_band(name, band, band_t_s) for name, band in bands.items() if name not in _TRACK]
+    run = History(label="simulated", time_s=_in_si({"t_s": columns["t_s"]})["t_s"], values=table, bands=shaded)
+    held = ", ".join(f"{signal.title} {_held(signal, table[signal.name][0])}" for signal in constant)
+    said = ["Shaded: nine of ten ships at each time."] if shaded else []
+    said += [f"Constant: {held}."] if held else []
+    chart = history_chart([run], shown, title="Time histories", height_px=110)
+    return Illustration(chart=chart, caption=" ".join(said))
 
 
-def _marked(marks: Sequence[TimeMark], signal: Signal, x: alt.X) -> list[alt.Chart]:
-    """Tinted spans, each with a line where it begins, for the shortest are no wider than that."""
-    rows: list[ChartRecord] = [
-        {"t": mark.begin_s, "end": mark.end_s, "text": mark.text} for mark in marks if mark.signal == signal.name
-    ]
-    if not rows:
-        return []
-    tooltip = [alt.Tooltip("text:N", title="found"), alt.Tooltip("t:Q", title="from (s)", format=NUMBER)]
-    base = Chart(data(rows)).encode(x=x, tooltip=tooltip)
-    spans = base.mark_rect(style="region", clip=True).encode(x2="end:Q")
-    return [spans, base.mark_rule(style="limit", clip=True, strokeWidth=1.2)]
+def _band(name: str, band: BandOverTime, time_s: Array) -> HistoryBand:
+    low, high = _in_si({f"p5_{name}": band.p5, f"p95_{name}": band.p95}).values()
+    return HistoryBand(signal=stem_of(name), time_s=time_s, low=low, high=high)
 
 
-def _lines_and_points(
-    rows: Sequence[tuple[bool, list[ChartRecord]]],
-    position: Position,
-    look: SeriesLook,
-    tooltip: list[alt.Tooltip],
-) -> list[alt.Chart]:
-    lines = [row for measured, series in rows if not measured for row in series]
-    points = [row for measured, series in rows if measured for row in series]
-    hover = [row for measured, series in rows if not measured for row in every(series, HOVER_SAMPLES)]
-    layers = []
-    if lines:
-        line = Chart(data(lines)).mark_line(clip=True)
-        layers.append(line.encode(**position, color=look.colour, strokeDash=look.dash, order="i:Q"))
-    if points:
-        point = Chart(data(points)).mark_point(clip=True)
-        layers.append(point.encode(**position, color=look.colour, shape=look.shape, tooltip=tooltip))
-    if hover:
-        unseen = Chart(data(hover)).mark_point(clip=True, opacity=0, filled=True, size=110)
-        layers.append(unseen.encode(**position, tooltip=tooltip))
-    return layers
+def _held(signal: Signal, value: float) -> str:
+    unit, factor = shown_unit(signal.unit, signal.display_unit)
+    return f"{format_number(factor * value)} {unit}".strip()
+
+
+def _in_si(columns: _Columns) -> dict[str, Array]:
+    found = {}
+    for name, values in columns.items():
+        numbers = np.array([np.nan if value is None else value for value in values], dtype=float)
+        si, factor = to_si(name, 1.0)
+        found[si] = factor * numbers
+    return found
+
+
+def stem_of(name: str) -> str:
+    """Return the name of a column without its unit."""
+    return name.rpartition("_")[0] or name
+
+
+def _by_stem(table: Mapping[str, Array]) -> dict[str, Array]:
+    return {stem_of(name): values for name, values in table.items() if name != "t_s" and name not in _TRACK}
+
+
+def _signals(runs: Mapping[str, _Columns]) -> list[Signal]:
+    names = dict.fromkeys(name for columns in runs.values() for name in columns if name not in ("t_s", *_TRACK))
+    found = []
+    for name in names:
+        unit = to_si(name, 1.0)[0].rpartition("_")[2]
+        display = {"n": "rpm"}.get(stem_of(name))
+        known = _UNITS.get(unit, "1")
+        words, written = in_words(name)
+        title = _TITLES.get(stem_of(name)) or (words if unit in _UNITS or not written else f"{words} ({written})")
+        found.append(Signal(name=stem_of(name), title=title, unit=known, display_unit=display))
+    order = list(_TITLES)
+    return sorted(found, key=lambda signal: order.index(signal.name) if signal.name in order else len(order))
+
+
+def _moves(table: Mapping[str, Array]) -> bool:
+    return all(name in table and np.isfinite(table[name]).any() for name in _TRACK)
+
+
+def _track(label: str, table: Mapping[str, Array], measured: bool) -> TrackData:
+    return TrackData(label=label, x_m=table["x_m"], y_m=table["y_m"], time_s=table["t_s"], measured=measured)

@@ -1,4 +1,4 @@
-"""What every chart is made of: records, units, the look of a series, panning and zooming."""
+"""What every chart is made of: records, units, the look of a series, the frame of a plot."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import altair as alt
 import numpy as np
-from altair.utils.schemapi import debug_mode
 from numpy.typing import ArrayLike
 
 from tank2sim.answer.charts.theme import DASHES, SHAPES, STROKE
+from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis
 from tank2sim.arrays import Array
 from tank2sim.units import UNITS
 
@@ -20,17 +19,21 @@ LINE_SAMPLES = 600
 """Samples of one line; a chart is about as many pixels wide."""
 POINT_SAMPLES = 120
 """Measured points of one series; more would be a smear."""
-HOVER_SAMPLES = 90
-"""Places along a line that answer to the pointer."""
+HOVER_SAMPLES = 200
+"""Places along the lines of a chart that answer to the pointer."""
 
-STACKS = {"stacks": True}
-"""Meta data of a chart whose panels go under each other where they are too narrow side by side."""
-
-NUMBER = ",.4~r"
-"""How tooltips write numbers: four significant digits."""
-
-ChartRecord = dict[str, Any]
-Position = dict[str, alt.X | alt.Y]
+USUAL_MARKS = {
+    "simulated": 0,
+    "fit": 0,
+    "after": 0,
+    "card found": 0,
+    "before": 1,
+    "card before": 1,
+    "measured": 2,
+    "FMU": 3,
+}
+"""Name of a series to its place among colours, dashes and shapes: it looks the same on every chart. Other series take
+the places that are left."""
 
 
 def vector(values: ArrayLike) -> Array:
@@ -51,31 +54,6 @@ def records(label: str, columns: Mapping[str, Array]) -> list[ChartRecord]:
         {"run": label, "i": place} | {name: plain(value) for name, value in zip(names, row, strict=True)}
         for place, row in enumerate(rows)
     ]
-
-
-class _SharedData(alt.InlineData):  # type: ignore[misc]
-    """Data of which copies of a chart share the records: Altair copies a chart in most of its steps, and copying each
-    number of each record takes half of the time of a page. Nothing changes records."""
-
-    def __deepcopy__(self, memo: object) -> _SharedData:
-        return self
-
-
-class Chart(alt.Chart):  # type: ignore[misc]
-    """A chart whose copies share its marks and channels, which nothing changes once they are given.
-
-    Altair copies every chart in a group each time the group is put into another, and again when that is written; with
-    all that is in them this takes a quarter of the time of a page.
-    """
-
-    def __deepcopy__(self, memo: object) -> alt.Chart:
-        return self.copy(deep=False)
-
-
-def data(rows: Sequence[ChartRecord]) -> alt.InlineData:
-    """Records as the data of a chart."""
-    with debug_mode(False):  # validating thousands of numbers takes as long as all else of a page
-        return _SharedData(values=list(rows))
 
 
 def every(rows: Sequence[ChartRecord], limit: int) -> list[ChartRecord]:
@@ -116,75 +94,54 @@ def check_labels(labels: Sequence[str]) -> None:
 class SeriesLook:
     """Encodings that distinguish the series of a chart; together they make one legend."""
 
-    colour: alt.Color
-    dash: alt.StrokeDash
-    shape: alt.Shape
+    colour: ChartSpec
+    dash: ChartSpec
+    shape: ChartSpec
+
+    @property
+    def pale(self) -> ChartSpec:
+        """The colour of bands: their legend is shared with lines and points, and would be as faint as the band."""
+        legend = self.colour["legend"]
+        return self.colour | {"legend": legend and legend | {"symbolOpacity": 1}}
 
 
 def series_look(labels: Sequence[str], as_points: Collection[str] = ()) -> SeriesLook:
-    """Colour, dash and shape of each series, in the order of `labels`.
+    """Colour, dash and shape of each series; :data:`USUAL_MARKS` have their own, others take theirs in order.
 
     Those in `as_points` appear in the legend by the shape of their points, the others by a stroke of their line.
     """
     check_labels(labels)
-    shown = list(labels)
-    dashes = [[1, 0] if label in as_points else list(DASHES[n % len(DASHES)]) for n, label in enumerate(labels)]
+    places = _places(labels)
+    shown = [places.get(place, " " * (place + 1)) for place in range(max(places, default=-1) + 1)]
     points = [label for label in labels if label in as_points]
-    shapes = [SHAPES[points.index(label) % len(SHAPES)] if label in points else STROKE for label in labels]
-    # Where a chart has lines alone no shape enters the legend, and its symbol is to be reported.
-    symbol = {} if as_points else {"symbolType": STROKE}
-    legend = None if len(labels) == 1 else alt.Legend(title=None, **symbol)
-    return SeriesLook(
-        alt.Color("run:N", scale=alt.Scale(domain=shown), legend=legend),
-        alt.StrokeDash("run:N", scale=alt.Scale(domain=shown, range=dashes), legend=legend),
-        alt.Shape("run:N", scale=alt.Scale(domain=shown, range=shapes), legend=legend),
-    )
+    dashes = [[1, 0] if label in as_points else list(DASHES[place % len(DASHES)]) for place, label in enumerate(shown)]
+    shapes = [SHAPES[points.index(label) % len(SHAPES)] if label in points else STROKE for label in shown]
+    legend: ChartSpec | None = None
+    if len(labels) > 1:
+        legend = {"title": None} | ({} if list(labels) == shown else {"values": list(labels)})
+        # Where a chart has lines alone no shape enters the legend, and its symbol is to be reported.
+        legend |= {} if as_points else {"symbolType": STROKE}
+
+    def encoding(**scale: Any) -> ChartSpec:
+        return {"field": "run", "type": "nominal", "scale": {"domain": shown, **scale}, "legend": legend}
+
+    return SeriesLook(encoding(), encoding(range=dashes), encoding(range=shapes))
 
 
-def pan_zoom(*encodings: str, views: Sequence[str]) -> alt.TopLevelSelectionParameter:
-    """Drag to pan, wheel with Ctrl to zoom, double click to go back, in all of the named `views` together.
-
-    Without Ctrl the wheel scrolls the page, as a reader expects. Views and parameter have fixed names: those that
-    Altair finds may be counted up over the life of the process, and the same page would not be the same bytes.
-    """
-    wheel = "wheel![event.ctrlKey || event.metaKey]"
-    select = alt.IntervalSelectionConfig(type="interval", encodings=list(encodings), zoom=wheel)
-    return alt.TopLevelSelectionParameter(name="window", select=select, bind="scales", views=list(views))
-
-
-def stacked(panels: Sequence[alt.LayerChart], **properties: object) -> alt.VConcatChart:
-    """Panels under each other that share what is across and the looks of their series, and move together along it."""
-    # Altair ends the names of stacked views in their place; given so, they are the same in all its versions.
-    views = [f"panel_{place}" for place in range(len(panels))]
-    for view, panel in zip(views, panels, strict=True):
-        panel.layer[0].name = view
-    chart = alt.vconcat(*panels, spacing=14, params=[pan_zoom("x", views=views)])
-    return chart.resolve_scale(x="shared", color="shared", strokeDash="shared", shape="shared").properties(**properties)
+def _places(labels: Sequence[str]) -> dict[int, str]:
+    """Place of each series among colours and dashes, to its label."""
+    usual = [USUAL_MARKS.get(label) for label in labels]
+    known = {place: label for place, label in zip(usual, labels, strict=True) if place is not None}
+    if len(known) < sum(place is not None for place in usual) or len(labels) == 1:
+        return dict(enumerate(labels))
+    left = iter(place for place in range(len(labels) + len(known) + len(USUAL_MARKS)) if place not in known)
+    return known | {next(left): label for label in labels if label not in known.values()}
 
 
 def extent(values: Array) -> tuple[float, float]:
     """Lowest and highest finite value; 0 and 0 if there is none."""
     finite = values[np.isfinite(values)]
     return (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
-
-
-def panel_title(text: str) -> alt.Title:
-    """Return the title of one panel among several."""
-    return alt.Title(text, fontSize=11, offset=22, limit=240)
-
-
-def axis_above(title: str, **options: Any) -> alt.Axis:
-    """Return a vertical axis with a horizontal title above it."""
-    return alt.Axis(
-        title=title,
-        titleAngle=0,
-        titleAlign="left",
-        titleAnchor="end",
-        titleBaseline="bottom",
-        titleX=0,
-        titleY=-6,
-        **options,
-    )
 
 
 @dataclass(frozen=True)
@@ -201,17 +158,14 @@ class Frame:
         (left, right), (bottom, top) = self.across, self.up
         return self.width_px * (across - left) / (right - left), self.height_px * (top - up) / (top - bottom)
 
-    def axes(self, *, across: tuple[str, str], up: tuple[str, str]) -> Position:
+    def axes(self, *, across: tuple[str, str], up: tuple[str, str]) -> ChartSpec:
         """The two axes, each given by its field and title; their ticks have one step."""
 
-        def axis(domain: tuple[float, float], size_px: int, title: str) -> dict[str, Any]:
-            scale = alt.Scale(domain=list(domain), nice=False, zero=False)
-            return {"title": title, "scale": scale, "axis": alt.Axis(tickCount=max(2, round(size_px / 70)))}
+        def axis(domain: tuple[float, float], size_px: int, field: str, title: str) -> ChartSpec:
+            ticks = max(2, round(size_px / 70))
+            return PlotAxis(title=title, domain=domain, nice=False, ticks=ticks).channel(field)
 
-        return {
-            "x": alt.X(across[0], **axis(self.across, self.width_px, across[1])),
-            "y": alt.Y(up[0], **axis(self.up, self.height_px, up[1])),
-        }
+        return {"x": axis(self.across, self.width_px, *across), "y": axis(self.up, self.height_px, *up)}
 
 
 def free_frame(

@@ -1,112 +1,109 @@
-"""One plot function for each kind of thing, and the chart as a picture.
+"""A chart as a whole specification, as a picture, and as an object of Altair.
 
-A chart is defined once, in Altair, and is drawn the same in a picture (:func:`chart_png`) and in a page
+A chart is defined once and is drawn the same in a picture (:func:`chart_png`) and in a page
 (:mod:`tank2sim.answer.page`). It states what is drawn; the looks are defined in :mod:`tank2sim.answer.charts.theme`.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import altair as alt
-
-from tank2sim.answer.charts.analysis import (
-    FrequencyResponse,
-    OutputError,
-    PolesZeros,
-    bode_chart,
-    error_chart,
-    pole_zero_chart,
-)
-from tank2sim.answer.charts.motion import (
-    History,
-    Signal,
-    SpiralData,
-    TimeMark,
-    Tow,
-    TrackData,
-    history_chart,
-    spiral_chart,
-    tow_chart,
-    track_chart,
-)
 from tank2sim.answer.charts.theme import LIGHT, LOCALE
+from tank2sim.answer.charts.vega import ChartRecord, ChartSpec
 
-__all__ = [
-    "VEGALITE_VERSION",
-    "FrequencyResponse",
-    "History",
-    "OutputError",
-    "PolesZeros",
-    "Signal",
-    "SpiralData",
-    "TimeMark",
-    "Tow",
-    "TrackData",
-    "bode_chart",
-    "chart_picture",
-    "chart_png",
-    "chart_specification",
-    "error_chart",
-    "history_chart",
-    "pole_zero_chart",
-    "spiral_chart",
-    "tow_chart",
-    "track_chart",
-]
+if TYPE_CHECKING:
+    import altair as alt
 
-VEGALITE_VERSION = ".".join(alt.SCHEMA_VERSION.lstrip("v").split(".")[:2])
-"""Version of Vega-Lite that Altair writes, and in which its charts are drawn: ``6.1``."""
+VEGALITE_VERSION = "6.4"
+"""Version of Vega-Lite in which charts are written and drawn: the newest of vl-convert 1.9, and that of Altair 6.3."""
 
 CHECKED_AGAINST_SCHEMA = False
-"""Whether each chart is compared with the schema of Vega-Lite, which takes more than half of the time of a page. No
-chart's form depends on what a user gives: the tests of the pages set this, and a page is not delayed by it."""
+"""Whether each chart is compared with the schema of Vega-Lite. No chart's form depends on what a user gives: the tests
+of the pages set this, and a page is not delayed by it."""
 
 
-def chart_specification(chart: alt.TopLevelMixin) -> dict[str, Any]:
+def chart_specification(chart: ChartSpec | alt.TopLevelMixin) -> ChartSpec:
     """The Vega-Lite specification of a chart, without its looks; the same chart gives the same specification."""
-    specification: dict[str, Any] = chart.to_dict(validate=CHECKED_AGAINST_SCHEMA)
-    specification.pop("config", None)
+    if isinstance(chart, dict):
+        named: dict[int, tuple[str, list[ChartRecord]]] = {}
+        specification: ChartSpec = {"$schema": f"https://vega.github.io/schema/vega-lite/v{VEGALITE_VERSION}.json"}
+        specification |= _with_named_data(chart, named)
+        specification["datasets"] = dict(named.values())
+    else:
+        specification = chart.to_dict(validate=CHECKED_AGAINST_SCHEMA)
+        specification.pop("config", None)
+    if CHECKED_AGAINST_SCHEMA:
+        from altair.vegalite.v6.schema.core import Root
+
+        Root.validate(specification | {"datasets": {}})
     return specification
 
 
-def chart_picture(chart: alt.TopLevelMixin, ending: str = ".png") -> bytes:
+def _with_named_data(part: Any, named: dict[int, tuple[str, list[ChartRecord]]]) -> Any:
+    """A part of a chart whose rows have a name: layers of the same rows share them."""
+    if isinstance(part, list):
+        return [_with_named_data(each, named) for each in part]
+    if not isinstance(part, dict):
+        return part
+    found = {name: _with_named_data(each, named) for name, each in part.items() if name != "data"}
+    if data := part.get("data"):
+        rows = data["values"]
+        found["data"] = {"name": named.setdefault(id(rows), (f"rows_{len(named)}", list(rows)))[0]}
+    return found
+
+
+def altair_chart(chart: ChartSpec | alt.TopLevelMixin) -> alt.TopLevelMixin:
+    """The chart as an object of Altair, which a user can change."""
+    if not isinstance(chart, dict):
+        return chart
+    import altair as alt
+
+    specification = chart_specification(chart)
+    rows = specification.pop("datasets")
+    kinds = {
+        "layer": alt.LayerChart,
+        "vconcat": alt.VConcatChart,
+        "hconcat": alt.HConcatChart,
+        "concat": alt.ConcatChart,
+        "facet": alt.FacetChart,
+    }
+    kind = next((kind for name, kind in kinds.items() if name in specification), alt.Chart)
+    made = kind.from_dict(specification, validate=False)
+    made["datasets"] = rows
+    return made
+
+
+def chart_picture(chart: ChartSpec | alt.TopLevelMixin, ending: str = ".png") -> bytes:
     """The chart as a picture on white; needs no network and no browser.
 
     Parameters
     ----------
-    chart : Chart
+    chart : ChartSpec or Chart of Altair
     ending : str
         ``.svg`` or ``.pdf``; else it is a PNG.
     """
     import vl_convert
 
-    how: dict[str, Any] = {
-        "vl_version": VEGALITE_VERSION,
-        "config": LIGHT,
-        "format_locale": LOCALE,
-        "allowed_base_urls": [],
-    }
-    specification = chart_specification(chart)
     match ending.lower():
         case ".svg":
-            return str(vl_convert.vegalite_to_svg(specification, **how)).encode()
+            return str(vl_convert.vegalite_to_svg(chart_specification(chart), **_HOW)).encode()
         case ".pdf":
-            return bytes(vl_convert.vegalite_to_pdf(specification, **how))
+            return bytes(vl_convert.vegalite_to_pdf(chart_specification(chart), **_HOW))
         case _:
             return chart_png(chart)
 
 
-def chart_png(chart: alt.TopLevelMixin, *, scale: float = 2.0) -> bytes:
+def chart_png(chart: ChartSpec | alt.TopLevelMixin, *, scale: float = 2.0) -> bytes:
     """The chart as a PNG picture on white, `scale` pixels to each px of its size. Needs no network and no browser."""
     import vl_convert
 
-    picture: bytes = vl_convert.vegalite_to_png(
-        chart_specification(chart),
-        vl_version=VEGALITE_VERSION,
-        scale=scale,
-        config=LIGHT,
-        format_locale=LOCALE,
-        allowed_base_urls=[],
-    )
+    picture: bytes = vl_convert.vegalite_to_png(chart_specification(chart), scale=scale, **_HOW)
     return picture
+
+
+_HOW: dict[str, Any] = {
+    "vl_version": VEGALITE_VERSION,
+    "config": LIGHT,
+    "format_locale": LOCALE,
+    "allowed_base_urls": [],
+}

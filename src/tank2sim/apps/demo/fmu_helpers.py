@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tank2sim.answer.charts.picture import OutputError
+from tank2sim.answer.charts.analysis import OutputError
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import KeyFigure, Section
 from tank2sim.cards import Card

@@ -11,17 +11,9 @@ import numpy as np
 from tank2sim.analysis.linearisation import state_space, straight_course
 from tank2sim.analysis.stability.imo import ImoCriterion, imo_criteria
 from tank2sim.analysis.stability.straight_line import Stability, stability
-from tank2sim.answer.charts.picture import (
-    FrequencyResponse,
-    History,
-    TrackData,
-    bode_chart,
-    chart_png,
-    error_chart,
-    history_chart,
-    track_chart,
-)
-from tank2sim.answer.charts.run_series import SHIP_SIGNALS, history_of, signals_of, track_data
+from tank2sim.answer.charts.analysis import FrequencyResponse, bode_chart, error_chart
+from tank2sim.answer.charts.motion import History, Signal, TrackData, history_chart, track_chart
+from tank2sim.answer.charts.picture import chart_png
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict
 from tank2sim.answer.study import study_values
@@ -34,12 +26,20 @@ from tank2sim.fmu.manoeuvre import InputSequence
 from tank2sim.fmu.running import replay
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import Run, simulate
+from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.simulation.trial_file import trial_csv
 from tank2sim.units import in_words
 
 MANOEUVRES = {"turn-35": "turn:35", "zigzag-20-20": "zigzag:20/20"}
 IN_WORDS = {"turn:35": "turning circle, 35 deg of rudder", "zigzag:20/20": "20/20 zigzag"}
 THIRD, FIRST, IN_FMU = "third order", "linear", "third order, FMU"
+_SIGNALS = {
+    "rudder.angle": "rudder, + to starboard",
+    "motion.psi": "heading",
+    "motion.r": "yaw rate",
+    "motion.u": "surge velocity",
+    "motion.v": "sway velocity, + to starboard",
+}
 
 
 def mariner(workshop: Workshop) -> DemoOutcome:
@@ -82,22 +82,20 @@ def _in_fmu(model: Model, path: Path, run: Run) -> dict[str, Array]:
 
 def _manoeuvre_section(workshop: Workshop, name: str, text: str, run: dict[str, Run], fmu: dict[str, Array]) -> Section:
     third, first = run[THIRD].trajectory, run[FIRST].trajectory
+    motions: dict[str, Trajectory | dict[str, Array]] = {THIRD: third, IN_FMU: fmu, FIRST: first}
     tracks = track_chart(
         [
-            track_data(THIRD, third),
-            TrackData(label=IN_FMU, x_m=fmu["motion.x"], y_m=fmu["motion.y"], time_s=third.t),
-            track_data(FIRST, first),
+            TrackData(label=label, x_m=motion["motion.x"], y_m=motion["motion.y"], time_s=third.t)
+            for label, motion in motions.items()
         ],
         title=f"{IN_WORDS[text]}: tracks".capitalize(),
     )
-    in_fmu = History(label=IN_FMU, time_s=third.t, values=dict(fmu))
     histories = history_chart(
         [
-            history_of(THIRD, third, SHIP_SIGNALS),
-            in_fmu,
-            history_of(FIRST, first, SHIP_SIGNALS),
+            History(label=label, time_s=third.t, values={name: motion[name] for name in _SIGNALS})
+            for label, motion in motions.items()
         ],
-        signals_of(third.model, SHIP_SIGNALS),
+        [Signal(name=name, title=title, unit=third.model[name].unit) for name, title in _SIGNALS.items()],
         title=f"{IN_WORDS[text]}: time histories".capitalize(),
     )
     workshop.write(f"mariner-{name}-track.png", chart_png(tracks))

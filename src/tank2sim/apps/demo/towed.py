@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import altair as alt
 import numpy as np
 
-from tank2sim.answer.charts.picture import Tow, chart_png, tow_chart
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart
+from tank2sim.answer.charts.picture import chart_png
+from tank2sim.answer.charts.vega import ChartSpec, PlotAxis
 from tank2sim.answer.parts import Column, Illustration, KeyFigure, Section, Table, Verdict
 from tank2sim.answer.study import study_values
 from tank2sim.apps.demo.fmu_helpers import DemoOutcome, Workshop, error_words, largest_error
@@ -66,21 +67,24 @@ def _towed_again(model: Model, fmu: Path, tows: Tows, force_N: float) -> tuple[A
     return times, replay(fmu, InputSequence(times, held), model)["motion.u"]
 
 
-def _chart(tows: Tows, times: Array, speed: Array) -> alt.LayerChart:
-    return tow_chart(
-        [
-            *(
-                Tow(label=f"tow {k + 1}", time_s=tows.time_s, speed_mps=column, model_time_s=[], model_speed_mps=[])
-                for k, column in enumerate(tows.speed_mps.T)
-            ),
-            Tow(label="FMU", time_s=[], speed_mps=[], model_time_s=times, model_speed_mps=speed),
-        ],
+def _chart(tows: Tows, times: Array, speed: Array) -> ChartSpec:
+    measured = [
+        PlotSeries(label=f"tow {k + 1}", x=tows.time_s, y=column, points=True)
+        for k, column in enumerate(tows.speed_mps.T)
+    ]
+    return curve_chart(
+        Plot(
+            series=[PlotSeries(label="FMU", x=times, y=speed), *measured], up=PlotAxis(title="speed (m/s)", zero=True)
+        ),
+        PlotAxis(title="time (s)", nice=False, zero=True),
         title="Speed of the vehicle: five tows, and the FMU under the same force",
+        described="Speed over time of five tows; points were measured, the line is the FMU.",
+        shown={"run:N": "tow"},
     )
 
 
 def _section(
-    paper: TowIdentification, chosen: TowIdentification, misses: list[dict[str, float]], chart: alt.LayerChart
+    paper: TowIdentification, chosen: TowIdentification, misses: list[dict[str, float]], chart: ChartSpec
 ) -> Section:
     return Section(
         heading="A towed vehicle: from five tows to an FMU",

@@ -26,6 +26,7 @@ from tank2sim.apps.design.tank_form import TankFile
 from tank2sim.apps.design.trial_design import SENSORS, TrialDesign, design_of_trial
 from tank2sim.apps.programs.conventions import Conventions
 from tank2sim.apps.programs.languages import converted as converted_card
+from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.cards.card import MmgCard
 from tank2sim.cards.estimates import RELATIVE_ERROR
@@ -102,15 +103,7 @@ def _campaign_study(name: str, design: CaptiveDesign, notices: tuple[Notice, ...
         gauges={
             force: GaugeStudy(gauge.noise, gauge.zero, gauge.largest) for force, gauge in design.planned.gauges.items()
         },
-        figures={
-            figure.text: PlannedFigure(
-                value=float(design.slopes.values[row]),
-                design=float(design.standard_errors[row]),
-                usual=float(design.usual_standard_errors[row]),
-                variance_ratio=float(design.ratios[row]),
-            )
-            for row, figure in enumerate(design.slopes.figures)
-        },
+        figures=_planned_figures(design, variance_ratio=design.ratios),
         coefficients=design.coefficients,
         not_excited=design.not_excited,
         certainty=design.curve,
@@ -118,6 +111,15 @@ def _campaign_study(name: str, design: CaptiveDesign, notices: tuple[Notice, ...
         runs=run_rows(design),
         notices=notices,
     )
+
+
+def _planned_figures(design: CaptiveDesign | TrialDesign, **more: Array) -> dict[str, PlannedFigure]:
+    """Figures with their errors by the plan and the usual programme; `more` are further fields (figures,)."""
+    columns = {"value": design.slopes.values, "design": design.standard_errors, "usual": design.usual_standard_errors}
+    return {
+        figure.text: PlannedFigure(**{name: float(values[row]) for name, values in {**columns, **more}.items()})
+        for row, figure in enumerate(design.slopes.figures)
+    }
 
 
 def _kinds(design: CaptiveDesign) -> tuple[PlannedKind, ...]:
@@ -201,15 +203,7 @@ def planned_trial(
             repeats=design.minutes / design.usual_minutes,
         ),
         sensors=_by_column(design.sensors),
-        figures={
-            figure.text: PlannedFigure(
-                value=float(design.slopes.values[row]),
-                before=float(design.prior_errors[row]),
-                design=float(design.standard_errors[row]),
-                usual=float(design.usual_standard_errors[row]),
-            )
-            for row, figure in enumerate(design.slopes.figures)
-        },
+        figures=_planned_figures(design, before=design.prior_errors),
         coefficients=design.coefficients,
         certainty=design.curve,
         manoeuvres=manoeuvres,

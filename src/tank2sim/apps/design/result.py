@@ -2,22 +2,35 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, ClassVar, TypeVar
 
+import numpy as np
+
+from tank2sim.analysis.influence.figures import figure_label
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart
+from tank2sim.answer.charts.parts import plain, series_look
+from tank2sim.answer.charts.rows import runs_of
+from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, channel, layer, layered, tooltips
 from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, records_table, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.design.captive_design import CaptiveDesign
-from tank2sim.apps.design.charts import certainty_charts, figure_words, run_planes
 from tank2sim.apps.design.plan_files import campaign_template, plan_csv
 from tank2sim.apps.design.planning import counted
-from tank2sim.apps.design.study import CampaignStudy, TrialStudy
+from tank2sim.apps.design.study import CampaignStudy, Certainty, TrialStudy
 from tank2sim.apps.design.trial_design import TrialDesign
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_WIDTH = 320
+_HEIGHT = 240
+DESIGN, USUAL = "design", "usual"
+
 
 _S = TypeVar("_S", CampaignStudy, TrialStudy)
 
@@ -39,10 +52,10 @@ class DesignResult(Result[_S]):
         return pd.DataFrame.from_dict(rows, orient="index").dropna(axis=1, how="all").rename_axis("figure")
 
     def _certainty(self, text: str, seconds: float, unit: str) -> Section:
-        charts = certainty_charts(self.study.certainty, seconds, unit)
+        charts = _certainty_charts(self.study.certainty, seconds, unit)
         rows: list[list[Cell]] = [
             [
-                figure_words(name),
+                figure_label(name),
                 one.value,
                 one.before,
                 one.design,
@@ -77,7 +90,7 @@ class DesignResult(Result[_S]):
             ),
         ]
         for name, one in self.study.figures.items():
-            label = figure_words(name)
+            label = figure_label(name)
             note = f"± {one.design:.2g}; usual programme ± {one.usual:.2g}"
             figure_unit = in_words(name.partition("@")[0])[1]
             cards.append(KeyFigure(label=label[:1].upper() + label[1:], value=one.value, unit=figure_unit, note=note))
@@ -200,7 +213,7 @@ class CampaignDesignResult(DesignResult[CampaignStudy]):
         largest: list[list[Cell]] = [
             [name, one.value, one.design, one.usual, 100 * one.largest_share] for name, one in ordered[:_ON_SCREEN]
         ]
-        words = [f"{figure_words(figure)} (%)" for figure in names]
+        words = [f"{figure_label(figure)} (%)" for figure in names]
         return (
             table("Coefficients that matter (prime)", [*heads, "largest share of a variance (%)"], largest, digits=3),
             table("Coefficients and their shares of the variances", [*heads, *words], rows, digits=3, on_screen=False),
@@ -337,3 +350,78 @@ _TRIAL = (
     "as the errors of the card and of the sensors go. Windows of the records have an unknown first state and unknown "
     "constant disturbances, as wind and waves make."
 )
+
+
+def run_planes(study: CampaignStudy) -> list[ChartSpec]:
+    """Runs in the plane of drift and rudder, and oscillations in that of frequency and amplitude; areas are numbers of
+    runs."""
+    steady, swinging = Counter[tuple[float, ...]](), Counter[tuple[object, ...]]()
+    for run in study.runs:
+        if run.frequency_radps is None:
+            steady[run.drift_deg, run.rudder_deg] += 1
+            continue
+        kind, ratio = "pure sway (v')", (run.sway_amplitude_m or 0.0) * run.frequency_radps / run.speed_mps
+        if run.type != "pure_sway":
+            kind = f"{run.type.replace('_', ' ')} (r')"
+            ratio = math.radians(run.yaw_rate_amplitude_degps or 0.0) * study.model.length_m / run.speed_mps
+        swinging[kind, plain(run.frequency_radps), plain(ratio)] += 1
+    planes: list[ChartSpec] = []
+    if swinging:
+        rows = [{"run": kind, "x": x, "y": y, "runs": count} for (kind, x, y), count in swinging.items()]
+        title = "Oscillations: amplitude and frequency"
+        planes.append(_plane(rows, title, "frequency (rad/s)", "amplitude of v/U or r L/U"))
+    if steady:
+        rows = [{"run": "steady", "x": x, "y": y, "runs": count} for (x, y), count in steady.items()]
+        planes.append(_plane(rows, "Steady runs: drift and rudder", "drift (deg)", "rudder (deg)"))
+    return planes
+
+
+def _plane(rows: Sequence[ChartRecord], title: str, across: str, up: str) -> ChartSpec:
+    kinds = runs_of(rows)
+    look = series_look(kinds, as_points=kinds)
+    most = max(int(row["runs"]) for row in rows)
+    counts = sorted({1, max(1, most // 2), most})
+    scale = {"domain": [0, most], "range": [0, 500]}  # from no area for no runs: the legend has only numbers of runs
+    place = {
+        "x": PlotAxis(title=across, padding=20).channel("x"),
+        "y": PlotAxis(title=up, padding=20, zero=True).channel("y"),
+        "size": channel("runs:Q", scale=scale, legend={"title": "runs", "values": counts, "format": "d"}),
+        "color": look.colour,
+        "shape": look.shape,
+        "tooltip": tooltips({"run:N": "type", "x:Q": across, "y:Q": up, "runs:Q": "runs"}),
+    }
+    return layered(
+        [layer("point", rows, place, filled=True, opacity=0.7)],
+        size=(2 * _WIDTH, _HEIGHT),
+        title=title,
+        description=f"{title}, by number of runs.",
+    )
+
+
+def _certainty_charts(curve: Certainty, seconds: float, unit: str) -> list[ChartSpec]:
+    """Standard error of each figure over the time in a unit of so many `seconds`, by both programmes."""
+    charts: list[ChartSpec] = []
+    for figure in curve.design:
+        plans = {DESIGN: (curve.time_s, curve.design), USUAL: (curve.usual_time_s, curve.usual)}
+        series = []
+        for kind, (times, errors) in plans.items():
+            known = np.isfinite(errors[figure])
+            time, error = np.asarray(times)[known] / seconds, np.asarray(errors[figure])[known]
+            series.append(PlotSeries(label=kind, x=time, y=error))
+        up = PlotAxis(title=f"standard error ({in_words(figure.partition('@')[0])[1]})", zero=True)
+        across = PlotAxis(title=f"time ({unit})")
+        dots = [row for each in series for row in each.rows]
+        place = {"x": across.channel("x"), "y": up.channel("v")}
+        place["color"] = series_look([DESIGN, USUAL]).colour
+        charts.append(
+            curve_chart(
+                Plot(series=series, up=up, height_px=160, over=[layer("point", dots, place, filled=True, size=36)]),
+                across,
+                title=f"Certainty of the {figure_label(figure)}",
+                width_px=2 * _WIDTH,
+                window=[],
+                described=f"Standard error of the {figure_label(figure)} over the time, by both programmes.",
+                shown={"run:N": "plan", "x:Q": unit, "v:Q": "standard error"},
+            )
+        )
+    return charts

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar
 
-import altair as alt
-
-from tank2sim.answer.charts.parts import NUMBER, Chart, data, series_look
+from tank2sim.answer.charts.parts import series_look
+from tank2sim.answer.charts.rows import RowPlot, row_chart
+from tank2sim.answer.charts.vega import PlotAxis, Rule
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Link, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.fleet.summary import REPORT_FILE, FleetStudy, ShipSummary
@@ -165,34 +165,26 @@ def _hundredths(misfit: float | None) -> float | None:
 def _misfits(found: Sequence[ShipSummary]) -> list[Illustration]:
     """Misfit of each ship before and after, a row each; empty where no simulation came to its end."""
     rows = [
-        {"ship": ship.folder, "run": label, "misfit": _hundredths(misfit)}
+        {"name": ship.folder, "run": label, "v": _hundredths(misfit)}
         for ship in found
         for label, misfit in zip((_BEFORE, _AFTER), ship.misfits, strict=True)
         if misfit
     ]
     if not rows:
         return []
-    look = series_look([_BEFORE, _AFTER], as_points=[_BEFORE, _AFTER])
-    points = (
-        Chart(data(rows))
-        .mark_point(filled=True, size=70)
-        .encode(
-            x=alt.X("misfit:Q", title="misfit (standard deviations of the noise)", scale=alt.Scale(type="log")),
-            y=alt.Y("ship:N", sort=[ship.folder for ship in found], title=None),
-            color=look.colour,
-            shape=look.shape,
-            tooltip=[
-                alt.Tooltip("ship:N", title="ship"),
-                alt.Tooltip("run:N", title="model"),
-                alt.Tooltip("misfit:Q", title="misfit", format=NUMBER),
-            ],
-        )
-    )
-    noise = Chart(data([{"misfit": 1.0}])).mark_rule(style="limit").encode(x="misfit:Q")
-    chart = alt.layer(noise, points).properties(
+    chart = row_chart(
+        RowPlot(
+            rows=rows,
+            across=PlotAxis(title="misfit (standard deviations of the noise)", log=True),
+            look=series_look([_BEFORE, _AFTER], as_points=[_BEFORE, _AFTER]),
+            names=[ship.folder for ship in found],
+            rules=[Rule(at=[1.0], style="limit")],
+            shown={"name:N": "ship", "run:N": "model", "v:Q": "misfit"},
+        ),
         title="Misfit before and after",
-        width=620,
-        height=alt.Step(22),
-        description=f"Misfit of {len(found)} ships by the cards as given and by those found.",
+        described=f"Misfit of {len(found)} ships by the cards as given and by those found.",
+        step_px=22,
+        filled=True,
+        size=70,
     )
     return [Illustration(chart=chart, caption=_CHART, name="misfit")]

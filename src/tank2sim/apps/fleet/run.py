@@ -2,31 +2,60 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
-from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Executor
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from pathlib import Path
+from typing import Any
 
 from tank2sim.api.trial import fitted_and_held
 from tank2sim.apps.fleet.result import FleetResult
-from tank2sim.apps.fleet.run_record import NEW, RUN, fleet_run_record, stale, with_results
-from tank2sim.apps.fleet.search import Fault, ShipTask, fault_of_program, find_at_once, find_in_turn
 from tank2sim.apps.fleet.ships import Fleet, ShipFolder, fleet_in
 from tank2sim.apps.fleet.summary import FleetStudy, ShipSummary, fleet_study, ship_summary
 from tank2sim.arguments import PROCESSES
 from tank2sim.cards import read_card
-from tank2sim.errors import InputError
+from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.executors import check_executor, executing
 from tank2sim.files import folder_made, json_text, parsed_json, read_text, writable_folder, write_together
 from tank2sim.gap.inference.fit_all import StageReport
 from tank2sim.gap.outcome.files import GAP, put, refuse_early
 from tank2sim.gap.outcome.study import GapStudy
 from tank2sim.gap.result import Gap
-from tank2sim.gap.workflow import GapOptions, nonlinear_card
+from tank2sim.gap.workflow import GapOptions, nonlinear_card, run_gap_workflow
+from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.notices import Notice
 from tank2sim.results.gap import GapResult, gap_result
+from tank2sim.version import __version__
+
+AHEAD = 256
+"""Ships that are read and handed out before the first of them is done: a bound on memory (project choice)."""
+
+
+RUN = "run.json"
+"""File next to ``gap.json``."""
+
+_FORMAT = "tank2sim-run/1"
+
+
+NEW = "not computed before"
+
+_RESULTS = "its results were changed"
+
+_WORDS = {
+    "format": "its record is of another form",
+    "tank2sim": "computed by another version",
+    "card": "the card was changed",
+    "trials": "the trials were changed",
+    "holdout": "the trials held out were changed",
+    "options": "the options were changed",
+}
+
 
 _JSON, _PAGE = "fleet.json", "fleet.html"
 
@@ -137,9 +166,6 @@ def _compute(course: _Course, request: FleetRequest, report: StageReport) -> Non
                 course.faults[ship.folder.name] = fault.line
 
 
-Find = Callable[..., Iterator[tuple[ShipTask, Gap | Fault]]]
-
-
 @contextmanager
 def _working(request: FleetRequest, number: int) -> Iterator[tuple[Find, Executor | None]]:
     """Search function and executor for a number of ships.
@@ -211,3 +237,215 @@ def _without_ship(study: FleetStudy, output: Path) -> list[Notice]:
         for path in sorted(output.glob(f"*/{RUN}"))
         if path.parent.name not in ships
     ]
+
+
+def fleet_run_record(ship: ShipFolder, options: GapOptions) -> dict[str, object]:
+    """All on which a result depends: files by the SHA-256 of their bytes, options, version of the program.
+
+    The number and place of the processes is not part of it.
+
+    Raises
+    ------
+    InputError
+        A file cannot be read.
+    """
+    return {
+        "format": _FORMAT,
+        "tank2sim": __version__,
+        "card": _sums([ship.card]),
+        "trials": _sums(ship.trials),
+        "holdout": _sums(ship.holdout),
+        "options": {
+            "effects": None if options.effects is None else list(options.effects),
+            "without": list(options.without),
+            "max_effects": options.max_effects,
+            "false_discovery": options.false_discovery,
+        },
+    }
+
+
+def with_results(record: Mapping[str, object], contents: Mapping[Path, str | bytes], folder: Path) -> dict[str, object]:
+    """The record of a run that wrote these files into its folder."""
+    files = {path.relative_to(folder).as_posix(): sum_of(content) for path, content in contents.items()}
+    return {**record, "files": dict(sorted(files.items()))}
+
+
+def stale(record: Mapping[str, object], folder: Path) -> str:
+    """Reason why the files in a folder are not the results of this record; empty if they are.
+
+    The files of the result are compared, too: a run that was killed between two of them leaves the record of the run
+    before, and a user may have changed one. Without a record it is :data:`NEW`.
+    """
+    earlier = _earlier(folder / RUN)
+    if earlier is None:
+        return NEW
+    for key, words in _WORDS.items():
+        if earlier.get(key) != record[key]:
+            return words
+    results = earlier.get("files")
+    if not isinstance(results, dict) or not results:
+        return _RESULTS
+    for name, digest in results.items():
+        try:
+            if sum_of((folder / name).read_bytes()) != digest:
+                return _RESULTS
+        except OSError:
+            return _RESULTS
+    return ""
+
+
+def sum_of(content: str | bytes) -> str:
+    """SHA-256 of the bytes of a file's content, in hexadecimal."""
+    return hashlib.sha256(content.encode("utf-8") if isinstance(content, str) else content).hexdigest()
+
+
+def _sums(paths: Iterable[Path]) -> dict[str, str]:
+    sums = {}
+    for path in paths:
+        try:
+            sums[path.name] = sum_of(path.read_bytes())
+        except OSError as error:
+            raise InputError(path, "", f"cannot be read ({error.strerror})", "check its permissions") from None
+    return sums
+
+
+def _earlier(path: Path) -> dict[str, Any] | None:
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return None
+    return content if isinstance(content, dict) else None
+
+
+@dataclass(frozen=True, eq=False)
+class ShipTask:
+    """A ship with its data read: the input of the search for its missing effect.
+
+    Parameters
+    ----------
+    folder : ShipFolder
+    card : ManoeuvringCard
+    fitted, held : Measured
+    """
+
+    folder: ShipFolder
+    card: ManoeuvringCard
+    fitted: Measured
+    held: Measured
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Reason why a ship has no result, in one line."""
+
+    line: str
+
+
+def find_in_turn(
+    ships: Iterable[ShipTask], options: GapOptions, progress: StageReport, executor: Executor | None = None
+) -> Iterator[tuple[ShipTask, Gap | Fault]]:
+    """Find the missing effect of each ship, one after the other.
+
+    Parameters
+    ----------
+    ships : iterable of Sought
+        Read as they are needed.
+    options : GapOptions
+    progress : callable
+        Called with each stage of each ship.
+    executor : Executor, optional
+        For the explanations of each ship; by default they are fitted in this process, or in others of this machine.
+
+    Raises
+    ------
+    InputError
+        The executor is lost.
+    """
+    for ship in ships:
+        name = ship.folder.name
+
+        def report(stage: str, name: str = name) -> None:
+            progress(f"{name}: {stage}")
+
+        with _executor_kept(name):
+            found = _find(ship, options, report, executor)
+        yield ship, found
+
+
+def find_at_once(
+    ships: Iterable[ShipTask], options: GapOptions, progress: StageReport, executor: Executor
+) -> Iterator[tuple[ShipTask, Gap | Fault]]:
+    """Find the missing effect of each ship as :func:`find_in_turn`, in the order in which the executor completes them.
+
+    Each ship is one task of the executor.
+
+    Raises
+    ------
+    InputError
+        The executor is lost.
+    """
+    waiting: dict[Future[Gap | Fault], ShipTask] = {}
+    for ship in ships:
+        waiting[executor.submit(_find_in_worker, ship, options)] = ship
+        yield from _done(waiting, None if len(waiting) >= AHEAD else 0.0)
+        if waiting:
+            progress(_awaited(waiting.values()))
+    while waiting:
+        progress(_awaited(waiting.values()))
+        yield from _done(waiting, None)
+
+
+def _awaited(ships: Collection[ShipTask]) -> str:
+    names = [ship.folder.name for ship in islice(ships, 3)]
+    return f"{len(ships)} to go: {', '.join(names)}{' ...' if len(ships) > len(names) else ''}"
+
+
+def _done(
+    waiting: dict[Future[Gap | Fault], ShipTask], timeout_s: float | None
+) -> Iterator[tuple[ShipTask, Gap | Fault]]:
+    for future in wait(waiting, timeout_s, FIRST_COMPLETED).done:
+        ship = waiting.pop(future)
+        with _executor_kept(ship.folder.name):
+            try:
+                found = future.result()
+            except InputError as error:  # of the cluster: this ship was too much for each worker that tried
+                found = Fault(str(error))
+        yield ship, found
+
+
+@contextmanager
+def _executor_kept(name: str) -> Iterator[None]:
+    try:
+        yield
+    except (BrokenExecutor, CancelledError):
+        problem = f"a worker was lost while {name} was sought (is there memory enough for all workers?)"
+        remedy = "give fewer workers; the same search goes on where this one stopped"
+        raise ArgumentError("executor", "", problem, remedy) from None
+
+
+def _find_in_worker(ship: ShipTask, options: GapOptions) -> Gap | Fault:
+    """Find a ship's missing effect in a worker, in one process."""
+    return _find(ship, replace(options, workers=1))
+
+
+def _find(
+    ship: ShipTask, options: GapOptions, progress: StageReport = lambda text: None, executor: Executor | None = None
+) -> Gap | Fault:
+    try:
+        return run_gap_workflow(ship.card, ship.fitted, ship.held, options, progress, executor)
+    except InputError as error:
+        return Fault(str(error))
+    except (BrokenExecutor, CancelledError):
+        raise
+    except Exception as error:  # a failure of the program at one ship does not stop the others
+        return fault_of_program(error)
+
+
+def fault_of_program(error: Exception) -> Fault:
+    """The message about an `error` that no check of the input foresaw."""
+    words = " ".join(str(error).split())[:200]
+    remedy = "run 'tank2sim gap' with its card and trials alone, and report its message"
+    return Fault(f"a fault of the program, not of yours: {type(error).__name__}: {words}; {remedy}")
+
+
+Find = Callable[..., Iterator[tuple[ShipTask, Gap | Fault]]]

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
-import altair as alt
 import numpy as np
 
-from tank2sim.answer.charts.parts import Chart
+from tank2sim.answer.charts.parts import series_look
+from tank2sim.answer.charts.rows import RowPlot, names_of, row_layers, runs_of
+from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, layered
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, records_table, table
 from tank2sim.answer.result import Result
@@ -170,37 +171,36 @@ def _named(key: str) -> str:
     return f"{_MANOEUVRES.get(manoeuvre, manoeuvre)}: {in_words(figure)[0]}"
 
 
-def figures_chart(study: GuessStudy) -> alt.TopLevelMixin:
+def figures_chart(study: GuessStudy) -> ChartSpec:
     """Intervals of each figure over the median found: by the dimensions alone, with the figures, and as given.
 
     Parameters
     ----------
     study : GuessStudy
     """
-    rows: list[dict[str, object]] = []
     anything = any(figure.given is not None for figure in study.figures.values())
+    rows: list[ChartRecord] = []
+    points: list[ChartRecord] = []
     for key, figure in study.figures.items():
         middle = figure.found.p50
         label = f"{_named(key)}, {format_number(middle, 3)} {figure.unit}"
         ways = {"by dimensions": figure.by_dimensions, **({"with the figures": figure.found} if anything else {})}
         for kind, band in ways.items():
-            rows.append({"figure": label, "kind": kind, "low": band.p5 / middle, "high": band.p95 / middle})
+            rows.append({"name": label, "run": kind, "low": band.p5 / middle, "high": band.p95 / middle})
         if figure.given is not None:
-            share = figure.given / middle
-            rows.append({"figure": label, "kind": "given", "low": share, "high": share})
-    base = Chart(alt.Data(values=rows))
-    scale = alt.Scale(type="log", nice=False)
-    x = alt.X("low:Q", title="times the median", scale=scale, axis=alt.Axis(format="~g"))
-    y = alt.Y("figure:N", title=None, sort=None, axis=alt.Axis(labelExpr="split(datum.label, ': ')"))
-    legend = alt.Legend() if anything else None
-    colour = alt.Color("kind:N", title=None, sort=["by dimensions", "with the figures", "given"], legend=legend)
-    offset = alt.YOffset("kind:N", sort=["by dimensions", "with the figures", "given"])
-    bars = base.transform_filter("datum.kind != 'given'").mark_bar(height=6)
-    points = base.transform_filter("datum.kind == 'given'").mark_point(filled=True, size=50)
-    layers = [bars.encode(x=x, x2="high:Q", y=y, color=colour, yOffset=offset)]
-    if anything:
-        layers.append(points.encode(x=x, y=y, color=colour))
-    chart: alt.TopLevelMixin = alt.layer(*layers).properties(
-        width=560, height=36 * len(study.figures), title="Figures that nine of ten such ships have"
+            points.append({"name": label, "run": "given", "v": figure.given / middle})
+    kinds = [*runs_of(rows), *runs_of(points)]
+    bars = RowPlot(
+        rows=rows,
+        across=PlotAxis(title="times the median", log=True, nice=False, form="~g"),
+        shown={"name:N": "figure", "run:N": "it is"},
+        look=series_look(kinds, as_points=kinds),
+        side={"labelExpr": "split(datum.label, ': ')"},
+        apart=True,
     )
-    return chart
+    given = replace(bars, rows=points, names=names_of(rows), apart=False)
+    return layered(
+        [*row_layers(bars, span_px=6), *row_layers(given, filled=True, size=50)],
+        size=(560, 36 * len(study.figures)),
+        title="Figures that nine of ten such ships have",
+    )

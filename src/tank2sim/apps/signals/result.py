@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from tank2sim.answer.charts.columns import columns_chart, measured_histories
+from tank2sim.answer.charts.motion import columns_chart, measured_histories
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.signals.charts import (

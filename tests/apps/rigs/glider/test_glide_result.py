@@ -36,9 +36,7 @@ def result():
 
 def lines(chart, layer=0):
     specification = chart_specification(chart)
-    # Altair lifts the data of a chart with one layer.
-    source = specification["layer"][layer].get("data") or specification["data"]
-    return specification["datasets"][source["name"]]
+    return specification["datasets"][specification["layer"][layer]["data"]["name"]]
 
 
 def test_the_result_has_the_figures_and_every_chart(result) -> None:
@@ -86,21 +84,21 @@ def test_the_error_sweep_is_in_a_study_with_views(result) -> None:
 def test_a_climb_to_the_east_is_drawn_where_it_goes() -> None:
     path = SpacePath(label="p", north_m=[0, 0], east_m=[0, 40], height_m=[0, 30])
     (_, plan), (_, side) = lines(plan_chart([path])), lines(elevation_chart([path]))
-    assert (plan["a"], plan["b"]) == (40, 0) and (side["a"], side["b"]) == (40, 30)
+    assert (plan["x"], plan["v"]) == (40, 0) and (side["x"], side["v"]) == (40, 30)
     rows = lines(isometric_chart(path, path))
-    assert (rows[1]["a"], rows[1]["b"]) == pytest.approx((40 * math.cos(math.pi / 6), -20 + 30), rel=1e-5)
+    assert (rows[1]["x"], rows[1]["v"]) == pytest.approx((40 * math.cos(math.pi / 6), -20 + 30), rel=1e-5)
     shadow = rows[3]
-    assert shadow["b"] == pytest.approx(-20)
+    assert shadow["v"] == pytest.approx(-20)
 
 
 def test_the_polar_marks_the_glides_it_is_given(result) -> None:
     study = result.study
     chart = polar_chart(study.polar, {"best": study.design.best_glide})
-    marked = lines(chart, 2)
-    assert math.degrees(math.atan2(marked[0]["y"], marked[0]["x"])) == pytest.approx(23.385, abs=1e-3)
+    marked = lines(chart, 1)
+    assert math.degrees(math.atan2(marked[0]["v"], marked[0]["x"])) == pytest.approx(23.385, abs=1e-3)
     speeds = np.array([row["x"] for row in lines(chart)])
     assert speeds.max() == pytest.approx(study.design.fastest_glide.horizontal_speed_mps, rel=1e-3)
-    assert line(chart, "y") == pytest.approx(-study.polar["climb_mps"], rel=1e-5)
+    assert line(chart, "v", "polar") == pytest.approx(-study.polar["climb_mps"], rel=1e-5)
 
 
 @pytest.mark.slow

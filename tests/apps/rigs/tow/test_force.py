@@ -12,10 +12,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
 from tank2sim.apps.rigs.tow.equation_error import covariance, discretise, fit_mean_speed, solve_by_qr
-from tank2sim.apps.rigs.tow.force import force_words, parse_force
 from tank2sim.apps.rigs.tow.identify import identify_tow, tow_card_text
 from tank2sim.apps.rigs.tow.output_error import TowOptions, fit_speeds, speed_predictor
-from tank2sim.apps.rigs.tow.records import Tows, read_tows
+from tank2sim.apps.rigs.tow.records import Tows, force_words, parse_force, read_tows
 from tank2sim.bundled import bundled
 from tank2sim.errors import InputError
 

@@ -83,9 +83,9 @@ def test_charts_hold_the_speeds_and_the_models(result):
 
 def test_drag_chart_has_speed_and_reynolds_number(result):
     body, drag = result.study.body, result.study.drag_coefficients["qr"].by_length_squared
-    rows = [row for row in rows_of(drag_chart({"qr": drag}, body, 0.176)) if "v" in row]
-    last = max(rows, key=lambda row: row["v"])
-    assert last["v"] == pytest.approx(0.176) and last["re"] == pytest.approx(0.176 * 3.8 / 1.139e-6, rel=1e-5)
+    rows = [row for row in rows_of(drag_chart({"qr": drag}, body, 0.176)) if "speed" in row]
+    last = max(rows, key=lambda row: row["speed"])
+    assert last["speed"] == pytest.approx(0.176) and last["re"] == pytest.approx(0.176 * 3.8 / 1.139e-6, rel=1e-5)
     assert last["cv"] == pytest.approx(8.42716 * last["c"], rel=1e-4)
     assert last["c"] == pytest.approx(float(drag.at(np.array(0.176))), rel=1e-5)
 
@@ -97,7 +97,7 @@ def test_residuals_are_readings_less_the_first_fit(table_1):
         simulated_t_s=np.array([0.0, 50.0]),
         simulated_mps={"line": np.array([0.0, 0.175])},
     )
-    found = {(row["run"], row["t"]): row["v"] for row in whole_panel(tow_speed_chart(speeds), 1)}
+    found = {(row["run"], row["x"]): row["v"] for row in whole_panel(tow_speed_chart(speeds), 1)}
     assert found["tow 3", 20.0] == pytest.approx(0.078 - 0.07)
     assert found["line", 50.0] == 0
 

@@ -6,30 +6,17 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import altair as alt
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, look_of
 from tank2sim.answer.charts.motion import History, Signal, history_chart
-from tank2sim.answer.charts.parts import (
-    HOVER_SAMPLES,
-    LINE_SAMPLES,
-    NUMBER,
-    Chart,
-    ChartRecord,
-    data,
-    equal_frame,
-    every,
-    pan_zoom,
-    records,
-    series_look,
-    vector,
-)
+from tank2sim.answer.charts.parts import equal_frame, vector
+from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, layer, layered
 from tank2sim.apps.rigs.glider.quasi_steady_error import SwingError
 from tank2sim.apps.rigs.glider.study import GlideState, PathPlace, TransientPath
 from tank2sim.apps.rigs.glider.transient import ProgrammeError
 from tank2sim.arrays import Array, Columns
-from tank2sim.records.thinning import thin_line
 from tank2sim.units import to_si
 
 
@@ -54,19 +41,19 @@ def corners_of(places: Sequence[PathPlace]) -> SpacePath:
     return SpacePath(label="steps", north_m=north, east_m=east, height_m=height)
 
 
-def plan_chart(paths: Sequence[SpacePath], *, title: str = "") -> alt.LayerChart:
+def plan_chart(paths: Sequence[SpacePath], *, title: str = "") -> ChartSpec:
     """Paths from above: north up, east to the right, one scale."""
     drawn = [(path.label, vector(path.east_m), vector(path.north_m)) for path in paths]
     return _plane(drawn, ("east y (m)", "north x (m)"), title=title, height_px=480)
 
 
-def elevation_chart(paths: Sequence[SpacePath], *, title: str = "") -> alt.LayerChart:
+def elevation_chart(paths: Sequence[SpacePath], *, title: str = "") -> ChartSpec:
     """Paths from the side, rolled out: height above the start against the way over the ground, one scale."""
     drawn = [(path.label, _way(path), vector(path.height_m)) for path in paths]
     return _plane(drawn, ("way over the ground (m)", "height (m)"), title=title, height_px=360)
 
 
-def isometric_chart(path: SpacePath, corners: SpacePath, *, title: str = "") -> alt.LayerChart:
+def isometric_chart(path: SpacePath, corners: SpacePath, *, title: str = "") -> ChartSpec:
     """A path in isometric projection: north to the upper right, east to the lower right, height up, one scale.
 
     Its shadow is drawn at the height of the start, and plumb lines from there to the `corners` of the path.
@@ -77,7 +64,7 @@ def isometric_chart(path: SpacePath, corners: SpacePath, *, title: str = "") -> 
     arms = _arms(0.25 * max(1.0, *(float(np.abs(vector(values)).max()) for values in (path.north_m, path.east_m))))
     ends = (corners.north_m, corners.east_m, corners.height_m)
     for place, points in enumerate(zip(_points(*ends, flat=True), _points(*ends, flat=False), strict=True)):
-        arms += [{"axis": f"plumb {place}", "name": "", "a": a, "b": b, "i": i} for i, (a, b) in enumerate(points)]
+        arms += [{"axis": f"plumb {place}", "name": "", "x": a, "v": b, "i": i} for i, (a, b) in enumerate(points)]
     return _plane(drawn, ("", ""), title=title, height_px=480, arms=arms)
 
 
@@ -98,46 +85,42 @@ def _arms(length: float) -> list[ChartRecord]:
     rows: list[ChartRecord] = []
     for name, end in (("north", (length, 0, 0)), ("east", (0, length, 0)), ("up", (0, 0, length))):
         points = [(0.0, 0.0), *_points(*([point] for point in end), flat=False)]
-        rows += [{"axis": name, "name": name if i else "", "a": a, "b": b, "i": i} for i, (a, b) in enumerate(points)]
+        rows += [{"axis": name, "name": name if i else "", "x": a, "v": b, "i": i} for i, (a, b) in enumerate(points)]
     return rows
 
 
-def polar_chart(polar: Columns, marked: Mapping[str, GlideState], *, title: str = "") -> alt.LayerChart:
+def polar_chart(polar: Columns, marked: Mapping[str, GlideState], *, title: str = "") -> ChartSpec:
     """The polar: speed down against speed over the ground, with marked glides."""
-    across, down, angle = polar["horizontal_speed_mps"], -polar["climb_mps"], np.abs(polar["path_angle_deg"])
-    x = alt.X("x:Q", title="speed over the ground (m/s)", scale=alt.Scale(zero=True))
-    y = alt.Y("y:Q", title="speed down (m/s)", scale=alt.Scale(zero=True, reverse=True))
-    tooltip = [
-        alt.Tooltip("x:Q", title="over the ground (m/s)", format=NUMBER),
-        alt.Tooltip("y:Q", title="down (m/s)", format=NUMBER),
-        alt.Tooltip("angle:Q", title="path angle (deg)", format=NUMBER),
-    ]
-    rows = records("polar", {"x": across, "y": down, "angle": angle})
-    line = Chart(data(rows)).mark_line(clip=True).encode(x=x, y=y, order="i:Q").properties(name="plot")
-    hover = Chart(data(every(rows, HOVER_SAMPLES))).mark_point(opacity=0, filled=True, size=110)
-    points: list[ChartRecord] = [
-        {
-            "run": label,
-            "x": glide.horizontal_speed_mps,
-            "y": -glide.climb_mps,
-            "angle": abs(glide.path_angle_deg),
-        }
+    line = PlotSeries(
+        label="polar",
+        x=polar["horizontal_speed_mps"],
+        y=-polar["climb_mps"],
+        closed=True,
+        more={"angle": np.abs(polar["path_angle_deg"])},
+    )
+    glides = [
+        PlotSeries(
+            label=label,
+            x=[glide.horizontal_speed_mps],
+            y=[-glide.climb_mps],
+            points=True,
+            more={"angle": [abs(glide.path_angle_deg)]},
+        )
         for label, glide in marked.items()
     ]
-    best = max(points, key=lambda point: point["x"] / point["y"])
-    tangent = Chart(data([{"x": 0.0, "y": 0.0}, best])).mark_line(style="reference")
-    look = series_look(list(marked), as_points=list(marked))
-    dots = Chart(data(points)).mark_point(size=90, strokeWidth=2)
-    layers = [
-        line,
-        tangent.encode(x=x, y=y),
-        hover.encode(x=x, y=y, tooltip=tooltip),
-        dots.encode(
-            x=x, y=y, color=look.colour, shape=look.shape, tooltip=[alt.Tooltip("run:N", title="glide"), *tooltip]
-        ),
-    ]
-    return alt.layer(*layers, params=[pan_zoom("x", "y", views=["plot"])]).properties(
-        title=title, width=620, height=380, description="Glide polar: speed down against speed over the ground."
+    best = max(marked.values(), key=lambda glide: glide.horizontal_speed_mps / -glide.climb_mps)
+    across = PlotAxis(title="speed over the ground (m/s)", zero=True)
+    up = PlotAxis(title="speed down (m/s)", zero=True, scale={"reverse": True})
+    tangent = [{"x": 0.0, "v": 0.0}, {"x": best.horizontal_speed_mps, "v": -best.climb_mps}]
+    over = [layer("line", tangent, {"x": across.channel("x"), "y": up.channel("v")}, style="reference")]
+    return curve_chart(
+        Plot(series=[line, *glides], up=up, height_px=380, over=over),
+        across,
+        title=title,
+        width_px=620,
+        described="Glide polar: speed down against speed over the ground.",
+        shown={"run:N": "glide", "x:Q": "over the ground (m/s)", "v:Q": "down (m/s)", "angle:Q": "path angle (deg)"},
+        point_px=90,
     )
 
 
@@ -150,7 +133,7 @@ _PROGRAMME = {
 }
 
 
-def programme_chart(transient: TransientPath, *, title: str = "") -> alt.VConcatChart:
+def programme_chart(transient: TransientPath, *, title: str = "") -> ChartSpec:
     """Orders and the motion of the transient model over time."""
     histories = []
     for label, columns in (("orders and steady glides", transient.orders), ("transient", transient.histories)):
@@ -160,35 +143,33 @@ def programme_chart(transient: TransientPath, *, title: str = "") -> alt.VConcat
     return history_chart(histories, panels, title=title, height_px=90)
 
 
-def quasi_steady_chart(errors: Sequence[ProgrammeError], *, title: str = "") -> alt.LayerChart:
+def quasi_steady_chart(errors: Sequence[ProgrammeError], *, title: str = "") -> ChartSpec:
     """Largest distance from the transient path, per cent of the way, against the length of a step."""
     series = [(error.label, error.duration_s, error.share) for error in errors]
     return _errors(series, ("length of a step (s)", "distance of the paths (% of the way)"), title=title)
 
 
-def swing_chart(errors: Sequence[SwingError], *, title: str = "") -> alt.LayerChart:
+def swing_chart(errors: Sequence[SwingError], *, title: str = "") -> ChartSpec:
     """Error of velocity or rate of turn, per cent, against the period of a swing."""
     series = [(error.label, error.period_s, error.share) for error in errors]
     return _errors(series, ("period of the swing (s)", "error (%)"), title=title)
 
 
-def _errors(series: Sequence[tuple[str, Array, Array]], titles: tuple[str, str], *, title: str) -> alt.LayerChart:
+def _errors(series: Sequence[tuple[str, Array, Array]], titles: tuple[str, str], *, title: str) -> ChartSpec:
     """Shares in per cent against times, both logarithmic."""
-    look = series_look([label for label, _, _ in series])
-    rows = [row for label, time, share in series for row in records(label, {"t": time, "e": 100 * share})]
-    x = alt.X("t:Q", title=titles[0], scale=alt.Scale(type="log", nice=False, padding=12), axis=alt.Axis(format="~g"))
-    y = alt.Y("e:Q", title=titles[1], scale=alt.Scale(type="log"), axis=alt.Axis(format="~g"))
-    tooltip = [
-        alt.Tooltip("run:N", title="programme"),
-        alt.Tooltip("t:Q", title=titles[0], format=NUMBER),
-        alt.Tooltip("e:Q", title=titles[1], format=NUMBER),
-    ]
-    base = Chart(data(rows)).encode(x=x, y=y, color=look.colour)
-    line = base.mark_line(clip=True).encode(strokeDash=look.dash, order="i:Q").properties(name="plot")
-    dots = base.mark_point(clip=True, filled=True).encode(tooltip=tooltip)
+    curves = [PlotSeries(label=label, x=time, y=100 * share) for label, time, share in series]
+    across = PlotAxis(title=titles[0], log=True, nice=False, padding=12, form="~g")
+    up = PlotAxis(title=titles[1], log=True, form="~g")
     text = ", ".join(label for label, _, _ in series)
-    return alt.layer(line, dots, params=[pan_zoom("x", "y", views=["plot"])]).properties(
-        title=title, width=680, height=340, description=f"{titles[1]} against {titles[0]} of {text}."
+    place = {"x": across.channel("x"), "y": up.channel("v"), "color": look_of(curves).colour}
+    dots = layer("point", [row for curve in curves for row in curve.rows], place, clip=True, filled=True)
+    return curve_chart(
+        Plot(series=curves, up=up, height_px=340, over=[dots]),
+        across,
+        title=title,
+        width_px=680,
+        described=f"{titles[1]} against {titles[0]} of {text}.",
+        shown={"run:N": "programme"},
     )
 
 
@@ -205,31 +186,29 @@ def _plane(
     title: str,
     height_px: int,
     arms: Sequence[ChartRecord] = (),
-) -> alt.LayerChart:
+) -> ChartSpec:
     """Lines in a plane with one scale; with `arms`, lines of reference with a name at their end, there are no axes."""
-    across = np.concatenate([*(outline[1] for outline in drawn), vector([arm["a"] for arm in arms])])
-    up = np.concatenate([*(outline[2] for outline in drawn), vector([arm["b"] for arm in arms])])
+    across = np.concatenate([*(outline[1] for outline in drawn), vector([arm["x"] for arm in arms])])
+    up = np.concatenate([*(outline[2] for outline in drawn), vector([arm["v"] for arm in arms])])
     frame = equal_frame(across, up, width_px=680, height_px=height_px)
-    position = frame.axes(across=("a:Q", titles[0]), up=("b:Q", titles[1]))
+    place = frame.axes(across=("x", titles[0]), up=("v", titles[1]))
     if arms:
-        position = {key: axis.axis(None) for key, axis in position.items()}
-    look = series_look([label for label, _, _ in drawn])
-    rows = []
-    for label, x, y in drawn:
-        kept = thin_line([x, y], LINE_SAMPLES)
-        rows += records(label, {"a": x[kept], "b": y[kept]})
-    line = Chart(data(rows)).mark_line(clip=True)
-    layers = [line.encode(**position, color=look.colour, strokeDash=look.dash, order="i:Q").properties(name="plot")]
+        place = {name: axis | {"axis": None} for name, axis in place.items()}
+    series = [PlotSeries(label=label, x=x, y=y, closed=True) for label, x, y in drawn]
+    look = look_of(series)
+    rows = [row for each in series for row in each.rows]
+    marks = {**place, "color": look.colour, "strokeDash": look.dash, "order": "i:Q"}
+    layers = [layer("line", rows, marks, clip=True)]
     if arms:
-        base = Chart(data(list(arms))).encode(**position)
-        layers.append(
-            base.mark_line(style="reference", strokeWidth=0.8, clip=True).encode(detail="axis:N", order="i:Q")
-        )
-        layers.append(base.mark_text(style="reference", dx=5, align="left", clip=True).encode(text="name:N"))
-    return alt.layer(*layers, params=[pan_zoom("x", "y", views=["plot"])]).properties(
+        along = {**place, "detail": "axis:N", "order": "i:Q"}
+        layers.append(layer("line", arms, along, style="reference", strokeWidth=0.8, clip=True))
+        text = {**place, "text": "name:N"}
+        layers.append(layer("text", arms, text, style="reference", dx=5, align="left", clip=True))
+    return layered(
+        layers,
+        size=(frame.width_px, frame.height_px),
+        window=["x", "y"],
         title=title,
-        width=frame.width_px,
-        height=frame.height_px,
         description="Paths of " + ", ".join(label for label, _, _ in drawn) + "; both axes have one scale.",
         usermeta={"equal_scales": True},
     )

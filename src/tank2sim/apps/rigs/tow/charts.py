@@ -3,22 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
-import altair as alt
 import numpy as np
 
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_layers, look_of
 from tank2sim.answer.charts.motion import History, Signal, history_chart
-from tank2sim.answer.charts.parts import (
-    NUMBER,
-    STACKS,
-    Chart,
-    ChartRecord,
-    data,
-    pan_zoom,
-    plain,
-    records,
-    series_look,
-)
+from tank2sim.answer.charts.parts import plain, series_look
+from tank2sim.answer.charts.rows import RowPlot, row_layers
+from tank2sim.answer.charts.vega import STACKS, ChartRecord, ChartSpec, PlotAxis, Rule, layered
 from tank2sim.apps.rigs.tow.model_selection import FittedModel, TowByTow
 from tank2sim.apps.rigs.tow.study import Ellipse, TowSpeeds
 from tank2sim.apps.rigs.tow.theory import DragPolynomial, TowedBody
@@ -30,7 +23,7 @@ _SPEEDS = (
 )
 
 
-def tow_speed_chart(speeds: TowSpeeds, *, title: str = "") -> alt.VConcatChart:
+def tow_speed_chart(speeds: TowSpeeds, *, title: str = "") -> ChartSpec:
     """Readings as points and simulated speeds as lines; below, all of them less the first simulation.
 
     Parameters
@@ -52,140 +45,120 @@ def tow_speed_chart(speeds: TowSpeeds, *, title: str = "") -> alt.VConcatChart:
     return history_chart(runs, _SPEEDS, title=title, height_px=230)
 
 
-def drag_chart(drags: Mapping[str, DragPolynomial], body: TowedBody, top_speed_mps: float) -> alt.HConcatChart:
+def drag_chart(drags: Mapping[str, DragPolynomial], body: TowedBody, top_speed_mps: float) -> ChartSpec:
     """C referred to L^2 against speed, and C referred to V^(2/3) against Reynolds number."""
     speeds = np.linspace(0.0, top_speed_mps, 121)
-    look = series_look(list(drags))
-    rows = [
-        row
-        for name, drag in drags.items()
-        for row in records(
-            name,
-            {
-                "v": speeds,
-                "re": body.reynolds(speeds),
-                "c": drag.at(speeds),
-                "cv": drag.times(body.area_ratio).at(speeds),
-            },
-        )
-    ]
-    tooltip = [
-        alt.Tooltip("run:N", title="by"),
-        alt.Tooltip("v:Q", title="v (m/s)", format=NUMBER),
-        alt.Tooltip("re:Q", title="Re", format=",.3~s"),
-        alt.Tooltip("c:Q", title="C by L²", format=NUMBER),
-        alt.Tooltip("cv:Q", title="C by V^(2/3)", format=NUMBER),
-    ]
     panels = []
-    factors = {"c:Q": 1.0, "cv:Q": body.area_ratio}
-    for across, words, up, name in (
-        ("v:Q", "speed (m/s)", "c:Q", "C referred to L²"),
-        ("re:Q", "Reynolds number v L / ν", "cv:Q", "C referred to V^(2/3)"),
+    shown: dict[str, str | tuple[str, str]] = {
+        "run:N": "by",
+        "speed:Q": "v (m/s)",
+        "re:Q": ("Re", ",.3~s"),
+        "c:Q": "C by L²",
+        "cv:Q": "C by V^(2/3)",
+    }
+    for across, values, name, factor in (
+        (PlotAxis(title="speed (m/s)", nice=False), speeds, "C referred to L²", 1.0),
+        (
+            PlotAxis(title="Reynolds number v L / ν", nice=False, form="~s"),
+            body.reynolds(speeds),
+            "C referred to V^(2/3)",
+            body.area_ratio,
+        ),
     ):
-        axis = alt.Axis(format="~s") if across == "re:Q" else alt.Axis()
-        x = alt.X(across, title=words, axis=axis, scale=alt.Scale(nice=False))
-        y = alt.Y(up, title=name, scale=alt.Scale(domain=_frame(drags, speeds, factors[up]), nice=True))
-        zero = Chart(data([{"zero": 0.0}])).mark_rule(style="reference").encode(y="zero:Q")
-        base = Chart(data(rows)).encode(x=x, y=y, color=look.colour, order="i:Q")
-        line = base.mark_line(clip=True).encode(strokeDash=look.dash)
-        hover = base.mark_point(opacity=0, filled=True, size=110, clip=True).encode(tooltip=tooltip)
-        panels.append(alt.layer(zero, line, hover).properties(width=330, height=300))
-    return alt.hconcat(*panels, spacing=28).properties(
-        title="Drag coefficient",
-        description="Drag coefficient referred to length squared over speed, and to volume over Reynolds number.",
-        usermeta=STACKS,
-    )
+        series = []
+        for label, drag in drags.items():
+            both = {"c": drag.at(speeds), "cv": drag.times(body.area_ratio).at(speeds)}
+            more = {"speed": speeds, "re": body.reynolds(speeds), **both}
+            series.append(PlotSeries(label=label, x=values, y=drag.times(factor).at(speeds), more=more))
+        up = PlotAxis(title=name, domain=_frame(drags, speeds, factor))
+        plot = Plot(series=series, up=up, rules=[Rule(at=[0.0])])
+        layers = curve_layers(plot, across, look_of(series), shown=shown)
+        panels.append(layered(layers, size=(330, 300)))
+    return {
+        "hconcat": panels,
+        "spacing": 28,
+        "title": "Drag coefficient",
+        "description": "Drag coefficient referred to length squared over speed, and to volume over Reynolds number.",
+        "usermeta": STACKS,
+    }
 
 
-def _frame(drags: Mapping[str, DragPolynomial], speeds: Array, factor: float) -> list[float]:
+def _frame(drags: Mapping[str, DragPolynomial], speeds: Array, factor: float) -> tuple[float, float]:
     """From a little below 0 to above the highest C of the curves that stay above zero; of all, if none does."""
     curves = [drag.times(factor).at(speeds) for drag in drags.values()]
     kept = [curve for curve in curves if curve.min() >= 0] or curves
     low, high = min(0.0, *(float(curve.min()) for curve in kept)), max(float(curve.max()) for curve in kept)
     margin = 0.08 * (high - low)
-    return [low - margin, high + margin]
+    return low - margin, high + margin
 
 
-def ellipse_chart(
-    ellipses: Sequence[Ellipse], by_tow: Mapping[str, TowByTow], *, width_px: int = 620
-) -> alt.LayerChart:
+def ellipse_chart(ellipses: Sequence[Ellipse], by_tow: Mapping[str, TowByTow]) -> ChartSpec:
     """Joint 95 % regions of M and B3 from all tows, and each tow by itself as a point."""
-    lines: list[ChartRecord] = []
-    points: list[ChartRecord] = []
-    for ellipse in ellipses:
-        lines += records(f"95 %: {ellipse.label}", {"m": ellipse.mass_kg, "b": ellipse.B3_kgpm})
+    series = [
+        PlotSeries(label=f"95 %: {ellipse.label}", x=ellipse.mass_kg, y=ellipse.B3_kgpm, closed=True)
+        for ellipse in ellipses
+    ]
     for name, way in by_tow.items():
         if way.unknowns[:2] == ("M", "B3") and name.startswith("output error"):
-            for number, row in enumerate(way.alone, start=1):
-                if np.isfinite(row[:2]).all():
-                    label = f"each tow: {', '.join(way.unknowns)}"
-                    points.append({"run": label, "m": plain(row[0]), "b": plain(row[1]), "tow": number})
-    labels = [f"95 %: {ellipse.label}" for ellipse in ellipses]
-    dots = list(dict.fromkeys(str(row["run"]) for row in points))
-    look = series_look([*labels, *dots], as_points=dots)
-    x = alt.X("m:Q", title="M (kg)", scale=alt.Scale(zero=False))
-    y = alt.Y("b:Q", title="B3 (kg/m)", scale=alt.Scale(zero=False))
-    outline = Chart(data(lines)).mark_line(clip=True)
-    layers = [outline.encode(x=x, y=y, color=look.colour, strokeDash=look.dash, order="i:Q").properties(name="plot")]
-    tooltip = [
-        alt.Tooltip("run:N", title="of"),
-        alt.Tooltip("tow:O", title="tow"),
-        alt.Tooltip("m:Q", title="M (kg)", format=NUMBER),
-        alt.Tooltip("b:Q", title="B3 (kg/m)", format=NUMBER),
-    ]
-    if points:
-        shown = Chart(data(points)).mark_point(size=70, strokeWidth=1.8, clip=True)
-        layers.append(shown.encode(x=x, y=y, color=look.colour, shape=look.shape, tooltip=tooltip))
-    return alt.layer(*layers, params=[pan_zoom("x", "y", views=["plot"])]).properties(
+            known = np.flatnonzero(np.isfinite(np.asarray(way.alone)[:, :2]).all(axis=1))
+            if len(known):
+                mass, drag = np.asarray(way.alone)[known, :2].T
+                label, more = f"each tow: {', '.join(way.unknowns)}", {"tow": known + 1.0}
+                series.append(PlotSeries(label=label, x=mass, y=drag, points=True, more=more))
+    return curve_chart(
+        Plot(series=series, up=PlotAxis(title="B3 (kg/m)"), height_px=360),
+        PlotAxis(title="M (kg)"),
         title="M and B3 together",
-        width=width_px,
-        height=360,
-        description="Joint 95 % regions of M and B3 with and without a start delay, and the estimates of each tow.",
+        width_px=620,
+        described="Joint 95 % regions of M and B3 with and without a start delay, and the estimates of each tow.",
+        shown={"run:N": "of", "tow:O": "tow"},
+        point_px=70,
     )
 
 
 _VERDICTS = ("usable", "not determined", "drag negative somewhere")
 
 
-def model_chart(models: Sequence[FittedModel], *, width_px: int = 340) -> alt.HConcatChart:
+def model_chart(models: Sequence[FittedModel]) -> ChartSpec:
     """M with its 95 % interval, and AIC above the lowest, of each model."""
     lowest = min(model.aic for model in models)
-    names = [model.label for model in models]
     rows: list[ChartRecord] = []
-    for name, model in zip(names, models, strict=True):
+    for model in models:
         mass, half = model.estimates["M"], model.half_widths_95["M"]
         rows.append(
-            {"name": name, "run": _verdict(model), "m": plain(mass)}
-            | {"low": plain(mass - half), "high": plain(mass + half), "aic": plain(model.aic - lowest)}
+            {"name": model.label, "run": _verdict(model), "v": plain(mass), "m": plain(mass)}
+            | {"low": plain(mass - half), "high": plain(mass + half)}
+            | {"least": plain(mass - half), "most": plain(mass + half), "aic": plain(model.aic - lowest)}
         )
-    shown = [verdict for verdict in _VERDICTS if any(row["run"] == verdict for row in rows)]
-    look = series_look(shown, as_points=shown)
-    y = alt.Y("name:N", sort=names, axis=alt.Axis(title=None, grid=True, labelLimit=200))
-    tooltip = [
-        alt.Tooltip("name:N", title="model"),
-        alt.Tooltip("run:N", title="it is"),
-        alt.Tooltip("m:Q", title="M (kg)", format=NUMBER),
-        alt.Tooltip("low:Q", title="from", format=NUMBER),
-        alt.Tooltip("high:Q", title="to", format=NUMBER),
-        alt.Tooltip("aic:Q", title="AIC above the lowest", format=NUMBER),
-    ]
-    base = Chart(data(rows)).encode(y=y, tooltip=tooltip)
-    scale = alt.Scale(zero=False)
-    bars = base.mark_rule(strokeWidth=2).encode(x=alt.X("low:Q", scale=scale), x2="high:Q", color=look.colour)
-    marks = base.mark_point(size=70, strokeWidth=2).encode(color=look.colour, shape=look.shape)
-    masses = alt.layer(bars, marks.encode(x=alt.X("m:Q", scale=scale, title="M with its 95 % interval (kg)")))
-    ranks = marks.encode(
-        x=alt.X("aic:Q", title="AIC above the lowest"),
-        y=alt.Y("name:N", sort=names, axis=alt.Axis(labels=False, title=None, grid=True)),
+    verdicts = [verdict for verdict in _VERDICTS if any(row["run"] == verdict for row in rows)]
+    shown = {
+        "name:N": "model",
+        "run:N": "it is",
+        "m:Q": "M (kg)",
+        "least:Q": "from",
+        "most:Q": "to",
+        "aic:Q": "AIC above the lowest",
+    }
+    mass_rows = RowPlot(
+        rows=rows,
+        across=PlotAxis(title="M with its 95 % interval (kg)"),
+        shown=shown,
+        look=series_look(verdicts, as_points=verdicts),
     )
+    rank_rows = replace(
+        mass_rows,
+        rows=[row | {"v": row["aic"], "low": None} for row in rows],
+        across=PlotAxis(title="AIC above the lowest", zero=True),
+        side={"labels": False},
+    )
+    masses, ranks = (row_layers(each, span_px=2, size=70, strokeWidth=2) for each in (mass_rows, rank_rows))
     height = 30 * len(models)
-    return alt.hconcat(
-        masses.properties(width=width_px, height=height), ranks.properties(width=width_px - 60, height=height)
-    ).properties(
-        title="Models of different size",
-        description="Mass and AIC of each model fitted by output error.",
-        usermeta=STACKS,
-    )
+    return {
+        "hconcat": [layered(masses, size=(340, height)), layered(ranks, size=(280, height))],
+        "title": "Models of different size",
+        "description": "Mass and AIC of each model fitted by output error.",
+        "usermeta": STACKS,
+    }
 
 
 def _verdict(model: FittedModel) -> str:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def _parsed_force(text: str) -> float | list[float]:
-    from tank2sim.apps.rigs.tow.force import parse_force
+    from tank2sim.apps.rigs.tow.records import parse_force
 
     coefficients: list[float] = parse_force(text).coef.tolist()
     return coefficients[0] if len(coefficients) == 1 else coefficients

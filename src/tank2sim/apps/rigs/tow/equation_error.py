@@ -17,8 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from tank2sim.apps.rigs.tow.force import as_force
-from tank2sim.apps.rigs.tow.records import Tows
+from tank2sim.apps.rigs.tow.records import Tows, as_force
 from tank2sim.apps.rigs.tow.surge import DRAG_POWERS
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError

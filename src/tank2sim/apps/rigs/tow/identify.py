@@ -22,9 +22,8 @@ from numpy.polynomial import Polynomial
 from tank2sim.apps.rigs.tow import equation_error, output_error
 from tank2sim.apps.rigs.tow.findings import tow_findings
 from tank2sim.apps.rigs.tow.fit import TowFit, TowSolution
-from tank2sim.apps.rigs.tow.force import as_force, checked_force, force_words, mean_force
 from tank2sim.apps.rigs.tow.output_error import AT_ONCE, TowOptions
-from tank2sim.apps.rigs.tow.records import Tows
+from tank2sim.apps.rigs.tow.records import Tows, as_force, checked_force, force_words, mean_force
 from tank2sim.apps.rigs.tow.surge import DRAG_POWERS
 from tank2sim.cards.writing import SurgeResult, surge_card_text
 from tank2sim.errors import InputError

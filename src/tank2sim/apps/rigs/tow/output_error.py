@@ -13,8 +13,7 @@ from numpy.polynomial import Polynomial
 from scipy import stats
 from scipy.optimize import least_squares
 
-from tank2sim.apps.rigs.tow.force import as_force, mean_force
-from tank2sim.apps.rigs.tow.records import Tows
+from tank2sim.apps.rigs.tow.records import Tows, as_force, mean_force
 from tank2sim.apps.rigs.tow.surge import DRAG_POWERS, SurgeCoefficients, surge_model
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model

@@ -24,9 +24,9 @@ from tank2sim.answer.result import Result
 from tank2sim.apps.rigs.tow import paper as tow_paper
 from tank2sim.apps.rigs.tow.charts import drag_chart, ellipse_chart, model_chart, tow_speed_chart
 from tank2sim.apps.rigs.tow.fit import TOW_PARAMETERS, TowFit
-from tank2sim.apps.rigs.tow.force import force_words
 from tank2sim.apps.rigs.tow.identify import tow_card_text
 from tank2sim.apps.rigs.tow.model_selection import TowByTow
+from tank2sim.apps.rigs.tow.records import force_words
 from tank2sim.apps.rigs.tow.study import TowStudy
 from tank2sim.apps.rigs.tow.theory import DragPolynomial, TowedBody, drag_polynomial
 from tank2sim.cards import Card, parse_card
