@@ -18,6 +18,7 @@ from tank2sim.gap.outcome.export import (
     signal_display_name,
 )
 from tank2sim.gap.result import Acting, Gap, Named, Refitted
+from tank2sim.identification.trials.problem.prepare_trials import RecordDoubt
 from tank2sim.results.gap_text import found_in_words, place_of_cause
 from tank2sim.units import to_si
 from tests.gap import made_up
@@ -174,6 +175,19 @@ def test_what_no_effect_explains_has_its_place_and_size_in_newton() -> None:
     said = place_of_cause(forced)
     assert "from 10 s to 20 s of turn35" in said and "3000 kN m" in said
     assert said in found_in_words(forced)
+
+
+def test_a_record_that_the_audit_doubts_comes_before_what_no_effect_explains() -> None:
+    """Only where the misfit is in that record: a heading 5 deg off in another trial explains nothing."""
+    passages = (Acting("turn35", "sway", 0.0, 9.0, 4.0, 2e4),)
+    gap = replace(made_up.outside(), missing_force=replace(made_up.force(), passages=passages))
+    doubts = {name: RecordDoubt(name, "psi_deg", "psi reads +5 deg too much") for name in ("turn35", "zigzag")}
+    acting = gap_study(gap).acting[0].trial.removesuffix(".csv")
+    other = next(name for name in doubts if name != acting)
+    plain = found_in_words(gap_study(gap))
+    assert found_in_words(gap_study(replace(gap, doubts=(doubts[other],)))) == plain
+    said = found_in_words(gap_study(replace(gap, doubts=(doubts[acting],))))
+    assert said != plain and acting in said and "psi reads +5 deg too much" in said
 
 
 def cautions_of(gap: Gap) -> list[str]:

@@ -12,6 +12,7 @@ from tank2sim.arrays import Array, Number, Unbounded
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.gap.inference.wave_band import WaveBand
 from tank2sim.identification.trials.assessment.evaluation import FigureComparison
+from tank2sim.identification.trials.problem.prepare_trials import RecordDoubt
 from tank2sim.notices import Notice
 
 MISSING = "missing effect"
@@ -358,6 +359,8 @@ class Gap:
         Effect parameter's model name to {trial: (value, standard error)}: its estimate by each trial alone.
     next_test : NextTest or None
     notices : tuple of Notice
+    doubts : tuple of RecordDoubt
+        Findings of the audit on fitted trials that were left as they are.
     """
 
     card: ManoeuvringCard
@@ -382,6 +385,7 @@ class Gap:
     agreement: Mapping[str, Mapping[str, tuple[float, float]]]
     next_test: NextTest | None
     notices: tuple[Notice, ...] = ()
+    doubts: tuple[RecordDoubt, ...] = ()
 
     def misfit(self, version: str, *, held_out: bool) -> float | None:
         """Root mean square over all fitting (or held-out) trials of (simulated - measured)/noise; None without any.

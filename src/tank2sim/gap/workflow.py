@@ -372,6 +372,7 @@ def _assemble_gap(prover: Prover, found: Search, judged: Judged) -> Gap:
         agreement=agreement,
         next_test=_next(card, found, decision, replays.noise),
         notices=gap_notices(given, judged, agreement, prover.trials, waves),
+        doubts=fitted.doubts,
     )
 
 

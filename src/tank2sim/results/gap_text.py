@@ -140,6 +140,14 @@ def found_in_words(study: GapStudy) -> str:
         remainder = "" if after <= GOOD else ", which is more than noise, but no effect explains the rest"
         follows = f"the card as given follows the fitting trials to {noises(after)}{remainder}"
         return f"No missing effect shows in these data: {follows}."
+    acting = study.acting[0].trial if study.acting else ""
+    doubts = [one for one in study.record_doubts if trial_name(acting) == one.trial]
+    if doubts:
+        found = "; ".join(f"{one.column}, {one.likely_truth}" for one in doubts)
+        return (
+            f"The record of {doubts[0].trial} is in doubt, before any effect of the ship is: the misfit is in it, and "
+            f"the audit finds {found}. Correct it and search again."
+        )
     sentence = "Something is missing that no tried effect explains: the remaining misfit has a pattern, but no name."
     return " ".join([sentence, *([f"The cause acts most in {place_of_cause(study)}."] if study.acting else [])])
 

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from tank2sim.arrays import Columns, Number, Unbounded
 from tank2sim.gap.result import MisfitPlace, Refitted, Rival
+from tank2sim.identification.trials.problem.prepare_trials import RecordDoubt
 from tank2sim.identification.trials.study import TrialMotions
 from tank2sim.notices import Notice
 
@@ -291,6 +292,8 @@ class GapStudy:
         The cautions, then messages about the trials.
     files : tuple of str
         Files written next to ``gap.json``.
+    record_doubts : tuple of RecordDoubt
+        Findings of the audit on fitted trials that were left as they are.
     """
 
     ship: str
@@ -314,6 +317,7 @@ class GapStudy:
     replays: tuple[GapReplay, ...]
     notices: tuple[Notice, ...]
     files: tuple[str, ...] = ()
+    record_doubts: tuple[RecordDoubt, ...] = ()
 
     def set_misfit(self, version: str, *, held_out: bool, signal: str | None = None) -> float | None:
         """Root mean square of the misfits of all fitting (or held-out) trials, noise units; None without any.

@@ -36,6 +36,15 @@ FARTHEST_REVOLUTIONS = 10.0
 near the card's speed, has them in another unit (project choice; of revolutions a second and a minute it is 60)."""
 
 
+@dataclass(frozen=True)
+class RecordDoubt:
+    """A finding of the audit that was left as it is: the trial, the column, and what it likely holds instead."""
+
+    trial: str
+    column: str
+    likely_truth: str
+
+
 @dataclass(frozen=True, eq=False)
 class Measured:
     """Trials at the size of the ship, and captive tests of a model of it where there are any.
@@ -49,12 +58,14 @@ class Measured:
         Repairs and scalings.
     captive : CaptiveRuns, optional
         Captive tests, at the size of their model.
+    doubts : tuple of RecordDoubt
     """
 
     trials: tuple[Trial, ...]
     driven_by: str
     notices: tuple[Notice, ...]
     captive: CaptiveRuns | None = None
+    doubts: tuple[RecordDoubt, ...] = ()
 
 
 def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unused: bool = True) -> Measured:
@@ -104,7 +115,18 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unu
         remedy = "give trials that all have delta_deg, or all only delta_order_deg"
         raise InputError(odd.path, "header", "has no delta_deg, but other trials have", remedy)
     notices = [*alike, *_of_audit(audited), *dict.fromkeys(notices)]
-    return Measured(tuple(trials), "angle" if all(by_angle) else "order", tuple(notices))
+    doubts = tuple(
+        RecordDoubt(Path(name).stem, finding.column, finding.likely_truth)
+        for name, findings in audited.items()
+        for finding in findings
+        if not _taken_so(finding)
+    )
+    return Measured(tuple(trials), "angle" if all(by_angle) else "order", tuple(notices), doubts=doubts)
+
+
+def _taken_so(finding: Finding) -> bool:
+    """Whether the trial was repaired as a finding says."""
+    return finding.safe and finding.repair is not None
 
 
 def _of_audit(audited: Mapping[str, Sequence[Finding]]) -> list[Notice]:
@@ -112,7 +134,7 @@ def _of_audit(audited: Mapping[str, Sequence[Finding]]) -> list[Notice]:
     groups: dict[tuple[Level, str, str, str], list[tuple[str, str]]] = {}
     for name, findings in audited.items():
         for finding in findings:
-            done = "taken so" if finding.safe and finding.repair is not None else "left as it is"
+            done = "taken so" if _taken_so(finding) else "left as it is"
             level = Level.CAUTION if finding.kind == "fault" else Level.INFO
             key = level, finding.column, finding.what, done
             groups.setdefault(key, []).append((name, finding.likely_truth))
