@@ -52,6 +52,7 @@ def test_a_record_of_one_turn_uses_the_moving_circle_and_says_so(tmp_path: Path)
     assert found.study.current.spread_mps is None
 
 
+@pytest.mark.slow
 def test_a_tide_that_falls_shows_in_the_spread_and_widens_the_errors(tmp_path: Path) -> None:
     steady, falling = tmp_path / "steady", tmp_path / "falling"
     for folder in (steady, falling):
@@ -77,6 +78,7 @@ def test_wind_and_current_are_separated_and_the_wind_is_taken_off_by_the_model(t
         assert _figures(found, "advance_m", "calm")[side] == pytest.approx(advance, rel=0.012)
 
 
+@pytest.mark.slow
 def test_without_an_anemometer_both_sides_separate_the_wind(tmp_path: Path) -> None:
     ship = Mariner(wind=(10.0, 30.0))
     found = t2s.trial_office(turns(tmp_path, ship, with_wind=False), ship="mariner", members=0)
@@ -156,6 +158,7 @@ def test_published_figures_without_records_fill_the_form(bitumen: t2s.Ship, tmp_
     assert study.current is None and "Current" not in rows
 
 
+@pytest.mark.slow
 def test_conditions_that_are_not_met_are_said_and_refuse_nothing(tmp_path: Path) -> None:
     notes = tmp_path / "notes.toml"
     notes.write_text("depth_m = 20.0\nspeed_85_mcr_mps = 8.8\nsea_state = 5\n", encoding="utf-8")
@@ -183,6 +186,21 @@ def test_a_trial_far_from_full_load_certifies_nothing(tmp_path: Path) -> None:
     assert near.study.tested_at_full_load
 
 
+def test_a_ship_that_is_stable_in_ballast_alone_certifies_no_overshoot(tmp_path: Path) -> None:
+    """The KVLCC2 by MMG: C' is positive at 0.7 draughts with a trim by the stern, and negative at full load."""
+    notes = tmp_path / "notes.toml"
+    figures = '[figures."zigzag:10/10"]\novershoot_1_deg = 4.0\novershoot_2_deg = 6.0\n'
+    notes.write_text(f"draught_fore_m = 13.5\ndraught_aft_m = 15.6\n{figures}", encoding="utf-8")
+    found = t2s.trial_office((), ship="kvlcc2-mmg", notes=notes, members=10)
+    study = found.study
+    assert study.stable_as_tried == 1.0 and study.stable_at_full_load == 0.0
+    verdicts = {one.name: one.verdict for one in study.criteria if one.as_run is not None}
+    assert len(verdicts) == 2 and all(verdict.endswith("EXTRAPOLATED") for verdict in verdicts.values())
+    assert any("P stable = 0.00" in notice for notice in found.cautions)
+
+
+@pytest.mark.essential
+@pytest.mark.slow
 def test_the_report_is_written_as_a_whole(tmp_path: Path) -> None:
     records = turns(tmp_path, Mariner(current=(0.5, 90.0)))
     found = t2s.trial_office(records, ship="mariner", members=2, draught_fore_m=5.0, draught_aft_m=6.0)

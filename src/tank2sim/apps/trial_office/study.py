@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tank2sim.analysis.ensemble.results import EnsembleRequest, named_bands
 from tank2sim.analysis.stability.imo import (
     SHORTEST_SHIP_M,
     TRIAL_RUDDER,
 )
-from tank2sim.analysis.stability.straight_line import stability
+from tank2sim.analysis.validation.standard_trials import SEED
 from tank2sim.apps.guess.study import OVERSHOOT_ERROR_DEG, TRIAL_ERROR
 from tank2sim.apps.trial_office.conditions import Met, TrialCondition, TrialState, trial_conditions
 from tank2sim.apps.trial_office.drift import CircleDrift, circle_drift
@@ -150,8 +151,8 @@ class TrialOffice:
     tested_at_full_load : bool
     loading_validity : float
         Of the formulas that take the ship from the trial to full load: 1 where they hold, 0 where they do not.
-    stable_as_tried, stable_at_full_load : bool or None
-        Whether a straight course is stable, by the card.
+    stable_as_tried, stable_at_full_load : float or None
+        Probability that a straight course is stable, by the members; None without them.
     particulars : FormParticulars
     form : FormWords
     tracks : tuple of OfficeTrack
@@ -174,8 +175,8 @@ class TrialOffice:
     criteria: tuple[CriterionVerdict, ...]
     tested_at_full_load: bool
     loading_validity: float
-    stable_as_tried: bool | None
-    stable_at_full_load: bool | None
+    stable_as_tried: float | None
+    stable_at_full_load: float | None
     particulars: FormParticulars
     form: FormWords
     tracks: tuple[OfficeTrack, ...]
@@ -226,6 +227,8 @@ def study_trials(
     ]
     conditions = trial_conditions(state, notes, as_run)
     validity = 1.0 if state.at_full_load else loading_validity(ships)
+    stable = [stability_chance(one, count) for one in (ships.as_tried, ships.full_load)]
+    unstable = _of_stability(*stable)
     study = TrialOffice(
         ship=card.ship.name,
         source=card.source,
@@ -234,11 +237,11 @@ def study_trials(
         drifts=drifts,
         current=current,
         figures=tuple(figure for group in zip(as_run, still, predicted, strict=True) for figure in _figures(*group)),
-        criteria=judge_criteria(card, as_run, still, predicted, validity),
+        criteria=judge_criteria(card, as_run, still, predicted, validity, overshoots_hold=not unstable),
         tested_at_full_load=state.at_full_load,
         loading_validity=validity,
-        stable_as_tried=_stable(ships.as_tried),
-        stable_at_full_load=_stable(ships.full_load),
+        stable_as_tried=stable[0],
+        stable_at_full_load=stable[1],
         particulars=_particulars(card, state),
         form=notes.form,
         tracks=tuple(_track(*pair) for pair in zip(as_run, still, strict=True) if pair[0].drawn),
@@ -248,7 +251,7 @@ def study_trials(
         depth_m=notes.depth_m,
         sea_state=notes.sea_state,
         applies=card.ship.length_m >= SHORTEST_SHIP_M,
-        notices=tuple(dict.fromkeys([*messages, *more, *_cautions(state, current, conditions, validity)])),
+        notices=tuple(dict.fromkeys([*messages, *more, *_cautions(state, current, conditions, validity), *unstable])),
     )
     return study, ships.as_tried, ships.full_load
 
@@ -420,12 +423,37 @@ def _words(manoeuvre: Turn | Zigzag | Stop) -> str:
     return "stop"
 
 
-def _stable(card: ManoeuvringCard) -> bool | None:
-    """Whether a straight course is stable at the card's speed; None where there is none."""
-    try:
-        return stability(build(card)).stable
-    except InputError:
+def stability_chance(card: ManoeuvringCard, count: int) -> float | None:
+    """Probability that a straight course is stable (C' > 0), by members drawn within the errors of a card.
+
+    None without members, and of a ship that cannot be linearised.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+    count : int
+    """
+    if not count:
         return None
+    try:
+        found = named_bands(card, ["criterion_C"], EnsembleRequest(count, SEED)).drawn.figures["criterion_C"]
+    except (InputError, KeyError):
+        return None
+    known = found[np.isfinite(found)]
+    return float(np.mean(known > 0)) if len(known) else None
+
+
+def _of_stability(as_tried: float | None, at_full_load: float | None) -> list[Notice]:
+    """A caution where the ship is probably stable in one condition and unstable in the other."""
+    if as_tried is None or at_full_load is None or (as_tried > 0.5) == (at_full_load > 0.5):
+        return []
+    words = [f"{'stable' if one > 0.5 else 'unstable'} (P stable = {one:.2f})" for one in (as_tried, at_full_load)]
+    return [
+        caution(
+            f"EXTRAPOLATED to full load: a straight course is {words[0]} as tried and {words[1]} at full load, and "
+            "overshoots of the trial certify nothing"
+        )
+    ]
 
 
 def _particulars(card: ManoeuvringCard, state: TrialState) -> FormParticulars:

@@ -76,9 +76,27 @@ class CriterionVerdict:
 
 
 def judge_criteria(
-    card: ManoeuvringCard, raw: Sequence[Tried], still: Sequence[Tried], found: Sequence[Prediction], validity: float
+    card: ManoeuvringCard,
+    raw: Sequence[Tried],
+    still: Sequence[Tried],
+    found: Sequence[Prediction],
+    validity: float,
+    *,
+    overshoots_hold: bool = True,
 ) -> tuple[CriterionVerdict, ...]:
-    """Verdicts on all criteria of MSC.137(76)."""
+    """Verdicts on all criteria of MSC.137(76).
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+    raw, still : sequence of Tried
+        As run, and without the current.
+    found : sequence of Prediction
+    validity : float
+        Of the formulas for the loading.
+    overshoots_hold : bool
+        False for a ship that is stable in one condition and unstable in the other: overshoots are then extrapolated.
+    """
     length = card.ship.length_m
     by_name: dict[str, str] = {TRACK_REACH: "track_reach_lengths"}
     for trial in manoeuvring_trials(TRIAL_RUDDER):
@@ -93,7 +111,8 @@ def judge_criteria(
             if figure in group[0].figures and figure in group[1].figures and _is_trial_of(name, group[0])
         ]
         verdict = CriterionVerdict(name=name, unit=unit, allowed=allowed)
-        verdicts.append(_judged(verdict, figure, scale, chosen, validity) if chosen else verdict)
+        holds = validity if overshoots_hold or unit == "L" else 0.0
+        verdicts.append(_judged(verdict, figure, scale, chosen, holds) if chosen else verdict)
     return tuple(verdicts)
 
 
