@@ -116,6 +116,7 @@ RESULTS: dict[str, Callable[[Path], Result]] = {
     ),
     "reduce to MMG": lambda folder: t2s.reduce_to_mmg(write_campaign(folder, KVLCC2)),
     "ships": lambda _: list_ships(),
+    "serve": lambda _: t2s.serve("otter", instance=7, silence_s=0.1),
     "signals": lambda folder: t2s.signals(_trials(folder)),
     "signals with a filter": lambda folder: t2s.signals(_trials(folder), "r_degps", filter="lowpass:0.1"),
     "simulate": lambda _: t2s.load("mariner").zigzag(20, 20),

@@ -15,6 +15,8 @@ from .api.results import json_schema as json_schema
 from .api.trial import TrialRecord as TrialRecord
 from .api.trial import read_trial as read_trial
 from .api.validation import validate as validate
+from .apps.ardupilot.command import serve as serve
+from .apps.ardupilot.result import ServeResult as ServeResult
 from .apps.bridge.result import PilotCardResult as PilotCardResult
 from .apps.bridge.result import PosterResult as PosterResult
 from .apps.demo.command import run_demo as run_demo

@@ -31,7 +31,7 @@ GROUPS = {
     "Measure": ("design", "log", "run", "reduce", "tow", "yaw", "audit", "signals"),
     "Identify": ("identify", "gap", "guess", "validate", "compare", "trials"),
     "Study": ("simulate", "stability", "autopilot", "influence", "glide"),
-    "Export": ("convert", "convention", "export", "check"),
+    "Export": ("convert", "convention", "export", "check", "serve"),
     "Show": ("ships", "poster", "pilotcard", "steer", "report", "open", "demo"),
 }
 """Commands by what people do; those of other packages come last."""
