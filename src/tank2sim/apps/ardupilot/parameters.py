@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from tank2sim.apps.ardupilot.physics import GRAVITY_MPS2, NEUTRAL_US, REACH_US, SitlShip
+from tank2sim.apps.ardupilot.physics import NEUTRAL_US, REACH_US, REST_FORCE_MPS2, SitlShip
 from tank2sim.dynamics.model import Model
 
 CRUISE_PERCENT = 50
@@ -86,6 +86,6 @@ def boat_parameters(model: Model) -> BoatParameters:
         cruise_throttle_percent=CRUISE_PERCENT,
         cruise_speed_mps=cruise,
         rate_at_full_steering_radps=rate,
-        lateral_g=speed * rate / GRAVITY_MPS2,
+        lateral_g=speed * rate / REST_FORCE_MPS2,
         radius_m=speed / rate,
     )

@@ -29,7 +29,7 @@ NEUTRAL_US, REACH_US = 1500, 500
 _DRIVEN_US = 800, 2200
 """Pulses that drive a servo; others (0 while disarmed) leave it at rest. Project choice: the range of hobby servos."""
 
-GRAVITY_MPS2 = 9.80665
+REST_FORCE_MPS2 = 9.80665
 """Gravity that SITL expects of an accelerometer at rest."""
 
 _LARGEST_RUDDER = math.radians(35.0)
@@ -40,6 +40,10 @@ _RATES = ("motion.x", "motion.y", "motion.u", "motion.v")
 
 def share(pulse_us: int) -> float:
     """Deflection of a servo, -1 to 1; 0 where it is not driven.
+
+    Parameters
+    ----------
+    pulse_us : int
 
     Examples
     --------
@@ -168,7 +172,7 @@ class SitlShip:
     def answer(self, data: bytes) -> bytes | None:
         """The reply to a packet of SITL; None to one that is none of its frames.
 
-        A frame that is repeated is answered again without a step, and a smaller count begins anew: SITL was restarted.
+        A frame that is repeated is answered again without a step; a smaller count restarts the ship, as SITL was.
 
         Parameters
         ----------
@@ -203,7 +207,7 @@ class SitlShip:
         u, v, r = (self.state(f"motion.{name}") for name in "uvr")
         heading = (self.state("motion.psi") + math.pi) % math.tau - math.pi
         # The specific force; a current that is constant adds none to it.
-        force = (udot - v * r, vdot + u * r, -GRAVITY_MPS2)
+        force = (udot - v * r, vdot + u * r, -REST_FORCE_MPS2)
         text = (
             f'{{"timestamp":{self.time:.6f},"imu":{{"gyro":{_list(self.state("motion.p"), 0.0, r)},'
             f'"accel_body":{_list(*force)}}},"position":{_list(self.state("motion.x"), self.state("motion.y"), 0.0)},'
