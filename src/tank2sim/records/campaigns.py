@@ -239,12 +239,13 @@ def copied_runs(runs: Sequence[CaptiveRun]) -> tuple[dict[str, InputError], list
     faults: dict[str, InputError] = {}
     remarks: list[Notice] = []
     seen: list[tuple[CaptiveRun, Recording]] = []
+    looked_for = (Likeness.COPY, Likeness.MIRROR)
     for run in runs:
         record = Recording(run.time_s, {column: run.force(force) for force, column in _FORCE_COLUMNS.items()})
         if run.is_average or len(run.time_s) < _FEWEST_READINGS or not all(map(np.ptp, record.signals.values())):
             continue
         for other, before in seen:
-            alike = likeness(before, record) if _similar(before, record) else None
+            alike = likeness(before, record, looked_for) if _similar(before, record) else None
             if alike is Likeness.COPY:
                 problem = f"has the forces of {other.name}, reading for reading"
                 remedy = "one is a copy of the other: take it out, or give the run its own record"
