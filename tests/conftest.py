@@ -86,7 +86,9 @@ def quick_compiler(session_folder: Path, pytestconfig: pytest.Config) -> None:
     script = f'exec {shlex.join(compiler)} "$@"'
     # Essential tests run many ships in lanes, where more time is gained by optimisation than it takes.
     lanes = f'case "$*" in *lanes.c*) {script} ;; esac\n' if pytestconfig.option.markexpr == "essential" else ""
-    own.write_text(f"#!/bin/sh\n{lanes}{script} -Og\n", encoding="utf-8")
+    # A model is compiled for a few runs; filters, sensitivities and lanes take many steps.
+    models = f'case "$*" in *model.c*) {script} -O0 ;; esac\n'
+    own.write_text(f"#!/bin/sh\n{lanes}{models}{script} -Og\n", encoding="utf-8")
     own.chmod(0o755)
     own.replace(command)  # one name for all worker processes: what one has compiled is known by it
     os.environ["CC"] = str(command)
