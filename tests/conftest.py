@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import importlib
 import os
 import shlex
@@ -28,12 +29,19 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     What an import compiles is kept next to the module. In a fresh checkout two workers that go through the modules in
     the same order would both compile all of them, their assertions included; now they meet in the middle.
     """
+    gc.disable()  # until all are collected: what is imported stays, and going through it takes seconds
     worker = os.environ.get("PYTEST_XDIST_WORKER", "gw0")
     if not int(worker.removeprefix("gw")) % 2 or session.config.args_source is not session.config.ArgsSource.TESTPATHS:
         return
     for path in sorted((ROOT / "tests").rglob("test_*.py"), reverse=True):
         with contextlib.suppress(Exception, pytest.skip.Exception):  # collection reports it
             importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
+
+
+def pytest_collection_finish() -> None:
+    """What was imported and collected lasts as long as the process: no search for garbage goes through it again."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session")
@@ -86,7 +94,9 @@ def quick_compiler(session_folder: Path, pytestconfig: pytest.Config) -> None:
     script = f'exec {shlex.join(compiler)} "$@"'
     # Essential tests run many ships in lanes, where more time is gained by optimisation than it takes.
     lanes = f'case "$*" in *lanes.c*) {script} ;; esac\n' if pytestconfig.option.markexpr == "essential" else ""
-    own.write_text(f"#!/bin/sh\n{lanes}{script} -Og\n", encoding="utf-8")
+    # A model is compiled for a few runs; filters, sensitivities and lanes take many steps.
+    models = f'case "$*" in *model.c*) {script} -O0 ;; esac\n'
+    own.write_text(f"#!/bin/sh\n{lanes}{models}{script} -Og\n", encoding="utf-8")
     own.chmod(0o755)
     own.replace(command)  # one name for all worker processes: what one has compiled is known by it
     os.environ["CC"] = str(command)

@@ -89,7 +89,7 @@ RESULTS: dict[str, Callable[[Path], Result]] = {
     "gap": lambda _: _gap(made_up.missing),
     "gap with an unnamed effect": lambda _: _gap(made_up.outside),
     "gap without an effect": lambda _: _gap(made_up.nothing),
-    "glide": lambda _: t2s.load("kulikovsky-velikanov").glide([-30, -45]),
+    "glide": lambda _: t2s.load("kulikovsky-velikanov").glide([-30, -45], views=False),
     "glide of a programme": _glide_programme,
     "identify": _identify,
     "influence": lambda _: t2s.load("mariner").influence(
@@ -143,6 +143,7 @@ SLOW = (
     *("guess", "identify", "influence of a steering card", "run and repeat", "signals", "signals with a filter"),
     *("simulate an ensemble", "stability", "stability of an ensemble", "stability with small probabilities", "steer"),
     *("tow of one term", "validate", "influence with targets", "influence through two points", "gap", "run", "tow"),
+    "trials",
 )
 """Names whose result and page take 2 s or more."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -17,7 +18,8 @@ from tank2sim.errors import InputError
 
 from .wigley import write_wigley_gdf
 
-pytest.importorskip("capytaine")
+# It takes seconds to import, in each process that collects tests.
+pytestmark = pytest.mark.skipif(find_spec("capytaine") is None, reason="capytaine is not installed (extra waves)")
 
 LONG, MIDDLE, SHORT = 0.12, 0.8, 1.1  # rad/s: waves of 27, 0.60 and 0.32 lengths
 G, RHO = 9.80665, 1025.0

@@ -25,11 +25,11 @@ def drawn(labels: list[tuple[str, list[Spot]]], lines: tuple[tuple[np.ndarray, n
     ("ship", "manoeuvre"),
     [
         ("mariner", "turn:35"),  # advance and tactical diameter cross in the middle of both
-        ("mariner", "turn:-35"),
         ("mariner", "zigzag:20/20"),
-        ("kvlcc2", "turn:35"),
-        ("kvlcc2", "zigzag:-20/20"),
         ("kvlcc2", "stop"),
+        pytest.param("mariner", "turn:-35", marks=pytest.mark.slow),
+        pytest.param("kvlcc2", "turn:35", marks=pytest.mark.slow),
+        pytest.param("kvlcc2", "zigzag:-20/20", marks=pytest.mark.slow),
         pytest.param("mariner", "spiral", marks=pytest.mark.slow),
         pytest.param("kvlcc2", "spiral", marks=pytest.mark.slow),
         pytest.param("esso-osaka", "turn:20", marks=pytest.mark.slow),

@@ -29,6 +29,7 @@ def test_figures_of_a_course_change_are_those_of_its_motion(pilot: t2s.Autopilot
     assert abs(motion["delta_deg"][moving]).max() == pytest.approx(change["largest_rudder_deg"], rel=0.01)
 
 
+@pytest.mark.slow
 def test_margins_are_those_of_the_loop_that_is_drawn(pilot: t2s.AutopilotResult) -> None:
     """Phase at the crossover and largest sensitivity, read off the frequency response on the page."""
     design = next(row for row in pilot.to_dict()["responses"] if row["speed_mps"] == pilot.margins.index[0])

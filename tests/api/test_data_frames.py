@@ -91,11 +91,15 @@ def test_a_ship_is_validated_and_searched_by_frames(files, frames) -> None:
     by_file, by_frame = (t2s.validate(SHIP, given["turn"], members=0) for given in (files, frames))
     figures = [[row[1:] for row in found.tables[0].rows] for found in (by_file, by_frame)]
     assert figures[0] == figures[1]
-    found = t2s.find_gap(SHIP, frames["turn"], effects=["current"], max_effects=1, workers=1)
-    assert (
-        found.study.verdict
-        == t2s.find_gap(SHIP, files["turn"], effects=["current"], max_effects=1, workers=1).study.verdict
-    )
+    fitted = []
+    for given in (files, frames):  # up to the search, which sees trials alone
+        searched = mock.patch("tank2sim.api.gap_search.run_gap_workflow", side_effect=InterruptedError)
+        with searched as asked, pytest.raises(InterruptedError):
+            t2s.find_gap(SHIP, given["turn"], effects=["current"], max_effects=1, workers=1)
+        fitted.append(asked.call_args.args[1].trials[0])
+    np.testing.assert_array_equal(fitted[0].time_s, fitted[1].time_s)
+    for name, values in fitted[0].signals.items():
+        np.testing.assert_allclose(fitted[1].signals[name], values, rtol=1e-14, err_msg=name)
 
 
 def test_a_trial_without_a_file_is_corrected_in_the_trial_format(frames) -> None:
@@ -106,16 +110,40 @@ def test_a_trial_without_a_file_is_corrected_in_the_trial_format(frames) -> None
     np.testing.assert_allclose(corrected["psi_deg"], frames["turn"]["psi_deg"] - np.degrees(0.05), atol=1e-6)
 
 
-def test_craft_are_identified_and_validated_by_frames() -> None:
-    otter = t2s.load("otter")
+@pytest.fixture(scope="module")
+def otter_rows() -> list[pd.DataFrame]:
     names = ("straight:600", "spin:400", "difference:300")
-    rows = [otter.simulate(name, duration_s=30).df[::20].reset_index(drop=True) for name in names]
+    return [t2s.load("otter").simulate(name, duration_s=30).df[::20].reset_index(drop=True) for name in names]
+
+
+def test_frames_of_a_craft_are_read_as_its_files(otter_rows, tmp_path) -> None:
+    otter, rows = t2s.load("otter"), otter_rows
+    paths = [tmp_path / f"{number}.csv" for number in range(3)]
+    for path, row in zip(paths, rows, strict=True):
+        row.to_csv(path, index=False)
+    read = []
+    for given in (paths, rows):  # up to the search, which sees trials alone
+        searched = mock.patch("tank2sim.api.craft_identification.identify_craft", side_effect=InterruptedError)
+        with searched as asked, pytest.raises(InterruptedError):
+            t2s.identify(otter, given[:2], holdout=given[2])
+        _, fitted, held, _ = asked.call_args.args
+        assert (len(fitted), len(held)) == (2, 1)
+        read.append([*fitted, *held])
+    for by_file, by_frame in zip(*read, strict=True):
+        assert by_frame.signals.keys() == by_file.signals.keys()
+        for name, values in by_file.signals.items():
+            np.testing.assert_allclose(by_frame.signals[name], values, rtol=1e-14, err_msg=name)
+    with pytest.raises(t2s.InputError, match=r"^trials\[1\]: header: lacks x_m"):
+        t2s.identify(otter, [rows[0], rows[1].drop(columns="x_m")])
+
+
+@pytest.mark.slow
+def test_craft_are_identified_and_validated_by_frames(otter_rows) -> None:
+    otter, rows = t2s.load("otter"), otter_rows
     found = t2s.identify(otter, rows[:2], holdout=rows[2])
     assert abs(found.card.thrusters[0].ahead_Ns2 / 0.01108 - 1) < 0.05
     checked = t2s.validate(otter, rows)
     assert "trials[2]" in str(checked.to_dict())
-    with pytest.raises(t2s.InputError, match=r"^trials\[1\]: header: lacks x_m"):
-        t2s.identify(otter, [rows[0], rows[1].drop(columns="x_m")])
 
 
 def test_tows_and_yaw_records_are_frames(tmp_path) -> None:

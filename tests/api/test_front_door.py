@@ -54,7 +54,9 @@ LENGTHY = (
     "design_campaign",
     "design_trial",
     "guess",
+    "identify",
     "tow",
+    "trial_office",
     "yaw",
 )
 

@@ -97,8 +97,12 @@ def test_samples_of_a_covariance_that_are_no_numbers_are_refused(rows: str, tmp_
     refused(tank2sim("simulate", "ship.toml", *options, cwd=tmp_path), "ship.covariance.json", "samples")
 
 
-@pytest.mark.parametrize(
-    "command", [("simulate", "--manoeuvre", "turn:35"), ("stability", "--no-spirals"), ("influence",)]
+@first_fast(
+    "command",
+    [
+        pytest.param(command, id=command[0])
+        for command in (("simulate", "--manoeuvre", "turn:35"), ("stability", "--no-spirals"), ("influence",))
+    ],
 )
 def test_an_ensemble_without_one_ship_that_sails_is_refused(command: tuple[str, ...], tmp_path: Path) -> None:
     name, *options = command

@@ -91,7 +91,7 @@ def test_a_card_that_is_off_comes_back_to_the_truth(folder: Path) -> None:
 
 def test_a_trial_of_a_model_identifies_the_ship(folder: Path) -> None:
     """A 4 m model's zigzag, Froude-scaled, next to the ship's own turn."""
-    result = tank2sim("identify", "off.toml", "small.csv", "turn25.csv", "--json", "small.json", *NO_BANDS, cwd=folder)
+    result = tank2sim("identify", "off.toml", "small.csv", "turn25.csv", "--json", "small.json", *SHORT, cwd=folder)
     assert result.returncode == 0, result.stderr
     assert "25 times as long" in " ".join(result.stdout.split())
     found = json.loads((folder / "small.json").read_text())["derivatives"]

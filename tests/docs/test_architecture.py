@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import re
 import sys
 from graphlib import CycleError
+from types import ModuleType
 
 import pytest
 
@@ -13,32 +15,40 @@ from tests.conftest import ROOT
 
 from .examples import MANUAL
 
-pytest.importorskip("sphinx", reason="Sphinx is not installed (extra docs)")
-sys.path.insert(0, str(MANUAL))
-import architecture
+
+@pytest.fixture(scope="module")
+def architecture() -> ModuleType:
+    """The module of the manual's pictures; Sphinx takes seconds to import, in each process that collects tests."""
+    pytest.importorskip("sphinx", reason="Sphinx is not installed (extra docs)")
+    sys.path.insert(0, str(MANUAL))
+    return importlib.import_module("architecture")
 
 
-def test_a_package_is_above_all_that_it_imports() -> None:
+@pytest.fixture(scope="module")
+def drawn(architecture) -> str:
+    return architecture.architecture()
+
+
+def test_a_package_is_above_all_that_it_imports(architecture) -> None:
     imports = {"roof": frozenset({"wall", "floor"}), "wall": frozenset({"floor"}), "floor": frozenset[str]()}
     assert architecture.layers(imports) == [["floor"], ["wall"], ["roof"]]
     assert architecture.direct(imports) == {"roof": ["wall"], "wall": ["floor"], "floor": []}
 
 
-def test_imports_in_a_circle_are_an_error() -> None:
+def test_imports_in_a_circle_are_an_error(architecture) -> None:
     with pytest.raises(CycleError):
         architecture.layers({"a": frozenset({"b"}), "b": frozenset({"a"})})
 
 
-def test_every_arrow_of_the_picture_goes_down() -> None:
-    drawn = architecture.architecture()
+def test_every_arrow_of_the_picture_goes_down(architecture, drawn) -> None:
     arrows = re.findall(r'class="arrow" d="M\S+ (\S+?)[LC](?:.* )?\S+ (\S+?)"', drawn)
     assert len(arrows) == sum(map(len, architecture.direct(architecture.package_imports()).values()))
     assert all(float(begin) < float(end) for begin, end in arrows)
 
 
-def test_every_package_is_drawn_and_described() -> None:
+def test_every_package_is_drawn_and_described(architecture, drawn) -> None:
     packages = [path.parent.name for path in (ROOT / "src" / "tank2sim").glob("*/__init__.py")]
-    drawn, table = architecture.architecture(), architecture.package_table()
+    table = architecture.package_table()
     assert all(f">{name}</text>" in drawn and f"| `{name}` |" in table for name in packages)
 
 

@@ -78,6 +78,7 @@ def test_the_instants_of_orders_are_found(tmp_path: Path) -> None:
     assert np.std(found) < 0.5 * np.std(middle)
 
 
+@pytest.mark.slow
 def test_a_beginning_that_the_first_search_loses_is_found_without_steps_of_the_order(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -29,6 +29,8 @@ from tests.marks import first_fast
 pytestmark = pytest.mark.skipif(widest_lanes() == 0, reason="needs a C compiler")
 
 WIDTHS = [lanes for lanes in (8, 4, 2, 1) if lanes <= widest_lanes()]
+ENDS_FIRST = first_fast("widths", [WIDTHS[:: len(WIDTHS) - 1 or 1], WIDTHS], ids=["two", "all"])
+"""The widest and the narrowest alone in a fast test: each width is compiled by itself."""
 
 TEN, TWENTY, LARGE = (math.radians(angle) for angle in (10.0, 20.0, 35.0))
 
@@ -152,9 +154,10 @@ def test_figures_outside_the_cards_range_are_those_of_single_runs(mariner_card, 
 
 
 @pytest.mark.parametrize("manoeuvre", [Turn(LARGE), Zigzag(TEN, TEN)])
-def test_no_bit_depends_on_the_number_of_lanes_or_on_neighbours(mariner_card, mariner, manoeuvre) -> None:
+@ENDS_FIRST
+def test_no_bit_depends_on_the_number_of_lanes_or_on_neighbours(mariner_card, mariner, manoeuvre, widths) -> None:
     _, p = ships(mariner_card, mariner, 11)
-    results = [LaneManoeuvres(mariner, lanes).run(manoeuvre, p, None, [10.0, 50.0]) for lanes in WIDTHS]
+    results = [LaneManoeuvres(mariner, lanes).run(manoeuvre, p, None, [10.0, 50.0]) for lanes in widths]
     results.append(LaneManoeuvres(mariner).run(manoeuvre, p[3:8], None, [10.0, 50.0]))
     for result in results[1:]:
         part = slice(3, 8) if len(result.states) == 5 else slice(None)
@@ -226,9 +229,10 @@ def test_figures_in_single_precision_are_those_of_single_runs(name: str, manoeuv
 
 
 @pytest.mark.parametrize("manoeuvre", [Turn(LARGE), Zigzag(TEN, TEN)])
-def test_no_bit_in_single_precision_depends_on_lanes_or_neighbours(mariner_card, mariner, manoeuvre) -> None:
+@ENDS_FIRST
+def test_no_bit_in_single_precision_depends_on_lanes_or_neighbours(mariner_card, mariner, manoeuvre, widths) -> None:
     _, p = ships(mariner_card, mariner, 19)
-    results = [LaneManoeuvres(mariner, lanes).run(manoeuvre, p, pace=SINGLE) for lanes in WIDTHS]
+    results = [LaneManoeuvres(mariner, lanes).run(manoeuvre, p, pace=SINGLE) for lanes in widths]
     part = LaneManoeuvres(mariner).run(manoeuvre, p[3:8], pace=SINGLE)
     for figure, values in results[0].figures.items():
         for result in results[1:]:

@@ -238,13 +238,15 @@ def copied_runs(runs: Sequence[CaptiveRun]) -> tuple[dict[str, InputError], list
     """
     faults: dict[str, InputError] = {}
     remarks: list[Notice] = []
-    seen: list[tuple[CaptiveRun, Recording]] = []
+    seen: list[tuple[CaptiveRun, Recording, Array]] = []
+    looked_for = (Likeness.COPY, Likeness.MIRROR)
     for run in runs:
         record = Recording(run.time_s, {column: run.force(force) for force, column in _FORCE_COLUMNS.items()})
         if run.is_average or len(run.time_s) < _FEWEST_READINGS or not all(map(np.ptp, record.signals.values())):
             continue
-        for other, before in seen:
-            alike = likeness(before, record) if _similar(before, record) else None
+        sizes = np.array([[np.mean(values), np.std(values)] for values in record.signals.values()]).T
+        for other, before, its_sizes in seen:
+            alike = likeness(before, record, looked_for) if _similar(its_sizes, sizes) else None
             if alike is Likeness.COPY:
                 problem = f"has the forces of {other.name}, reading for reading"
                 remedy = "one is a copy of the other: take it out, or give the run its own record"
@@ -253,19 +255,16 @@ def copied_runs(runs: Sequence[CaptiveRun]) -> tuple[dict[str, InputError], list
                 remarks.append(
                     caution(f"{run.name} is the mirror image of {other.name}, noise included: not a second run.")
                 )
-        seen.append((run, record))
+        seen.append((run, record, sizes))
     return faults, remarks
 
 
-def _similar(first: Recording, second: Recording) -> bool:
-    """Whether means and scatter of all forces, or their mirror image, are such that a closer look is worth it."""
-    for name, values in first.signals.items():
-        other = second.signals[name]
-        scatter = float(np.std(values)), float(np.std(other))
-        means = abs(float(np.mean(values))), abs(float(np.mean(other)))
-        if abs(means[0] - means[1]) > max(scatter) or max(scatter) > 2 * min(scatter):
-            return False
-    return True
+def _similar(first: Array, second: Array) -> bool:
+    """Whether means and scatter (2, n) of all forces, or their mirror image, are worth a closer look."""
+    (means, scatter), (other_means, other_scatter) = first, second
+    largest, least = np.maximum(scatter, other_scatter), np.minimum(scatter, other_scatter)
+    apart = np.abs(np.abs(means) - np.abs(other_means))
+    return bool(np.all((apart <= largest) & (largest <= 2 * least)))
 
 
 def together(faults: list[InputError], *, can_leave_out: bool = True) -> InputError:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
@@ -168,16 +168,18 @@ _SAID = {
 
 def same_record(first: TimedSignals, second: TimedSignals) -> bool:
     """True if one of two records is a copy of the other, see :func:`likeness`."""
-    return likeness(first, second) is Likeness.COPY
+    return likeness(first, second, (Likeness.COPY,)) is Likeness.COPY
 
 
-def likeness(first: TimedSignals, second: TimedSignals) -> Likeness | None:
+def likeness(
+    first: TimedSignals, second: TimedSignals, among: Collection[Likeness] = tuple(Likeness)
+) -> Likeness | None:
     """What two records have in common, whatever their clock, heading, origin, digits and rows; None for two runs.
 
     A copy has in all signals that both measured the same values at the same times, except for printed digits. A mirror
     image has them with port and starboard exchanged. A run recorded twice differs by no more than the white noise of
     the sensors, also in means over a sixteenth of the record, where a second run shows its own disturbances. Both are
-    at the size of one ship. A signal that does not move says nothing.
+    at the size of one ship. A signal that does not move says nothing. Only what is in `among` is looked for.
     """
     if _step(first.time_s) < _step(second.time_s):  # at the rows of the coarser one, between which nothing is drawn
         first, second = second, first
@@ -196,9 +198,10 @@ def likeness(first: TimedSignals, second: TimedSignals) -> Likeness | None:
         return _together(first, second.time_s + shift, signals, precision)
 
     for alike, sign in ((Likeness.COPY, 1.0), (Likeness.MIRROR, -1.0)):
-        shifts = list(_shifts(first, second, sign))
-        if any(_copied(together(shift, sign)) for shift in shifts):
+        if alike in among and any(_copied(together(shift, sign)) for shift in _shifts(first, second, sign)):
             return alike
+    if Likeness.TWICE not in among:
+        return None
     shifts = list(_shifts(first, second, 1.0))
     shifts.append(_nearest(together, shifts[-1], first.time_s))
     return Likeness.TWICE if any(_recorded_twice(together(shift)) for shift in shifts) else None

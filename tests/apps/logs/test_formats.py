@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from tank2sim.apps.logs.reading import read_log
+from tank2sim.apps.logs.streams import VesselLog
 from tank2sim.apps.logs.voyage import Voyage, make_voyage
 from tests.conftest import DATA
 from tests.marks import first_fast
@@ -42,7 +43,12 @@ def logs(data: Path) -> Path:
 
 @cache
 def voyage_of(vessel: str, name: str) -> Voyage:
-    return make_voyage([read_log(DATA / "data" / "logs" / vessel / name)])
+    return make_voyage([log_of(vessel, name)])
+
+
+@cache
+def log_of(vessel: str, name: str) -> VesselLog:
+    return read_log(DATA / "data" / "logs" / vessel / name)
 
 
 @cache
@@ -145,7 +151,7 @@ def test_positions_of_two_formats_agree_to_the_last_digit(logs, vessel, first, s
     if vessel == "usv_22" and second == "voyage.nmea":
         pytest.skip("the craft's receiver sends NMEA at another rate than the bag has")
     _, _, t_zero = truth_of(vessel)
-    both_logs = [read_log(logs / vessel / name).streams for name in (first, second)]
+    both_logs = [log_of(vessel, name).streams for name in (first, second)]
     for axis in ("latitude", "longitude"):
         pair = []
         for streams in both_logs:
@@ -191,7 +197,7 @@ def test_lost_and_spoilt_sentences_are_counted(logs) -> None:
     pytest.importorskip("pynmea2")
     for vessel in VESSELS:
         known, _, _ = truth_of(vessel)
-        log = read_log(logs / vessel / "voyage.nmea")
+        log = log_of(vessel, "voyage.nmea")
         assert log.counts["lines"] == known["files"]["nmea"]["lines"]
         assert log.counts["corrupted"] == len(known["files"]["nmea"]["corrupted_lines"])
 

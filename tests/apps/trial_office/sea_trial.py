@@ -28,6 +28,9 @@ class Mariner:
         body, self.terms = card["rigid_body"], dict(card["derivatives"])
         m, x_g = body["mass"], body["x_G"]
         added = {name: self.terms.pop(name, 0.0) for name in ("Xudot", "Yvdot", "Yrdot", "Nvdot", "Nrdot")}
+        rows = {name: ["XYN".index(name[0]), *map(name[1:].count, "uvrd")] for name in self.terms}
+        self.rows, *powers = np.array(list(rows.values())).T
+        self.powers, self.values = np.array(powers), np.array(list(self.terms.values()))
         self.surge_mass = m - added["Xudot"]
         self.mass = np.array(
             [
@@ -40,12 +43,11 @@ class Mariner:
         """Rates of u, v, r (through the water), x, y (over it), psi, delta (starboard positive)."""
         u, v, r, _, _, psi, delta = state
         total = math.hypot(u, v)
-        signs = {"u": (u - self.speed) / total, "v": v / total, "r": r * self.length / total, "d": -delta}
-        sums = {"X": 0.0, "Y": 0.0, "N": 0.0}
-        for name, value in self.terms.items():
-            sums[name[0]] += value * math.prod(signs[letter] for letter in name[1:].replace("0", ""))
+        signs = np.array([(u - self.speed) / total, v / total, r * self.length / total, -delta])
+        products = self.values * np.prod(signs[:, None] ** self.powers, axis=0)
+        surge, sway, yaw = np.bincount(self.rows, products, minlength=3)
         water = 0.5 * self.density * self.length**2 * total**2
-        force = np.array([sums["X"], sums["Y"], sums["N"] * self.length]) * water + self._wind(state)
+        force = np.array([surge, sway, yaw * self.length]) * water + self._wind(state)
         mass = 0.5 * self.density * self.length**3
         udot = force[0] / (mass * self.surge_mass)
         scale = np.array([[1, self.length], [self.length, self.length**2]])

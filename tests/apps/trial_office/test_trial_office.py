@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import jsonschema
 import pytest
 
 import tank2sim as t2s
@@ -208,6 +209,7 @@ def test_the_report_is_written_as_a_whole(tmp_path: Path) -> None:
     names = {"report.html", "form.html", "report.pdf", "trials.json", "poster.html", "pilotcard.html"}
     assert names | {"as-tried.toml", "full-load.toml"} <= set(files)
     assert files["report.pdf"].startswith(b"%PDF-")
+    jsonschema.validate(found.to_dict(), t2s.json_schema("trials"))
     again = type(found).read(found.to_dict(), "trials.json")
     assert again.to_json() == found.to_json()
     as_tried = tmp_path / "as-tried.toml"

@@ -12,7 +12,7 @@ from tank2sim.identification.captive.harmonics import reduced_run
 from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
 from tank2sim.identification.captive.run_faults import record_faults, reduced_faults
 from tank2sim.records.campaigns import read_campaign
-from tests.identification.captive.generator import NOISE_SHARE, Campaign, write
+from tests.identification.captive.generator import NOISE_SHARE, Campaign, plan, ship, write
 from tests.marks import first_fast
 
 CASES = {
@@ -23,6 +23,7 @@ CASES = {
     "wrong type": ("yaw_12", "has type pure_sway"),
     "missing": ("rudder_+10", "the file does not exist"),
 }
+SOME_SOUND = ("drift_-04", "rudder_+20", "sway_01", "yaw_01")
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +54,9 @@ def test_sound_runs_have_no_fault(sound):
 
 @pytest.mark.parametrize(("fault", "name", "message"), [(fault, *case) for fault, case in CASES.items()])
 def test_a_fault_is_reported_with_the_name_of_its_run(tmp_path, fault, name, message):
-    path = write(Campaign(seed=2, rate_hz=10.0, faults={name: fault}), tmp_path).path
+    campaign = Campaign(seed=2, rate_hz=10.0, faults={name: fault})
+    planned = [run for run in plan(campaign, ship(campaign)) if run.name in {name, *SOME_SOUND}]
+    path = write(campaign, tmp_path, planned).path
     with pytest.raises(InputError, match=message) as error:
         reduce_campaign(read_campaign(path))
     assert f"{name}.csv" in str(error.value)

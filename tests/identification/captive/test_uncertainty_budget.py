@@ -50,13 +50,19 @@ def sound(tmp_path_factory):
     return budget_of(SOUND, tmp_path_factory.mktemp("sound"))
 
 
-@first_fast(
-    "campaign",
-    [replace(SOUND, gain_error=0.01), replace(SOUND, size="linear", force_delay_s=0.03)],
-    ids=["gains", "delay"],
-)
-def test_parts_add_up_to_the_standard_errors(tmp_path, campaign):
-    reduction, rows = budget_of(campaign, tmp_path)
+@pytest.fixture(scope="module")
+def gains(tmp_path_factory):
+    return budget_of(replace(SOUND, gain_error=0.01), tmp_path_factory.mktemp("gains"))
+
+
+@pytest.fixture(scope="module")
+def delay(tmp_path_factory):
+    return budget_of(replace(SOUND, size="linear", force_delay_s=0.03), tmp_path_factory.mktemp("delay"))
+
+
+@first_fast("campaign", ["gains", "delay"])
+def test_parts_add_up_to_the_standard_errors(request, campaign):
+    reduction, rows = request.getfixturevalue(campaign)
     assert rows.keys() == reduction.derivatives.keys()
     for name, row in rows.items():
         assert row.combined == pytest.approx(reduction.derivatives[name].standard_error, rel=1e-6), name
@@ -65,9 +71,9 @@ def test_parts_add_up_to_the_standard_errors(tmp_path, campaign):
         assert tuple(row.parts) == tuple(BUDGET_SOURCES)
 
 
-def test_parts_of_the_regression_are_the_covariances_by_brute_force(tmp_path):
+def test_parts_of_the_regression_are_the_covariances_by_brute_force(gains):
     """Weights and covariances written out as full matrices."""
-    reduction, _ = budget_of(replace(SOUND, gain_error=0.01), tmp_path)
+    reduction, _ = gains
     result = reduction.forces["Y"]
     used, spread = result.selection.equations, result.solution.spread
     rows = used.run_of_row

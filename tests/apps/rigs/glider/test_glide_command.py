@@ -15,7 +15,7 @@ PROGRAMME = str(Path(__file__).parents[4] / "models/kulikovsky-velikanov/program
 def test_angles_give_states(tmp_path) -> None:
     result = tank2sim(
         *("glide", "--angles", "25", "-45,35", "30", "--as-printed", "--budget-kg", "50"),
-        *("--depth-m", "200", "--json", "g.json"),
+        *("--depth-m", "200", "--no-views", "--json", "g.json"),
         cwd=tmp_path,
     )
     assert result.returncode == 0, result.stderr
@@ -41,7 +41,7 @@ def test_a_programme_gives_a_path_and_the_transient_next_to_it(tmp_path) -> None
 
 
 def test_the_reference_area_is_an_option(tmp_path) -> None:
-    arguments = ["glide", "--angles", "30", "--reference-area-m2", "0.0356", "--json", "g.json"]
+    arguments = ["glide", "--angles", "30", "--reference-area-m2", "0.0356", "--no-views", "--json", "g.json"]
     assert tank2sim(*arguments, cwd=tmp_path).returncode == 0
     (state,) = json.loads((tmp_path / "g.json").read_text())["states"]
     assert state["speed_mps"] == pytest.approx(0.515, abs=1e-3)
@@ -56,8 +56,8 @@ def test_the_reference_area_is_an_option(tmp_path) -> None:
         (["--angles", "95"], ["95 deg"]),
         (["mariner"], ["model.kind", "glider"]),
         (["--programme", "none.csv"], ["none.csv"]),
-        (["--budget-kg", "10"], ["--depth", "missing"]),
-        (["--budget-kg", "10", "--depth-m", "-3"], ["--depth", "-3"]),
+        (["--no-views", "--budget-kg", "10"], ["--depth", "missing"]),
+        (["--no-views", "--budget-kg", "10", "--depth-m", "-3"], ["--depth", "-3"]),
         (["--reference-area-m2", "-1"], ["--reference-area"]),
         (["--angles", "30", "--json", "missing/g.json"], ["missing/g.json"]),
     ],

@@ -18,7 +18,7 @@ def glider() -> t2s.Ship:
 
 def test_lift_drag_and_buoyancy_balance_in_degrees(glider: t2s.Ship) -> None:
     """(3) and (9) of the paper; 1 kg of net buoyancy is g N."""
-    glides = glider.glide([25, -30, 60], roll_deg=10, buoyancy_kg=2.0).glides
+    glides = glider.glide([25, -30, 60], roll_deg=10, buoyancy_kg=2.0, views=False).glides
     path, roll = np.radians(glides["path_angle_deg"]), np.radians(glides["roll_deg"])
     lift, drag = glides["lift_N"] * np.cos(roll), glides["drag_N"]
     assert glides["path_angle_deg"].tolist() == pytest.approx([25, -30, 60])
@@ -32,7 +32,7 @@ def test_lift_drag_and_buoyancy_balance_in_degrees(glider: t2s.Ship) -> None:
 
 def test_a_programme_of_one_step_is_a_straight_path(glider: t2s.Ship, tmp_path: Path) -> None:
     (tmp_path / "p.csv").write_text("duration_s,path_angle_deg\n100,-30\n")
-    found = glider.glide(-30, programme=tmp_path / "p.csv")
+    found = glider.glide(-30, programme=tmp_path / "p.csv", views=False)
     speed, last = found.glides["speed_mps"].iloc[0], found.path.iloc[-1]
     assert last["x_m"] == pytest.approx(100 * speed * math.cos(math.radians(30)))
     assert last["height_m"] == pytest.approx(-100 * speed * math.sin(math.radians(30)))
@@ -41,7 +41,7 @@ def test_a_programme_of_one_step_is_a_straight_path(glider: t2s.Ship, tmp_path: 
 
 def test_a_range_is_the_way_of_its_cycles(glider: t2s.Ship) -> None:
     """Each metre down and each metre up takes 1/tan(angle) over the ground."""
-    ranges = glider.glide(budget_kg=50, depth_m=200).ranges
+    ranges = glider.glide(budget_kg=50, depth_m=200, views=False).ranges
     assert len(ranges) == 2
     way = ranges["cycles"] * 2 * 200 / np.tan(np.radians(ranges["path_angle_deg"].abs()))
     np.testing.assert_allclose(ranges["range_m"], way, rtol=1e-9)
@@ -64,9 +64,9 @@ def test_what_cannot_be_asked_is_refused_at_its_place(glider: t2s.Ship, tmp_path
         glider.glide(budget_kg=10)
     assert str(refusal.value.source) == "depth_m" and refusal.value.remedy
     with pytest.raises(t2s.InputError) as refusal:
-        glider.glide(programme=tmp_path / "none.csv")
+        glider.glide(programme=tmp_path / "none.csv", views=False)
     assert str(refusal.value.source).endswith("none.csv")
     for angle in (20, 95, math.nan):
         with pytest.raises(t2s.InputError) as refusal:
-            glider.glide(angle)
+            glider.glide(angle, views=False)
         assert refusal.value.remedy

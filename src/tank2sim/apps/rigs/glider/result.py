@@ -75,7 +75,7 @@ class GlideResult(Result[GlideStudy]):
     --------
     >>> import tank2sim as t2s
     >>> glider = t2s.load("kulikovsky-velikanov")
-    >>> found = glider.glide([-25, -30, -45])
+    >>> found = glider.glide([-25, -30, -45], views=False)
     >>> found.glides["speed_mps"].round(3).tolist()
     [0.203, 0.244, 0.312]
     >>> round(found.smallest_angle_deg, 1)
