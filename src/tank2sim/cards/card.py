@@ -120,7 +120,7 @@ class Card:
 
 
 SHIP_KINDS = "a linear, abkowitz or mmg"
-NOT_STEERED = "is not of a ship that manoeuvres"
+NOT_STEERED = "is not a manoeuvring ship: it has no rudder"
 
 
 class SteeredBy(StrEnum):

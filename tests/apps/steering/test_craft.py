@@ -15,7 +15,6 @@ from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.running import Running
 from tests.apps.steering.sailing import data_of, in_browser, sailed
-from tests.made_results import without_wasm
 
 RPM = 30 / math.pi
 
@@ -69,8 +68,7 @@ def test_members_drawn_from_the_covariance_of_a_craft_sail_along(otter, tmp_path
     covariance = Covariance(("derivatives.Xu",), np.array([[9.0]]))
     replace(card, covariance=covariance).save(tmp_path / "otter.toml")
     ship = t2s.load(tmp_path / "otter.toml")
-    with without_wasm():
-        result = ship.steering_page()
+    result = ship.steering_page()
     assert result.study.members == PAGE_MEMBERS
     drags = [member["derivatives.Xu"] for member in members_of(ship.card, otter, count=200)]
     assert np.std(drags) == pytest.approx(3.0, rel=0.15)

@@ -166,8 +166,8 @@ def test_conditions_that_are_not_met_are_said_and_refuse_nothing(tmp_path: Path)
     records = turns(tmp_path, Mariner())
     found = t2s.trial_office(records, ship="mariner", notes=notes, members=0, wind_speed_mps=12.0, wind_from_deg=0.0)
     met = {one.name: one.met for one in found.study.conditions}
-    assert {met[name] for name in ("deep water", "wind", "waves", "test speed")} == {Met.NOT_MET}
-    assert {met[name] for name in ("draught", "trim", "turns", "both sides", "approach")} == {Met.MET}
+    assert {met[name] for name in ("deep water", "wind speed", "sea state", "test speed")} == {Met.NOT_MET}
+    assert {met[name] for name in ("draught", "trim by the stern", "turns", "both sides", "approach")} == {Met.MET}
     assert met["engine"] is Met.UNKNOWN
     verdicts = {one.name: one.verdict for one in found.study.criteria}
     assert verdicts["tactical diameter"] == "fail"

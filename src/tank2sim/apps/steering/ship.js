@@ -61,7 +61,7 @@ class Ship {
     for (const [name, value] of Object.entries(values)) this.set(name, value);
     EQUATIONS.constants(this.p, this.c);
     EQUATIONS.initial(this.p, this.x);
-    if (this.data.trim !== null && this.p[this.data.trim] && EQUATIONS.trimmed) this.#trim();
+    if (this.data.trimSwitch !== null && this.p[this.data.trimSwitch] && EQUATIONS.trimmed) this.#trim();
     this.stale = true;
     if (!this.#plausible(this.x)) throw new Error("there is no start with these values");
   }

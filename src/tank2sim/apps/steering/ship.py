@@ -207,7 +207,7 @@ def ship_tables(model: Model, drawn: Iterable[str] = ()) -> dict[str, Any]:
         "outputs": len(model.outputs),
         "limits": [TIMES_BEYOND * UNITS[state.unit].extent for state in model.states],
         "nominal": [state.nominal for state in model.states],
-        "trim": model.parameter_names.index("initial.trim") if "initial.trim" in model.parameter_names else None,
+        "trimSwitch": model.parameter_names.index("initial.trim") if "initial.trim" in model.parameter_names else None,
     }
 
 

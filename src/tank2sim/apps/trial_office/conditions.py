@@ -110,13 +110,13 @@ def trial_conditions(state: TrialState, notes: TrialNotes, trials: Sequence[Trie
             depth is not None and depth > DEPTH_OVER_DRAUGHT
         ),
         _judged(
-            "wind", f"up to {STRONGEST_WIND:g} m/s (Beaufort 5)", state.wind_speed_mps, "{:.1f} m/s", circular
+            "wind speed", f"up to {STRONGEST_WIND:g} m/s (Beaufort 5)", state.wind_speed_mps, "{:.1f} m/s", circular
         ).when(state.wind_speed_mps is not None and state.wind_speed_mps <= STRONGEST_WIND),
-        _judged("waves", f"up to sea state {HIGHEST_SEA_STATE}", notes.sea_state, "sea state {:d}", circular).when(
+        _judged("sea state", f"up to sea state {HIGHEST_SEA_STATE}", notes.sea_state, "sea state {:d}", circular).when(
             notes.sea_state is not None and notes.sea_state <= HIGHEST_SEA_STATE
         ),
         _judged("draught", "full load within 5 %", 100 * away, "{:+.1f} %", circular).when(abs(away) <= DRAUGHT_SHARE),
-        _judged("trim", "even keel", state.trim_m, "{:+.2f} m by the stern", standards).when(
+        _judged("trim by the stern", "even keel", state.trim_m, "{:+.2f} m", standards).when(
             abs(state.trim_m) <= DRAUGHT_SHARE * state.draught_m
         ),
         _judged("test speed", "at least 90 % of that at 85 % MCR", test and 100 * test, "{:.0f} %", standards).when(

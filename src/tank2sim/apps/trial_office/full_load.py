@@ -14,8 +14,9 @@ from tank2sim.apps.trial_office.tried import Tried, calm_run, simulated
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
-from tank2sim.dynamics.effects.loading import BY_REGRESSION
+from tank2sim.dynamics.effects.loading import BY_REGRESSION, LOADING
 from tank2sim.dynamics.effects.particulars import model_particular
+from tank2sim.dynamics.effects.surroundings import WIND
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card
@@ -66,11 +67,11 @@ def tried_ships(card: ManoeuvringCard, state: TrialState, count: int) -> tuple[T
     for name, (draught, trim) in loadings.items():
         entries: list[Found] = []
         if not math.isclose(draught, own, rel_tol=1e-6) or abs(trim) > 1e-6:
-            if "loading" in listed:
+            if LOADING.name in listed:
                 raise card.fault("effects", "has the effect loading already", "give the card of one loading condition")
-            entries.append(("loading", {"mean_draught_m": draught, "trim_m": trim}, {}))
-        if name == "tried" and state.wind_speed_mps and state.wind_from_rad is not None and "wind" not in listed:
-            entries.append(("wind", {}, {}))
+            entries.append((LOADING.name, {"mean_draught_m": draught, "trim_m": trim}, {}))
+        if name == "tried" and state.wind_speed_mps and state.wind_from_rad is not None and WIND.name not in listed:
+            entries.append((WIND.name, {}, {}))
         cards[name] = add_effects_to_card(card, entries) if entries else card
     models = {name: build(steerable(one)) for name, one in cards.items()}
     drawn, messages = members(cards["tried"], models["tried"], count)
