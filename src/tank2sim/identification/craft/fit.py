@@ -7,15 +7,18 @@ are constant in a trial: :mod:`tank2sim.identification.trials.methods.kalman`.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
 
 from tank2sim.arrays import Array
+from tank2sim.errors import InputError
 from tank2sim.identification.craft.problem import DISTURBANCES, with_disturbances
+from tank2sim.identification.trials.methods.gauss_newton import StoppedSearchError
 from tank2sim.identification.trials.methods.kalman import KalmanEstimate, KalmanSettings, Smoothed, kalman
-from tank2sim.identification.trials.methods.kalman_gains import smooth_states
+from tank2sim.identification.trials.methods.kalman_gains import FilterFault, smooth_states
 from tank2sim.identification.trials.methods.kalman_pass import Levels
 from tank2sim.identification.trials.methods.kalman_search import (
     SearchPoint,
@@ -24,6 +27,7 @@ from tank2sim.identification.trials.methods.kalman_search import (
     task_of,
     whitened_innovations,
 )
+from tank2sim.identification.trials.methods.process_noise import PUSHED
 from tank2sim.identification.trials.problem.estimation_problem import Problem, SearchReport, silent
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 from tank2sim.simulation.sensitivity import Sensitivity
@@ -62,6 +66,11 @@ _EXPECTATIONS = 1000
 
 _LINEARISATIONS = 5
 """Passes of the filter, each linearised along the one before: the trajectory of the last no longer moves."""
+
+
+AXES = {f"motion.{key}": words for key, words in (("u", "surge"), ("v", "sway"), ("r", "yaw"), ("psi", "heading"))}
+AXES |= {"motion.x": "position to north", "motion.y": "position to east"}
+"""Names of the motion's states in messages."""
 
 
 class CoefficientVerdict(StrEnum):
@@ -122,8 +131,8 @@ class CraftFit:
 def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
     """Estimate the free parameters of a craft with the noise levels.
 
-    Twice: the second time current, wind and bias of each trial are known beforehand as well as they agreed between
-    trials the first time (empirical Bayes), for they change slowly.
+    With :data:`FEWEST_TRIALS` twice: the second time current, wind and bias of each trial are known beforehand as well
+    as they agreed between trials the first time (empirical Bayes), for they change slowly.
 
     Parameters
     ----------
@@ -133,10 +142,13 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
         Called with each better estimate.
     """
     settings = KalmanSettings(drifting=True, scale_prior=False)
-    first = _first_estimate(problem, settings, progress)
-    problem = with_disturbances(problem, *_disturbances_of(problem, first.smoothed))
-    estimate = kalman(problem, first.values, settings, progress)
+    estimate = _first_estimate(problem, settings, progress)
     levels = levels_of(problem, estimate)
+    if len(problem.runs) >= FEWEST_TRIALS:
+        narrower = with_disturbances(problem, *_disturbances_of(problem, estimate.smoothed))
+        with suppress(StoppedSearchError):  # the first estimate stays
+            estimate = kalman(narrower, estimate.values, settings, progress, levels)
+            problem, levels = narrower, levels_of(narrower, estimate)
     return CraftFit(problem, estimate, levels, information(problem, estimate.values, levels))
 
 
@@ -144,15 +156,31 @@ def _first_estimate(problem: Problem, settings: KalmanSettings, progress: Search
     """The estimate from the card, or with stronger damping of sway and yaw if that craft is too unstable."""
     damping = np.array([name in STABILISING for name in problem.free])
     task = task_of(problem, drifting=True)
+    fault: InputError | None = None
     for factor in STRONGER:
         start = np.where(damping, factor * problem.prior_mean, problem.prior_mean)
         try:
-            system = normal(task, task.first_point(start))
-        except np.linalg.LinAlgError:
-            continue
-        if all(np.isfinite(part).all() for part in system):
-            return kalman(problem, start, settings, progress)
-    raise np.linalg.LinAlgError("the covariance of the filter is not a number")
+            point = task.first_point(start)
+            if point.filtered.wild is not None:
+                raise FilterFault(point.filtered.wild)
+            if all(np.isfinite(part).all() for part in normal(task, point)):
+                return kalman(problem, start, settings, progress)
+        except FilterFault as error:
+            fault = fault or not_followed(problem, error.place)
+        except StoppedSearchError as error:
+            fault = fault or error
+    raise fault or not_followed(problem, (0, 0, 0))
+
+
+def not_followed(problem: Problem, place: tuple[int, int, int]) -> InputError:
+    """The error that names trial, time and axis at which the filter loses the motion (run, instant, state)."""
+    run = problem.runs[place[0]]
+    names = [*problem.model.state_names, *(f"random acceleration {name}" for name in PUSHED)]
+    name = names[place[2]] if place[2] < len(names) else "the drift of a sensor"
+    axis = AXES.get(name, name)
+    remedy = "check mass, thrust curves and damping of the card, and the places and signs of the thrusters"
+    where = f"{axis} at {run.times[place[1]]:.4g} s"
+    return InputError(run.origin, where, "the card does not move as the trial does, not even roughly", remedy)
 
 
 def _disturbances_of(problem: Problem, runs: Sequence[Smoothed]) -> tuple[Array, Array]:
@@ -216,11 +244,28 @@ def information(problem: Problem, values: Array, levels: Levels) -> Array:
 
 
 def _point(problem: Problem, values: Array, levels: Levels) -> tuple[SearchTask, SearchPoint]:
-    """A pass of the filter over the runs."""
+    """A pass of the filter over the runs; a linearisation that fails is left out.
+
+    Raises
+    ------
+    InputError
+        The filter loses the motion of a trial; the message names trial, time and axis.
+    """
     task = replace(task_of(problem, drifting=True), first=levels)
-    point = task.first_point(values)
+    try:
+        point = task.first_point(values)
+    except FilterFault as error:
+        raise not_followed(problem, error.place) from None
+    if point.filtered.wild is not None:
+        raise not_followed(problem, point.filtered.wild)
     for _ in range(_LINEARISATIONS):
-        point = task.relinearise(point)
+        try:
+            newer = task.relinearise(point)
+        except np.linalg.LinAlgError:
+            break
+        if not np.isfinite(newer.cost):
+            break
+        point = newer
     return task, point
 
 
@@ -259,7 +304,7 @@ def predict_free(fit: CraftFit, runs: Sequence[SampledRun]) -> list[FreePredicti
     """
     problem = fit.problem.with_runs(tuple(runs))
     names = problem.model.state_names
-    point = _point(problem, fit.estimate.values, fit.levels)[1]
+    task, point = _point(problem, fit.estimate.values, fit.levels)
     filtered, nx = point.filtered, len(names)
     tangents = filtered.tangents
     states, _ = smooth_states(tangents.A, tangents.C, filtered.gains, filtered.before, filtered.innovations)
@@ -273,9 +318,14 @@ def predict_free(fit: CraftFit, runs: Sequence[SampledRun]) -> list[FreePredicti
         rows, predicted, ends = [], [], []
         count, length = len(run.measured), round(PREDICTED_S / run.step_s)
         begin = round(PREDICTION_LEAD_S / run.step_s)
+        parts = task.disturbed.parts(filtered.after[number, :count], run.inputs, p, run.step_s)
         while count - begin >= SHORTEST_PREDICTION_S / run.step_s:
             end = min(begin + length, count)
-            free = sensitivity.motion(filtered.after[number, begin, :nx], run.inputs[begin : end - 1], p, run.step_s)
+            inputs = np.repeat(run.inputs[begin : end - 1], parts, axis=0)
+            free = sensitivity.motion(filtered.after[number, begin, :nx], inputs, p, run.step_s / parts)[::parts]
+            if not np.isfinite(free).all():
+                instant, state = np.argwhere(~np.isfinite(free))[0].tolist()
+                raise not_followed(problem, (number, begin + instant, state))
             rows.append(np.arange(begin + 1, end))
             predicted.append(free[1:, motion])
             ends.append(free[-1, placed] - run.measured[end - 1, measured])

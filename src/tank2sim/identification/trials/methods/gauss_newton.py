@@ -9,9 +9,47 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from tank2sim.arrays import Array
+from tank2sim.errors import InputError
 
 MOST_ATTEMPTS = 10
 """Most attempts of a step, each with ten times the damping of the previous one: the last steps are negligible."""
+
+
+class StoppedSearchError(InputError):
+    """A search that could not take a single step, although its start is no minimum: its estimate would be the start."""
+
+
+def refuse_stopped(
+    method: str, H: Array, g: Array, *, scale: float = 1.0, bounded: tuple[Array, Array, Array] | None = None
+) -> None:
+    """Raise StoppedSearchError for a search that did not move, unless its start is a minimum.
+
+    Parameters
+    ----------
+    method : str
+        Name of the method in the message.
+    H, g : arrays (k, k) and (k,)
+        Normal equations there. The step that they ask for would lower the sum of squares by ``g' H^-1 g``.
+    scale : float
+        Variance of the residuals. At a minimum the step gains less than one of these for each unknown, its scatter.
+    bounded : (array, array, array), optional
+        Values (k,) and their least and largest: an unknown that is pressed against a bound stays there.
+
+    Raises
+    ------
+    StoppedSearchError
+    """
+    free = np.ones(len(g), dtype=bool)
+    if bounded is not None:
+        values, low, high = bounded
+        free = ~(((values <= low) & (g > 0)) | ((values >= high) & (g < 0)))
+    H, g = H[np.ix_(free, free)], g[free]
+    gain = float(g @ np.linalg.lstsq(H, g, rcond=None)[0]) if np.isfinite(H).all() and np.isfinite(g).all() else np.inf
+    if not gain <= scale * max(1, len(g)):
+        problem = f"the search by {method} could not take a step from its start, which does not fit the data"
+        raise StoppedSearchError(
+            "trials", "", problem, "give a start that is nearer, or check the records and the card"
+        )
 
 
 class _WithCost(Protocol):

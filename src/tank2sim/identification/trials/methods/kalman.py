@@ -19,8 +19,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tank2sim.arrays import Array
+from tank2sim.identification.trials.methods.gauss_newton import refuse_stopped
 from tank2sim.identification.trials.methods.kalman_gains import smooth_states
-from tank2sim.identification.trials.methods.kalman_pass import FilterPass
+from tank2sim.identification.trials.methods.kalman_pass import FilterPass, Levels
 from tank2sim.identification.trials.methods.kalman_search import (
     SearchPoint,
     SearchTask,
@@ -132,6 +133,7 @@ def kalman(
     start: Array | None = None,
     settings: KalmanSettings | None = None,
     progress: SearchReport = silent,
+    levels: Levels | None = None,
 ) -> KalmanEstimate:
     """Estimate the free parameters and the noise levels by maximum likelihood of the innovations.
 
@@ -144,10 +146,17 @@ def kalman(
     settings : KalmanSettings, optional
     progress : callable
         Called with each better estimate; its exceptions propagate.
+    levels : Levels, optional
+        Noise levels at the start; by default from the measurements.
+
+    Raises
+    ------
+    StoppedSearchError
+        The search cannot move from its start, which is no minimum.
     """
     settings = settings or KalmanSettings()
     task = task_of(problem, white=settings.white, drifting=settings.drifting)
-    best = task.first_point((problem.prior_mean if start is None else start).copy())
+    best = task.first_point((problem.prior_mean if start is None else start).copy(), levels)
     costs: tuple[float, ...] = ()
     scale: Mapping[str, float] = {}
     for number in range(_ROUNDS):
@@ -155,6 +164,8 @@ def kalman(
             task, best, settings.iterations, lambda point: progress("kalman", point.values, point.cost)
         )
         costs += found
+        if not costs:
+            refuse_stopped("the Kalman filter", *normal(task, best), bounded=(best.values, *problem.bounds))
         wanted = evidence_scale(problem, _information(task, best), best.values, scale)
         same = all(abs(factor / scale.get(group, 1.0) - 1) < SAME_SCALE for group, factor in wanted.items())
         if not settings.scale_prior or number == _ROUNDS - 1 or same:
