@@ -251,9 +251,9 @@ def _point(problem: Problem, values: Array, levels: Levels) -> tuple[SearchTask,
     InputError
         The filter loses the motion of a trial; the message names trial, time and axis.
     """
-    task = replace(task_of(problem, drifting=True), first=levels)
+    task = task_of(problem, drifting=True)
     try:
-        point = task.first_point(values)
+        point = task.first_point(values, levels)
     except FilterFault as error:
         raise not_followed(problem, error.place) from None
     if point.filtered.wild is not None:

@@ -19,33 +19,40 @@ class StoppedSearchError(InputError):
     """A search that could not take a single step, although its start is no minimum: its estimate would be the start."""
 
 
-def refuse_stopped(
-    method: str, H: Array, g: Array, *, scale: float = 1.0, bounded: tuple[Array, Array, Array] | None = None
-) -> None:
-    """Raise StoppedSearchError for a search that did not move, unless its start is a minimum.
+def is_minimum(H: Array, g: Array, *, variance: float = 1.0, bounded: tuple[Array, Array, Array] | None = None) -> bool:
+    """Whether a point is a minimum of a sum of squares, as nearly as its scatter tells.
+
+    The step that the normal equations ask for lowers the sum by ``g' H^-1 g``: at a minimum by less than one variance
+    for each unknown.
 
     Parameters
     ----------
-    method : str
-        Name of the method in the message.
     H, g : arrays (k, k) and (k,)
-        Normal equations there. The step that they ask for would lower the sum of squares by ``g' H^-1 g``.
-    scale : float
-        Variance of the residuals. At a minimum the step gains less than one of these for each unknown, its scatter.
+        Normal equations at the point.
+    variance : float
+        Variance of the residuals.
     bounded : (array, array, array), optional
         Values (k,) and their least and largest: an unknown that is pressed against a bound stays there.
 
-    Raises
-    ------
-    StoppedSearchError
+    Examples
+    --------
+    >>> import numpy as np
+    >>> is_minimum(np.eye(2), np.array([0.5, 0.5])), is_minimum(np.eye(2), np.array([0.5, 3.0]))
+    (True, False)
     """
     free = np.ones(len(g), dtype=bool)
     if bounded is not None:
         values, low, high = bounded
         free = ~(((values <= low) & (g > 0)) | ((values >= high) & (g < 0)))
     H, g = H[np.ix_(free, free)], g[free]
-    gain = float(g @ np.linalg.lstsq(H, g, rcond=None)[0]) if np.isfinite(H).all() and np.isfinite(g).all() else np.inf
-    if not gain <= scale * max(1, len(g)):
+    if not (np.isfinite(H).all() and np.isfinite(g).all()):
+        return False
+    return bool(g @ np.linalg.lstsq(H, g, rcond=None)[0] <= variance * max(1, len(g)))
+
+
+def refuse_stopped(method: str, at_minimum: bool) -> None:
+    """Raise StoppedSearchError for a search by `method` that never moved, unless its start is a minimum."""
+    if not at_minimum:
         problem = f"the search by {method} could not take a step from its start, which does not fit the data"
         raise StoppedSearchError(
             "trials", "", problem, "give a start that is nearer, or check the records and the card"

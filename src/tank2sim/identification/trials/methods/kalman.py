@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.identification.trials.methods.gauss_newton import refuse_stopped
+from tank2sim.identification.trials.methods.gauss_newton import is_minimum, refuse_stopped
 from tank2sim.identification.trials.methods.kalman_gains import smooth_states
 from tank2sim.identification.trials.methods.kalman_pass import FilterPass, Levels
 from tank2sim.identification.trials.methods.kalman_search import (
@@ -165,7 +165,8 @@ def kalman(
         )
         costs += found
         if not costs:
-            refuse_stopped("the Kalman filter", *normal(task, best), bounded=(best.values, *problem.bounds))
+            stays = is_minimum(*normal(task, best), bounded=(best.values, *problem.bounds))
+            refuse_stopped("the Kalman filter", stays)
         wanted = evidence_scale(problem, _information(task, best), best.values, scale)
         same = all(abs(factor / scale.get(group, 1.0) - 1) < SAME_SCALE for group, factor in wanted.items())
         if not settings.scale_prior or number == _ROUNDS - 1 or same:

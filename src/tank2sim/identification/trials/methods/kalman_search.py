@@ -89,11 +89,12 @@ class SearchTask:
     def first_point(self, values: Array, levels: Levels | None = None) -> SearchPoint:
         """First point, linearised along the trajectory of a pass that is linearised along the measurements.
 
-        A second pass that fails goes only a part of the way from the measurements to that trajectory.
+        The pass along the measurements has the first noise levels, which are wide, so that it follows them. A second
+        pass that fails goes only a part of the way from the measurements to that trajectory.
         """
-        levels = levels or self.first
         along = measured_trajectory(self.problem, self.batch)
-        first = self.point(values, levels, along)
+        first = self.point(values, self.first, along)
+        levels = levels or self.first
         if not np.isfinite(first.cost):
             return first
         for share in _SHORTER:
