@@ -15,20 +15,22 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
+from tank2sim.identification.craft.first_values import estimate_by_velocities
 from tank2sim.identification.craft.problem import DISTURBANCES, with_disturbances
 from tank2sim.identification.trials.methods.gauss_newton import StoppedSearchError
-from tank2sim.identification.trials.methods.kalman import KalmanEstimate, KalmanSettings, Smoothed, kalman
+from tank2sim.identification.trials.methods.kalman import KalmanEstimate, KalmanSettings, Smoothed, estimate_at, kalman
 from tank2sim.identification.trials.methods.kalman_gains import FilterFault, smooth_states
 from tank2sim.identification.trials.methods.kalman_pass import Levels
 from tank2sim.identification.trials.methods.kalman_search import (
     SearchPoint,
     SearchTask,
+    maximise,
     normal,
     task_of,
     whitened_innovations,
 )
 from tank2sim.identification.trials.methods.process_noise import PUSHED
-from tank2sim.identification.trials.problem.estimation_problem import Problem, SearchReport, silent
+from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 from tank2sim.simulation.sensitivity import Sensitivity
 
@@ -57,6 +59,13 @@ STRONGER = (1.0, 2.0, 4.0, 8.0, 16.0)
 
 FEWEST_TRIALS = 5
 """Fewest trials whose currents and winds determine how much these differ (project choice)."""
+
+CLEARLY_BETTER = 0.8
+"""Unpredicted share of the fitted trials, over the filter's share, below which the estimate by velocities is taken
+(project choice): where the model holds the filter is better, and where it does not its noise hides the error."""
+
+_LEVEL_STEPS = 8
+"""Steps of the noise levels at an estimate that is held."""
 
 LEAST_SPREAD = 0.03
 """Least spread of a disturbance between trials, over that before them: 0.01 m/s of a current (project choice)."""
@@ -142,23 +151,53 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
         Called with each better estimate.
     """
     settings = KalmanSettings(drifting=True, scale_prior=False)
-    estimate = _first_estimate(problem, settings, progress)
+    by_velocities = estimate_by_velocities(problem)
+    estimate = _first_estimate(problem, settings, progress, by_velocities)
     levels = levels_of(problem, estimate)
     if len(problem.runs) >= FEWEST_TRIALS:
         narrower = with_disturbances(problem, *_disturbances_of(problem, estimate.smoothed))
         with suppress(StoppedSearchError):  # the first estimate stays
             estimate = kalman(narrower, estimate.values, settings, progress, levels)
             problem, levels = narrower, levels_of(narrower, estimate)
-    return CraftFit(problem, estimate, levels, information(problem, estimate.values, levels))
+    fit = CraftFit(problem, estimate, levels, information(problem, estimate.values, levels))
+    other = None if by_velocities is None else _at_velocities(fit, by_velocities)
+    return other if other is not None and _unpredicted(other) < CLEARLY_BETTER * _unpredicted(fit) else fit
 
 
-def _first_estimate(problem: Problem, settings: KalmanSettings, progress: SearchReport) -> KalmanEstimate:
-    """The estimate from the card, or with stronger damping of sway and yaw if that craft is too unstable."""
+def _at_velocities(fit: CraftFit, found: Estimate) -> CraftFit | None:
+    """The fit with the estimate by velocities and its errors, and noise levels sought there; None if that fails."""
+    task = task_of(fit.problem, drifting=True)
+    try:
+        point = maximise(task, task.first_point(found.values, fit.levels), _LEVEL_STEPS, lambda _: None, hold=True)[0]
+        by_run = information(fit.problem, found.values, point.levels)
+    except (InputError, np.linalg.LinAlgError):
+        return None
+    whole = estimate_at(task, point)
+    estimate = replace(whole, method=found.method, covariance=found.covariance, information=found.information)
+    return CraftFit(fit.problem, estimate, point.levels, by_run)
+
+
+def _unpredicted(fit: CraftFit) -> float:
+    """Share of the variance of u, v and r that free predictions of the fitted trials leave; inf if they fail."""
+    try:
+        found = predict_free(fit, fit.problem.runs)
+    except InputError:
+        return np.inf
+    if not found:
+        return np.inf
+    predicted, smoothed = (np.concatenate([getattr(each, key) for each in found]) for key in ("predicted", "smoothed"))
+    return float(np.sum(1 - determination(predicted, smoothed)))
+
+
+def _first_estimate(
+    problem: Problem, settings: KalmanSettings, progress: SearchReport, by_velocities: Estimate | None
+) -> KalmanEstimate:
+    """The estimate from that by velocities, from the card, or with stronger damping if that craft is too unstable."""
     damping = np.array([name in STABILISING for name in problem.free])
     task = task_of(problem, drifting=True)
     fault: InputError | None = None
-    for factor in STRONGER:
-        start = np.where(damping, factor * problem.prior_mean, problem.prior_mean)
+    starts = [np.where(damping, factor * problem.prior_mean, problem.prior_mean) for factor in STRONGER]
+    for start in starts if by_velocities is None else [by_velocities.values, *starts]:
         try:
             point = task.first_point(start)
             if point.filtered.wild is not None:

@@ -291,6 +291,8 @@ def _bounded(model: Model) -> Model:
     def bounded(parameter: Parameter) -> Parameter:
         if parameter.name.endswith(".speed_loss"):
             return same_symbol(parameter, replace(parameter, minimum=None))
+        if parameter.name.startswith("thrusters.") and parameter.name.endswith(".time_constant"):
+            return same_symbol(parameter, replace(parameter, minimum=OBSERVED_STEP_S / 2))  # less does not show
         if parameter.name.endswith(".order_exponent"):
             return same_symbol(parameter, replace(parameter, minimum=_EXPONENTS[0], maximum=_EXPONENTS[1]))
         if parameter.name.removeprefix("derivatives.") in NOT_POSITIVE:

@@ -174,7 +174,7 @@ def kalman(
         scale = wanted
         task = replace(task, problem=replace(problem, prior_error=scaled_prior(problem, scale)))
         best = task.relinearise(best)
-    return _estimate(task, best, costs, scale)
+    return estimate_at(task, best, costs, scale)
 
 
 def _information(task: SearchTask, point: SearchPoint) -> Array:
@@ -182,9 +182,20 @@ def _information(task: SearchTask, point: SearchPoint) -> Array:
     return normal(task, point)[0] - task.problem.prior_precision(task.problem.prior_error)
 
 
-def _estimate(
-    task: SearchTask, best: SearchPoint, costs: tuple[float, ...], scale: Mapping[str, float]
+def estimate_at(
+    task: SearchTask, best: SearchPoint, costs: tuple[float, ...] = (), scale: Mapping[str, float] | None = None
 ) -> KalmanEstimate:
+    """The estimate at a point of the search.
+
+    Parameters
+    ----------
+    task : SearchTask
+    best : SearchPoint
+    costs : tuple of float
+        Of the search.
+    scale : mapping, optional
+        Factors on the prior's standard errors by group.
+    """
     problem, batch = task.problem, task.batch
     information = _information(task, best)
     before = problem.prior_precision(problem.prior_error)
@@ -199,7 +210,7 @@ def _estimate(
         information=information,
         noise=dict(zip(problem.seen, map(float, spread), strict=True)),
         cost=costs,
-        prior_scale=dict(scale),
+        prior_scale=dict(scale or {}),
         process_noise=dict(zip(task.disturbed.pushed, correlated, strict=False)),
         drift=dict(zip(problem.seen, correlated[len(task.disturbed.pushed) :], strict=False)),
         measurement_noise=dict(zip(problem.seen, map(float, np.exp(best.levels.measurement)), strict=True)),

@@ -214,14 +214,22 @@ def measured_trajectory(problem: Problem, batch: Batch) -> tuple[Array, Array]:
                 columns[name] = np.interp(np.arange(n), known, batch.measured[number, known, column])
                 states[number, :, place] = columns[name]
         if {"motion.x", "motion.y", "motion.psi"} <= columns.keys():
-            derived = _velocities(columns, float(batch.steps[number]))
+            derived = velocities_of(columns, float(batch.steps[number]))
             for name in derived.keys() & set(names) - columns.keys():
                 states[number, :, names.index(name)] = derived[name]
     return states, states
 
 
-def _velocities(columns: Mapping[str, Array], step: float) -> dict[str, Array]:
-    """Velocities (n,) over the ground, along and across the vessel, and the yaw rate, from position and heading."""
+def velocities_of(columns: Mapping[str, Array], step: float) -> dict[str, Array]:
+    """Velocities (n,) over the ground, along and across the vessel, and the yaw rate, by smooth position and heading.
+
+    Parameters
+    ----------
+    columns : mapping
+        ``motion.x``, ``motion.y`` and ``motion.psi`` (n,), without gaps.
+    step : float
+        s.
+    """
     width = max(1, round(_SMOOTHED_S / step))
     north, east, rate = (
         uniform_filter1d(np.gradient(columns[f"motion.{letter}"], step), width) for letter in ("x", "y", "psi")
