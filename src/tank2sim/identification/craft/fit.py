@@ -7,7 +7,6 @@ are constant in a trial: :mod:`tank2sim.identification.trials.methods.kalman`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -24,7 +23,6 @@ from tank2sim.identification.trials.methods.kalman_pass import Levels
 from tank2sim.identification.trials.methods.kalman_search import (
     SearchPoint,
     SearchTask,
-    maximise,
     normal,
     task_of,
     whitened_innovations,
@@ -61,11 +59,14 @@ FEWEST_TRIALS = 5
 """Fewest trials whose currents and winds determine how much these differ (project choice)."""
 
 CLEARLY_BETTER = 0.8
-"""Unpredicted share of the fitted trials, over the filter's share, below which the estimate by velocities is taken
+"""Errors of predictions of the fitted trials, over the filter's errors, below which the estimate by velocities is taken
 (project choice): where the model holds the filter is better, and where it does not its noise hides the error."""
 
-_LEVEL_STEPS = 8
-"""Steps of the noise levels at an estimate that is held."""
+_WIND_SHARES = (1.0, 0.3, 0.1)
+"""Spreads of the wind's force, over the usual one, that are tried with an estimate that knows no wind."""
+
+_STEPS_FROM_NEAR = 20
+"""Most steps of a search that begins at the estimate by velocities, each of the filter over all trials."""
 
 LEAST_SPREAD = 0.03
 """Least spread of a disturbance between trials, over that before them: 0.01 m/s of a current (project choice)."""
@@ -140,8 +141,10 @@ class CraftFit:
 def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
     """Estimate the free parameters of a craft with the noise levels.
 
-    With :data:`FEWEST_TRIALS` twice: the second time current, wind and bias of each trial are known beforehand as well
-    as they agreed between trials the first time (empirical Bayes), for they change slowly.
+    The search begins at the estimate by velocities, which is taken itself where it predicts the fitted trials clearly
+    better (:data:`CLEARLY_BETTER`). With :data:`FEWEST_TRIALS` the filter searches twice: the second time current, wind
+    and bias of each trial are known beforehand as well as they agreed between trials the first time (empirical Bayes),
+    for they change slowly.
 
     Parameters
     ----------
@@ -150,43 +153,64 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
     progress : callable
         Called with each better estimate.
     """
-    settings = KalmanSettings(drifting=True, scale_prior=False)
-    by_velocities = estimate_by_velocities(problem)
-    estimate = _first_estimate(problem, settings, progress, by_velocities)
-    levels = levels_of(problem, estimate)
-    if len(problem.runs) >= FEWEST_TRIALS:
-        narrower = with_disturbances(problem, *_disturbances_of(problem, estimate.smoothed))
-        with suppress(StoppedSearchError):  # the first estimate stays
-            estimate = kalman(narrower, estimate.values, settings, progress, levels)
-            problem, levels = narrower, levels_of(narrower, estimate)
-    fit = CraftFit(problem, estimate, levels, information(problem, estimate.values, levels))
-    other = None if by_velocities is None else _at_velocities(fit, by_velocities)
-    return other if other is not None and _unpredicted(other) < CLEARLY_BETTER * _unpredicted(fit) else fit
-
-
-def _at_velocities(fit: CraftFit, found: Estimate) -> CraftFit | None:
-    """The fit with the estimate by velocities and its errors, and noise levels sought there; None if that fails."""
-    task = task_of(fit.problem, drifting=True)
+    found = estimate_by_velocities(problem)
+    other = None if found is None else _at_velocities(problem, found)
+    steps = KalmanSettings.iterations if found is None else _STEPS_FROM_NEAR
+    settings = KalmanSettings(drifting=True, scale_prior=False, iterations=steps)
+    estimate = _first_estimate(problem, settings, progress, found)
+    fit = _fit_of(problem, estimate)
+    if other is not None and _unpredicted(other) < CLEARLY_BETTER * _unpredicted(fit):
+        return other
+    if len(problem.runs) < FEWEST_TRIALS:
+        return fit
+    narrower = with_disturbances(problem, *_disturbances_of(problem, estimate.smoothed))
     try:
-        point = maximise(task, task.first_point(found.values, fit.levels), _LEVEL_STEPS, lambda _: None, hold=True)[0]
-        by_run = information(fit.problem, found.values, point.levels)
-    except (InputError, np.linalg.LinAlgError):
-        return None
-    whole = estimate_at(task, point)
-    estimate = replace(whole, method=found.method, covariance=found.covariance, information=found.information)
-    return CraftFit(fit.problem, estimate, point.levels, by_run)
+        return _fit_of(narrower, kalman(narrower, estimate.values, settings, progress, fit.levels))
+    except InputError:  # it stops, or loses a trial: the first estimate stays
+        return fit
+
+
+def _fit_of(problem: Problem, estimate: KalmanEstimate) -> CraftFit:
+    """The fit of an estimate by the filter."""
+    levels = levels_of(problem, estimate)
+    return CraftFit(problem, estimate, levels, information(problem, estimate.values, levels))
+
+
+def _at_velocities(problem: Problem, found: Estimate) -> CraftFit | None:
+    """The fit with the estimate by velocities, its errors, and the spread of the wind's force that predicts best.
+
+    None where the filter loses the motion with all of them.
+    """
+    wide = np.array([problem.model[name].nominal for name in DISTURBANCES])
+    wind = np.array([name.startswith("disturbance") for name in DISTURBANCES])
+    fits = []
+    for share in _WIND_SHARES:
+        posed = with_disturbances(problem, np.zeros(len(wide)), np.where(wind, share * wide, wide))
+        task = task_of(posed, drifting=True)
+        try:
+            point = task.first_point(found.values)
+            by_run = information(posed, found.values, task.first)
+        except (InputError, np.linalg.LinAlgError):
+            continue
+        if not np.isfinite(point.cost):
+            continue
+        filtered = estimate_at(task, point)
+        estimate = replace(
+            filtered, method=found.method, covariance=found.covariance, information=found.information, cost=found.cost
+        )
+        fits.append(CraftFit(posed, estimate, point.levels, by_run))
+    return min(fits, key=_unpredicted, default=None)
 
 
 def _unpredicted(fit: CraftFit) -> float:
-    """Share of the variance of u, v and r that free predictions of the fitted trials leave; inf if they fail."""
+    """Errors at the ends of free predictions of the fitted trials, rms distance times rms heading; inf if they fail."""
     try:
-        found = predict_free(fit, fit.problem.runs)
+        ends = np.concatenate([np.zeros((0, 3)), *(found.ends for found in predict_free(fit, fit.problem.runs))])
     except InputError:
         return np.inf
-    if not found:
-        return np.inf
-    predicted, smoothed = (np.concatenate([getattr(each, key) for each in found]) for key in ("predicted", "smoothed"))
-    return float(np.sum(1 - determination(predicted, smoothed)))
+    distance, turned = np.hypot(ends[:, 0], ends[:, 1]), np.angle(np.exp(1j * ends[:, 2]))
+    seen = np.isfinite(distance) & np.isfinite(turned)
+    return float(np.sqrt(np.mean(distance[seen] ** 2) * np.mean(turned[seen] ** 2))) if seen.any() else np.inf
 
 
 def _first_estimate(
