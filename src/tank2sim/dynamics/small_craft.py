@@ -344,7 +344,7 @@ def _thruster(thruster: ThrusterSection, start: float, s: Mapping[str, ca.SX]) -
         exponent = constant(
             "order_exponent", "1", "Power of the order that the revolutions follow", thruster.order_exponent
         )
-        ordered = float(revolutions_of_order(ca.DM(start), thruster.max_radps, 1 / thruster.order_exponent))
+        ordered = float(ca.evalf(revolutions_of_order(ca.SX(start), thruster.max_radps, 1 / thruster.order_exponent)))
     command = Input(
         name=f"{prefix}.command",
         unit="rad/s",

@@ -70,7 +70,7 @@ _SLOWEST_MPS = 0.05
 """Speed of a track, m/s, below which its times are in a smaller unit. Project choice: receivers at rest wander so."""
 
 _LEAST_TURNED_DEG, _SLOWEST_TURN_DEGPS = 10.0, 0.05
-"""Turn of a log from which its rate tells the unit of the time, deg, and the rate at which no vessel turns at its
+"""Turn of a log from which its rate gives the unit of the time, deg, and the rate at which no vessel turns at its
 fastest, deg/s. Project choice: large tankers turn at 0.3 deg/s."""
 
 _MOST = 0.5

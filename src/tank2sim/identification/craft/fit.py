@@ -159,8 +159,8 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
     settings = KalmanSettings(drifting=True, scale_prior=False, iterations=steps)
     estimate = _first_estimate(problem, settings, progress, found)
     fit = _fit_of(problem, estimate)
-    if other is not None and _unpredicted(other) < CLEARLY_BETTER * _unpredicted(fit):
-        return other
+    if other is not None and other[0] < CLEARLY_BETTER * _unpredicted(fit):
+        return other[1]
     if len(problem.runs) < FEWEST_TRIALS:
         return fit
     narrower = with_disturbances(problem, *_disturbances_of(problem, estimate.smoothed))
@@ -176,8 +176,8 @@ def _fit_of(problem: Problem, estimate: KalmanEstimate) -> CraftFit:
     return CraftFit(problem, estimate, levels, information(problem, estimate.values, levels))
 
 
-def _at_velocities(problem: Problem, found: Estimate) -> CraftFit | None:
-    """The fit with the estimate by velocities, its errors, and the spread of the wind's force that predicts best.
+def _at_velocities(problem: Problem, found: Estimate) -> tuple[float, CraftFit] | None:
+    """Errors of predictions and fit with the estimate by velocities, with the spread of the wind's force that is best.
 
     None where the filter loses the motion with all of them.
     """
@@ -198,8 +198,9 @@ def _at_velocities(problem: Problem, found: Estimate) -> CraftFit | None:
         estimate = replace(
             filtered, method=found.method, covariance=found.covariance, information=found.information, cost=found.cost
         )
-        fits.append(CraftFit(posed, estimate, point.levels, by_run))
-    return min(fits, key=_unpredicted, default=None)
+        fit = CraftFit(posed, estimate, point.levels, by_run)
+        fits.append((_unpredicted(fit), fit))
+    return min(fits, key=lambda entry: entry[0], default=None)
 
 
 def _unpredicted(fit: CraftFit) -> float:

@@ -72,7 +72,7 @@ DRAUGHT_OF_CRAFT = 0.06
 """Draught over length where the card states none: between that of a planing hull and of a displacement one (project
 choice)."""
 
-NOT_POSITIVE = ("Xudot", "Yvdot", "Nrdot", "Xu", "Xuabsu", "Yv", "Yvabsv", "Nr", "Nrabsr")
+NEVER_POSITIVE = ("Xudot", "Yvdot", "Nrdot", "Xu", "Xuabsu", "Yv", "Yvabsv", "Nr", "Nrabsr")
 """Coefficients that are not positive: an added mass and a damping of each motion by itself."""
 
 DISTURBANCES = ("current.north", "current.east", "disturbance.north", "disturbance.east", "gyro.bias")
@@ -286,7 +286,7 @@ def with_disturbances(problem: Problem, means: Array, spreads: Array) -> Problem
 
 
 def _bounded(model: Model) -> Model:
-    """The model with the bounds of physics, and none on the loss of thrust, whose error near zero has two sides."""
+    """The model with the bounds of physics, and none on the loss of thrust, whose error may have either sign."""
 
     def bounded(parameter: Parameter) -> Parameter:
         if parameter.name.endswith(".speed_loss"):
@@ -295,7 +295,7 @@ def _bounded(model: Model) -> Model:
             return same_symbol(parameter, replace(parameter, minimum=OBSERVED_STEP_S / 2))  # less does not show
         if parameter.name.endswith(".order_exponent"):
             return same_symbol(parameter, replace(parameter, minimum=_EXPONENTS[0], maximum=_EXPONENTS[1]))
-        if parameter.name.removeprefix("derivatives.") in NOT_POSITIVE:
+        if parameter.name.removeprefix("derivatives.") in NEVER_POSITIVE:
             return same_symbol(parameter, replace(parameter, maximum=0.0))
         return parameter
 

@@ -106,7 +106,7 @@ def equation_error(
     ------
     InputError
         A run lacks velocities and signals that determine them, all runs are shorter than a window, or the search
-        cannot move from its start, which is no minimum (:class:`.StoppedSearchError`).
+        cannot move from its start, although the data ask for it (:class:`.StoppedSearchError`).
     """
     settings = settings or EquationErrorSettings()
     form = WeakForm(problem, settings.width)

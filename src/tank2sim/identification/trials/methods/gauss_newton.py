@@ -16,11 +16,11 @@ MOST_ATTEMPTS = 10
 
 
 class StoppedSearchError(InputError):
-    """A search that could not take a single step, although its start is no minimum: its estimate would be the start."""
+    """A search that could not take a single step, although the data ask for one: its estimate would be the start."""
 
 
 def is_minimum(H: Array, g: Array, *, variance: float = 1.0, bounded: tuple[Array, Array, Array] | None = None) -> bool:
-    """Whether a point is a minimum of a sum of squares, as nearly as its scatter tells.
+    """Whether a point is a minimum of a sum of squares, within its scatter.
 
     The step that the normal equations ask for lowers the sum by ``g' H^-1 g``: at a minimum by less than one variance
     for each unknown.

@@ -152,7 +152,7 @@ def kalman(
     Raises
     ------
     StoppedSearchError
-        The search cannot move from its start, which is no minimum.
+        The search cannot move from its start, although the data ask for it.
     """
     settings = settings or KalmanSettings()
     task = task_of(problem, white=settings.white, drifting=settings.drifting)

@@ -96,7 +96,7 @@ def output_error(
     Raises
     ------
     StoppedSearchError
-        The search cannot move from its start, which is no minimum.
+        The search cannot move from its start, although the data ask for it.
     """
     settings = settings or OutputErrorSettings()
     shooting = Shooting(problem)
