@@ -157,8 +157,13 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
     other = None if found is None else _at_velocities(problem, found)
     steps = KalmanSettings.iterations if found is None else _STEPS_FROM_NEAR
     settings = KalmanSettings(drifting=True, scale_prior=False, iterations=steps)
-    estimate = _first_estimate(problem, settings, progress, found)
-    fit = _fit_of(problem, estimate)
+    try:
+        estimate = _first_estimate(problem, settings, progress, found)
+        fit = _fit_of(problem, estimate)
+    except InputError:
+        if other is None or not np.isfinite(other[0]):
+            raise
+        return other[1]
     if other is not None and other[0] < CLEARLY_BETTER * _unpredicted(fit):
         return other[1]
     if len(problem.runs) < FEWEST_TRIALS:
