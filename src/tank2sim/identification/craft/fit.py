@@ -161,7 +161,7 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
         estimate = _first_estimate(problem, settings, progress, found)
         fit = _fit_of(problem, estimate)
     except InputError:
-        if other is None or not np.isfinite(other[0]):
+        if other is None:
             raise
         return other[1]
     if other is not None and other[0] < CLEARLY_BETTER * _unpredicted(fit):
