@@ -355,3 +355,23 @@ def test_the_derivatives_of_a_craft_are_a_table_in_si() -> None:
     otter = t2s.load("otter").replace({"uncertainty.Nr": 2.5})
     assert otter.derivatives.loc["Xu", "value"] == pytest.approx(-77.5544)
     assert otter.derivatives.loc["Nr", "standard_error"] == 2.5
+
+
+def test_revolutions_follow_the_power_of_the_order_and_the_command_at_the_start_holds_the_cruising_speed() -> None:
+    model = changed(("max_radps = 103.930864", "max_radps = 103.930864\norder_exponent = 0.6"))
+    p = model.parameter_values()
+    function = ca.Function("q", [model.x, model.u, model.p], [model.expand(model.symbol("thrusters.port.order"))])
+    place = model.input_names.index("thrusters.port.command")
+
+    def reached(order: float) -> float:
+        inputs = np.array(model.input_values())
+        inputs[place] = order
+        return float(function(model.initial(p), inputs, p))
+
+    assert reached(0.0) == 0.0
+    for share in (1.0, 0.5, 0.1):
+        assert reached(share * 103.930864) == pytest.approx(share**0.6 * 103.930864, rel=5e-3)
+    assert reached(-0.5 * 101.736666) == pytest.approx(-(0.5**0.6) * 101.736666, rel=5e-3)
+    plain = build(OTTER)
+    cruising = float(np.array(plain.input_values())[place])
+    assert reached(float(np.array(model.input_values())[place])) == pytest.approx(cruising, rel=1e-2)

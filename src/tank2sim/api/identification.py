@@ -221,14 +221,10 @@ def identify_craft(
     alike = (*refuse_copies(fitted), *refuse_copies(fitted, held))
     problem, driven_by = craft_problem(card, read), craft_driven_by(card, read)
     runs = problem.runs
-    try:
-        # A step of the search may be one to an unstable craft. Threads of the linear algebra only wait for each other.
-        with np.errstate(all="ignore"), threadpool_limits(limits=1, user_api="blas"):
-            fit = fit_craft(problem.with_runs(runs[: len(fitted)]), progress or silent)
-    except np.linalg.LinAlgError:
-        remedy = "check mass, thrust curves and damping of the card, and the places and signs of the thrusters"
-        raise InputError(card.source, "", "does not move as the trials do, not even roughly", remedy) from None
-    predictions = predict_free(fit, runs[len(fitted) :]) if held else []
+    # A step of the search may be one to an unstable craft. Threads of the linear algebra only wait for each other.
+    with np.errstate(all="ignore"), threadpool_limits(limits=1, user_api="blas"):
+        fit = fit_craft(problem.with_runs(runs[: len(fitted)]), progress or silent)
+        predictions = predict_free(fit, runs[len(fitted) :]) if held else []
     responses = order_responses(card, fitted)
     names = [run.name for run in runs[len(fitted) :]]
     found = identified_craft(card, fit, responses)

@@ -355,6 +355,9 @@ class ThrusterSection(CardSection):
         Largest revolutions, either way; astern by default as ahead.
     dead_band_radps : float
         Orders that are no larger leave the propeller at rest.
+    order_exponent : float, optional
+        e: an order o, within its largest m, goes to the revolutions m (o/m)^e. By default, with e = 1, these are the
+        order. Pulses of controllers without a speed loop have less than 1.
     time_constant_s : float, optional
         Lag of the revolutions behind their order; by default none.
     max_azimuth_rad : float, optional
@@ -362,7 +365,8 @@ class ThrusterSection(CardSection):
     azimuth_time_constant_s, max_azimuth_rate_radps : float, optional
         Lag and largest rate of that turn; the lag is required with ``max_azimuth_rad``.
     uncertainty : dict
-        Standard errors of ``ahead_Ns2``, ``astern_Ns2``, ``speed_loss_kg``, ``dead_band_radps``, ``time_constant_s``.
+        Standard errors of ``ahead_Ns2``, ``astern_Ns2``, ``speed_loss_kg``, ``dead_band_radps``, ``order_exponent``,
+        ``time_constant_s``.
     """
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,30}$")]
@@ -375,6 +379,7 @@ class ThrusterSection(CardSection):
     max_radps: AngularRate
     max_astern_radps: AngularRate | None = None
     dead_band_radps: Annotated[float, Field(ge=0.0, le=1e5)] = 0.0
+    order_exponent: Annotated[float, Field(ge=0.1, le=5.0)] | None = None
     time_constant_s: TimeConstant | None = None
     max_azimuth_rad: Annotated[float, Field(gt=0, le=6.283185307179586)] | None = None
     azimuth_time_constant_s: TimeConstant | None = None

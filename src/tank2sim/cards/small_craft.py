@@ -13,7 +13,14 @@ from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
 from tank2sim.units import from_si
 
-UNCERTAIN_OF_THRUSTER = ("ahead_Ns2", "astern_Ns2", "speed_loss_kg", "dead_band_radps", "time_constant_s")
+UNCERTAIN_OF_THRUSTER = (
+    "ahead_Ns2",
+    "astern_Ns2",
+    "speed_loss_kg",
+    "dead_band_radps",
+    "order_exponent",
+    "time_constant_s",
+)
 """Keys of ``[[thrusters]]`` that may have a standard error."""
 
 

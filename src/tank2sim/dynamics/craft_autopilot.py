@@ -26,7 +26,7 @@ from tank2sim.cards.craft_terms import CRAFT_TERMS
 from tank2sim.cards.form import ThrusterSection
 from tank2sim.dynamics.autopilot import heading_error, heading_signals, limit, within
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State, Variable
-from tank2sim.dynamics.small_craft import craft_damping, revolutions_for, thrust_of
+from tank2sim.dynamics.small_craft import craft_damping, revolutions_for, revolutions_of_order, thrust_of
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -179,6 +179,9 @@ def _order(thruster: ThrusterSection, thrust: ca.SX, u: ca.SX) -> Quantity:
     if not thruster.astern_Ns2:  # reversing gives nothing
         thrust = ca.fmax(thrust, 0)
     n = revolutions_for(thrust, u, ca.SX(thruster.ahead_Ns2), ca.SX(thruster.astern_Ns2), ca.SX(thruster.speed_loss_kg))
+    if thruster.order_exponent is not None:
+        largest = ca.if_else(n >= 0, thruster.max_radps, -thruster.lowest_radps)
+        n = revolutions_of_order(n, largest, 1 / thruster.order_exponent)
     return Quantity(
         name=f"thrusters.{thruster.name}.command",
         unit="rad/s",

@@ -9,8 +9,8 @@
 
 with M, C_RB (:mod:`tank2sim.dynamics.rigid_body`), C_A (:func:`.added_mass_forces`), the azimuth a of a thruster at
 x, y, and u_T = u cos a + v sin a, the craft's velocity along it; what the yaw rate adds at its place is left out. The
-order is held within the largest revolutions, and one within the dead band leaves the propeller at rest; the revolutions
-follow with a lag of the first order.
+order is held within the largest revolutions, and one within the dead band leaves the propeller at rest. The revolutions
+go to the order, or to m (o/m)^e of an order o with its largest m, with a lag of the first order.
 
 Fossen (2021), Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd ed., 6.1 to 6.5 (equations), 9.1 (thrust:
 T_nn n|n| - T_nu |n| u_a). That a reversed propeller loses nothing by speed is a project choice.
@@ -52,6 +52,10 @@ _STEPS_PER_LENGTH = 200
 _STEPS_PER_LAG = 5
 """Integration steps while the craft covers its length, and in the shortest lag: as of a ship, project choices."""
 
+_ROUNDED_SHARE = 0.01
+"""Share of the largest order below which the curve of the revolutions is straight (project choice: a dead band is
+larger)."""
+
 THRUSTER_PARAMETERS = {
     "x_m": "x",
     "y_m": "y",
@@ -59,6 +63,7 @@ THRUSTER_PARAMETERS = {
     "astern_Ns2": "astern",
     "speed_loss_kg": "speed_loss",
     "dead_band_radps": "dead_band",
+    "order_exponent": "order_exponent",
     "time_constant_s": "time_constant",
 }
 """Key of ``[[thrusters]]`` to the last part of the name of the parameter that holds it."""
@@ -280,6 +285,22 @@ def revolutions_for(thrust: ca.SX, along: ca.SX, ahead: ca.SX, astern: ca.SX, lo
     return ca.if_else(thrust >= 0, forward, -ca.sqrt(ca.fmax(-thrust, 0) / astern))
 
 
+def revolutions_of_order(order: ca.SX, largest: ca.SX | float, exponent: ca.SX | float) -> ca.SX:
+    """Revolutions m (o/m)^e (rad/s) to which an order goes; with 1/e the order for revolutions.
+
+    The power is rounded near zero, so that its slope is finite there.
+
+    Parameters
+    ----------
+    order, largest : casadi.SX
+        o and m, rad/s.
+    exponent : casadi.SX
+        e.
+    """
+    share = order / largest
+    return order * (share**2 + _ROUNDED_SHARE**2) ** ((exponent - 1) / 2)
+
+
 def _thrusters(card: SteeredCard, s: Mapping[str, ca.SX]) -> tuple[list[Variable], tuple[ca.SX, ca.SX, ca.SX]]:
     """Variables of all thrusters, and their X, Y (N) and N (N m)."""
     cruising = cruising_revolutions(card)
@@ -317,6 +338,13 @@ def _thruster(thruster: ThrusterSection, start: float, s: Mapping[str, ca.SX]) -
     band = constant(
         "dead_band", "rad/s", "Largest order that leaves the propeller at rest", thruster.dead_band_radps, "rpm"
     )
+    exponent = None
+    ordered = start
+    if thruster.order_exponent is not None:
+        exponent = constant(
+            "order_exponent", "1", "Power of the order that the revolutions follow", thruster.order_exponent
+        )
+        ordered = float(ca.evalf(revolutions_of_order(ca.SX(start), thruster.max_radps, 1 / thruster.order_exponent)))
     command = Input(
         name=f"{prefix}.command",
         unit="rad/s",
@@ -325,16 +353,18 @@ def _thruster(thruster: ThrusterSection, start: float, s: Mapping[str, ca.SX]) -
         nominal=thruster.max_radps / 2,
         minimum=thruster.lowest_radps,
         maximum=thruster.max_radps,
-        start=start,
+        start=ordered,
     )
     held = ca.fmax(thruster.lowest_radps, ca.fmin(thruster.max_radps, command.symbol))
+    beyond = held * (ca.fabs(held) > band.symbol) if thruster.dead_band_radps else held
+    largest = ca.if_else(held >= 0, thruster.max_radps, -thruster.lowest_radps)
     order = Quantity(
         name=f"{prefix}.order",
         unit="rad/s",
         description=f"Revolutions that {where} goes to: its order within its limits, 0 in the dead band",
         display_unit="rpm",
         nominal=thruster.max_radps,
-        value=held * (ca.fabs(held) > band.symbol) if thruster.dead_band_radps else held,
+        value=beyond if exponent is None else revolutions_of_order(beyond, largest, exponent.symbol),
     )
     places = [
         Parameter(
@@ -350,6 +380,8 @@ def _thruster(thruster: ThrusterSection, start: float, s: Mapping[str, ca.SX]) -
     variables: list[Variable] = [command, order, ahead, astern, loss, *places]
     if thruster.dead_band_radps:
         variables.append(band)
+    if exponent is not None:
+        variables.append(exponent)
     variables += (speed := _revolutions(thruster, prefix, where, order, start))
     turning, azimuth = _azimuth(thruster, prefix, where)
     variables += turning

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TypeGuard
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
 from tank2sim.cards.form import ThrusterSection
@@ -20,6 +21,10 @@ CRAFT_SIGNALS = ("x_m", "y_m", "psi_rad", "r_radps", "u_mps", "v_mps")
 
 ROUNDED_ORDER = 0.01
 """By how much an order may be beyond 1: rounding of pulse widths (project choice)."""
+
+MOST_REPEATED = 4
+"""Rows in a row that repeat a position because the recorder is faster than the receiver; more are a craft at rest
+(project choice)."""
 
 LEAST_CRAFT_ROWS = 20
 """Fewest rows of a trial. Project choice: a few seconds at the rates of small receivers."""
@@ -67,10 +72,24 @@ def read_craft_trial(path: Path | CsvTable, thrusters: Sequence[ThrusterSection]
     driven |= _azimuths(path, thrusters, columns)
     signals = {name: values for name, values in (driven | orders).items() if values is not None and _known(values)}
     signals |= {name: columns[name] for name in CRAFT_SIGNALS if name in columns}
+    held = _held(signals["x_m"], signals["y_m"])
+    signals |= {name: np.where(held, np.nan, signals[name]) for name in ("x_m", "y_m")}
     known = np.isfinite(signals["psi_rad"])
     psi = signals["psi_rad"].copy()
     psi[known] = np.unwrap(psi[known])
     return Trial(path, time, signals | {"psi_rad": psi})
+
+
+def _held(x: Array, y: Array) -> NDArray[np.bool_]:
+    """Rows (n,) in which a recorder faster than its receiver repeats a position: a few in a row, exactly the same."""
+    same = np.concatenate([[False], (np.diff(x) == 0) & (np.diff(y) == 0)])
+    run = np.arange(len(same)) - np.maximum.accumulate(np.where(same, 0, np.arange(len(same))))
+    ends = np.append(~same[1:], True)
+    lengths = np.zeros(len(same), dtype=int)
+    lengths[ends] = run[ends]
+    # Every row has the length of the repetition that it belongs to.
+    following = np.flip(np.minimum.accumulate(np.flip(np.where(ends, np.arange(len(same)), len(same)))))
+    return same & (lengths[following] <= MOST_REPEATED)
 
 
 def _azimuths(path: Path, thrusters: Sequence[ThrusterSection], columns: Mapping[str, Array]) -> dict[str, Array]:

@@ -280,3 +280,15 @@ def test_a_vessel_that_makes_way_with_its_engine_stopped_does_not_rest(tmp_path)
 def test_a_speed_that_stays_at_0_while_the_vessel_moves_is_not_used(tmp_path) -> None:
     result = steering(tmp_path, rudder_deg=rudder(), stw_kn=np.zeros(1800))
     assert any("stw_kn" in mark for mark in result.cautions) and "u_water" not in result.voyage.series
+
+
+def test_a_time_in_ms_without_positions_is_known_by_the_turn(tmp_path) -> None:
+    rows = np.arange(600)
+    heading = 90 + 40 * np.sin(rows / 30)
+    lines = [f"{50 * row + 1234},{angle:.2f}" for row, angle in zip(rows, heading, strict=True)]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["timestamp,heading", *lines]) + "\n")
+    made = read_log(path)
+    (stream,) = [stream for stream in made.streams if stream.name == "heading"]
+    assert np.median(np.diff(stream.time_s)) == pytest.approx(0.05)
+    assert any("ms" in finding.text for finding in made.findings)

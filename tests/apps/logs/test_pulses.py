@@ -190,3 +190,39 @@ def test_a_rudder_that_lay_hard_over_for_long_rests_in_the_middle() -> None:
     scale = pulses_of(LogStream("ch1", 0.2 * np.arange(100), pulses))[1]
     assert scale.rest_us == 1127  # as of a controller that turns one way
     assert scale.two_way.share(np.array([1500.0, 1900.0])).tolist() == [0.0, 1.0]
+
+
+def test_a_reversed_controller_with_sides_exchanged_and_its_own_rest_is_found(tmp_path) -> None:
+    """As a real craft logs it: the left column is the starboard thruster, and its controller is reversed."""
+    made, path = craft(), tmp_path / "craft.csv"
+    table = motion(made)
+    table["thr_left"] = np.round(1512 - 380 * made["starboard"]).astype(int)
+    table["thr_right"] = np.round(1512 + 380 * made["port"]).astype(int)
+    table["thr_left_pwm_zero_point"] = table["thr_right_pwm_zero_point"] = 1512.0
+    table["yaw_acc"] = 0.0
+    table.to_csv(path, index=False)
+    found = log(path)
+    used = {channel.quantity: channel for channel in found.voyage.channels.channels if channel.use}
+    assert (used["thrust_order_port"].stream, used["thrust_order_port"].sign) == ("thr_right", 1)
+    assert (used["thrust_order_starboard"].stream, used["thrust_order_starboard"].sign) == ("thr_left", -1)
+    assert used["thrust_order_port"].offset == 1512
+    assert used["heading"].stream != "yaw_acc"
+    assert any("against its name" in notice for notice in found.cautions)
+    for quantity, truth in (("thrust_order_port", made["port"]), ("thrust_order_starboard", made["starboard"])):
+        values = found.voyage.series[quantity].values
+        assert np.abs(values).max() <= 1.0
+        assert np.corrcoef(values, truth)[0, 1] > 0.999
+
+
+def test_shares_are_never_beyond_the_full_order(tmp_path) -> None:
+    """A rest off the middle leaves more room to one side."""
+    made, path = craft(), tmp_path / "craft.csv"
+    table = motion(made)
+    scale = 408 / max(np.abs(made["port"]).max(), np.abs(made["starboard"]).max())
+    for name, side in (("pwm_left", "port"), ("pwm_right", "starboard")):
+        table[name] = np.round(1510 + scale * made[side]).astype(int)
+    table.to_csv(path, index=False)
+    found = log(path)
+    assert all(
+        np.abs(found.voyage.series[f"thrust_order_{side}"].values).max() <= 1.0 for side in ("port", "starboard")
+    )

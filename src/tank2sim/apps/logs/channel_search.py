@@ -28,7 +28,7 @@ from tank2sim.apps.logs.content import (
     steering_evidence,
 )
 from tank2sim.apps.logs.delays import rate_delay
-from tank2sim.apps.logs.pulses import PulseScale, pulses_of
+from tank2sim.apps.logs.pulses import PulseScale, pulses_of, rest_of
 from tank2sim.apps.logs.quantities import QUANTITIES, names_another, names_thrust, plain_words, sign_of_name
 from tank2sim.apps.logs.reference import (
     HEADING_WINDOW_S,
@@ -86,6 +86,14 @@ _HOLDS, _MOVES = 0.5, 0.2
 
 _CLEARLY = 0.05
 """By how much the agreement of a rudder with the turn is above that of all other streams (project choice)."""
+
+_CLEARLY_REVERSED = 0.2
+"""By how much the agreement of the speed with the difference of two orders is above that with their sum, where one
+controller is reversed (project choice)."""
+
+_LITTLE, _TURNED_RAD = 0.4, math.pi / 2
+"""Size of the sum of two orders over that of their difference, and change of heading, rad, below which a vessel goes
+straight although its orders are opposite (project choice)."""
 
 _DOUBTED = 0.85
 """Largest confidence of a stream of which one thing is open: whether it is measured or ordered, or its unit."""
@@ -179,10 +187,17 @@ class _Search:
         self.pulse_scales: dict[str, PulseScale] = {}
 
     def pulses(self) -> None:
-        """Search among the shares that pulses are of full order."""
+        """Search among the shares that pulses are of full order; streams that hold their rest are no orders."""
+        rests = {stream.name: rest for stream in self.streams if (rest := rest_of(stream)) is not None}
+        self.streams = [replace(stream, quantity="") if stream.name in rests else stream for stream in self.streams]
         for place, stream in enumerate(self.streams):
+            if stream.name in rests:
+                continue
             pulses, scale = pulses_of(stream)
             if scale is not None:
+                # The rest of an order is in the column whose name begins with its own.
+                own = [rest for name, rest in rests.items() if name.startswith(stream.name)]
+                scale = scale.resting_at(own[0] if own else scale.rest_us, pulses.values)
                 self.pulse_scales[stream.name] = scale
                 self.streams[place] = replace(stream, values=scale.share(pulses.values), unit="1")
 
@@ -526,7 +541,8 @@ class _Search:
             if any(channel.stream == stream.name for channel in self.found):
                 continue
             time, values = self.thin(stream)
-            if self._best("yaw_rate") is None and stream.unit in ("", *QUANTITIES["yaw_rate"].units):
+            unknown = self._best("yaw_rate") is None and not self.named("yaw_rate")
+            if unknown and stream.unit in ("", *QUANTITIES["yaw_rate"].units):
                 evidence = rate_evidence(time, values, self.motion)
                 if evidence.agreement is not None and evidence.agreement > 0.97 and evidence.unit:
                     unit, text = stream.unit or evidence.unit, f"by content alone: {evidence.text}"
@@ -780,26 +796,67 @@ class _Search:
         for port_name, starboard_name in pairs:
             ports, starboards = self.named(port_name), self.named(starboard_name)
             for port, starboard in zip(ports, starboards, strict=False):
+                signs, reversal = self._reversed(port, starboard)
                 time, values = self.thin(port)
                 other = np.interp(time, *self.thin(starboard))
-                evidence, _ = steering_evidence(time, values - other, *self.rate)
-                swap = evidence.agreement is not None and evidence.agreement > 0.6 and evidence.sign < 0
-                for stream, name in ((port, port_name), (starboard, starboard_name)):
-                    confidence, why = self.judged(stream, evidence, agrees=0.6)
+                evidence, _ = steering_evidence(time, signs[0] * values - signs[1] * other, *self.rate)
+                swap = evidence.agreement is not None and evidence.agreement > _SHOWN and evidence.sign < 0
+                for stream, name, sign in zip((port, starboard), (port_name, starboard_name), signs, strict=True):
+                    confidence, why = self.judged(stream, evidence, agrees=_SHOWN)
                     quantity = name
-                    if swap and stream.stated_by == "":
+                    # A reversed controller is found by the speed, and then the turn shows the sides, or nothing.
+                    if swap and (stream.stated_by == "" or -1 in signs):
                         quantity = starboard_name if name == port_name else port_name
                         confidence, why = 0.9, f"{evidence.text} with the sides exchanged"
                     elif swap:
                         confidence, why = _CONTRADICTED, f"{why}: the turn contradicts its side"
                         self.fault(stream, why)
+                    if reversal and signs == (1, 1):
+                        confidence = _CONTRADICTED
+                        self.fault(stream, reversal)
+                    elif reversal:
+                        confidence = _DOUBTED if swap or (evidence.agreement or 1.0) >= _SHOWN else _BASE["name"]
+                        why = f"{why}; {reversal}"
                     unit = _share_unit(stream, quantity)
                     shown = "rpm" in plain_words(stream.name).split() or np.abs(stream.values).max() > _FASTEST_SHAFT_HZ
                     if unit == "rpm" != stream.unit and not shown:
                         confidence, why = min(confidence, _DOUBTED), f"{why}; rpm by their size"
-                    self.add(stream, confidence, why, quantity=quantity, unit=unit)
+                    self.add(stream, confidence, why, quantity=quantity, unit=unit, sign=sign)
+                    if quantity != name and stream.stated_by == "name":
+                        self.fault(stream, f"is {QUANTITIES[quantity].words}, against its name: {evidence.text}")
+                    if sign < 0:
+                        self.fault(stream, f"is positive astern: {reversal}")
             for stream in ports[len(starboards) :] + starboards[len(ports) :]:
                 self.add(stream, 0.6, "the other side is missing", unit=_share_unit(stream, stream.quantity))
+
+    def _reversed(self, port: LogStream, starboard: LogStream) -> tuple[tuple[int, int], str]:
+        """Signs of two orders by the speed ahead, which follows their sum, and why one is reversed.
+
+        1, 1 without a reason where none is, and with one where it is not known which of the two.
+        """
+        heading = self._best("heading")
+        at = self.motion.time_s
+        if heading is None or len(at) < FEW_SAMPLES or port.stated_by == "format":
+            return (1, 1), ""
+        angle = self._heading_at(at)
+        ahead = self.motion.v_north_mps * np.cos(angle) + self.motion.v_east_mps * np.sin(angle)
+        good = np.isfinite(ahead)
+        if good.sum() < FEW_SAMPLES or np.percentile(np.abs(ahead[good]), 95) < 2 * LEAST_SPEED_MPS:
+            return (1, 1), ""
+        time, first = self.thin(port)
+        second = np.interp(time, *self.thin(starboard))
+        total, difference = (
+            steering_evidence(time, values, at[good], ahead[good])[0] for values in (first + second, first - second)
+        )
+        by_total, by_difference = total.agreement or 0.0, difference.agreement or 0.0
+        # A pair that pulls apart for long turns the vessel about, unless one of it is reversed.
+        straight = np.std(first + second) < _LITTLE * np.std(first - second) and np.ptp(angle[good]) < _TURNED_RAD
+        if by_difference >= max(_SHOWN, 0.0 if straight else by_total + _CLEARLY_REVERSED):
+            way = difference.sign
+            return (way, -way), f"the speed ahead follows the difference of the orders by {by_difference:.2f}"
+        if by_total >= _SHOWN and total.sign < 0:
+            return (1, 1), "the speed falls with the orders: one or both are reversed"
+        return (1, 1), ""
 
     def others(self) -> None:
         done = {channel.stream for channel in self.found}

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tank2sim.apps.logs.quantities import plain_words
+from tank2sim.apps.logs.quantities import names_rest, plain_words
 from tank2sim.apps.logs.streams import LogStream
 from tank2sim.arrays import Array
 
@@ -21,6 +21,9 @@ MIDDLE_US, SPAN_US, WIDE_SPAN_US = 1500.0, 400.0, 500.0
 _BEYOND_US = 10.0
 _IDLE_US = 1150.0
 """Longest pulse of a controller at rest that turns one way (project choice)."""
+
+_REST_OFF_US = 100.0
+"""Largest distance of a rest from :data:`MIDDLE_US` (project choice: trims are some tens of us)."""
 
 _WORDS = re.compile(
     r"\b(pwm|pulse|servo\d*|output|outputs|rcou|rcout|rc|esc\d*|ch\d*|chan\d*|channels?|ch ?\d* ?out|c\d+)\b"
@@ -36,6 +39,12 @@ class PulseScale:
     rest_us: float
     span_us: float
 
+    def resting_at(self, rest_us: float, pulses: Array) -> PulseScale:
+        """The scale with another rest; the farther end of the pulses (n,), or of the usual range, is the full order."""
+        ends = self.rest_us - self.span_us, self.rest_us + self.span_us
+        reach = max(abs(end - rest_us) for end in (*ends, float(np.nanmin(pulses)), float(np.nanmax(pulses))))
+        return PulseScale(rest_us, reach)
+
     @property
     def two_way(self) -> PulseScale:
         """The scale with rest in the middle, as of a rudder that lay hard over for most of a log."""
@@ -44,6 +53,15 @@ class PulseScale:
     def share(self, pulses: Array) -> Array:
         """Shares of the full order (n,) of pulses (n,), us."""
         return (pulses - self.rest_us) / self.span_us
+
+
+def rest_of(stream: LogStream) -> float | None:
+    """Pulse of rest (us) of a stream that holds it, by its name and its steady value; None of any other stream."""
+    values = stream.values[np.isfinite(stream.values)]
+    if not len(values) or not names_rest(stream.name):
+        return None
+    middle = float(np.median(values))
+    return middle if abs(middle - MIDDLE_US) < _REST_OFF_US and np.ptp(values) < _REST_OFF_US else None
 
 
 def pulses_of(stream: LogStream) -> tuple[LogStream, PulseScale | None]:

@@ -140,8 +140,8 @@ _TRANSVERSE = r"\b(transverse|trans|lateral|sway|quer\w*|transversal|tvar\w*|pop
 _PATTERNS: tuple[tuple[str, str, str], ...] = (
     # quantity, words that must be there, words that must not
     # An x or y alone may be of any axes, mirrored ones among them: only names that say north and east are taken.
-    ("x", r"^(x|pos|position)? ?(n|north|northing)( position| pos)?( m)?$", r"^n$"),
-    ("y", r"^(y|pos|position)? ?(e|east|easting)( position| pos)?( m)?$", r"^e$"),
+    ("x", r"^(x|pos|position)? ?(n|north|northing)( position| pos)?( m)?$|^x ned( m)?$", r"^n$"),
+    ("y", r"^(y|pos|position)? ?(e|east|easting)( position| pos)?( m)?$|^y ned( m)?$", r"^e$"),
     (
         "latitude",
         r"\b(lat|latitude|breite|breitengrad|latitud|latitudine|breedte|breedtegraad|bredde|breddegrad|szerokosc"
@@ -287,6 +287,17 @@ def names_thrust(name: str) -> bool:
     """
     words = re.sub(r"(?<=[a-z])(?=\d)", " ", plain_words(name))
     return bool(re.search(_THRUST, words)) and not re.search(rf"{_REVOLUTIONS}|{_RUDDER}|{_NOT_SPEED}", words)
+
+
+def names_rest(name: str) -> bool:
+    """Whether the words of a name say that its values are the pulse at which a controller rests.
+
+    Examples
+    --------
+    >>> names_rest("thr_left_pwm_zero_point"), names_rest("thr_left")
+    (True, False)
+    """
+    return bool(re.search(r"\b(zero|neutral|trim|rest|idle|center|centre|mid|middle)\b", plain_words(name)))
 
 
 def sign_of_name(name: str) -> int:

@@ -32,6 +32,10 @@ JUMP_S = 2.0
 """Time in which an order changes by more than a half of its threshold where it jumps, s. Project choice: steering gear
 turns by 2.3 deg/s and more (SOLAS II-1, regulation 29.3.2), helmsmen's corrections are slower or smaller."""
 
+SPLINTER_S = 5.0
+"""Stretches of a craft that are shorter go with their neighbour, s. Project choice: the time before the execute, with
+which a trial begins, would be most of theirs."""
+
 PROPULSION_STEP = 0.1
 """Change of propulsion, as a share of its largest, that is an order. Project choice: governors hold 2 %."""
 
@@ -156,6 +160,8 @@ def find_stretches(voyage: Voyage) -> tuple[Stretch, ...]:
     if signals is None:
         return ()
     pieces = _merged(signals, [_piece(signals, begin, end) for begin, end in _cuts(signals)])
+    if signals.threshold != HELD_RUDDER_RAD:
+        pieces = _without_splinters(signals, pieces)
     return tuple(_stretch(signals, piece) for piece in pieces)
 
 
@@ -378,6 +384,20 @@ def _merged(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
             out[-1] = replace(out[-1], end=piece.end)
         else:
             out.append(piece)
+    return out
+
+
+def _without_splinters(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
+    """Pieces of a craft of which none that excites it is a splinter next to another such piece: both are steps."""
+    out: list[_Piece] = []
+    for piece in pieces:
+        last = out[-1] if out else None
+        if last is not None and last.kind.excites and piece.kind.excites:
+            shortest = min(each.end - each.begin for each in (last, piece)) * signals.step
+            if shortest < SPLINTER_S:
+                out[-1] = replace(last, end=piece.end, kind=StretchKind.STEPS)
+                continue
+        out.append(piece)
     return out
 
 

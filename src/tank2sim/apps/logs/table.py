@@ -69,6 +69,10 @@ have a row a second or more; a row in 100 s shows no manoeuvre."""
 _SLOWEST_MPS = 0.05
 """Speed of a track, m/s, below which its times are in a smaller unit. Project choice: receivers at rest wander so."""
 
+_LEAST_TURNED_DEG, _SLOWEST_TURN_DEGPS = 10.0, 0.05
+"""Turn of a log from which its rate gives the unit of the time, deg, and the rate at which no vessel turns at its
+fastest, deg/s. Project choice: large tankers turn at 0.3 deg/s."""
+
 _MOST = 0.5
 """Share of the rows of a time that have a value of a column that is sampled row by row. Project choice."""
 
@@ -345,10 +349,13 @@ def _count_by_motion(name: str, values: Array, frame: pd.DataFrame, findings: li
     if step < _DOUBTFUL_STEP:
         return 1.0
     speed = _track_speed(values, frame)
-    if speed is None:
-        if step < _SLOWEST_STEP_S:
+    if not speed:  # no positions, or the receiver was at rest
+        slow = _turns_too_slowly(values, frame)
+        if not slow and step < _SLOWEST_STEP_S - 1e-3:
             return 1.0
-        text = f"{name} states no unit, and a row in {step:.4g} s shows no manoeuvre: it is taken to count ms"
+        rows = f"a row in {step:.4g} s shows no manoeuvre"
+        why = "the heading would turn by less than any vessel" if slow else rows
+        text = f"{name} states no unit, and {why}: it is taken to count ms"
         findings.append(LogFinding("fault", text, name))
         return 1e-3
     factor = next((factor for factor in (1.0, 1e-3, 1e-6, 1e-9) if speed > _SLOWEST_MPS * factor), 1.0)
@@ -356,6 +363,19 @@ def _count_by_motion(name: str, values: Array, frame: pd.DataFrame, findings: li
         text = f"{name} states no unit; in s the vessel would make {speed:.2g} m/s, so it counts in {factor:g} s"
         findings.append(LogFinding("note", text, name, {"unit_s": factor}))
     return factor
+
+
+def _turns_too_slowly(values: Array, frame: pd.DataFrame) -> bool:
+    """Whether a heading (deg) turns so slowly, with the time in s, that the time is in a smaller unit."""
+    columns = {quantity_of_name(name): name for name in frame.columns}
+    if "heading" not in columns or (heading := _numbers(frame[columns["heading"]], False)) is None:
+        return False
+    known = np.isfinite(heading) & np.isfinite(values)
+    turned, steps = np.unwrap(heading[known], period=360), np.diff(values[known])
+    if len(steps) < _ROWS_OF_A_SIGNAL or np.ptp(turned) < _LEAST_TURNED_DEG or not (steps > 0).any():
+        return False
+    rates = np.abs(np.diff(turned))[steps > 0] / steps[steps > 0]
+    return float(np.percentile(rates, 99)) < _SLOWEST_TURN_DEGPS
 
 
 def _track_speed(values: Array, frame: pd.DataFrame) -> float | None:

@@ -13,9 +13,12 @@ from enum import StrEnum
 import numpy as np
 
 from tank2sim.arrays import Array
+from tank2sim.errors import InputError
+from tank2sim.identification.craft.first_values import estimate_by_velocities
 from tank2sim.identification.craft.problem import DISTURBANCES, with_disturbances
-from tank2sim.identification.trials.methods.kalman import KalmanEstimate, KalmanSettings, Smoothed, kalman
-from tank2sim.identification.trials.methods.kalman_gains import smooth_states
+from tank2sim.identification.trials.methods.gauss_newton import StoppedSearchError
+from tank2sim.identification.trials.methods.kalman import KalmanEstimate, KalmanSettings, Smoothed, estimate_at, kalman
+from tank2sim.identification.trials.methods.kalman_gains import FilterFault, smooth_states
 from tank2sim.identification.trials.methods.kalman_pass import Levels
 from tank2sim.identification.trials.methods.kalman_search import (
     SearchPoint,
@@ -24,7 +27,8 @@ from tank2sim.identification.trials.methods.kalman_search import (
     task_of,
     whitened_innovations,
 )
-from tank2sim.identification.trials.problem.estimation_problem import Problem, SearchReport, silent
+from tank2sim.identification.trials.methods.process_noise import PUSHED
+from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 from tank2sim.simulation.sensitivity import Sensitivity
 
@@ -54,6 +58,16 @@ STRONGER = (1.0, 2.0, 4.0, 8.0, 16.0)
 FEWEST_TRIALS = 5
 """Fewest trials whose currents and winds determine how much these differ (project choice)."""
 
+CLEARLY_BETTER = 0.8
+"""Errors of predictions of the fitted trials, over the filter's errors, below which the estimate by velocities is taken
+(project choice): where the model holds the filter is better, and where it does not its noise hides the error."""
+
+_WIND_SHARES = (1.0, 0.3, 0.1)
+"""Spreads of the wind's force, over the usual one, that are tried with an estimate that knows no wind."""
+
+_STEPS_FROM_NEAR = 20
+"""Most steps of a search that begins at the estimate by velocities, each of the filter over all trials."""
+
 LEAST_SPREAD = 0.03
 """Least spread of a disturbance between trials, over that before them: 0.01 m/s of a current (project choice)."""
 
@@ -62,6 +76,11 @@ _EXPECTATIONS = 1000
 
 _LINEARISATIONS = 5
 """Passes of the filter, each linearised along the one before: the trajectory of the last no longer moves."""
+
+
+AXES = {f"motion.{key}": words for key, words in (("u", "surge"), ("v", "sway"), ("r", "yaw"), ("psi", "heading"))}
+AXES |= {"motion.x": "position to north", "motion.y": "position to east"}
+"""Names of the motion's states in messages."""
 
 
 class CoefficientVerdict(StrEnum):
@@ -122,8 +141,10 @@ class CraftFit:
 def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
     """Estimate the free parameters of a craft with the noise levels.
 
-    Twice: the second time current, wind and bias of each trial are known beforehand as well as they agreed between
-    trials the first time (empirical Bayes), for they change slowly.
+    The search begins at the estimate by velocities, which is taken itself where it predicts the fitted trials clearly
+    better (:data:`CLEARLY_BETTER`). With :data:`FEWEST_TRIALS` the filter searches twice: the second time current, wind
+    and bias of each trial are known beforehand as well as they agreed between trials the first time (empirical Bayes),
+    for they change slowly.
 
     Parameters
     ----------
@@ -132,27 +153,103 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
     progress : callable
         Called with each better estimate.
     """
-    settings = KalmanSettings(drifting=True, scale_prior=False)
-    first = _first_estimate(problem, settings, progress)
-    problem = with_disturbances(problem, *_disturbances_of(problem, first.smoothed))
-    estimate = kalman(problem, first.values, settings, progress)
+    found = estimate_by_velocities(problem)
+    other = None if found is None else _at_velocities(problem, found)
+    steps = KalmanSettings.iterations if found is None else _STEPS_FROM_NEAR
+    settings = KalmanSettings(drifting=True, scale_prior=False, iterations=steps)
+    try:
+        estimate = _first_estimate(problem, settings, progress, found)
+        fit = _fit_of(problem, estimate)
+    except InputError:
+        if other is None:
+            raise
+        return other[1]
+    if other is not None and other[0] < CLEARLY_BETTER * _unpredicted(fit):
+        return other[1]
+    if len(problem.runs) < FEWEST_TRIALS:
+        return fit
+    narrower = with_disturbances(problem, *_disturbances_of(problem, estimate.smoothed))
+    try:
+        return _fit_of(narrower, kalman(narrower, estimate.values, settings, progress, fit.levels))
+    except InputError:  # it stops, or loses a trial: the first estimate stays
+        return fit
+
+
+def _fit_of(problem: Problem, estimate: KalmanEstimate) -> CraftFit:
+    """The fit of an estimate by the filter."""
     levels = levels_of(problem, estimate)
     return CraftFit(problem, estimate, levels, information(problem, estimate.values, levels))
 
 
-def _first_estimate(problem: Problem, settings: KalmanSettings, progress: SearchReport) -> KalmanEstimate:
-    """The estimate from the card, or with stronger damping of sway and yaw if that craft is too unstable."""
+def _at_velocities(problem: Problem, found: Estimate) -> tuple[float, CraftFit] | None:
+    """Errors of predictions and fit with the estimate by velocities, with the spread of the wind's force that is best.
+
+    None where the filter loses the motion with all of them.
+    """
+    wide = np.array([problem.model[name].nominal for name in DISTURBANCES])
+    wind = np.array([name.startswith("disturbance") for name in DISTURBANCES])
+    fits = []
+    for share in _WIND_SHARES:
+        posed = with_disturbances(problem, np.zeros(len(wide)), np.where(wind, share * wide, wide))
+        task = task_of(posed, drifting=True)
+        try:
+            point = task.first_point(found.values)
+            by_run = information(posed, found.values, task.first)
+        except (InputError, np.linalg.LinAlgError):
+            continue
+        if not np.isfinite(point.cost):
+            continue
+        filtered = estimate_at(task, point)
+        estimate = replace(
+            filtered, method=found.method, covariance=found.covariance, information=found.information, cost=found.cost
+        )
+        fit = CraftFit(posed, estimate, point.levels, by_run)
+        fits.append((_unpredicted(fit), fit))
+    return min(fits, key=lambda entry: entry[0], default=None)
+
+
+def _unpredicted(fit: CraftFit) -> float:
+    """Errors at the ends of free predictions of the fitted trials, rms distance times rms heading; inf if they fail."""
+    try:
+        ends = np.concatenate([np.zeros((0, 3)), *(found.ends for found in predict_free(fit, fit.problem.runs))])
+    except InputError:
+        return np.inf
+    distance, turned = np.hypot(ends[:, 0], ends[:, 1]), np.angle(np.exp(1j * ends[:, 2]))
+    seen = np.isfinite(distance) & np.isfinite(turned)
+    return float(np.sqrt(np.mean(distance[seen] ** 2) * np.mean(turned[seen] ** 2))) if seen.any() else np.inf
+
+
+def _first_estimate(
+    problem: Problem, settings: KalmanSettings, progress: SearchReport, by_velocities: Estimate | None
+) -> KalmanEstimate:
+    """The estimate from that by velocities, from the card, or with stronger damping if that craft is too unstable."""
     damping = np.array([name in STABILISING for name in problem.free])
     task = task_of(problem, drifting=True)
-    for factor in STRONGER:
-        start = np.where(damping, factor * problem.prior_mean, problem.prior_mean)
+    fault: InputError | None = None
+    starts = [np.where(damping, factor * problem.prior_mean, problem.prior_mean) for factor in STRONGER]
+    for start in starts if by_velocities is None else [by_velocities.values, *starts]:
         try:
-            system = normal(task, task.first_point(start))
-        except np.linalg.LinAlgError:
-            continue
-        if all(np.isfinite(part).all() for part in system):
-            return kalman(problem, start, settings, progress)
-    raise np.linalg.LinAlgError("the covariance of the filter is not a number")
+            point = task.first_point(start)
+            if point.filtered.wild is not None:
+                raise FilterFault(point.filtered.wild)
+            if all(np.isfinite(part).all() for part in normal(task, point)):
+                return kalman(problem, start, settings, progress)
+        except FilterFault as error:
+            fault = fault or not_followed(problem, error.place)
+        except StoppedSearchError as error:
+            fault = fault or error
+    raise fault or not_followed(problem, (0, 0, 0))
+
+
+def not_followed(problem: Problem, place: tuple[int, int, int]) -> InputError:
+    """The error that names trial, time and axis at which the filter loses the motion (run, instant, state)."""
+    run = problem.runs[place[0]]
+    names = [*problem.model.state_names, *(f"random acceleration {name}" for name in PUSHED)]
+    name = names[place[2]] if place[2] < len(names) else "the drift of a sensor"
+    axis = AXES.get(name, name)
+    remedy = "check mass, thrust curves and damping of the card, and the places and signs of the thrusters"
+    where = f"{axis} at {run.times[place[1]]:.4g} s"
+    return InputError(run.origin, where, "the card does not move as the trial does, not even roughly", remedy)
 
 
 def _disturbances_of(problem: Problem, runs: Sequence[Smoothed]) -> tuple[Array, Array]:
@@ -216,11 +313,28 @@ def information(problem: Problem, values: Array, levels: Levels) -> Array:
 
 
 def _point(problem: Problem, values: Array, levels: Levels) -> tuple[SearchTask, SearchPoint]:
-    """A pass of the filter over the runs."""
-    task = replace(task_of(problem, drifting=True), first=levels)
-    point = task.first_point(values)
+    """A pass of the filter over the runs; a linearisation that fails is left out.
+
+    Raises
+    ------
+    InputError
+        The filter loses the motion of a trial; the message names trial, time and axis.
+    """
+    task = task_of(problem, drifting=True)
+    try:
+        point = task.first_point(values, levels)
+    except FilterFault as error:
+        raise not_followed(problem, error.place) from None
+    if point.filtered.wild is not None:
+        raise not_followed(problem, point.filtered.wild)
     for _ in range(_LINEARISATIONS):
-        point = task.relinearise(point)
+        try:
+            newer = task.relinearise(point)
+        except np.linalg.LinAlgError:
+            break
+        if not np.isfinite(newer.cost):
+            break
+        point = newer
     return task, point
 
 
@@ -259,7 +373,7 @@ def predict_free(fit: CraftFit, runs: Sequence[SampledRun]) -> list[FreePredicti
     """
     problem = fit.problem.with_runs(tuple(runs))
     names = problem.model.state_names
-    point = _point(problem, fit.estimate.values, fit.levels)[1]
+    task, point = _point(problem, fit.estimate.values, fit.levels)
     filtered, nx = point.filtered, len(names)
     tangents = filtered.tangents
     states, _ = smooth_states(tangents.A, tangents.C, filtered.gains, filtered.before, filtered.innovations)
@@ -273,9 +387,14 @@ def predict_free(fit: CraftFit, runs: Sequence[SampledRun]) -> list[FreePredicti
         rows, predicted, ends = [], [], []
         count, length = len(run.measured), round(PREDICTED_S / run.step_s)
         begin = round(PREDICTION_LEAD_S / run.step_s)
+        parts = task.disturbed.parts(filtered.after[number, :count], run.inputs, p, run.step_s)
         while count - begin >= SHORTEST_PREDICTION_S / run.step_s:
             end = min(begin + length, count)
-            free = sensitivity.motion(filtered.after[number, begin, :nx], run.inputs[begin : end - 1], p, run.step_s)
+            inputs = np.repeat(run.inputs[begin : end - 1], parts, axis=0)
+            free = sensitivity.motion(filtered.after[number, begin, :nx], inputs, p, run.step_s / parts)[::parts]
+            if not np.isfinite(free).all():
+                instant, state = np.argwhere(~np.isfinite(free))[0].tolist()
+                raise not_followed(problem, (number, begin + instant, state))
             rows.append(np.arange(begin + 1, end))
             predicted.append(free[1:, motion])
             ends.append(free[-1, placed] - run.measured[end - 1, measured])

@@ -11,6 +11,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredCard
+from tank2sim.errors import InputError
 from tank2sim.identification.craft.fit import (
     IDENTIFIED_SHARE,
     TRIALS_SHARE,
@@ -141,5 +142,5 @@ def _added_information(fit: CraftFit, inputs: Array) -> Array | None:
     made = replace(run, name="candidate", begin_s=0.0, inputs=inputs, measured=shown)
     try:
         return np.asarray(information(problem.with_runs((made,)), fit.estimate.values, fit.levels)[0])
-    except np.linalg.LinAlgError:
+    except InputError:  # the filter loses the motion
         return None

@@ -57,6 +57,13 @@ THRUST_SPREAD = 1.0
 LAG_SPREAD = 0.5
 """Standard error of the lag of a thruster on the card, over its value, where the card states none (project choice)."""
 
+EXPONENT_SPREAD = 0.3
+"""Standard error of the exponent of the orders of a thruster, where the card states none: from revolutions that follow
+the order to thrust that nearly does (project choice)."""
+
+_EXPONENTS = (0.2, 3.0)
+"""Bounds of the exponent of the orders (project choice)."""
+
 LOSS_SPREAD = 0.5
 """Standard error of the loss of thrust by speed, over half of the thrust at the cruising revolutions over the cruising
 speed (project choice)."""
@@ -64,6 +71,9 @@ speed (project choice)."""
 DRAUGHT_OF_CRAFT = 0.06
 """Draught over length where the card states none: between that of a planing hull and of a displacement one (project
 choice)."""
+
+NEVER_POSITIVE = ("Xudot", "Yvdot", "Nrdot", "Xu", "Xuabsu", "Yv", "Yvabsv", "Nr", "Nrabsr")
+"""Coefficients that are not positive: an added mass and a damping of each motion by itself."""
 
 DISTURBANCES = ("current.north", "current.east", "disturbance.north", "disturbance.east", "gyro.bias")
 """States of the model that do not change in a trial: m/s, m/s, N, N, rad/s."""
@@ -80,15 +90,20 @@ def craft_fit_model(card: SteeredCard, driven_by: str = "revolutions", *, turned
     ----------
     card : SteeredCard
     driven_by : str
-        ``revolutions``: lag and dead band of the card are left out, for both lie before the revolutions; ``orders``:
-        they are in, except a lag shorter than a step.
+        ``revolutions``: lag, dead band and exponent of the card are left out, for they lie before the revolutions;
+        ``orders``: they are in, except a lag shorter than a step.
     turned : bool
         The directions of thrusters that turn were measured: their lag is left out.
     """
     thrusters = tuple(
-        thruster.model_copy(update={"time_constant_s": None, "dead_band_radps": 0.0})
+        thruster.model_copy(update={"time_constant_s": None, "dead_band_radps": 0.0, "order_exponent": None})
         if driven_by == "revolutions"
-        else thruster.model_copy(update={"time_constant_s": _felt(thruster.time_constant_s)})
+        else thruster.model_copy(
+            update={
+                "time_constant_s": _felt(thruster.time_constant_s),
+                "order_exponent": thruster.order_exponent or 1.0,
+            }
+        )
         for thruster in card.thrusters
     )
     if turned:
@@ -145,6 +160,7 @@ def twins(card: SteeredCard) -> dict[str, tuple[str, ...]]:
         "ahead_Ns2": "ahead",
         "astern_Ns2": "astern",
         "speed_loss_kg": "speed_loss",
+        "order_exponent": "order_exponent",
         "time_constant_s": "time_constant",
     }
     first, *others = card.thrusters
@@ -186,11 +202,13 @@ def craft_prior(card: SteeredCard, model: Model) -> dict[str, tuple[float, float
             "astern": ("astern_Ns2", THRUST_SPREAD * max(thruster.astern_Ns2, 0.5 * thruster.ahead_Ns2)),
             "speed_loss": ("speed_loss_kg", LOSS_SPREAD * 0.5 * thruster.ahead_Ns2 * thruster.max_radps / speed),
         }
+        spreads["order_exponent"] = "order_exponent", EXPONENT_SPREAD
         if lag := _felt(thruster.time_constant_s):
             spreads["time_constant"] = "time_constant_s", LAG_SPREAD * lag
         for part, (key, spread) in spreads.items():
             if f"{prefix}.{part}" in model:
-                found[f"{prefix}.{part}"] = getattr(thruster, key), thruster.uncertainty.get(key, spread)
+                stated = getattr(thruster, key)
+                found[f"{prefix}.{part}"] = 1.0 if stated is None else stated, thruster.uncertainty.get(key, spread)
     return found
 
 
@@ -210,7 +228,7 @@ def craft_problem(card: SteeredCard, trials: Sequence[Trial]) -> Problem:
     """
     by = craft_driven_by(card, trials)
     turned = not any(name.startswith("azimuth_order_") for trial in trials for name in trial.signals)
-    model = _unbounded(craft_fit_model(card, by, turned=turned))
+    model = _bounded(craft_fit_model(card, by, turned=turned))
     unused = "order_" if by == "revolutions" else "n_"
     trials = [
         replace(trial, signals={key: values for key, values in trial.signals.items() if not key.startswith(unused)})
@@ -267,12 +285,18 @@ def with_disturbances(problem: Problem, means: Array, spreads: Array) -> Problem
     return replace(problem, model=replace(problem.model, states=tuple(map(with_prior, problem.model.states))))
 
 
-def _unbounded(model: Model) -> Model:
-    """The model without bounds on the loss of thrust: an estimate near zero has an error to both sides."""
+def _bounded(model: Model) -> Model:
+    """The model with the bounds of physics, and none on the loss of thrust, whose error may have either sign."""
 
-    def without_bound(parameter: Parameter) -> Parameter:
-        if not parameter.name.endswith(".speed_loss"):
-            return parameter
-        return same_symbol(parameter, replace(parameter, minimum=None))
+    def bounded(parameter: Parameter) -> Parameter:
+        if parameter.name.endswith(".speed_loss"):
+            return same_symbol(parameter, replace(parameter, minimum=None))
+        if parameter.name.startswith("thrusters.") and parameter.name.endswith(".time_constant"):
+            return same_symbol(parameter, replace(parameter, minimum=OBSERVED_STEP_S / 2))  # less does not show
+        if parameter.name.endswith(".order_exponent"):
+            return same_symbol(parameter, replace(parameter, minimum=_EXPONENTS[0], maximum=_EXPONENTS[1]))
+        if parameter.name.removeprefix("derivatives.") in NEVER_POSITIVE:
+            return same_symbol(parameter, replace(parameter, maximum=0.0))
+        return parameter
 
-    return replace(model, parameters=tuple(map(without_bound, model.parameters)))
+    return replace(model, parameters=tuple(map(bounded, model.parameters)))

@@ -287,12 +287,8 @@ def predict_trials(card: SteeredCard, trials: Sequence[Trial]) -> tuple[Predicti
         A file is at fault, none is long enough, or the card does not move as the trials do.
     """
     problem = craft_problem(card, trials)
-    try:
-        with np.errstate(all="ignore"), threadpool_limits(limits=1, user_api="blas"):
-            predictions = predict_by_card(problem)
-    except np.linalg.LinAlgError:
-        remedy = "identify the card from trials first"
-        raise InputError(card.source, "", "does not move as the trials do, not even roughly", remedy) from None
+    with np.errstate(all="ignore"), threadpool_limits(limits=1, user_api="blas"):
+        predictions = predict_by_card(problem)
     least = PREDICTION_LEAD_S + SHORTEST_PREDICTION_S
     if not predictions:
         raise InputError("trials", "", f"none is longer than {least:g} s", "give longer ones")

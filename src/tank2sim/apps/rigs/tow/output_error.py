@@ -19,6 +19,7 @@ from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import column_norms, scaled_condition
+from tank2sim.identification.trials.methods.gauss_newton import is_minimum
 from tank2sim.simulation.scheme import runge_kutta_step
 from tank2sim.simulation.sensitivity import augmented_step
 
@@ -213,6 +214,11 @@ def fit_speeds(
         gtol=1e-12,
     )
     if not found.success or not np.isfinite(found.x).all():
+        return None
+    variance = max(float(np.mean(found.fun**2)), np.finfo(float).tiny)
+    H, g = found.jac.T @ found.jac, found.jac.T @ found.fun
+    stays = is_minimum(H, g, variance=variance, bounded=(found.x, lowest, highest))
+    if np.array_equal(found.x, start) and not stays:  # the search did not move: it would be the guess
         return None
     best = np.where(found.active_mask < 0, 0.0, found.x)
     residuals, design = at(*best)

@@ -23,6 +23,7 @@ from tank2sim.apps.rigs.yaw.records import YawRecord
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import column_norms
+from tank2sim.identification.trials.methods.gauss_newton import is_minimum
 from tank2sim.simulation.scheme import runge_kutta_step
 from tank2sim.simulation.sensitivity import augmented_step
 
@@ -130,7 +131,9 @@ def _search(evaluate: Callable[[Array], tuple[Array, Array]], begin: Array, coun
             )
         except ValueError:
             continue
-        if found.success:
+        variance = max(float(np.mean(found.fun**2)), np.finfo(float).tiny)
+        stays = is_minimum(found.jac.T @ found.jac, found.jac.T @ found.fun, variance=variance)
+        if found.success and (stays or not np.array_equal(found.x, start)):
             return found
     return None
 

@@ -16,7 +16,7 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise, estimate_coloured_noise, white
-from tank2sim.identification.trials.methods.gauss_newton import damped_gauss_newton
+from tank2sim.identification.trials.methods.gauss_newton import damped_gauss_newton, is_minimum, refuse_stopped
 from tank2sim.identification.trials.methods.posterior import BLOCK, evidence_scale, sandwich, scaled_prior
 from tank2sim.identification.trials.methods.weak_form import WEAK_EQUATIONS, WIDTH, WeakForm, WeakWindows
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
@@ -105,12 +105,13 @@ def equation_error(
     Raises
     ------
     InputError
-        A run lacks velocities and signals that determine them, or all runs are shorter than a window.
+        A run lacks velocities and signals that determine them, all runs are shorter than a window, or the search
+        cannot move from its start, although the data ask for it (:class:`.StoppedSearchError`).
     """
     settings = settings or EquationErrorSettings()
     form = WeakForm(problem, settings.width)
     refuse_empty(form)
-    values = (problem.prior_mean if start is None else start).astype(float)
+    first = values = (problem.prior_mean if start is None else start).astype(float)
     windows = form.at(values)
     weights = first_weights(form)
     scale: dict[str, float] = {}
@@ -123,6 +124,10 @@ def equation_error(
             weights = weights_of(form, windows)
             if settings.scale_prior:
                 scale = evidence_scale(problem, normal.information, values, scale)
+    if np.array_equal(values, first):
+        known = problem.prior_precision(prior)
+        H, g = normal.information + known, normal.gradient + known @ (values - problem.prior_mean)
+        refuse_stopped("equation error", is_minimum(H, g, bounded=(values, *problem.bounds)))
     deviations = np.sqrt(np.mean(np.concatenate([window.residuals for window in windows]) ** 2, axis=0))
     return Estimate(
         method="equation_error",

@@ -9,9 +9,54 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from tank2sim.arrays import Array
+from tank2sim.errors import InputError
 
 MOST_ATTEMPTS = 10
 """Most attempts of a step, each with ten times the damping of the previous one: the last steps are negligible."""
+
+
+class StoppedSearchError(InputError):
+    """A search that could not take a single step, although the data ask for one: its estimate would be the start."""
+
+
+def is_minimum(H: Array, g: Array, *, variance: float = 1.0, bounded: tuple[Array, Array, Array] | None = None) -> bool:
+    """Whether a point is a minimum of a sum of squares, within its scatter.
+
+    The step that the normal equations ask for lowers the sum by ``g' H^-1 g``: at a minimum by less than one variance
+    for each unknown.
+
+    Parameters
+    ----------
+    H, g : arrays (k, k) and (k,)
+        Normal equations at the point.
+    variance : float
+        Variance of the residuals.
+    bounded : (array, array, array), optional
+        Values (k,) and their least and largest: an unknown that is pressed against a bound stays there.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> is_minimum(np.eye(2), np.array([0.5, 0.5])), is_minimum(np.eye(2), np.array([0.5, 3.0]))
+    (True, False)
+    """
+    free = np.ones(len(g), dtype=bool)
+    if bounded is not None:
+        values, low, high = bounded
+        free = ~(((values <= low) & (g > 0)) | ((values >= high) & (g < 0)))
+    H, g = H[np.ix_(free, free)], g[free]
+    if not (np.isfinite(H).all() and np.isfinite(g).all()):
+        return False
+    return bool(g @ np.linalg.lstsq(H, g, rcond=None)[0] <= variance * max(1, len(g)))
+
+
+def refuse_stopped(method: str, at_minimum: bool) -> None:
+    """Raise StoppedSearchError for a search by `method` that never moved, unless its start is a minimum."""
+    if not at_minimum:
+        problem = f"the search by {method} could not take a step from its start, which does not fit the data"
+        raise StoppedSearchError(
+            "trials", "", problem, "give a start that is nearer, or check the records and the card"
+        )
 
 
 class _WithCost(Protocol):

@@ -19,8 +19,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tank2sim.arrays import Array
+from tank2sim.identification.trials.methods.gauss_newton import is_minimum, refuse_stopped
 from tank2sim.identification.trials.methods.kalman_gains import smooth_states
-from tank2sim.identification.trials.methods.kalman_pass import FilterPass
+from tank2sim.identification.trials.methods.kalman_pass import FilterPass, Levels
 from tank2sim.identification.trials.methods.kalman_search import (
     SearchPoint,
     SearchTask,
@@ -132,6 +133,7 @@ def kalman(
     start: Array | None = None,
     settings: KalmanSettings | None = None,
     progress: SearchReport = silent,
+    levels: Levels | None = None,
 ) -> KalmanEstimate:
     """Estimate the free parameters and the noise levels by maximum likelihood of the innovations.
 
@@ -144,10 +146,17 @@ def kalman(
     settings : KalmanSettings, optional
     progress : callable
         Called with each better estimate; its exceptions propagate.
+    levels : Levels, optional
+        Noise levels at the start; by default from the measurements.
+
+    Raises
+    ------
+    StoppedSearchError
+        The search cannot move from its start, although the data ask for it.
     """
     settings = settings or KalmanSettings()
     task = task_of(problem, white=settings.white, drifting=settings.drifting)
-    best = task.first_point((problem.prior_mean if start is None else start).copy())
+    best = task.first_point((problem.prior_mean if start is None else start).copy(), levels)
     costs: tuple[float, ...] = ()
     scale: Mapping[str, float] = {}
     for number in range(_ROUNDS):
@@ -155,6 +164,9 @@ def kalman(
             task, best, settings.iterations, lambda point: progress("kalman", point.values, point.cost)
         )
         costs += found
+        if not costs:
+            stays = is_minimum(*normal(task, best), bounded=(best.values, *problem.bounds))
+            refuse_stopped("the Kalman filter", stays)
         wanted = evidence_scale(problem, _information(task, best), best.values, scale)
         same = all(abs(factor / scale.get(group, 1.0) - 1) < SAME_SCALE for group, factor in wanted.items())
         if not settings.scale_prior or number == _ROUNDS - 1 or same:
@@ -162,7 +174,7 @@ def kalman(
         scale = wanted
         task = replace(task, problem=replace(problem, prior_error=scaled_prior(problem, scale)))
         best = task.relinearise(best)
-    return _estimate(task, best, costs, scale)
+    return estimate_at(task, best, costs, scale)
 
 
 def _information(task: SearchTask, point: SearchPoint) -> Array:
@@ -170,9 +182,20 @@ def _information(task: SearchTask, point: SearchPoint) -> Array:
     return normal(task, point)[0] - task.problem.prior_precision(task.problem.prior_error)
 
 
-def _estimate(
-    task: SearchTask, best: SearchPoint, costs: tuple[float, ...], scale: Mapping[str, float]
+def estimate_at(
+    task: SearchTask, best: SearchPoint, costs: tuple[float, ...] = (), scale: Mapping[str, float] | None = None
 ) -> KalmanEstimate:
+    """The estimate at a point of the search.
+
+    Parameters
+    ----------
+    task : SearchTask
+    best : SearchPoint
+    costs : tuple of float
+        Of the search.
+    scale : mapping, optional
+        Factors on the prior's standard errors by group.
+    """
     problem, batch = task.problem, task.batch
     information = _information(task, best)
     before = problem.prior_precision(problem.prior_error)
@@ -187,7 +210,7 @@ def _estimate(
         information=information,
         noise=dict(zip(problem.seen, map(float, spread), strict=True)),
         cost=costs,
-        prior_scale=dict(scale),
+        prior_scale=dict(scale or {}),
         process_noise=dict(zip(task.disturbed.pushed, correlated, strict=False)),
         drift=dict(zip(problem.seen, correlated[len(task.disturbed.pushed) :], strict=False)),
         measurement_noise=dict(zip(problem.seen, map(float, np.exp(best.levels.measurement)), strict=True)),

@@ -67,6 +67,34 @@ class Gains:
         return float(-2 * np.log(np.diagonal(self.whitener, axis1=-2, axis2=-1)).sum())
 
 
+class FilterFault(np.linalg.LinAlgError):
+    """The covariance of a filter is no longer positive, because the linearised motion is too unstable.
+
+    Parameters
+    ----------
+    place : (int, int, int)
+        Run, instant, and the state whose variance is largest.
+    """
+
+    def __init__(self, place: tuple[int, int, int]):
+        super().__init__("the covariance of the filter is not positive")
+        self.place = place
+
+
+def first_place(wild: NDArray[np.bool_]) -> tuple[int, int, int]:
+    """Run, instant and state of the earliest true place of an array (runs, n, nz).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> first_place(np.array([[[0, 0], [0, 1]], [[1, 0], [0, 0]]]).astype(bool))
+    (1, 0, 0)
+    """
+    runs, instants, states = np.nonzero(wild)
+    place = int(np.argmin(instants))
+    return int(runs[place]), int(instants[place]), int(states[place])
+
+
 def _together(lengths: Sequence[int] | None, runs: int, n: int) -> Iterator[tuple[range, NDArray[np.intp]]]:
     """Instants in their order, taken apart where a run ends, each part with the runs that go on in it."""
     every = np.full(runs, n) if lengths is None else np.asarray(lengths)
@@ -88,12 +116,22 @@ def gains(A: Array, C: Array, variances: Variances) -> Gains:
         P, process = last[on], variances.process[on]
         for k in instants:
             result.P[on, k] = P
-            _, W, M = _update(P, C[on, k], variances.measurement[on, k])
+            try:
+                _, W, M = _update(P, C[on, k], variances.measurement[on, k])
+            except np.linalg.LinAlgError:
+                raise FilterFault(_faulty(P, on, k)) from None
             result.whitener[on, k] = W
             result.K[on, k] = np.swapaxes(M, -1, -2) @ W
             P = _following(P, M, A[on, k], process)
         last[on] = P
     return result
+
+
+def _faulty(P: Array, on: NDArray[np.intp], instant: int) -> tuple[int, int, int]:
+    """Place of the largest variance of covariances (runs, nz, nz), the instant being known."""
+    size = np.abs(np.diagonal(P, axis1=-2, axis2=-1))
+    run, state = np.unravel_index(int(np.argmax(np.where(np.isfinite(size), size, np.inf))), size.shape)
+    return int(on[run]), instant, int(state)
 
 
 def variant_likelihoods(

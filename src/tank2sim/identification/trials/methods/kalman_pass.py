@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from tank2sim.arrays import Array
-from tank2sim.identification.trials.methods.kalman_gains import Gains, Variances, gains
+from tank2sim.identification.trials.methods.kalman_gains import Gains, Variances, first_place, gains
 from tank2sim.identification.trials.methods.process_noise import Disturbed, Tangents
 from tank2sim.identification.trials.methods.shooting import cut
 from tank2sim.identification.trials.problem.estimation_problem import Problem
+
+_LARGEST = 1e9
+"""Size of a state, SI, that no motion has."""
+
+_SMOOTHED_S = 1.0
+"""Time over which positions give the velocity at which a filter is linearised first, s (project choice)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +143,8 @@ class FilterPass:
     gains : Gains
     cost : float
         -2 log likelihood except for a constant; inf where the motion leaves all bounds.
+    wild : (int, int, int), optional
+        Run, instant and state that leave all bounds first.
     """
 
     before: Array
@@ -143,6 +153,12 @@ class FilterPass:
     tangents: Tangents
     gains: Gains
     cost: float
+    wild: tuple[int, int, int] | None = None
+
+    @property
+    def trajectory(self) -> tuple[Array, Array]:
+        """States before and after each measurement."""
+        return self.before, self.after
 
     @property
     def white(self) -> Array:
@@ -157,9 +173,11 @@ def filter_pass(disturbed: Disturbed, batch: Batch, p: Array, levels: Levels, al
     runs, n, ny = batch.measured.shape
     nz, k = batch.starts.shape[1], disturbed.parameters
     tangents = Tangents(*(np.zeros((runs, n, *shape)) for shape in ((nz, nz), (nz, k), (ny, nz), (ny, k))))
+    parts: list[int] = []
     for number, (length, case) in enumerate(zip(batch.lengths, cases, strict=True)):
         rows, mask = np.s_[number, :length], batch.known[number, :length, :, None]
-        of_run = disturbed.tangents(along[0][rows], along[1][rows], batch.inputs[rows], case)
+        parts.append(disturbed.parts(along[1][rows], batch.inputs[rows], p, float(batch.steps[number])))
+        of_run = disturbed.tangents(along[0][rows], along[1][rows], batch.inputs[rows], case, parts[-1])
         tangents.A[rows], tangents.B[rows] = of_run.A, of_run.B
         tangents.C[rows], tangents.D[rows] = np.where(mask, of_run.C, 0.0), np.where(mask, of_run.D, 0.0)
     found = gains(tangents.A, tangents.C, levels.variances(batch, disturbed.nominal))
@@ -167,10 +185,12 @@ def filter_pass(disturbed: Disturbed, batch: Batch, p: Array, levels: Levels, al
     for number, (length, case) in enumerate(zip(batch.lengths, cases, strict=True)):
         rows = np.s_[number, :length]
         start, inputs, measured = batch.starts[number], batch.inputs[rows], batch.measured[rows]
-        before[rows] = disturbed.predicted(start, inputs, measured, found.K[rows], case)
+        before[rows] = disturbed.predicted(start, inputs, measured, found.K[rows], case, parts[number])
         before[number, length:] = before[number, length - 1]
-    if not np.isfinite(before).all() or np.abs(before).max() > 1e9:
-        return FilterPass(before, before, np.zeros_like(batch.measured), tangents, found, np.inf)
+    wild = ~(np.abs(before) < _LARGEST)  # nan, too
+    if wild.any():
+        place = first_place(wild)
+        return FilterPass(before, before, np.zeros_like(batch.measured), tangents, found, np.inf, place)
     seen = np.stack([disturbed.seen(states, inputs, p) for states, inputs in zip(before, batch.inputs, strict=True)])
     innovations = np.where(batch.known, batch.measured - seen, 0.0)
     after = before + (found.K @ innovations[..., None])[..., 0]
@@ -179,15 +199,40 @@ def filter_pass(disturbed: Disturbed, batch: Batch, p: Array, levels: Levels, al
 
 
 def measured_trajectory(problem: Problem, batch: Batch) -> tuple[Array, Array]:
-    """A first trajectory: the measured states, and the first states where none were measured."""
+    """A first trajectory: the measured states, velocities from positions, and the first states of all others."""
     n = batch.measured.shape[1]
     states = np.repeat(batch.starts[:, None], n, axis=1)
-    for place, name in enumerate(problem.model.state_names):
-        if name not in problem.seen:
-            continue
-        column = problem.seen.index(name)
-        for number in range(len(states)):
+    names = problem.model.state_names
+    for number in range(len(states)):
+        columns = {}
+        for place, name in enumerate(names):
+            if name not in problem.seen:
+                continue
+            column = problem.seen.index(name)
             known = np.flatnonzero(batch.known[number, :, column])
             if len(known):
-                states[number, :, place] = np.interp(np.arange(n), known, batch.measured[number, known, column])
+                columns[name] = np.interp(np.arange(n), known, batch.measured[number, known, column])
+                states[number, :, place] = columns[name]
+        if {"motion.x", "motion.y", "motion.psi"} <= columns.keys():
+            derived = velocities_of(columns, float(batch.steps[number]))
+            for name in derived.keys() & set(names) - columns.keys():
+                states[number, :, names.index(name)] = derived[name]
     return states, states
+
+
+def velocities_of(columns: Mapping[str, Array], step: float) -> dict[str, Array]:
+    """Velocities (n,) over the ground, along and across the vessel, and the yaw rate, by smooth position and heading.
+
+    Parameters
+    ----------
+    columns : mapping
+        ``motion.x``, ``motion.y`` and ``motion.psi`` (n,), without gaps.
+    step : float
+        s.
+    """
+    width = max(1, round(_SMOOTHED_S / step))
+    north, east, rate = (
+        uniform_filter1d(np.gradient(columns[f"motion.{letter}"], step), width) for letter in ("x", "y", "psi")
+    )
+    along, across = np.cos(columns["motion.psi"]), np.sin(columns["motion.psi"])
+    return {"motion.u": north * along + east * across, "motion.v": east * along - north * across, "motion.r": rate}

@@ -40,6 +40,9 @@ _FINEST = 0.1
 """A measurement's noise is at least this share of the value from its third differences (project choice: a smoothed
 record is rougher than its noise, and the likelihood would treat it as exact)."""
 
+_SHORTER = (1.0, 0.5, 0.25, 0.125)
+"""Shares of the way from one trajectory of linearisation to the next, until a pass succeeds (project choice)."""
+
 VARIATION = 1e-3
 """Step of the finite differences in the logarithm of a noise level."""
 
@@ -81,12 +84,28 @@ class SearchTask:
 
     def relinearise(self, point: SearchPoint) -> SearchPoint:
         """The same parameters and levels, linearised along the newest trajectory."""
-        return self.point(point.values, point.levels, (point.filtered.before, point.filtered.after))
+        return self.point(point.values, point.levels, point.filtered.trajectory)
 
-    def first_point(self, values: Array) -> SearchPoint:
-        """First point, linearised along the trajectory of a pass that is linearised along the measurements."""
-        first = self.point(values, self.first, measured_trajectory(self.problem, self.batch))
-        return self.relinearise(first)
+    def first_point(self, values: Array, levels: Levels | None = None) -> SearchPoint:
+        """First point, linearised along the trajectory of a pass that is linearised along the measurements.
+
+        The pass along the measurements has the first noise levels, which are wide, so that it follows them. A second
+        pass that fails goes only a part of the way from the measurements to that trajectory.
+        """
+        along = measured_trajectory(self.problem, self.batch)
+        first = self.point(values, self.first, along)
+        levels = levels or self.first
+        if not np.isfinite(first.cost):
+            return first
+        for share in _SHORTER:
+            way = [old + share * (new - old) for old, new in zip(along, first.filtered.trajectory, strict=True)]
+            try:
+                point = self.point(values, levels, (way[0], way[1]))
+            except np.linalg.LinAlgError:
+                continue
+            if np.isfinite(point.cost):
+                return point
+        return first
 
     @property
     def time_precision(self) -> Array:
@@ -133,6 +152,8 @@ def _first_levels(problem: Problem, disturbed: Disturbed, batch: Batch, white: b
         spread = float(known.std()) if len(known) else 1.0
         third = np.diff(column, n=3, axis=1)
         third = third[~np.isnan(third)]
+        if not len(third):  # a receiver slower than the grid
+            third = np.concatenate([np.diff(run[~np.isnan(run)], n=3) for run in column])
         rough = float(np.sqrt(np.mean(third**2) / 20)) if len(third) else 0.1 * spread
         roughness.append(max(rough, 1e-6 * spread, 1e-12))
     nominal = [state.nominal for state in problem.model.states if state.name in disturbed.pushed]
@@ -164,7 +185,7 @@ def maximise(
         levels = task.move_levels(point.levels, matrix, slope, damping)
         if np.isnan(values).any() or np.isnan(np.concatenate([levels.process, levels.time, levels.measurement])).any():
             return replace(point, cost=np.inf)
-        along = point.filtered.before, point.filtered.after
+        along = point.filtered.trajectory
         with np.errstate(all="ignore"):  # too long a step may leave all bounds
             try:
                 return task.point(np.clip(values, *task.problem.bounds), levels, along)

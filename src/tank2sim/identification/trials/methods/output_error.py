@@ -15,7 +15,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise, estimate_coloured_noise, white
-from tank2sim.identification.trials.methods.gauss_newton import damped_gauss_newton
+from tank2sim.identification.trials.methods.gauss_newton import damped_gauss_newton, is_minimum, refuse_stopped
 from tank2sim.identification.trials.methods.posterior import evidence_scale, sandwich, scaled_prior
 from tank2sim.identification.trials.methods.shooting import Normal, Pieces, Shooting, Shot, cut
 from tank2sim.identification.trials.problem.estimation_problem import (
@@ -92,6 +92,11 @@ def output_error(
     settings : OutputErrorSettings, optional
     progress : callable
         Called with each better estimate; its exceptions propagate.
+
+    Raises
+    ------
+    StoppedSearchError
+        The search cannot move from its start, although the data ask for it.
     """
     settings = settings or OutputErrorSettings()
     shooting = Shooting(problem)
@@ -114,6 +119,10 @@ def output_error(
         except KeyboardInterrupt:
             notices.append(INTERRUPTED)
             normals = work.normals(search.values, work.shots(search.values, search.starts, search.noise), search.noise)
+    if not search.costs and not notices:
+        prior = problem.prior_precision(scaled_prior(problem, search.scale))
+        H, g = _whole_normal(problem, search.values, prior, normals)
+        refuse_stopped("output error", is_minimum(H, g, bounded=(search.values, *problem.bounds)))
     motion = FittedMotion(settings.piece_s, tuple(search.starts), search.noise)
     return _estimate(work, search, normals, tuple(notices), motion)
 
@@ -164,9 +173,7 @@ def _minimise(work: _Work, search: _Search, tolerance: float) -> tuple[list[Shot
         return work.normals(start.values, start.shots, noise)
 
     def move(start: _Point, normals: list[Normal], damping: float) -> _Point:
-        tank, pull, _ = _captive_normal(problem, start.values)
-        H = sum(normal.matrix for normal in normals) + tank + prior
-        g = sum(normal.vector for normal in normals) + pull + prior @ (start.values - problem.prior_mean)
+        H, g = _whole_normal(problem, start.values, prior, normals)
         step = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
         step = np.clip(start.values + step, *problem.bounds) - start.values
         starts = [
@@ -184,6 +191,14 @@ def _minimise(work: _Work, search: _Search, tolerance: float) -> tuple[list[Shot
     found = damped_gauss_newton(point(search.values, search.starts), linearise, move, report, LONGEST_SEARCH)
     best, _, last = found
     return best.shots, last or linearise(best)
+
+
+def _whole_normal(problem: Problem, values: Array, prior: Array, normals: list[Normal]) -> tuple[Array, Array]:
+    """Normal equations (k, k), (k,) of all runs, the captive tests and the prior."""
+    tank, pull, _ = _captive_normal(problem, values)
+    H = np.asarray(sum(normal.matrix for normal in normals)) + tank + prior
+    g = np.asarray(sum(normal.vector for normal in normals)) + pull + prior @ (values - problem.prior_mean)
+    return H, g
 
 
 def _captive_normal(problem: Problem, values: Array) -> tuple[Array, Array, float]:

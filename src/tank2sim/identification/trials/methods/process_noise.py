@@ -21,6 +21,16 @@ from tank2sim.simulation.scheme import runge_kutta_step
 PUSHED = ("motion.u", "motion.v", "motion.r")
 """States whose rates have random accelerations, if the model has the state."""
 
+LARGEST_PART = 0.5
+"""Longest integration step, in the shortest time constant of the motion (project choice: Runge and Kutta's error is
+then 0.03 % of a fast mode, and the scheme is far from unstable)."""
+
+MOST_PARTS = 20
+"""Most integration steps from an instant to the next (project choice: a wilder motion leaves all bounds)."""
+
+_PROBED_S = 1e-3
+"""Step whose slopes show the rates of decay, s: far below the time constants of vessels."""
+
 
 @dataclass(frozen=True, eq=False)
 class Tangents:
@@ -59,6 +69,7 @@ class Disturbed:
         pushed = [state for state in model.states if state.name in PUSHED]
         self.pushed = tuple(state.name for state in pushed)
         self.nominal = np.array([state.nominal for state in model.states])
+        self._places = np.array([place for place, state in enumerate(model.states) if state in pushed])
         whole, pushes = _pushed(model, [state.derivative for state in pushed])
         drifts = ca.SX.sym("drift", len(seen) if drifting else 0)
         correlated = ca.vertcat(pushes, drifts)
@@ -76,9 +87,21 @@ class Disturbed:
         shown_by = [ca.densify(expression) for expression in (shown, ca.jacobian(shown, z), ca.jacobian(shown, theta))]
         self._observer = Chain(ca.Function("observer", [*arguments, y, ca.vec(K), phi, h], [corrected], cse))
         self._tangents = RowFunction(ca.Function("pushed_tangents", [*arguments, phi, h], step_derivatives, cse))
+        self._moved = RowFunction(ca.Function("pushed_moved", [*arguments, phi, h], [following], cse))
         self._shown = RowFunction(ca.Function("pushed_shown", arguments, shown_by, cse))
 
-    def predicted(self, start: Array, inputs: Array, measured: Array, gains: Array, case: tuple[Array, ...]) -> Array:
+    def parts(self, states: Array, inputs: Array, p: Array, h: float) -> int:
+        """Integration steps from an instant to the next, by the fastest mode of the motion along states (n, nz)."""
+        case = p, np.ones(self.correlated), np.array([_PROBED_S])
+        slopes = self._tangents(states, inputs, *case)[0].reshape(len(states), states.shape[1], -1)
+        block = slopes[:, self._places[:, None], self._places] - np.eye(len(self._places))
+        block = block[np.isfinite(block).all(axis=(1, 2))]
+        fastest = float(np.abs(np.linalg.eigvals(block)).max()) / _PROBED_S if len(block) else 0.0
+        return int(np.clip(np.ceil(fastest * h / LARGEST_PART), 1, MOST_PARTS))
+
+    def predicted(
+        self, start: Array, inputs: Array, measured: Array, gains: Array, case: tuple[Array, ...], parts: int = 1
+    ) -> Array:
         """States (n, nz) before each measurement, of the observer with given gains.
 
         Parameters
@@ -90,28 +113,50 @@ class Disturbed:
         gains : array (n, nz, ny)
         case : tuple
             Parameters p, factors phi (nz - nx,), step h (1,).
+        parts : int
+            Integration steps from an instant to the next.
         """
         p, phi, h = case
         columns = gains[:-1].transpose(0, 2, 1).reshape(len(gains) - 1, -1)
-        return self._observer.run(start, inputs[:-1], p, measured[:-1], columns, phi, h)
+        if parts == 1:
+            return self._observer.run(start, inputs[:-1], p, measured[:-1], columns, phi, h)
+        # A measurement corrects the first part, and accelerations decay after the last.
+        corrected = np.zeros((len(columns) * parts, columns.shape[1]))
+        corrected[::parts] = columns
+        decay = np.ones((len(corrected), len(phi)))
+        decay[parts - 1 :: parts] = phi
+        rows = np.repeat(inputs[:-1], parts, axis=0), np.repeat(measured[:-1], parts, axis=0)
+        return self._observer.run(start, rows[0], p, rows[1], corrected, decay, h / parts)[::parts]
 
     def seen(self, states: Array, inputs: Array, p: Array) -> Array:
         """Observed values (n, ny) at states z (n, nz)."""
         return self._shown(states, inputs, p)[0]
 
-    def tangents(self, before: Array, after: Array, inputs: Array, case: tuple[Array, ...]) -> Tangents:
-        """Derivatives at the states before and after each measurement (n, nz)."""
+    def tangents(self, before: Array, after: Array, inputs: Array, case: tuple[Array, ...], parts: int = 1) -> Tangents:
+        """Derivatives at the states before and after each measurement (n, nz), over `parts` integration steps."""
         p, phi, h = case
         n, nz = before.shape
-        by_state, by_theta = self._tangents(after, inputs, p, phi, h)
+        A, B = self._step_slopes(after, inputs, (p, phi if parts == 1 else np.ones(len(phi)), h / parts))
+        for part in range(2, parts + 1):
+            after = self._moved(after, inputs, p, np.ones(len(phi)), h / parts)[0]
+            by_state, by_theta = self._step_slopes(
+                after, inputs, (p, phi if part == parts else np.ones(len(phi)), h / parts)
+            )
+            A, B = by_state @ A, by_state @ B + by_theta
         seen, C, D = self._shown(before, inputs, p)
         ny = seen.shape[1]
         return Tangents(
-            A=by_state.reshape(n, nz, nz).transpose(0, 2, 1),
-            B=by_theta.reshape(n, -1, nz).transpose(0, 2, 1),
+            A=A,
+            B=B,
             C=C.reshape(n, nz, ny).transpose(0, 2, 1),
             D=D.reshape(n, -1, ny).transpose(0, 2, 1),
         )
+
+    def _step_slopes(self, after: Array, inputs: Array, case: tuple[Array, ...]) -> tuple[Array, Array]:
+        """Slopes (n, nz, nz) and (n, nz, k) of one integration step."""
+        n, nz = after.shape
+        by_state, by_theta = self._tangents(after, inputs, *case)
+        return by_state.reshape(n, nz, nz).transpose(0, 2, 1), by_theta.reshape(n, -1, nz).transpose(0, 2, 1)
 
 
 def _pushed(model: Model, rates: Sequence[str]) -> tuple[Model, ca.SX]:

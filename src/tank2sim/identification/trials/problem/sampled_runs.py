@@ -120,7 +120,7 @@ def prepare(
     """
     record = motion_record(model, trial, seen)
     sampling = float(np.median(np.diff(trial.time_s)))
-    stride = max(1, int((step_s or 1.5 * model.step_s) / sampling))
+    stride = max(1, int((step_s or 1.5 * model.step_s) / sampling + 1e-6))
     step = stride * sampling if step_s is None else stride * sampling / max(1, int(sampling / step_s + 1e-6))
     count = int((trial.time_s[-1] - trial.time_s[0]) / step + 1e-6)
     begin = float(trial.time_s[0]) + 0.5 * (stride - 1) * sampling
