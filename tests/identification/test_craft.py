@@ -13,6 +13,8 @@ from tank2sim.cards import CraftCard, parse_card
 from tank2sim.errors import InputError
 from tank2sim.identification.craft.card import identified_craft
 from tank2sim.identification.craft.fit import CoefficientVerdict, determination
+from tank2sim.identification.craft.study import worse_than_a_mean
+from tank2sim.notices import Level
 from tests.craft_trials import written
 
 
@@ -168,3 +170,10 @@ def test_the_share_explained_is_one_without_error_and_zero_for_the_mean() -> Non
     truth = np.array([[1.0], [2.0], [6.0]])
     assert determination(truth, truth)[0] == 1.0
     assert determination(np.full((3, 1), 3.0), truth)[0] == pytest.approx(0.0)
+
+
+def test_predictions_worse_than_a_mean_are_the_first_words() -> None:
+    assert worse_than_a_mean({"u": 0.9, "v": 0.2, "r": 0.5}) == []
+    (doubt,) = worse_than_a_mean({"u": 0.9, "v": -0.1, "r": float("nan")})
+    assert doubt.level is Level.CAUTION and "v -0.1" in doubt and "r nan" in doubt
+    assert "u 0.9" not in doubt

@@ -139,7 +139,8 @@ def study_craft(
         ``revolutions`` or ``orders``.
     """
     predictions = [entry for entry in held.values() if entry is not None]
-    notices = list(dict.fromkeys((*doubts(card), *doubts(found))))
+    r_squared = prediction_r_squared(predictions) if predictions else None
+    notices = [*worse_than_a_mean(r_squared or {}), *dict.fromkeys((*doubts(card), *doubts(found)))]
     if open_thrust := [
         name
         for name, verdict in zip(fit.problem.free, fit.verdicts, strict=True)
@@ -168,13 +169,32 @@ def study_craft(
         trials=tuple(run.name for run in fit.problem.runs),
         coefficients=_coefficients(fit),
         noise=dict(fit.estimate.measurement_noise),
-        determination=prediction_r_squared(predictions) if predictions else None,
+        determination=r_squared,
         driven_by=driven_by,
         order_responses={name: _response(response) for name, response in responses.items()},
         held_out=tuple(held),
         next_trials=tuple(next_trials(card, fit)),
         notices=tuple(notices),
     )
+
+
+def worse_than_a_mean(r_squared: Mapping[str, float]) -> list[Notice]:
+    """A caution where predictions of held-out trials are worse than the mean of what was measured.
+
+    Parameters
+    ----------
+    r_squared : mapping
+        R^2 of u, v and r.
+    """
+    bad = [f"{name} {value:.2g}" for name, value in r_squared.items() if not value > 0]
+    if not bad:
+        return []
+    return [
+        caution(
+            f"PREDICTS NOTHING: predictions of held-out trials are worse than the mean of their motion (R^2 of "
+            f"{', '.join(bad)}): these coefficients are not those of this craft, whatever their standard errors"
+        )
+    ]
 
 
 def _dead_band_notices(card: SteeredCard, responses: Mapping[str, OrderResponse], driven_by: str) -> list[Notice]:
