@@ -123,7 +123,7 @@ def test_frames_of_a_craft_are_read_as_its_files(otter_rows, tmp_path) -> None:
         row.to_csv(path, index=False)
     read = []
     for given in (paths, rows):  # up to the search, which sees trials alone
-        searched = mock.patch("tank2sim.api.craft_identification.identify_craft", side_effect=InterruptedError)
+        searched = mock.patch("tank2sim.api.identification.identify_craft", side_effect=InterruptedError)
         with searched as asked, pytest.raises(InterruptedError):
             t2s.identify(otter, given[:2], holdout=given[2])
         _, fitted, held, _ = asked.call_args.args

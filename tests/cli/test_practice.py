@@ -45,7 +45,7 @@ def test_pilot_card_and_poster_are_written_with_their_blanks_counted(tmp_path) -
     ("arguments", "words"),
     [
         (["compare", "mariner"], "two cards"),
-        (["compare", "mariner", "wilinski-zellman"], "manoeuvres"),
+        (["compare", "mariner", "wilinski-zellman"], "model.kind"),
         (["poster", "wilinski-zellman", "-o", "w.html"], "model.kind"),
         (["poster", "mariner", "-o", "w.html", "--order", "Half ahead"], "NAME=NUMBER"),
         (["pilotcard", "mariner", "-o", "w.html", "--order", "Half ahead=-3"], "NAME=RPM"),
