@@ -180,9 +180,9 @@ class Result(ABC, Generic[_S]):
 
         if path is not None:
             write_together({Path(path): self.picture(name, ending=Path(path).suffix)})
-        return altair_chart(self._chart(name))
+        return altair_chart(self._chart_of_name(name))
 
-    def _chart(self, name: str | None) -> ChartSpec | alt.TopLevelMixin:
+    def _chart_of_name(self, name: str | None) -> ChartSpec | alt.TopLevelMixin:
         charts = self._charts()
         if not charts or (name is not None and name not in charts):
             raise LookupError(
@@ -194,7 +194,7 @@ class Result(ABC, Generic[_S]):
         """One chart of the result as PNG, or as SVG or PDF if that is the `ending` of its file's name."""
         from tank2sim.answer.charts.picture import chart_picture
 
-        return chart_picture(self._chart(name), ending)
+        return chart_picture(self._chart_of_name(name), ending)
 
     def pictures(self) -> dict[str, bytes]:
         """All charts by name as PNG."""
