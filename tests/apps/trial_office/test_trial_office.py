@@ -6,10 +6,14 @@ import math
 from pathlib import Path
 
 import jsonschema
+import numpy as np
 import pytest
 
 import tank2sim as t2s
 from tank2sim.apps.trial_office.conditions import Met
+from tank2sim.apps.trial_office.tried import current_removed, tried
+from tank2sim.records.trials import Trial
+from tank2sim.simulation.manoeuvres import Stop
 from tests.apps.trial_office.sea_trial import APPROACH_S, CARD, Mariner, turn, turns, write_record, zigzag
 
 TRUE = {"starboard": (570.2, 1029.2), "port": (596.7, 1070.3)}
@@ -172,6 +176,30 @@ def test_conditions_that_are_not_met_are_said_and_refuse_nothing(tmp_path: Path)
     verdicts = {one.name: one.verdict for one in found.study.criteria}
     assert verdicts["tactical diameter"] == "fail"
     assert verdicts["20/20 zigzag, first overshoot"] == "not tried"
+
+
+def test_a_stop_is_read_from_the_revolutions_and_its_track_without_the_current() -> None:
+    """From 8 m/s evenly to rest in 100 s: 400 m; 0.4 m/s to the east add 40 m to starboard and none ahead."""
+    time = np.arange(0.0, 170.0)
+    after = np.clip(time - 60.0, 0.0, 100.0)
+    signals = {
+        "x_m": 8.0 * np.minimum(time, 60.0) + 8.0 * after - 0.04 * after**2,
+        "y_m": 0.4 * time,
+        "psi_rad": np.zeros_like(time),
+        "u_mps": 8.0 - 0.08 * after,
+        "delta_rad": np.zeros_like(time),
+        "n_radps": np.where(time < 60.0, 10.0, -5.0),
+    }
+    model = t2s.load("mariner").model
+    found = tried(Trial(Path("stop.csv"), time, signals), model)
+    still = current_removed(found, np.array([0.0, 0.4]), 0.01, model)
+    assert isinstance(found.manoeuvre, Stop) and found.manoeuvre.revolutions == -5.0
+    assert (found.begin_s, found.speed_mps) == (60.0, pytest.approx(8.0, abs=0.2))
+    assert found.figures["side_reach_m"] == pytest.approx(40.0, abs=1.0)
+    for name, value in {"track_reach_m": 400.0, "head_reach_m": 400.0, "side_reach_m": 0.0}.items():
+        assert still.figures[name] == pytest.approx(value, abs=1.0), name
+    assert still.figures["time_to_stop_s"] == pytest.approx(100.0, abs=4.0)
+    assert still.figures["track_reach_lengths"] == pytest.approx(400.0 / 160.93, abs=0.01)
 
 
 def test_a_trial_far_from_full_load_certifies_nothing(tmp_path: Path) -> None:

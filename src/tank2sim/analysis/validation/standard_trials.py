@@ -10,6 +10,7 @@ import numpy as np
 
 from tank2sim.analysis.ensemble.draws import draws_with
 from tank2sim.analysis.stability.imo import TRIAL_RUDDER
+from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredBy, SteeredCard
 from tank2sim.cards.small_craft import cruising_revolutions, pushes_ahead
 from tank2sim.dynamics import build
@@ -192,6 +193,18 @@ def members(
     return drawn, (Notice(f"{alone} large where errors go together"), *words)
 
 
+def robust_deviation(values: Array) -> float:
+    """Half the distance between the quantiles of 15.87 and 84.13 % of values (n,); 0 with fewer than two.
+
+    It equals the standard deviation of normal values, and is robust to a few diverging members.
+
+    Parameters
+    ----------
+    values : array (n,)
+    """
+    return float(np.diff(np.quantile(values, _SIGMA_QUANTILES))[0] / 2) if len(values) > 1 else 0.0
+
+
 def member_spread(runs: Sequence[Mapping[str, float]]) -> Numbers:
     """Standard deviation of each figure over the members' runs (empty where one could not be run).
 
@@ -201,8 +214,4 @@ def member_spread(runs: Sequence[Mapping[str, float]]) -> Numbers:
     names = dict.fromkeys(name for run in runs for name in run)
     found = {name: [run[name] for run in runs if name in run] for name in names}
     enough = max(2.0, LEAST_SHARE * len(runs))
-    return {
-        name: float(np.diff(np.quantile(values, _SIGMA_QUANTILES))[0] / 2)
-        for name, values in found.items()
-        if len(values) >= enough
-    }
+    return {name: robust_deviation(np.array(values)) for name, values in found.items() if len(values) >= enough}

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from tank2sim.analysis.stability.imo import TRIAL_RUDDER
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Input, Model, Parameter
 from tank2sim.errors import InputError
@@ -31,9 +32,6 @@ _DRIVEN_US = 800, 2200
 
 REST_FORCE_MPS2 = 9.80665
 """Gravity that SITL expects of an accelerometer at rest."""
-
-_LARGEST_RUDDER = math.radians(35.0)
-"""Rudder at full steering where a card states no largest angle: hard over of IMO MSC.137(76)."""
 
 _RATES = ("motion.x", "motion.y", "motion.u", "motion.v")
 
@@ -147,7 +145,7 @@ class SitlShip:
     def largest_rudder(self) -> float:
         """Rudder at full steering, rad."""
         if "steering.max_angle" not in self.model.parameter_names:
-            return _LARGEST_RUDDER
+            return TRIAL_RUDDER
         stop = self.model["steering.max_angle"]
         assert isinstance(stop, Parameter)
         return min(float(stop.start), math.radians(89.0))

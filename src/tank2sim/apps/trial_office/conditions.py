@@ -15,8 +15,10 @@ from tank2sim.simulation.manoeuvres import Stop, Turn
 from tank2sim.simulation.recorded import straight_over_gaps
 
 DEPTH_OVER_DRAUGHT = 4.0
-STRONGEST_WIND = 10.8
-"""m/s: the upper end of Beaufort 5 (MSC/Circ.1053, 2.2)."""
+BEAUFORT = (0.3, 1.6, 3.4, 5.5, 8.0, 10.8, 13.9, 17.2, 20.8, 24.5, 28.5, 32.7)
+"""Least mean wind of Beaufort 1, 2, ..., m/s (World Meteorological Organization)."""
+STRONGEST_WIND = BEAUFORT[5]
+"""m/s: the end of Beaufort 5 (MSC/Circ.1053, 2.2)."""
 HIGHEST_SEA_STATE = 4
 DRAUGHT_SHARE = 0.05
 """Deviation from the draught at full load that counts as full load (MSC/Circ.1053, 2.2); the same of the trim, for
@@ -110,8 +112,12 @@ def trial_conditions(state: TrialState, notes: TrialNotes, trials: Sequence[Trie
             depth is not None and depth > DEPTH_OVER_DRAUGHT
         ),
         _judged(
-            "wind speed", f"up to {STRONGEST_WIND:g} m/s (Beaufort 5)", state.wind_speed_mps, "{:.1f} m/s", circular
-        ).when(state.wind_speed_mps is not None and state.wind_speed_mps <= STRONGEST_WIND),
+            "wind speed",
+            f"below {STRONGEST_WIND:g} m/s (Beaufort 5)",
+            state.wind_speed_mps,
+            "{:.1f} m/s",
+            circular,
+        ).when(state.wind_speed_mps is not None and state.wind_speed_mps < STRONGEST_WIND),
         _judged("sea state", f"up to sea state {HIGHEST_SEA_STATE}", notes.sea_state, "sea state {:d}", circular).when(
             notes.sea_state is not None and notes.sea_state <= HIGHEST_SEA_STATE
         ),

@@ -20,11 +20,9 @@ from tank2sim.analysis.stability.imo import (
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.page import resource_text
 from tank2sim.apps.bridge.boxes import Box, Row
+from tank2sim.apps.trial_office.conditions import BEAUFORT
 from tank2sim.apps.trial_office.study import TrialOffice
 from tank2sim.version import __version__
-
-_BEAUFORT = (0.3, 1.6, 3.4, 5.5, 8.0, 10.8, 13.9, 17.2, 20.8, 24.5, 28.5, 32.7)
-"""Least mean wind of Beaufort 1, 2, ..., m/s (World Meteorological Organization)."""
 
 _ROWS = {
     ADVANCE: "Turning circle: advance, ship lengths",
@@ -65,7 +63,7 @@ def form_boxes(study: TrialOffice) -> tuple[Box, ...]:
     wind = state.wind_speed_mps
     weather: Mapping[str, str | float | None] = {
         "Water depth over trial draught": depth,
-        "Wind: Beaufort number": None if wind is None else sum(wind >= least for least in _BEAUFORT),
+        "Wind: Beaufort number": None if wind is None else sum(wind >= least for least in BEAUFORT),
         "Wave: sea state": study.sea_state,
     }
     tested = study.tested_at_full_load

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tank2sim.analysis.validation.standard_trials import SEED, members
+from tank2sim.analysis.validation.standard_trials import SEED, members, robust_deviation
 from tank2sim.apps.trial_office.conditions import TrialState
 from tank2sim.apps.trial_office.tried import Tried, calm_run, simulated
 from tank2sim.arrays import Array
@@ -31,18 +31,6 @@ scatter of Clarke's regressions between ships (30 %), for a ship keeps most of i
 
 SMALLEST = 1e-3
 """Figure or ratio below which it says nothing. Project choice."""
-
-_SIGMAS = (0.158655, 0.841345)
-
-
-def deviation(values: Array) -> float:
-    """Standard deviation (n,) by the quantiles of a normal one, robust to a few diverging members.
-
-    Parameters
-    ----------
-    values : array (n,)
-    """
-    return float(np.diff(np.quantile(values, _SIGMAS))[0] / 2) if len(values) > 1 else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +121,7 @@ class Prediction:
         if measured is None or before is None or after is None or min(before, after, measured) <= SMALLEST:
             return None
         ratios = self.ratios.get(name, np.zeros(0))
-        spread = deviation(ratios)
+        spread = robust_deviation(ratios)
         return measured * after / before, math.hypot(spread, one.errors.get(name, 0.0) / measured)
 
 
@@ -178,7 +166,7 @@ def _run(simulation: Callable[[], Numbers]) -> Numbers:
 
 
 def loading_validity(ships: TriedShips) -> float:
-    """The least of both conditions."""
+    """Validity of the formulas for the loading in both conditions, the lower one."""
     found = [1.0]
     for integrator in (ships.tried, ships.full):
         model = integrator.model

@@ -11,7 +11,6 @@ import numpy as np
 from tank2sim.analysis.ensemble.results import EnsembleRequest, named_bands
 from tank2sim.analysis.stability.imo import (
     SHORTEST_SHIP_M,
-    TRIAL_RUDDER,
 )
 from tank2sim.analysis.validation.standard_trials import SEED
 from tank2sim.apps.guess.study import OVERSHOOT_ERROR_DEG, TRIAL_ERROR
@@ -27,7 +26,9 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.effects.particulars import model_particular
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
+from tank2sim.identification.trials.assessment.structure_choice import hard_rudder
 from tank2sim.notices import Notice, caution
+from tank2sim.records.signals.statistics import mean_and_deviation
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag, parse_manoeuvre
@@ -89,9 +90,9 @@ class OfficeFigure:
     trial, manoeuvre, side, name : str
     as_run : float
     without_current : float
-        Of the track in water that rests.
+        As the track is in water that rests.
     error : float
-        Standard error of the reading, with that of the current.
+        Standard error of the reading and of the current.
     calm : float or None
         Also without the wind, by the model: times its figure in calm water over that in the wind.
     full_load : float or None
@@ -150,7 +151,7 @@ class TrialOffice:
     criteria : tuple of CriterionVerdict
     tested_at_full_load : bool
     loading_validity : float
-        Of the formulas that take the ship from the trial to full load: 1 where they hold, 0 where they do not.
+        1 where the formulas that take the ship from the trial to full load hold, 0 where they do not.
     stable_as_tried, stable_at_full_load : float or None
         Probability that a straight course is stable, by the members; None without them.
     particulars : FormParticulars
@@ -281,7 +282,6 @@ def _state(card: ManoeuvringCard, trials: Sequence[Trial], notes: TrialNotes) ->
     own = model_particular(card, "draught_m")
     fore, aft = notes.draught_fore_m, notes.draught_aft_m
     draught, trim = (own, 0.0) if fore is None or aft is None else ((fore + aft) / 2, aft - fore)
-    gear = card.steering_gear
     speed = notes.wind_speed_mps
     direction = None if notes.wind_from_deg is None else math.radians(notes.wind_from_deg)
     measured = [trial.signals for trial in trials if {"wind_speed_mps", "wind_direction_rad"} <= set(trial.signals)]
@@ -292,7 +292,7 @@ def _state(card: ManoeuvringCard, trials: Sequence[Trial], notes: TrialNotes) ->
         trim_m=trim,
         full_load_draught_m=own if notes.full_load_draught_m is None else notes.full_load_draught_m,
         length_m=card.ship.length_m,
-        largest_rudder_rad=min(TRIAL_RUDDER, gear.max_angle_rad if gear and gear.max_angle_rad else TRIAL_RUDDER),
+        largest_rudder_rad=hard_rudder(card),
         wind_speed_mps=speed,
         wind_from_rad=direction,
     )
@@ -313,21 +313,22 @@ def _wind(one: Tried, state: TrialState, integrator: Integrator) -> dict[str, fl
 
 
 def mean_wind(records: Sequence[Mapping[str, Array]]) -> tuple[float, float]:
-    """Mean speed (m/s) and direction (rad, from) of the wind in records; of the direction that of its unit vectors.
+    """Mean speed (m/s) and direction (rad, from) of the wind in records.
 
     Parameters
     ----------
     records : sequence of mapping
         Signals ``wind_speed_mps`` and ``wind_direction_rad``.
     """
-    speeds, directions = (
-        np.concatenate([signals[name] for signals in records]) for name in ("wind_speed_mps", "wind_direction_rad")
-    )
-    return float(np.nanmean(speeds)), float(np.angle(np.nanmean(np.exp(1j * directions))))
+    found = []
+    for name in ("wind_speed_mps", "wind_direction_rad"):
+        values = np.concatenate([signals[name] for signals in records])
+        found.append(mean_and_deviation(name, values[np.isfinite(values)])[0])
+    return found[0], found[1]
 
 
 def _drift(one: Tried, integrator: Integrator, wind: Mapping[str, float]) -> TurnDrift | None:
-    """The drift of a turn, and that of the model in the wind alone."""
+    """The drift of a turn, and the drift of the model in the wind alone."""
     measured = one.drift
     if measured is None or one.record is None or one.trial is None:
         return None

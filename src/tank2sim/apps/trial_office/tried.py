@@ -69,7 +69,7 @@ class Tried:
 
     @property
     def side(self) -> str:
-        """``starboard`` or ``port``: that of the first rudder; empty for a stop."""
+        """``starboard`` or ``port``, the side of the first rudder; empty for a stop."""
         rudder = 0.0 if isinstance(self.manoeuvre, Stop) else self.manoeuvre.rudder
         return "starboard" if rudder > 0 else "port" if rudder < 0 else ""
 
@@ -158,7 +158,7 @@ def simulated(one: Tried, integrator: Integrator, weather: Mapping[str, float], 
     ----------
     one : Tried
     integrator : Integrator
-        Of a :func:`.steerable` ship.
+        With a :func:`.steerable` ship.
     weather : mapping
         Inputs of the model; without any, a calm approach.
     values : mapping

@@ -9,15 +9,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tank2sim.analysis.stability.imo import TRACK_REACH, TRIAL_RUDDER, largest_allowed, manoeuvring_trials
-from tank2sim.analysis.validation.standard_trials import SEED
-from tank2sim.apps.trial_office.full_load import Prediction, deviation
+from tank2sim.analysis.validation.standard_trials import SEED, robust_deviation
+from tank2sim.apps.trial_office.full_load import Prediction
 from tank2sim.apps.trial_office.tried import Tried
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag
 
 DECIDED = 0.95
 """Probability from which a criterion is passed, and one less which it is failed; undecided between. Project choice:
-that of the other intervals."""
+as wide as the other intervals."""
 
 LOADING_HOLDS = 0.5
 """``validity`` of the loading below which its formulas do not carry the verdict. Project choice: halfway between where
@@ -57,7 +57,7 @@ class CriterionVerdict:
         Limit for the ship at full load.
     as_run, full_load : float or None
     probability_as_run, probability : float or None
-        Of meeting it.
+        Chance of meeting it.
     verdict_as_run, verdict : str
         ``pass``, ``fail`` or ``undecided``; ``not tried``; ``undecided, EXTRAPOLATED`` where the formulas for the
         loading do not hold.
@@ -93,7 +93,7 @@ def judge_criteria(
         As run, and without the current.
     found : sequence of Prediction
     validity : float
-        Of the formulas for the loading.
+        Validity of the formulas for the loading.
     overshoots_hold : bool
         False for a ship that is stable in one condition and unstable in the other: overshoots are then extrapolated.
     """
@@ -158,7 +158,7 @@ def _judged(
     middle, spread = max((math.log(centre), error) for centre, error in known)
     if shortest > 1:  # errors that both sides share do not add up
         worst = np.max([draw[:shortest] for draw in draws], axis=0)
-        middle, spread = float(np.median(worst)), deviation(worst)
+        middle, spread = float(np.median(worst)), robust_deviation(worst)
     probability = _probability(math.log(limit) - middle, spread)
     words = _verdict(probability)
     if validity < LOADING_HOLDS:
