@@ -61,7 +61,8 @@ def test_a_search_that_begins_at_the_minimum_need_not_move() -> None:
 
 def _stays(residuals, start, jacobian, *_, **__) -> OptimizeResult:
     """A search that does not move."""
-    return OptimizeResult(x=np.array(start), fun=residuals(start), jac=jacobian(start), success=True, active_mask=0)
+    fun, jac = residuals(start), jacobian(start)
+    return OptimizeResult(x=np.array(start), fun=fun, jac=jac, grad=jac.T @ fun, success=True, active_mask=0)
 
 
 def test_a_stopped_search_of_tows_gives_no_fit(monkeypatch) -> None:

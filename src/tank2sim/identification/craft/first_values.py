@@ -60,8 +60,9 @@ def estimate_by_velocities(problem: Problem) -> Estimate | None:
     try:
         first = equation_error(problem.with_runs(runs), settings=EquationErrorSettings(scale_prior=False))
         search = _Search(problem.with_runs(tuple(replace(run, seen=_SHOWN) for run in runs)))
-        values = np.clip(first.values, *problem.bounds)
         noise = _FIRST_NOISE * np.nanstd(np.concatenate([run.measured for run in runs]), axis=0)
+        starts = [np.clip(each, *problem.bounds) for each in (first.values, problem.prior_mean)]
+        values = min(starts, key=lambda each: search.loss(each, noise))
         for _ in range(_ROUNDS):
             found = search.least(values, noise)
             values, errors = found.x, search.errors(found.x)
@@ -109,15 +110,20 @@ class _Search:
         J = self.slopes(values, noise)
         return np.asarray(J.T @ J)
 
+    def weighted(self, values: Array, noise: Array) -> Array:
+        """Errors in standard deviations, and the distance from what was known before as the loss makes it a square."""
+        errors = np.concatenate([(of_run / noise).ravel() for of_run in self.errors(values)])
+        held = np.clip(np.nan_to_num(errors, nan=0.0, posinf=_WILD, neginf=-_WILD), -_WILD, _WILD)
+        away = (values - self.problem.prior_mean) / self.problem.prior_error
+        return np.concatenate([held, away * np.sqrt(1 + away**2 / 4)])
+
+    def loss(self, values: Array, noise: Array) -> float:
+        """What :meth:`least` makes least."""
+        return float(np.sum(np.sqrt(1 + self.weighted(values, noise) ** 2) - 1))
+
     def least(self, start: Array, noise: Array) -> OptimizeResult:
         """Values with the least robust sum of errors and of the distance from what was known before."""
         mean, error = self.problem.prior_mean, self.problem.prior_error
-
-        def weighted(values: Array) -> Array:
-            errors = np.concatenate([(of_run / noise).ravel() for of_run in self.errors(values)])
-            held = np.clip(np.nan_to_num(errors, nan=0.0, posinf=_WILD, neginf=-_WILD), -_WILD, _WILD)
-            away = (values - mean) / error
-            return np.concatenate([held, away * np.sqrt(1 + away**2 / 4)])  # the loss makes it away^2: it is no outlier
 
         def slopes(values: Array) -> Array:
             away = (values - mean) / error
@@ -127,11 +133,17 @@ class _Search:
         low, high = self.problem.bounds
         inside = np.clip(start, low + 1e-9, high - 1e-9)
         found = least_squares(
-            weighted, inside, slopes, (low, high), x_scale=error, loss="soft_l1", max_nfev=_EVALUATIONS
+            lambda values: self.weighted(values, noise),
+            inside,
+            slopes,
+            (low, high),
+            x_scale=error,
+            loss="soft_l1",
+            max_nfev=_EVALUATIONS,
         )
         if np.array_equal(found.x, inside):
             J = found.jac
-            refuse_stopped("output error", is_minimum(J.T @ J, J.T @ found.fun, bounded=(inside, low, high)))
+            refuse_stopped("output error", is_minimum(J.T @ J, found.grad, bounded=(inside, low, high)))
         return found
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.identification.craft.first_values import PREDICTED_S, estimate_by_velocities
-from tank2sim.identification.craft.problem import DISTURBANCES, with_disturbances
+from tank2sim.identification.craft.problem import DISTURBANCES, FORCE_SPREAD, with_disturbances
 from tank2sim.identification.trials.methods.gauss_newton import StoppedSearchError
 from tank2sim.identification.trials.methods.kalman import KalmanEstimate, KalmanSettings, Smoothed, estimate_at, kalman
 from tank2sim.identification.trials.methods.kalman_gains import FilterFault, smooth_states
@@ -54,10 +54,6 @@ STRONGER = (1.0, 2.0, 4.0, 8.0, 16.0)
 
 FEWEST_TRIALS = 5
 """Fewest trials whose currents and winds determine how much these differ (project choice)."""
-
-CLEARLY_BETTER = 0.8
-"""Errors of predictions of the fitted trials, over the filter's errors, below which the estimate by velocities is taken
-(project choice): where the model holds the filter is better, and where it does not its noise hides the error."""
 
 _DISTURBED_SHARES = (1.0, 0.3, 0.1, 0.03, 0.01)
 """Spreads of current and wind, over the usual ones, that are tried with an estimate that knows neither."""
@@ -138,8 +134,8 @@ class CraftFit:
 def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
     """Estimate the free parameters of a craft with the noise levels.
 
-    The search begins at the estimate by velocities, which is taken itself where it predicts the fitted trials clearly
-    better (:data:`CLEARLY_BETTER`). With :data:`FEWEST_TRIALS` the filter searches twice: the second time current, wind
+    The search begins at the estimate by velocities, which is taken itself where the model does not hold
+    (:func:`_holds`). With :data:`FEWEST_TRIALS` the filter searches twice: the second time current, wind
     and bias of each trial are known beforehand as well as they agreed between trials the first time (empirical Bayes),
     for they change slowly.
 
@@ -151,18 +147,17 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
         Called with each better estimate.
     """
     found = estimate_by_velocities(problem)
-    other = None if found is None else _at_velocities(problem, found)
     steps = KalmanSettings.iterations if found is None else _STEPS_FROM_NEAR
     settings = KalmanSettings(drifting=True, scale_prior=False, iterations=steps)
     try:
         estimate = _first_estimate(problem, settings, progress, found)
         fit = _fit_of(problem, estimate)
     except InputError:
-        if other is None:
+        if found is None or (other := _at_velocities(problem, found)) is None:
             raise
-        return other[1]
-    if other is not None and other[0] < CLEARLY_BETTER * _unpredicted(fit):
-        return other[1]
+        return other
+    if found is not None and not _holds(problem, estimate) and (other := _at_velocities(problem, found)):
+        return other
     if len(problem.runs) < FEWEST_TRIALS:
         return fit
     narrower = with_disturbances(problem, *_disturbances_of(problem, estimate.smoothed))
@@ -178,7 +173,14 @@ def _fit_of(problem: Problem, estimate: KalmanEstimate) -> CraftFit:
     return CraftFit(problem, estimate, levels, information(problem, estimate.values, levels))
 
 
-def _at_velocities(problem: Problem, found: Estimate) -> tuple[float, CraftFit] | None:
+def _holds(problem: Problem, estimate: KalmanEstimate) -> bool:
+    """Whether the filter explains the trials by the model, and gusts by no more than the wind that is expected."""
+    thrust = problem.model["disturbance.north"].nominal / FORCE_SPREAD
+    mass = problem.parameters(estimate.values)[problem.model.parameter_names.index("ship.mass")]
+    return bool(estimate.process_noise["motion.u"].deviation <= FORCE_SPREAD * thrust / mass)
+
+
+def _at_velocities(problem: Problem, found: Estimate) -> CraftFit | None:
     """Errors of predictions and fit with the estimate by velocities, with the spread of current and wind that is best.
 
     None where the filter loses the motion with all of them.
@@ -200,9 +202,8 @@ def _at_velocities(problem: Problem, found: Estimate) -> tuple[float, CraftFit] 
         estimate = replace(
             filtered, method=found.method, covariance=found.covariance, information=found.information, cost=found.cost
         )
-        fit = CraftFit(posed, estimate, point.levels, by_run)
-        fits.append((_unpredicted(fit), fit))
-    return min(fits, key=lambda entry: entry[0], default=None)
+        fits.append(CraftFit(posed, estimate, point.levels, by_run))
+    return min(fits, key=_unpredicted, default=None)
 
 
 def _unpredicted(fit: CraftFit) -> float:
