@@ -21,6 +21,7 @@ from tank2sim.bundled import bundled
 from tank2sim.cards import Card
 from tank2sim.dynamics.simulator_interface import with_simulator_interface
 from tank2sim.escaping import json_in_html
+from tank2sim.fmu.c99 import plain_ship
 from tank2sim.fmu.export import description_text
 from tank2sim.fmu.osp import osp_system
 from tests.cli.command_line import tank2sim
@@ -94,6 +95,24 @@ def test_a_class_hides_no_name_that_its_module_uses(text: str, made: Made) -> No
     ship = vehicle(r=10.0)
     nu, _ = ship.dynamics([0.0] * 6, ship.nu, ship.u_actual, ship.stepInput(1.0), 0.1)
     assert nu[0] > 7
+
+
+def _tokens(text: str, prefix: str) -> list[str]:
+    """What a compiler of C reads of a file, without comments, numbers, hashes and the prefix of its names."""
+    code = re.sub(r"/\*.*?\*/", " ", text, flags=re.DOTALL)
+    code = re.sub(r'"[0-9a-f]{64}"', '""', code)
+    return re.sub(rf"(?<!\w){prefix}_", "PREFIX_", code, flags=re.IGNORECASE).split()
+
+
+def test_the_c_of_a_ship_is_the_same_whatever_the_texts(made: Made) -> None:
+    plain = plain_ship(made("mariner", BENIGN).card)
+    for text in HOSTILE:
+        ship = plain_ship(made("mariner", text).card)
+        assert re.fullmatch("[a-z][a-z0-9_]*", ship.prefix)
+        for name, content in ship.files.items():
+            assert content.isascii() and "??" not in content and "\\" not in content.replace("\\n", "")
+            assert not re.search(r"/\*(?:(?!\*/).)*/\*", content, re.DOTALL)
+            assert _tokens(content, ship.prefix) == _tokens(plain.files[name], plain.prefix), (text, name)
 
 
 def _elements(text: str) -> list[tuple[str, list[str]]]:

@@ -48,3 +48,9 @@ def file_name(name: str) -> str:
     """A name of a file that resembles `name`, and that leads to no other folder."""
     plain = re.sub(r'[<>:"/\\|?*]', "_", one_line(name)).strip(". ")
     return plain or "_"
+
+
+def c_comment(text: str) -> str:
+    """The text within a comment of C, which it does not end: one line of ASCII without trigraphs."""
+    plain = one_line(text).encode("ascii", "replace").decode("ascii")
+    return re.sub(r"\?(?=\?)", "? ", plain.replace("\\", "/")).replace("*/", "* /").replace("/*", "/ *")
