@@ -106,7 +106,7 @@ def _tokens(text: str, prefix: str) -> list[str]:
 
 def test_the_c_of_a_ship_is_the_same_whatever_the_texts(made: Made) -> None:
     plain = plain_ship(made("mariner", BENIGN).card)
-    for text in HOSTILE:
+    for text in [*TOGETHER, "2", "船", "-", "M" * 300, "Mariner */ MARK(); /* ??/\n MARK ??=define ??/"]:
         ship = plain_ship(made("mariner", text).card)
         assert re.fullmatch("[a-z][a-z0-9_]*", ship.prefix)
         for name, content in ship.files.items():

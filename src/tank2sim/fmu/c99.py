@@ -29,7 +29,7 @@ _LONGEST_PREFIX = 24
 """Letters of the ship's name in each name of the code. Project choice: lines stay short."""
 
 _STEPS, _EVERY, _INTERNAL = 100, 5, 4.5
-"""Steps of the self-test, steps from one comparison to the next, and internal steps in a step (whole by rounding up)."""
+"""Steps of the self-test, steps from one comparison to the next, and internal steps in a step (rounded up)."""
 
 TOLERANCES = (1e-9, 1e-4)
 """Largest error of an output in the self-test, of its size, in double and single precision. Project choice: what
@@ -198,7 +198,7 @@ def _word(name: str) -> str:
 def self_test_run(model: Model) -> InputSequence:
     """The run of the self-test: each input goes through its course, some of them at a time."""
     inputs = manoeuvre(model).inputs
-    times = np.arange(_STEPS + 1) * (_INTERNAL * model.step_s)
+    times = np.arange(_STEPS + 1, dtype=np.float64) * (_INTERNAL * model.step_s)
     return InputSequence(times, inputs[:: len(inputs) // _STEPS][:_STEPS])
 
 

@@ -72,7 +72,7 @@ def plain_c(function: ca.Function, prefix: str, arguments: Iterable[str], result
         else:
             lines.append(f"    w{to[0]} = {_expression(operation, [f'w{place}' for place in given], prefix)};")
     declared = [f"    {prefix}_real w{place};" for place in range(function.sz_w())]
-    unused = [f"    (void){name};" for name in (*sources, *targets)]  # one that it does not use is no warning
+    unused = [f"    (void){name};" for name in (*sources, *targets)]  # so that none is reported as unused
     return "\n".join([*declared, *unused, *lines])
 
 
