@@ -24,6 +24,7 @@ from tank2sim.escaping import json_in_html
 from tank2sim.fmu.c99 import plain_ship
 from tank2sim.fmu.export import description_text
 from tank2sim.fmu.osp import osp_system
+from tank2sim.fmu.templates import c_identifier
 from tests.cli.command_line import tank2sim
 from tests.hostile_text import HOSTILE, TOGETHER, Outline, hostile_card
 from tests.marks import first_fast
@@ -164,12 +165,9 @@ def test_a_model_description_has_the_same_elements(fmi: int, made: Made) -> None
 def test_the_files_for_osp_lie_next_to_the_fmu(made: Made) -> None:
     for text in TOGETHER:
         model = with_simulator_interface(made("mariner", text).model)
-        for name, content in osp_system(model, "ship.fmu").items():
+        for name, content in osp_system(model, "ship.fmu", c_identifier(text)).items():
             assert Path(name).name == name and name.isprintable() and not re.search(r'[\\/:*?"<>|]', name), name
             _elements(content)
-    model = made("mariner", "../../MARK").model
-    assert "MARK_OspModelDescription.xml" in osp_system(model, "ship.fmu")  # its modelIdentifier
-    assert "Mariner class_OspModelDescription.xml" in osp_system(t2s.load("mariner").model, "ship.fmu")
 
 
 @pytest.mark.slow

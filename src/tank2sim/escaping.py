@@ -39,11 +39,6 @@ def json_in_html(value: object) -> Markup:
     return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
 
 
-def is_file_name(name: str) -> bool:
-    """Whether a name is that of one file, on every system: no folder, no character that a system keeps for itself."""
-    return name.isprintable() and not re.search(r'[<>:"/\\|?*]|^\.|[. ]$|^$', name)
-
-
 def file_name(name: str) -> str:
     """A name of a file that resembles `name`, and that leads to no other folder."""
     plain = re.sub(r'[<>:"/\\|?*]', "_", one_line(name)).strip(". ")

@@ -210,8 +210,9 @@ def test_names_that_resemble_markup_or_paths_do_no_harm(fmi: int, models: dict[s
     assert report.passed
     with zipfile.ZipFile(io.BytesIO(exported.content)) as archive:
         root = etree.fromstring(archive.read("modelDescription.xml"))
-        assert "船 🚢 Ünïcödé" in root.get("modelName")
-        assert "<tag> & amp; */ /* %s" in root.get("modelName")
+        assert root.get("modelName") == "x"
+        assert "船 🚢 Ünïcödé" in root.get("description")
+        assert "<tag> & amp; */ /* %s" in root.get("description")
         page = archive.read("documentation/index.html").decode()
         assert "<tag>" not in page
         assert "{{ 7 * 7 }}" in page
