@@ -316,7 +316,7 @@ def test_files_that_are_no_fmu_are_reported_in_one_line(
     [
         (b"<ModelVariables>", b"<ModelVariables", "modelDescription.xml: cannot be read"),
         (b'fmiVersion="2.0"', b'fmiVersion="1.0"', "FMI|cannot be read"),
-        (b'modelIdentifier="Test_hull"', b'modelIdentifier="Other"', "no library for this machine"),
+        (b'modelIdentifier="hull2"', b'modelIdentifier="Other"', "no library for this machine"),
     ],
 )
 def test_a_description_that_cannot_be_used_is_reported(

@@ -6,6 +6,7 @@ import hashlib
 import re
 from dataclasses import dataclass
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -164,7 +165,7 @@ def _values(card: Card, model: Model, described: Interface, prefix: str) -> dict
         "p": prefix,
         "P": prefix.upper(),
         "title": c_comment(card.ship.name),
-        "source": c_comment(str(card.source)),
+        "source": c_comment(f"{Path(card.source).name} ({card.ship.source})"),
         "version": version("tank2sim"),
         "card_hash": hashlib.sha256(card.text.encode("utf-8")).hexdigest(),
         "step_s": float(model.step_s),
@@ -191,7 +192,7 @@ def _entry(variable: FmuVariable) -> dict[str, Any]:
 
 
 def _word(name: str) -> str:
-    """A variable's name within an enumerator, in its own letters: ``external.X`` and ``external.x`` are two."""
+    """A variable's name within an enumerator, in its own letters."""
     return re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_")
 
 

@@ -216,7 +216,7 @@ def _repeat_reference(unpacked: UnpackedFmu) -> tuple[list[str], float | None]:
 
 
 def _as_exported(unpacked: UnpackedFmu, model: Model) -> Model:
-    """The lean model if the FMU has its variables; coefficients as constants if the FMU has parameters of those alone."""
+    """The model, the lean one, or the one with coefficients as constants, by the variables that the FMU has."""
     lean = lean_model(model)
     if not _name_differences(unpacked, lean):
         return lean

@@ -179,9 +179,8 @@ def _names_without_case(fmu: _Fmu) -> tuple[bool, str]:
     names = [one.get("name", "") for one in fmu.variables]
     lower = [name.lower() for name in names]
     doubled = [name for name, small in zip(names, lower, strict=True) if lower.count(small) > 1]
-    return not doubled, f"{len(doubled)} names differ by case alone" + (
-        f": {', '.join(doubled[:4])}" if doubled else ""
-    )
+    words = f"{len(doubled)} names differ by case alone"
+    return not doubled, words + (f": {', '.join(doubled[:4])}" if doubled else "")
 
 
 def _default_experiment(fmu: _Fmu) -> tuple[bool, str]:
