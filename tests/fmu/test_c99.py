@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import platform
 import re
 import shutil
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -118,17 +120,37 @@ def test_sanitizers_find_nothing(card: str, tmp_path: Path) -> None:
         assert ran.returncode == 0 and not ran.stderr, ran.stderr
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("target", ["arm-linux-gnueabihf", "aarch64-linux-gnu", "arm-freestanding-eabihf"])
-def test_a_compiler_for_arm_has_no_objection(target: str, made: PlainShip, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def clang() -> tuple[str, ...]:
     pytest.importorskip("ziglang", reason="the compiler for other machines is not installed (extra platforms)")
-    import sys
+    return (sys.executable, "-m", "ziglang", "cc")
 
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "target", ["arm-linux-gnueabihf", "aarch64-linux-gnu", "thumb-linux-musleabihf -mcpu=cortex_m4"]
+)
+def test_a_compiler_for_arm_has_no_objection(
+    target: str, clang: tuple[str, ...], made: PlainShip, tmp_path: Path
+) -> None:
     folder = written(made, tmp_path)
     for single in (False, True):
-        flags = ["-target", target, "-std=c99", "-O2", *STRICT[1:], *macro(made, single)]
-        done = call(sys.executable, "-m", "ziglang", "cc", *flags, "-c", "ship.c", "-o", "ship.o", folder=folder)
+        flags = ["-target", *target.split(), "-O2", *STRICT, *macro(made, single)]
+        done = call(*clang, *flags, "-c", "ship.c", "-o", "ship.o", folder=folder)
         assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="a program for Linux is run")
+def test_the_self_test_passes_with_another_compiler_and_mathematical_library(
+    clang: tuple[str, ...], made: PlainShip, tmp_path: Path
+) -> None:
+    folder = written(made, tmp_path)
+    for single in (False, True):
+        flags = ["-target", f"{platform.machine()}-linux-musl", *STRICT, "-O2", *macro(made, single)]
+        done = call(*clang, *flags, "ship.c", "self_test.c", "-lm", "-o", "run", folder=folder)
+        assert done.returncode == 0, done.stderr
+        assert call("./run", folder=folder).returncode == 0
 
 
 def test_single_precision_stays_near_the_model(made: PlainShip, mariner: Model) -> None:

@@ -53,7 +53,7 @@ def test_another_process_in_another_place_writes_the_same_bytes(model: str, fmi:
     for name, seed in (("one", "1"), ("another", "2")):
         folder = tmp_path / name
         folder.mkdir()
-        target = folder / f"{name}.fmu"
+        target = folder / "same.fmu"  # its name is the modelName
         command = [sys.executable, "-c", _EXPORT, str(Path(__file__).parent), str(target), str(fmi), model]
         environment = os.environ | {"TMPDIR": str(folder), "XDG_CACHE_HOME": str(folder), "PYTHONHASHSEED": seed}
         subprocess.run(command, check=True, cwd=folder, env=environment)
