@@ -23,7 +23,7 @@ from tank2sim.files import write_whole
 from tank2sim.fmu.dependencies import fmu_structure
 from tank2sim.fmu.interface import FmuVariable, Interface, interface
 from tank2sim.fmu.libraries import ProgressReport, libraries, require_compilers
-from tank2sim.fmu.osp import osp_groups
+from tank2sim.fmu.osp import OSP_FILE, osp_groups
 from tank2sim.fmu.platforms import Platform
 from tank2sim.fmu.provenance import Documents
 from tank2sim.fmu.sources import c_sources, headers_notice
@@ -39,9 +39,6 @@ _EXPERIMENT_TOLERANCE = 1e-6
 _NO_TOKEN = "{00000000-0000-0000-0000-000000000000}"
 _DESCRIPTION = "modelDescription.xml"
 _ICON_FILES = ("icon.png", "icon.svg")
-
-# OSP's engine looks for a copy of this next to the FMU, under the name <modelName>_OspModelDescription.xml.
-_OSP_FILE = "extra/com.open-simulation-platform/OspModelDescription.xml"
 
 _FIRST_TIME_OF_ZIP = 315532800  # 1980-01-01T00:00:00Z
 
@@ -183,7 +180,7 @@ def _texts(model: Model, described: Interface, fmi: int, documents: Documents, s
     files["documentation/index.html"] = render("index.html", values)
     files["documentation/licenses/license.txt"] = bundled("LICENSE").read_text(encoding="utf-8")
     files["documentation/licenses/FMI-headers.txt"] = headers_notice(fmi)
-    files[_OSP_FILE] = render("OspModelDescription.xml", {"groups": osp_groups(described)})
+    files[OSP_FILE] = render("OspModelDescription.xml", {"groups": osp_groups(described)})
     if fmi == 3:
         files["sources/buildDescription.xml"] = render("buildDescription.xml", values)
         grouped = {"terminals": terminals(described)}

@@ -16,6 +16,7 @@ from xml.etree import ElementTree
 
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
+from tank2sim.fmu.osp import OSP_FILE
 
 Host = Literal["unity", "unreal", "osp"]
 """A program that :func:`host_conditions` knows."""
@@ -30,7 +31,6 @@ SHORTEST_STOP_S = 3600.0
 _LARGEST_BYTES = 5_000_000  # Project choice: unpacked within the half second that Unreal's plugin waits
 _FARTHEST_M = 1e5  # single precision then resolves 4 mm
 _PLAIN_NAME = re.compile("[A-Za-z][A-Za-z0-9_]{0,59}", re.ASCII)
-_OSP_FILE = "extra/com.open-simulation-platform/OspModelDescription.xml"
 
 _LEAN_PARAMETERS = ("initial.x", "initial.y", "initial.psi", "initial.u")
 _LEAN_OUTPUTS = ("motion.speed", "motion.heading", "propeller.speed_actual", "validity")
@@ -119,7 +119,7 @@ def _read(path: Path) -> _Fmu:
         with zipfile.ZipFile(path) as archive:
             sizes = {entry.filename: entry.file_size for entry in archive.infolist()}
             root = ElementTree.fromstring(archive.read("modelDescription.xml"))
-            groups = ElementTree.fromstring(archive.read(_OSP_FILE)) if _OSP_FILE in sizes else None
+            groups = ElementTree.fromstring(archive.read(OSP_FILE)) if OSP_FILE in sizes else None
     except (OSError, KeyError, zipfile.BadZipFile, ElementTree.ParseError) as error:
         raise InputError(path, "", f"is not an FMU ({error})", "give a file that tank2sim exported") from None
     listed = root.find("ModelVariables")
@@ -229,7 +229,7 @@ def _structured_names(fmu: _Fmu) -> tuple[bool, str]:
 
 def _variable_groups(fmu: _Fmu) -> tuple[bool, str]:
     if fmu.groups is None:
-        return False, f"no {_OSP_FILE}"
+        return False, f"no {OSP_FILE}"
     named = [one.get("ref", "") for one in fmu.groups.iter() if one.tag.rpartition("}")[2] == "Variable"]
     unknown = sorted({*named} - {one.get("name", "") for one in fmu.variables})
     words = f"{len(named)} variables in groups"

@@ -81,6 +81,9 @@ def osp_system(model: Model, file: str, identifier: str) -> dict[str, str]:
     }
 
 
+OSP_FILE = "extra/com.open-simulation-platform/OspModelDescription.xml"
+"""Groups of variables in the FMU. OSP's engine looks for a copy next to it, ``<modelName>_OspModelDescription.xml``."""
+
 STEPS_IN_COMMUNICATION = 10
 """Steps of the model in a communication step of the system for OSP: project choice, within a second for ships."""
 
