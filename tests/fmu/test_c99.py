@@ -24,6 +24,7 @@ from tank2sim.fmu.manoeuvre import manoeuvre
 from tank2sim.fmu.reference import by_scheme, reference_errors
 from tank2sim.fmu.running import replay
 from tank2sim.native.compiler import SHARED_SUFFIX
+from tests.dynamics.effects.ships import TYPICAL, card_with
 from tests.fmu.plain_ships import STRICT, CompiledShip, call, macro, written
 from tests.marks import first_fast
 
@@ -72,6 +73,19 @@ def test_a_strict_compiler_has_no_objection_and_the_self_test_passes(card: str, 
         ran = call("./run", folder=folder)
         assert ran.returncode == 0 and ran.stdout.endswith("pass\n"), ran.stdout
         assert f"{ship.instance_bytes(single=single)} bytes" in ran.stdout
+
+
+@needs_gcc
+@pytest.mark.long
+@pytest.mark.parametrize("effect", TYPICAL)
+def test_every_effect_compiles_and_passes_its_self_test(effect: str, tmp_path: Path) -> None:
+    ship = plain_ship(card_with({effect: TYPICAL[effect]}))
+    folder = written(ship, tmp_path)
+    for single in (False, True):
+        done = call("gcc", *STRICT, *macro(ship, single), "ship.c", "self_test.c", "-lm", "-o", "run", folder=folder)
+        assert done.returncode == 0, done.stderr
+        ran = call("./run", folder=folder)
+        assert ran.returncode == 0, ran.stdout
 
 
 @needs_gcc
