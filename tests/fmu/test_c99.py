@@ -200,6 +200,8 @@ def test_a_motion_without_bounds_is_refused_and_the_last_good_state_kept(ship: C
     status = [ship.step(0.1) for _ in range(50)]
     before = ship.memory.copy()
     assert 2 in status and ship.step(0.1) == 2
+    limits = ship.made.files["ship.c"].partition("mariner_class_largest[")[2]
+    assert re.findall(r"_C\(([\d.e+]+)\)", limits)[:3] == ["1000000000.0", "1000000000.0", "1000000.0"]  # as the FMU
     assert ship.memory.tobytes() == before.tobytes() and np.isfinite(before).all()
 
 

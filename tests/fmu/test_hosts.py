@@ -169,6 +169,8 @@ def test_no_effect_has_names_that_differ_by_case_alone() -> None:
 def test_a_lean_fmu_sails_as_the_whole_one(lean: Path, mariner: Model, mariner_fmu: Callable[[int], Path]) -> None:
     small = lean_model(mariner)
     assert small.input_names == ("rudder.command",)
+    assert small.parameter_names == ("initial.x", "initial.y", "initial.psi", "initial.u")
+    assert set(small.outputs) == {*small.state_names, "motion.speed", "motion.heading", "validity"}
     run = manoeuvre(small)
     found = replay(lean, run, small)
     inputs = np.zeros((len(run.inputs), len(mariner.inputs)))

@@ -16,6 +16,7 @@ _FORCES = (("X", "N", "Surge force"), ("Y", "N", "Sway force"), ("N", "N.m", "Ya
 
 _SIDES = {"X": "forward", "Y": "to starboard", "N": "to starboard"}
 
+# x and X would be one variable where names do not know case, as in Unreal Engine.
 EXTERNAL_INPUTS = tuple(f"external.{name}" for name in ("X", "Y", "N", "point_x", "point_y"))
 """Inputs of :func:`with_external_forces`."""
 
@@ -170,14 +171,12 @@ def external_inputs(given: Mapping[str, float], *, rolls: bool = False) -> dict[
     InputError
         A key is none of these.
     """
-    inputs = {}
-    for name, value in given.items():
-        # Upper and lower case would be one variable in some hosts of FMUs.
-        variable = f"external.point_{name}" if name in ("x", "y", "z") else f"external.{name}"
-        if variable not in (*EXTERNAL_INPUTS, *(EXTERNAL_INPUTS_OF_ROLL if rolls else ())):
+    of_roll = dict(zip(("K", "z"), EXTERNAL_INPUTS_OF_ROLL, strict=True))
+    known = dict(zip(("X", "Y", "N", "x", "y"), EXTERNAL_INPUTS, strict=True)) | (of_roll if rolls else {})
+    for name in given:
+        if name not in known:
             remedy = "X and Y (N), N (N m), x and y (m) are known"
-            if variable in EXTERNAL_INPUTS_OF_ROLL:
+            if name in of_roll:
                 remedy = "it acts on a ship that rolls: give [roll] on the card"
             raise ArgumentError("external", name, "is not an external force", remedy)
-        inputs[variable] = float(value)
-    return inputs
+    return {known[name]: float(value) for name, value in given.items()}

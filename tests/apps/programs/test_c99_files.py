@@ -27,7 +27,7 @@ def test_figures_are_the_same_in_double_and_nearly_the_same_in_single_precision(
     for one in made.changes:
         assert one.before == one.after and one.before is not None, one
     percent, degrees = map(float, re.findall(r"by ([\d.e-]+) (?:%|deg)", made.losses[0]))
-    assert 1e-6 < percent < 0.1 and 1e-8 < degrees < 1e-3
+    assert 1e-4 < percent < 0.1 and 1e-8 < degrees < 1e-3
 
 
 def test_a_turn_by_the_files_is_that_of_the_model() -> None:
