@@ -177,3 +177,45 @@ def test_predictions_worse_than_a_mean_are_the_first_words() -> None:
     (doubt,) = worse_than_a_mean({"u": 0.9, "v": -0.1, "r": float("nan")})
     assert doubt.level is Level.CAUTION and "v -0.1" in doubt and "r nan" in doubt
     assert "u 0.9" not in doubt
+
+
+@pytest.fixture(scope="module")
+def deviating(craft, tmp_path_factory) -> t2s.CraftIdentificationResult:
+    """Trials in two folders with the same names, recorded with a compass that deviates by 1, 7 and -5 deg."""
+    paths = {}
+    for part, names in (("first", ["straight", "spin", "steps"]), ("second", ["astern", "zigzag"])):
+        folder = tmp_path_factory.mktemp("deviating") / part
+        folder.mkdir()
+        paths[part] = written(folder, craft, names)
+        for path in paths[part]:
+            rows = np.loadtxt(path, delimiter=",", skiprows=1)
+            heading = np.radians(rows[:, 3]) + (1.0 if part == "second" else 0.0)  # the second day to another side
+            turned = np.array([[np.cos(1.0), -np.sin(1.0)], [np.sin(1.0), np.cos(1.0)]])
+            rows[:, 1:3] = rows[:, 1:3] @ (turned.T if part == "second" else np.eye(2))
+            rows[:, 3] = np.degrees(heading) + 1.0 + 7.0 * np.sin(heading) - 5.0 * np.cos(heading)
+            np.savetxt(path, rows, delimiter=",", header=path.read_text().splitlines()[0], comments="")
+    paths["second"][1] = paths["second"][1].rename(paths["second"][1].with_name("steps.csv"))
+    first = craft_log.first_card(craft, np.random.default_rng(5))
+    return t2s.identify(first, paths["first"], holdout=paths["second"])
+
+
+@pytest.mark.slow
+def test_the_deviation_of_the_compass_is_found_and_does_not_bend_the_coefficients(craft, deviating, found) -> None:
+    compass = deviating.study.compass
+    for letter, truth in (("a", 1.0), ("b", 7.0), ("c", -5.0)):
+        value, error = getattr(compass, f"{letter}_deg"), getattr(compass, f"{letter}_error_deg")
+        assert abs(value - truth) < 3 * error and error < 2.0, letter
+    assert compass.b_deg > 3.5 and compass.c_deg < -2.5
+    assert compass.notices and not found.study.compass.notices
+    for name in ("port.ahead", "Xuabsu", "Nrabsr"):
+        entry = deviating.study.coefficients[name]
+        assert abs(entry.value - craft[name.rpartition(".")[2]]) < 3 * entry.standard_error, name
+    assert not any(name.startswith("compass") for name in (*deviating.card.spelt, *deviating.study.coefficients))
+
+
+@pytest.mark.slow
+def test_trials_of_one_file_name_in_two_folders_are_two_trials(deviating) -> None:
+    assert deviating.study.trials == ("straight", "spin", "first/steps")
+    assert deviating.study.held_out == ("astern", "second/steps")
+    assert "second/steps" in {prediction.run.name for prediction in deviating.predictions}
+    assert min(deviating.determination.values()) > 0.8

@@ -14,6 +14,7 @@ from tank2sim.apps.rigs.tow import output_error as tow
 from tank2sim.apps.rigs.tow.records import Tows
 from tank2sim.apps.rigs.yaw import output_error as yaw
 from tank2sim.errors import InputError
+from tank2sim.identification.craft import first_values
 from tank2sim.identification.trials.methods import gauss_newton
 from tank2sim.identification.trials.methods.equation_error import equation_error
 from tank2sim.identification.trials.methods.gauss_newton import StoppedSearchError, is_minimum
@@ -42,7 +43,8 @@ def test_a_stopped_filter_of_a_ship_is_refused(stopped) -> None:
         kalman(problem)
 
 
-def test_a_stopped_search_of_a_craft_is_refused(stopped, tmp_path) -> None:
+def test_a_stopped_search_of_a_craft_is_refused(stopped, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(first_values, "least_squares", _stays)
     craft = craft_log.random_craft(np.random.default_rng(7))
     paths = written(tmp_path, craft, ["spin"])
     with pytest.raises(InputError, match="could not take a step"):
@@ -58,6 +60,7 @@ def test_a_search_that_begins_at_the_minimum_need_not_move() -> None:
 
 
 def _stays(residuals, start, jacobian, *_, **__) -> OptimizeResult:
+    """A search that does not move."""
     return OptimizeResult(x=np.array(start), fun=residuals(start), jac=jacobian(start), success=True, active_mask=0)
 
 

@@ -147,6 +147,7 @@ def identify(
     from tank2sim.identification.trials.identify import identify_trials
     from tank2sim.identification.trials.problem.structures import STRUCTURES
     from tank2sim.identification.trials.study import study_identification
+    from tank2sim.records.trials import distinctly_named
     from tank2sim.results.identification import IdentificationResult
 
     progress = _step_report(report)
@@ -154,7 +155,7 @@ def identify(
     if steered.steered_by is SteeredBy.THRUSTERS:
         taken = {"ship", "trials", "holdout", "report"}
         refuse_set(identify, given, "is not for a craft with thrusters", taken=taken)
-        to_fit, to_predict = (
+        to_fit, to_predict = distinctly_named(
             trials_of(trials, thrusters=steered.thrusters),
             trials_of(holdout, "holdout", thrusters=steered.thrusters),
         )

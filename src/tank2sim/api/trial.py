@@ -18,7 +18,7 @@ from tank2sim.records.reading import READERS, looks_like_a_trial
 from tank2sim.records.reading import read_trial_file as read_record
 from tank2sim.records.signals.columns import SignalName, file_columns
 from tank2sim.records.signals.writing import trial_text
-from tank2sim.records.trials import Trial
+from tank2sim.records.trials import Trial, distinctly_named
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -182,8 +182,10 @@ def trials_of(
         from tank2sim.records.craft_trials import read_craft_trial
 
         files = [source.path if isinstance(source, Trial) else source for source in sources]
-        return [read_craft_trial(file, thrusters) for file in files]
-    return [source if isinstance(source, Trial) else read_record(source, rising=rising) for source in sources]
+        found = [read_craft_trial(file, thrusters) for file in files]
+    else:
+        found = [source if isinstance(source, Trial) else read_record(source, rising=rising) for source in sources]
+    return distinctly_named(found)[0]
 
 
 def trial_sources(given: TrialPaths, name: str = "trials") -> list[Trial | Path | CsvTable]:
@@ -232,7 +234,7 @@ def fitted_and_held(
     from tank2sim.identification.trials.problem.prepare_trials import fitted_as, measured
     from tank2sim.records.same_record import refuse_copies
 
-    groups = (trials_of(trials), trials_of(holdout, "holdout"))
+    groups = distinctly_named(trials_of(trials), trials_of(holdout, "holdout"))
     fitted, held = (measured(group, card, report_unused=report_unused) for group in groups)
     if not fitted.trials:
         raise InputError("trials", "", "is empty", "give a file of a trial or a folder with trials")

@@ -22,7 +22,7 @@ from tank2sim.errors import InputError
 from tank2sim.gap.outcome.export import signal_display_name
 from tank2sim.gap.proof.replay import replay_by_card
 from tank2sim.gap.result import Passed
-from tank2sim.identification.craft.fit import PREDICTED_S
+from tank2sim.identification.craft.first_values import PREDICTED_S
 from tank2sim.identification.craft.study import predict_trials
 from tank2sim.identification.trials.assessment.other_ship import evidence_of_other_ship
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -53,6 +53,8 @@ class Trial:
         Signal to what its column is called in the file, where that differs.
     origin_deg : tuple or None
         Latitude and longitude of x = y = 0, deg, where the file states them.
+    folder : str
+        Folder that tells trials of one file name apart (:func:`distinctly_named`).
     """
 
     path: Path
@@ -64,11 +66,12 @@ class Trial:
     columns: Mapping[str, str] = field(default_factory=dict)
     length_m: float | None = None
     origin_deg: tuple[float, float] | None = None
+    folder: str = ""
 
     @property
     def name(self) -> str:
-        """File name without its ending."""
-        return self.path.stem
+        """File name without its ending, behind the folder where several trials have it."""
+        return f"{self.folder}/{self.path.stem}" if self.folder else self.path.stem
 
     def heading(self, signal: str) -> str:
         """What the column of a signal is called in the file."""
@@ -194,3 +197,22 @@ def unwrapped(angle: Array) -> Array:
 
 def _unit(signal: str) -> str:
     return signal.rpartition("_")[2]
+
+
+def distinctly_named(*groups: Sequence[Trial]) -> list[list[Trial]]:
+    """The groups with trials of one file name in different folders named by their folders, too.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> trials = [Trial(Path(name), np.arange(2.0), {}) for name in ("a/turn.csv", "b/turn.csv", "b/stop.csv")]
+    >>> [[trial.name for trial in group] for group in distinctly_named(trials[:1], trials[1:])]
+    [['a/turn'], ['b/turn', 'stop']]
+    """
+    paths: dict[str, set[Path]] = {}
+    for trial in (trial for group in groups for trial in group):
+        paths.setdefault(trial.path.stem, set()).add(trial.path)
+    return [
+        [replace(trial, folder=trial.path.parent.name) if len(paths[trial.path.stem]) > 1 else trial for trial in group]
+        for group in groups
+    ]

@@ -21,7 +21,7 @@ from tank2sim.answer.result import Result
 from tank2sim.arrays import Columns, Number
 from tank2sim.cards import SteeredBy, SteeredCard
 from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR
-from tank2sim.identification.craft.fit import PREDICTED_S
+from tank2sim.identification.craft.first_values import PREDICTED_S
 from tank2sim.identification.craft.study import PredictionStudy
 from tank2sim.notices import Notice
 from tank2sim.results.imo import imo_section

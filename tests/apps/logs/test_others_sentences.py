@@ -221,7 +221,7 @@ def test_a_rudder_is_found_in_other_sentences(read, wording, name, quantity) -> 
 def test_a_rudder_in_a_sentence_that_nobody_knows_is_found_by_content(read, tmp_path) -> None:
     read(changed("RSA", lambda words: f"PABC,RUD,{words[1]},A", of=whole()))
     result = log(tmp_path / "log.nmea")
-    assert [cut.stretch.kind.value for cut in result.cuts] == ["zigzag", "turn"] and "PABC.2" in result.cautions[0]
+    assert [cut.stretches[0].kind.value for cut in result.cuts] == ["zigzag", "turn"] and "PABC.2" in result.cautions[0]
 
 
 def test_a_known_kind_that_is_not_used_is_named(read) -> None:

@@ -215,7 +215,7 @@ def test_a_rudder_with_another_zero_is_taken_from_there_and_marked(tmp_path, nam
     made = np.interp(found.time_s - T0, voyage().time, voyage().rudder)
     assert np.degrees(np.abs(found.values - made)).max() < 1.1
     assert any(f"{zero:g} on straight legs" in mark for mark in result.cautions)
-    assert [cut.stretch.kind.value for cut in result.cuts] == ["zigzag", "turn"]
+    assert [cut.stretches[0].kind.value for cut in result.cuts] == ["zigzag", "turn"]
 
 
 @first_fast("name", ["rudder_raw", "rudder_adc"])

@@ -78,7 +78,7 @@ def test_manoeuvres_in_a_row_are_one_trial_each(tmp_path, case, restless_deg) ->
 
 def test_trials_are_read_again_and_begin_when_they_say(made, tmp_path) -> None:
     paths = made.save(tmp_path / "voyage")
-    cut = next(cut for cut in made.cuts if cut.stretch.kind.value == "turn")
+    cut = next(cut for cut in made.cuts if cut.stretches[0].kind.value == "turn")
     path = next(path for path in paths if path.name == cut.trial.path.name)
     trial = read_trial_file(path)
     assert f"# begins: {utc_text(cut.begins_s)}" in path.read_text(encoding="utf-8")

@@ -150,7 +150,7 @@ class LogStudy:
 def study_log(voyage: Voyage, stretches: Sequence[Stretch], cuts: Sequence[TrialCut]) -> LogStudy:
     """Study of a voyage, its stretches and the trials that were cut from it."""
     current = drift_current(voyage, voyage.begin_s, voyage.end_s)
-    files = {id(cut.stretch): cut.trial.path.name for cut in cuts}
+    files = {id(stretch): cut.trial.path.name for cut in cuts for stretch in cut.stretches}
     return LogStudy(
         logs=tuple(
             LogFile(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from tank2sim.apps.logs.clock import usual_step, utc_text
 from tank2sim.apps.logs.current import drift_current
 from tank2sim.apps.logs.quantities import QUANTITIES
 from tank2sim.apps.logs.reference import held, interpolated, thinned_series
-from tank2sim.apps.logs.stretches import LEAST_TRIAL_ROWS, Stretch
+from tank2sim.apps.logs.stretches import LEAST_TRIAL_ROWS, Stretch, StretchKind
 from tank2sim.apps.logs.voyage import QuantitySeries, Voyage
 from tank2sim.arrays import Array
 from tank2sim.records.signals.columns import file_columns
@@ -39,6 +39,9 @@ SHORTEST_STEP_S = 0.1
 LONGEST_STEP_S = 1.0
 """Largest step of a trial, s: slower streams leave empty cells. Project choice: rudders move within seconds."""
 
+LONGEST_RUN_S = 300.0
+"""Longest trial of a craft, s. Project choice: current and mean wind, steady within a trial, hold for minutes."""
+
 _HELD = ("rudder_order", "rpm_order", "thrust_order_port", "thrust_order_starboard")
 
 _THRUSTER_COLUMNS = {
@@ -52,11 +55,12 @@ _THRUSTER_COLUMNS = {
 
 @dataclass(frozen=True, eq=False)
 class TrialCut:
-    """A stretch as a trial.
+    """Stretches as a trial.
 
     Parameters
     ----------
-    stretch : Stretch
+    stretches : tuple of Stretch
+        One; of a craft all between two rests.
     trial : Trial
         Times from its begin; signals in SI.
     begins_s : float
@@ -67,7 +71,7 @@ class TrialCut:
         Whether it has a rudder, as the trial format asks; a craft with two thrusters has none.
     """
 
-    stretch: Stretch
+    stretches: tuple[Stretch, ...]
     trial: Trial
     begins_s: float
     text: str
@@ -80,26 +84,49 @@ def cut_trials(voyage: Voyage, stretches: tuple[Stretch, ...]) -> list[TrialCut]
     The rows of a trial have an even step, that of the heading between :data:`SHORTEST_STEP_S` and
     :data:`LONGEST_STEP_S`. Each sample of a slower stream is in the nearest row, by a straight line to its neighbour at
     the time of the row; rows without a sample are empty. Orders hold. Nothing is bridged over gaps.
+
+    A craft without a rudder does not make the manoeuvres of ships, and its motion is predicted for longer than one of
+    them: what it does between two rests is one trial, to :data:`LONGEST_RUN_S`.
     """
     cuts: list[TrialCut] = []
-    for place, stretch in enumerate(stretches):
-        if stretch.kind.excites:
-            before = stretches[place - 1] if place else None
-            lead = 0.0 if before is None else min(LEAD_S, before.duration_s)
-            cut = _cut(voyage, stretch, stretch.begin_s - lead, len(cuts) + 1)
-            if cut is not None:
-                cuts.append(cut)
+    steered = any(name in voyage.series for name in ("rudder_angle", "rudder_order"))
+    for place, length in _places(stretches, whole=not steered):
+        before = stretches[place - 1] if place else None
+        lead = 0.0 if before is None else min(LEAD_S, before.duration_s)
+        cut = _cut(voyage, stretches[place : place + length], stretches[place].begin_s - lead, len(cuts) + 1)
+        if cut is not None:
+            cuts.append(cut)
     return cuts
 
 
-def _cut(voyage: Voyage, stretch: Stretch, begin: float, number: int) -> TrialCut | None:
+def _places(stretches: Sequence[Stretch], whole: bool) -> Iterator[tuple[int, int]]:
+    """First stretch of each trial and how many it has: one that excites the vessel, or all between two rests."""
+    place = 0
+    while place < len(stretches):
+        end = place + 1
+        if whole and stretches[place].kind.excites:
+            while (
+                end < len(stretches)
+                and stretches[end].kind is not StretchKind.REST
+                and stretches[end].begin_s == stretches[end - 1].end_s
+                and stretches[end].end_s - stretches[place].begin_s <= LONGEST_RUN_S
+            ):
+                end += 1
+            while end > place + 1 and not stretches[end - 1].kind.excites:
+                end -= 1
+        if stretches[place].kind.excites:
+            yield place, end - place
+        place = end
+
+
+def _cut(voyage: Voyage, stretches: tuple[Stretch, ...], begin: float, number: int) -> TrialCut | None:
     clock = next((voyage.series[name] for name in ("heading", "yaw_rate", "x", "sog") if name in voyage.series), None)
     if clock is None:
         return None
     step = float(np.clip(usual_step(clock.time_s), SHORTEST_STEP_S, LONGEST_STEP_S))
     first = clock.time_s[np.clip(np.searchsorted(clock.time_s, begin), 0, len(clock.time_s) - 1)]
     first -= step * math.floor((first - begin) / step)
-    rows = math.floor((stretch.end_s - first) / step + 1e-6) + 1
+    rows = math.floor((stretches[-1].end_s - first) / step + 1e-6) + 1
     if rows < LEAST_TRIAL_ROWS:
         return None
     at = first + step * np.arange(rows)
@@ -123,12 +150,12 @@ def _cut(voyage: Voyage, stretch: Stretch, begin: float, number: int) -> TrialCu
     steered = any(name in signals for name in RUDDERS)
     if not any(name in signals for name in MEASURED_COLUMNS) or not (steered or thrusters):
         return None
-    name = _name(number, stretch, steered)
+    name = f"{number:02d}_run" if len(stretches) > 1 else _name(number, stretches[0], steered)
     trial = Trial(Path(f"{name}.csv"), np.round(at - first, 6), signals)
-    text = trial_text(trial, _remarks(voyage, stretch, first)) if steered else ""
+    text = trial_text(trial, _remarks(voyage, stretches, first)) if steered else ""
     if thrusters:
-        text = _with_thrusters(text, trial, thrusters, _remarks(voyage, stretch, first))
-    return TrialCut(stretch, trial, first, text, steered)
+        text = _with_thrusters(text, trial, thrusters, _remarks(voyage, stretches, first))
+    return TrialCut(stretches, trial, first, text, steered)
 
 
 def _redundant(series: Mapping[str, QuantitySeries]) -> tuple[str, ...]:
@@ -155,16 +182,17 @@ def _name(number: int, stretch: Stretch, steered: bool) -> str:
     return f"{number:02d}_{stretch.kind}_{level:+.0f}"
 
 
-def _remarks(voyage: Voyage, stretch: Stretch, first: float) -> list[str]:
+def _remarks(voyage: Voyage, stretches: Sequence[Stretch], first: float) -> list[str]:
+    begin, end = stretches[0].begin_s, stretches[-1].end_s
     logs = ", ".join(log.path.name for log in voyage.logs)
     remarks: list[str] = [*voyage.faults]
-    remarks.append(f"{stretch.kind}, {CUT_BY} from {logs}")
+    remarks.append(f"{', '.join(dict.fromkeys(one.kind for one in stretches))}, {CUT_BY} from {logs}")
     if voyage.dated:
         remarks.append(f"begins: {utc_text(first)}")
-    remarks.append(f"execute: {stretch.begin_s - first:.2f}")
+    remarks.append(f"execute: {begin - first:.2f}")
     if voyage.origin_deg:
         remarks.append(f"origin: {voyage.origin_deg[0]:g} {voyage.origin_deg[1]:g}")
-    if current := drift_current(voyage, stretch.begin_s, stretch.end_s):
+    if current := drift_current(voyage, begin, end):
         remarks.append(f"current {current.speed_mps:.2f} m/s towards {current.direction_deg:.0f} deg, by {current.by}")
     if "rpm" in voyage.series and "rpm_order" not in voyage.series:
         remarks.append("n_rpm are measured revolutions, not ordered")

@@ -10,7 +10,7 @@ from tank2sim.dynamics.small_craft import THRUSTER_PARAMETERS
 from tank2sim.errors import InputError
 from tank2sim.identification.craft.fit import CraftFit
 from tank2sim.identification.craft.order_response import OrderResponse
-from tank2sim.identification.craft.problem import twins
+from tank2sim.identification.craft.problem import COMPASS_SPREADS, twins
 from tank2sim.units import from_si
 
 _KEYS = {part: key for key, part in THRUSTER_PARAMETERS.items()}
@@ -81,6 +81,8 @@ def estimated_numbers(card: SteeredCard, fit: CraftFit) -> dict[str, int]:
     """
     found, free = {}, fit.problem.free
     for place, name in enumerate(free):
+        if name in COMPASS_SPREADS:  # of the instruments, and not of the craft
+            continue
         found[name] = place
         if name == "derivatives.Yrdot" and "derivatives.Nvdot" not in free:
             found["derivatives.Nvdot"] = place

@@ -14,7 +14,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.identification.craft.first_values import estimate_by_velocities
+from tank2sim.identification.craft.first_values import PREDICTED_S, estimate_by_velocities
 from tank2sim.identification.craft.problem import DISTURBANCES, with_disturbances
 from tank2sim.identification.trials.methods.gauss_newton import StoppedSearchError
 from tank2sim.identification.trials.methods.kalman import KalmanEstimate, KalmanSettings, Smoothed, estimate_at, kalman
@@ -31,9 +31,6 @@ from tank2sim.identification.trials.methods.process_noise import PUSHED
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 from tank2sim.simulation.sensitivity import Sensitivity
-
-PREDICTED_S = 30.0
-"""Length of a free-running prediction, s: that of the published comparisons on small craft."""
 
 PREDICTION_LEAD_S = 10.0
 """Time of a held-out trial in which the filter finds its state, s: several time constants (project choice)."""
@@ -62,8 +59,8 @@ CLEARLY_BETTER = 0.8
 """Errors of predictions of the fitted trials, over the filter's errors, below which the estimate by velocities is taken
 (project choice): where the model holds the filter is better, and where it does not its noise hides the error."""
 
-_WIND_SHARES = (1.0, 0.3, 0.1)
-"""Spreads of the wind's force, over the usual one, that are tried with an estimate that knows no wind."""
+_DISTURBED_SHARES = (1.0, 0.3, 0.1, 0.03, 0.01)
+"""Spreads of current and wind, over the usual ones, that are tried with an estimate that knows neither."""
 
 _STEPS_FROM_NEAR = 20
 """Most steps of a search that begins at the estimate by velocities, each of the filter over all trials."""
@@ -182,15 +179,15 @@ def _fit_of(problem: Problem, estimate: KalmanEstimate) -> CraftFit:
 
 
 def _at_velocities(problem: Problem, found: Estimate) -> tuple[float, CraftFit] | None:
-    """Errors of predictions and fit with the estimate by velocities, with the spread of the wind's force that is best.
+    """Errors of predictions and fit with the estimate by velocities, with the spread of current and wind that is best.
 
     None where the filter loses the motion with all of them.
     """
     wide = np.array([problem.model[name].nominal for name in DISTURBANCES])
-    wind = np.array([name.startswith("disturbance") for name in DISTURBANCES])
+    outside = np.array([name != "gyro.bias" for name in DISTURBANCES])
     fits = []
-    for share in _WIND_SHARES:
-        posed = with_disturbances(problem, np.zeros(len(wide)), np.where(wind, share * wide, wide))
+    for share in _DISTURBED_SHARES:
+        posed = with_disturbances(problem, np.zeros(len(wide)), np.where(outside, share * wide, wide))
         task = task_of(posed, drifting=True)
         try:
             point = task.first_point(found.values)
@@ -379,7 +376,8 @@ def predict_free(fit: CraftFit, runs: Sequence[SampledRun]) -> list[FreePredicti
     states, _ = smooth_states(tangents.A, tangents.C, filtered.gains, filtered.before, filtered.innovations)
     motion = [names.index(f"motion.{letter}") for letter in "uvr"]
     pose = ("motion.x", "motion.y", "motion.psi")
-    placed, measured = [names.index(name) for name in pose], [problem.seen.index(name) for name in pose]
+    placed = [names.index(name) for name in pose]
+    measured = [problem.seen.index(name) for name in ("motion.x", "motion.y", "compass.heading")]
     sensitivity = Sensitivity(problem.model, problem.free, problem.seen)
     p = problem.parameters(fit.estimate.values)
     found = []

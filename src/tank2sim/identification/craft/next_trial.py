@@ -19,6 +19,7 @@ from tank2sim.identification.craft.fit import (
     CraftFit,
     information,
 )
+from tank2sim.identification.craft.problem import COMPASS_SPREADS
 from tank2sim.simulation.sensitivity import Sensitivity
 
 TRIAL_S = 300.0
@@ -85,7 +86,11 @@ def next_trials(card: SteeredCard, fit: CraftFit) -> list[CandidateTrial]:
     """
     if len(card.thrusters) != 2:
         return []
-    open_places = [place for place, verdict in enumerate(fit.verdicts) if verdict is CoefficientVerdict.PRIOR]
+    open_places = [
+        place
+        for place, (name, verdict) in enumerate(zip(fit.problem.free, fit.verdicts, strict=True))
+        if verdict is CoefficientVerdict.PRIOR and name not in COMPASS_SPREADS
+    ]
     problem = fit.problem
     # The reported errors allow for residuals unlike the noise model: a candidate narrows both alike.
     so_far = fit.by_run.sum(axis=0) + problem.prior_precision(problem.prior_error)

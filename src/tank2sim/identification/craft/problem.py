@@ -10,6 +10,7 @@ added masses.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -74,6 +75,10 @@ choice)."""
 
 NEVER_POSITIVE = ("Xudot", "Yvdot", "Nrdot", "Xu", "Xuabsu", "Yv", "Yvabsv", "Nr", "Nrabsr")
 """Coefficients that are not positive: an added mass and a damping of each motion by itself."""
+
+COMPASS_SPREADS = {"compass.A": math.radians(2.0), "compass.B": math.radians(5.0), "compass.C": math.radians(5.0)}
+"""Standard error of each coefficient of the deviation before the trials, rad: a compass next to the motors of a small
+craft that nobody has swung (project choice)."""
 
 DISTURBANCES = ("current.north", "current.east", "disturbance.north", "disturbance.east", "gyro.bias")
 """States of the model that do not change in a trial: m/s, m/s, N, N, rad/s."""
@@ -141,12 +146,36 @@ def craft_fit_model(card: SteeredCard, driven_by: str = "revolutions", *, turned
         value=model.symbol("motion.r") + bias,
     )
     return (
-        model.extend(*states, *rates, shown)
+        model.extend(*states, *rates, shown, *_compass(model))
         .redefine("motion.xdot", lambda speed: speed + north)
         .redefine("motion.ydot", lambda speed: speed + east)
         .redefine("force.X", lambda force: force + forward)
         .redefine("force.Y", lambda force: force + starboard)
     )
+
+
+def _compass(model: Model) -> list[Parameter | Quantity]:
+    """A compass with a deviation, and the velocity over the ground in axes of its heading.
+
+    Heading shown - heading = A + B sin(heading) + C cos(heading): the lubber's line and the permanent magnetism of the
+    craft (Smith and Evans 1863, Admiralty manual for ascertaining and applying the deviations of the compass).
+    """
+    words = {"compass.A": "constant", "compass.B": "by the sine", "compass.C": "by the cosine of the heading"}
+    parts = [
+        Parameter(name=name, unit="rad", description=f"Deviation of the compass, {words[name]}", start=0.0)
+        for name in COMPASS_SPREADS
+    ]
+    constant, sine, cosine = (part.symbol for part in parts)
+    psi, u, v = (model.symbol(f"motion.{key}") for key in ("psi", "u", "v"))
+    deviation = constant + sine * ca.sin(psi) + cosine * ca.cos(psi)
+    ahead, across = earth_velocity(u, v, -deviation)
+    heading = "Heading that the compass shows"
+    return [
+        *parts,
+        Quantity(name="compass.heading", unit="rad", description=heading, value=psi + deviation),
+        Quantity(name="compass.u", unit="m/s", description=f"Velocity along the {heading.lower()}", value=ahead),
+        Quantity(name="compass.v", unit="m/s", description=f"Velocity across the {heading.lower()}", value=across),
+    ]
 
 
 def _felt(lag_s: float | None) -> float | None:
@@ -209,7 +238,7 @@ def craft_prior(card: SteeredCard, model: Model) -> dict[str, tuple[float, float
             if f"{prefix}.{part}" in model:
                 stated = getattr(thruster, key)
                 found[f"{prefix}.{part}"] = 1.0 if stated is None else stated, thruster.uncertainty.get(key, spread)
-    return found
+    return found | {name: (0.0, spread) for name, spread in COMPASS_SPREADS.items()}
 
 
 def craft_problem(card: SteeredCard, trials: Sequence[Trial]) -> Problem:
@@ -242,7 +271,8 @@ def craft_problem(card: SteeredCard, trials: Sequence[Trial]) -> Problem:
     runs = []
     for trial in trials:
         run = prepare(model, trial, [*seen, *(["motion.r"] if rated else [])], step_s=OBSERVED_STEP_S)
-        runs.append(replace(run, seen=(*seen, *(["gyro.rate"] if rated else []))))
+        shown = ["compass.heading" if name == "motion.psi" else name for name in seen]
+        runs.append(replace(run, seen=(*shown, *(["gyro.rate"] if rated else []))))
     means, errors = (np.array(column) for column in zip(*prior.values(), strict=True))
     return Problem(model, tuple(prior), means, errors, tuple(runs))
 

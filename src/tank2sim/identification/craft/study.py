@@ -24,7 +24,7 @@ from tank2sim.identification.craft.fit import (
 )
 from tank2sim.identification.craft.next_trial import CandidateTrial, next_trials
 from tank2sim.identification.craft.order_response import OrderResponse
-from tank2sim.identification.craft.problem import craft_problem
+from tank2sim.identification.craft.problem import COMPASS_SPREADS, craft_problem
 from tank2sim.notices import Notice, caution
 from tank2sim.records.trials import Trial
 from tank2sim.units import from_si
@@ -33,6 +33,10 @@ NOT_ITS_OWN = (
     "a trial that the card was identified from shows how well it was fitted, and not how well the card predicts"
 )
 """Notice of each validation: a card of a craft does not say what it was identified from."""
+
+
+CERTAIN_ERRORS = 3.0
+"""Standard errors beyond which a deviation of the compass is said (project choice: one craft in 400 by chance)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,6 +83,38 @@ class ThrusterResponse:
     turning_rpm: float
 
 
+@dataclass(frozen=True, kw_only=True)
+class CompassDeviation:
+    """Deviation of the compass with which the trials were recorded: A + B sin(heading) + C cos(heading).
+
+    Parameters
+    ----------
+    a_deg, b_deg, c_deg : float
+        Heading shown less heading.
+    a_error_deg, b_error_deg, c_error_deg : float
+        Standard errors.
+    """
+
+    a_deg: Number
+    a_error_deg: Number
+    b_deg: Number
+    b_error_deg: Number
+    c_deg: Number
+    c_error_deg: Number
+
+    @property
+    def notices(self) -> list[Notice]:
+        """A sentence where a part by the heading is beyond :data:`CERTAIN_ERRORS` of its standard errors."""
+        parts = ((self.b_deg, self.b_error_deg), (self.c_deg, self.c_error_deg))
+        if not any(abs(value) > CERTAIN_ERRORS * error for value, error in parts):
+            return []
+        words = (
+            f"the compass of these trials deviates by A {self.a_deg:+.1f}, B {self.b_deg:+.1f} sin(heading), "
+            f"C {self.c_deg:+.1f} cos(heading) deg: the headings were corrected by it; swing the compass"
+        )
+        return [Notice(words)]
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CraftIdentificationStudy:
     """Coefficients and thrust curves of a craft with thrusters.
@@ -90,6 +126,7 @@ class CraftIdentificationStudy:
         Names of the trials that were fitted, and held out (also those too short to be predicted).
     coefficients : dict
         By name without ``derivatives.`` and ``thrusters.``.
+    compass : CompassDeviation
     noise : dict
         Standard deviation of the noise by signal, SI.
     determination : dict or None
@@ -107,6 +144,7 @@ class CraftIdentificationStudy:
     method: str
     trials: tuple[str, ...]
     coefficients: dict[str, CraftCoefficient]
+    compass: CompassDeviation
     noise: dict[str, Number]
     determination: dict[str, Number] | None
     driven_by: str
@@ -157,6 +195,8 @@ def study_craft(
             )
         )
     notices += _dead_band_notices(card, responses, driven_by)
+    compass = _compass(fit)
+    notices += compass.notices
     notices.append(
         Notice(
             "the mass on the card is taken as exact: motion determines forces over masses, so that an error of the "
@@ -168,6 +208,7 @@ def study_craft(
         method=fit.estimate.method,
         trials=tuple(run.name for run in fit.problem.runs),
         coefficients=_coefficients(fit),
+        compass=compass,
         noise=dict(fit.estimate.measurement_noise),
         determination=r_squared,
         driven_by=driven_by,
@@ -216,9 +257,20 @@ def _dead_band_notices(card: SteeredCard, responses: Mapping[str, OrderResponse]
     return notices
 
 
+def _compass(fit: CraftFit) -> CompassDeviation:
+    found = {}
+    for name in COMPASS_SPREADS:
+        place, letter = fit.problem.free.index(name), name[-1].lower()
+        found[f"{letter}_deg"] = math.degrees(fit.estimate.values[place])
+        found[f"{letter}_error_deg"] = math.degrees(fit.estimate.standard_errors[place])
+    return CompassDeviation(**found)
+
+
 def _coefficients(fit: CraftFit) -> dict[str, CraftCoefficient]:
     found = {}
     for place, (name, verdict) in enumerate(zip(fit.problem.free, fit.verdicts, strict=True)):
+        if name in COMPASS_SPREADS:
+            continue
         known = verdict is not CoefficientVerdict.PRIOR
         found[name.removeprefix("derivatives.").removeprefix("thrusters.")] = CraftCoefficient(
             value=float(fit.estimate.values[place]),

@@ -59,6 +59,37 @@ def refuse_stopped(method: str, at_minimum: bool) -> None:
         )
 
 
+def within_bounds(H: Array, g: Array, values: Array, bounds: tuple[Array, Array]) -> Array:
+    """The step of the normal equations ``H step = -g`` with unknowns that reach a bound held there.
+
+    Parameters
+    ----------
+    H, g : arrays (k, k) and (k,)
+    values : array (k,)
+        Where the step begins, within the bounds.
+    bounds : (array, array)
+        Least and largest values (k,).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> H, g = np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([3.0, 3.0])
+    >>> within_bounds(H, g, np.zeros(2), (np.array([0.0, -9.0]), np.array([9.0, 9.0])))
+    array([ 0. , -1.5])
+    """
+    low, high = bounds[0] - values, bounds[1] - values
+    step, free = np.zeros(len(g)), np.ones(len(g), dtype=bool)
+    while free.any():
+        pull = g + H @ np.where(free, 0.0, step)
+        step[free] = -np.linalg.solve(H[np.ix_(free, free)], pull[free])
+        beyond = free & ((step < low) | (step > high))
+        if not beyond.any():
+            break
+        step[beyond] = np.clip(step, low, high)[beyond]
+        free &= ~beyond
+    return step
+
+
 class _WithCost(Protocol):
     @property
     def cost(self) -> float: ...

@@ -15,7 +15,12 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise, estimate_coloured_noise, white
-from tank2sim.identification.trials.methods.gauss_newton import damped_gauss_newton, is_minimum, refuse_stopped
+from tank2sim.identification.trials.methods.gauss_newton import (
+    damped_gauss_newton,
+    is_minimum,
+    refuse_stopped,
+    within_bounds,
+)
 from tank2sim.identification.trials.methods.posterior import evidence_scale, sandwich, scaled_prior
 from tank2sim.identification.trials.methods.shooting import Normal, Pieces, Shooting, Shot, cut
 from tank2sim.identification.trials.problem.estimation_problem import (
@@ -174,10 +179,10 @@ def _minimise(work: _Work, search: _Search, tolerance: float) -> tuple[list[Shot
 
     def move(start: _Point, normals: list[Normal], damping: float) -> _Point:
         H, g = _whole_normal(problem, start.values, prior, normals)
-        step = -np.linalg.solve(H + damping * np.diag(np.diag(H)), g)
-        step = np.clip(start.values + step, *problem.bounds) - start.values
+        step = within_bounds(H + damping * np.diag(np.diag(H)), g, start.values, problem.bounds)
+        # A share of the states' own step, too: with both small enough the sum of squares falls.
         starts = [
-            shot.starts - (normal.step + normal.states @ step).reshape(shot.starts.shape)
+            shot.starts - (normal.step / (1 + damping) + normal.states @ step).reshape(shot.starts.shape)
             for shot, normal in zip(start.shots, normals, strict=True)
         ]
         return point(start.values + step, starts)

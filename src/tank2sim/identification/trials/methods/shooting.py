@@ -44,6 +44,15 @@ class Pieces:
     starts: Array
 
 
+SENSORS = {
+    "motion.psi": "compass.heading",
+    "motion.r": "gyro.rate",
+    "motion.u": "compass.u",
+    "motion.v": "compass.v",
+}
+"""State to the reading of a sensor with errors of its own that is nearly the state."""
+
+
 def cut(problem: Problem, run: SampledRun, length_s: float | None) -> Pieces:
     """Pieces of about `length_s` s; the whole run for None. Up to one step per piece remains unused at the end."""
     steps = len(run.measured) - 1
@@ -64,7 +73,7 @@ def _start(problem: Problem, run: SampledRun, first: int) -> Array:
     default = np.array(model.initial(p)).ravel()
     state = []
     for place, variable in enumerate(model.states):
-        value = values.get(variable.name)
+        value = values.get(variable.name, values.get(SENSORS.get(variable.name, "")))
         if value is None and variable.name == "motion.u":
             value = values.get("motion.u_ground", values.get("motion.sog"))
         if value is None and variable.name == "motion.v":
