@@ -21,8 +21,10 @@ from tank2sim.bundled import bundled
 from tank2sim.cards import Card
 from tank2sim.dynamics.simulator_interface import with_simulator_interface
 from tank2sim.escaping import json_in_html
+from tank2sim.fmu.c99 import plain_ship
 from tank2sim.fmu.export import description_text
 from tank2sim.fmu.osp import osp_system
+from tank2sim.fmu.templates import c_identifier
 from tests.cli.command_line import tank2sim
 from tests.hostile_text import HOSTILE, TOGETHER, Outline, hostile_card
 from tests.marks import first_fast
@@ -96,6 +98,24 @@ def test_a_class_hides_no_name_that_its_module_uses(text: str, made: Made) -> No
     assert nu[0] > 7
 
 
+def _tokens(text: str, prefix: str) -> list[str]:
+    """What a compiler of C reads of a file, without comments, numbers, hashes and the prefix of its names."""
+    code = re.sub(r"/\*.*?\*/", " ", text, flags=re.DOTALL)
+    code = re.sub(r'"[0-9a-f]{64}"', '""', code)
+    return re.sub(rf"(?<!\w){prefix}_", "PREFIX_", code, flags=re.IGNORECASE).split()
+
+
+def test_the_c_of_a_ship_is_the_same_whatever_the_texts(made: Made) -> None:
+    plain = plain_ship(made("mariner", BENIGN).card)
+    for text in [*TOGETHER, "2", "船", "-", "M" * 300, "Mariner */ MARK(); /* ??/\n MARK ??=define ??/"]:
+        ship = plain_ship(made("mariner", text).card)
+        assert re.fullmatch("[a-z][a-z0-9_]*", ship.prefix)
+        for name, content in ship.files.items():
+            assert content.isascii() and "??" not in content and "\\" not in content.replace("\\n", "")
+            assert not re.search(r"/\*(?:(?!\*/).)*/\*", content, re.DOTALL)
+            assert _tokens(content, ship.prefix) == _tokens(plain.files[name], plain.prefix), (text, name)
+
+
 def _elements(text: str) -> list[tuple[str, list[str]]]:
     """Elements of XML with the names of their attributes and, of comments, only that they are there."""
     builder = ElementTree.TreeBuilder(insert_comments=True)
@@ -145,12 +165,9 @@ def test_a_model_description_has_the_same_elements(fmi: int, made: Made) -> None
 def test_the_files_for_osp_lie_next_to_the_fmu(made: Made) -> None:
     for text in TOGETHER:
         model = with_simulator_interface(made("mariner", text).model)
-        for name, content in osp_system(model, "ship.fmu").items():
+        for name, content in osp_system(model, "ship.fmu", c_identifier(text)).items():
             assert Path(name).name == name and name.isprintable() and not re.search(r'[\\/:*?"<>|]', name), name
             _elements(content)
-    model = made("mariner", "../../MARK").model
-    assert "MARK_OspModelDescription.xml" in osp_system(model, "ship.fmu")  # its modelIdentifier
-    assert "Mariner class_OspModelDescription.xml" in osp_system(t2s.load("mariner").model, "ship.fmu")
 
 
 @pytest.mark.slow

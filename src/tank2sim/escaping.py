@@ -39,12 +39,13 @@ def json_in_html(value: object) -> Markup:
     return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
 
 
-def is_file_name(name: str) -> bool:
-    """Whether a name is that of one file, on every system: no folder, no character that a system keeps for itself."""
-    return name.isprintable() and not re.search(r'[<>:"/\\|?*]|^\.|[. ]$|^$', name)
-
-
 def file_name(name: str) -> str:
     """A name of a file that resembles `name`, and that leads to no other folder."""
     plain = re.sub(r'[<>:"/\\|?*]', "_", one_line(name)).strip(". ")
     return plain or "_"
+
+
+def c_comment(text: str) -> str:
+    """The text within a comment of C, which it does not end: one line of ASCII without trigraphs."""
+    plain = one_line(text).encode("ascii", "replace").decode("ascii")
+    return re.sub(r"\?(?=\?)", "? ", plain.replace("\\", "/")).replace("*/", "* /").replace("/*", "/ *")

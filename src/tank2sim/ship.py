@@ -262,6 +262,7 @@ class Ship(Vessel):
         platforms: str = "host",
         sources: bool = True,
         osp: bool = False,
+        lean: bool = False,
     ) -> ExportResult:
         """Write the FMU (Model Exchange and Co-Simulation).
 
@@ -277,6 +278,8 @@ class Ship(Vessel):
         osp : bool
             Also write ``OspSystemStructure.xml`` and the OSP model description next to the FMU, for the Open Simulation
             Platform.
+        lean : bool
+            With few variables, for game engines.
 
         Raises
         ------
@@ -285,7 +288,7 @@ class Ship(Vessel):
         """
         from tank2sim.api.fmu import make_fmu_file
 
-        made = make_fmu_file(self, Path(path), fmi=fmi, platforms=platforms, sources=sources, osp=osp)
+        made = make_fmu_file(self, Path(path), fmi=fmi, platforms=platforms, sources=sources, osp=osp, lean=lean)
         write_together(made.files, inputs=[Path(self.card.source)])
         return made
 

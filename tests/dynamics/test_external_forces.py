@@ -113,3 +113,13 @@ def test_fmu_has_the_inputs_and_accelerates_as_the_model(fmi: int, tmp_path: Pat
             if kind == "ModelExchange":
                 fmu.update()
             np.testing.assert_allclose(fmu.read(ACCELERATIONS), expected, rtol=1e-12)
+
+
+def test_the_point_of_a_force_is_apart_from_the_force_also_without_case() -> None:
+    assert external_inputs({"X": 1.0, "x": 2.0, "y": 3.0}) == {
+        **{"external.X": 1.0, "external.point_x": 2.0, "external.point_y": 3.0}
+    }
+    assert external_inputs({"K": 4.0, "z": -5.0}, rolls=True) == {"external.K": 4.0, "external.point_z": -5.0}
+    for name in ("K", "z", "point_x", "XX"):
+        with pytest.raises(InputError, match=f"external: {name}: is not an external force"):
+            external_inputs({name: 1.0})

@@ -312,7 +312,7 @@ def test_an_external_moment_heels_the_ship_as_far_as_its_stability_holds() -> No
     by_force = np.array(
         model.rhs(
             upright,
-            model.input_values({"external.Y": moment / 5, "external.z": -5.0, "propeller.speed": 0.0}),
+            model.input_values({"external.Y": moment / 5, "external.point_z": -5.0, "propeller.speed": 0.0}),
             model.parameter_values(),
         )
     ).ravel()

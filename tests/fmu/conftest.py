@@ -198,7 +198,7 @@ def mariner_ssp(mariner: Model, mariner_fmu: Callable[[int], Path], session_fold
     path = session_folder / "mariner.ssp"
     if not path.exists():
         content = mariner_fmu(2).read_bytes()
-        made = ExportedFmu(content=content, fmi=2, model_identifier="Mariner_class", token="", platforms=())
+        made = ExportedFmu(content=content, fmi=2, model_identifier="mariner2", token="", platforms=())
         write_whole(path, ship_with_autopilot(mariner, made))
     return path
 

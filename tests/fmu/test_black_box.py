@@ -59,8 +59,8 @@ def test_it_moves_like_the_one_with_sources(fmus: dict[bool, Path]) -> None:
 
 def test_it_is_checked_against_a_card_and_repeats_its_reference(fmus: dict[bool, Path]) -> None:
     alone, compared = t2s.check_fmu(fmus[False]), t2s.check_fmu(fmus[False], t2s.load("mariner"))
-    assert alone.passed and not alone.report.compared
-    assert compared.passed and compared.report.compared
+    assert alone.passed and not alone.study.compared
+    assert compared.passed and compared.study.compared
     other = t2s.load("mariner", {"derivatives.Nr": -0.003})
     assert not t2s.check_fmu(fmus[False], other).passed
 

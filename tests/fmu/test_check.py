@@ -6,7 +6,7 @@ import json
 import re
 import zipfile
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import casadi as ca
@@ -19,9 +19,11 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model, Parameter
 from tank2sim.dynamics.simulator_interface import with_simulator_interface
 from tank2sim.errors import InputError
+from tank2sim.fmu import acceptance
 from tank2sim.fmu.check import LIMITS, compare_with_model, description_differences
 from tank2sim.fmu.export import write_fmu
 from tank2sim.fmu.manoeuvre import manoeuvre
+from tank2sim.fmu.passport import Replay
 from tank2sim.fmu.reference import by_scheme, exactly, reference_errors
 from tank2sim.fmu.unpacking import embedded_card
 from tests.marks import first_fast
@@ -124,6 +126,9 @@ def test_a_sign_changed_in_the_generated_code_fails(
 
     generate = sources.generate_c
     monkeypatch.setattr(sources, "generate_c", tampered)
+    with pytest.raises(InputError, match="library that the C compiler made for this machine does not work"):
+        write_fmu(hull, tmp_path / "x.fmu")
+    monkeypatch.setattr(acceptance, "replay_in_fmu", lambda *_: Replay(problem="not asked"))
     write_fmu(hull, tmp_path / "x.fmu")
     report = compare_with_model(tmp_path / "x.fmu", model=hull)
     assert not report.passed
@@ -265,6 +270,9 @@ def test_a_library_that_ends_its_process_is_a_failed_check(
     generate = sources.generate_c
     deadly = f"\n#include <stdlib.h>\n__attribute__((constructor)) static void end(void) {{ {end}; }}\n"
     monkeypatch.setattr(sources, "generate_c", lambda functions, stem: generate(functions, stem) + deadly)
+    with pytest.raises(InputError, match="library that the C compiler made for this machine does not work"):
+        write_fmu(hull, tmp_path / "x.fmu")
+    monkeypatch.setattr(acceptance, "replay_in_fmu", lambda *_: Replay(problem="not asked"))
     write_fmu(hull, tmp_path / "x.fmu")
     report = compare_with_model(tmp_path / "x.fmu", model=hull)
     assert not report.passed
@@ -281,7 +289,7 @@ def test_without_a_model_the_file_alone_is_validated(fmu_file: Callable[[str, in
 def test_the_report_is_plain_data_and_nothing_is_printed(
     fmu_file: Callable[[str, int], Path], hull: Model, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    report = compare_with_model(fmu_file("hull", 2), model=hull).as_json()
+    report = asdict(compare_with_model(fmu_file("hull", 2), model=hull))
     assert json.loads(json.dumps(report))["max_error"]["motion.x"] < 1e-6
     assert capfd.readouterr() == ("", "")
 
@@ -316,7 +324,7 @@ def test_files_that_are_no_fmu_are_reported_in_one_line(
     [
         (b"<ModelVariables>", b"<ModelVariables", "modelDescription.xml: cannot be read"),
         (b'fmiVersion="2.0"', b'fmiVersion="1.0"', "FMI|cannot be read"),
-        (b'modelIdentifier="Test_hull"', b'modelIdentifier="Other"', "no library for this machine"),
+        (b'modelIdentifier="hull2"', b'modelIdentifier="Other"', "no library for this machine"),
     ],
 )
 def test_a_description_that_cannot_be_used_is_reported(

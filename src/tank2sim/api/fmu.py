@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from tank2sim.api.verbs import Progress, Written, verb
+from tank2sim.api.verbs import Output, Progress, Written, verb
 from tank2sim.errors import ArgumentError
 from tank2sim.files import FMU, SYSTEM
 from tank2sim.notices import Notice, foremost
@@ -15,8 +15,20 @@ if TYPE_CHECKING:
     from tank2sim.dynamics.vessel import Vessel
     from tank2sim.results.fmu import CheckResult, ExportResult
 
+HOSTS = {
+    "unity": "Unity with CATIA-Systems' add-on",
+    "unreal": "Unreal Engine with ORNL's plugin",
+    "osp": "the engine of the Open Simulation Platform",
+}
+"""Programs whose conditions ``check`` knows."""
 
-@verb("the FMU, Model Exchange and Co-Simulation", name="export", results=("tank2sim.results.fmu:ExportResult",))
+
+@verb(
+    "the FMU, Model Exchange and Co-Simulation",
+    Output("--c", (), "Write the ship as plain C99, too.", lambda result, path: result.c_files(path), "DIR"),
+    name="export",
+    results=("tank2sim.results.fmu:ExportResult",),
+)
 def make_fmu_file(
     ship: Vessel,
     output: Annotated[Path, Written(FMU, "SHIP.fmu")],
@@ -27,6 +39,7 @@ def make_fmu_file(
     ssp: Annotated[Path, Written(SYSTEM, "SYSTEM.ssp")] | None = None,
     ssp_inputs: bool = False,
     osp: bool = False,
+    lean: bool = False,
     report: Progress = lambda _: None,
 ) -> ExportResult:
     """Make the FMU (Model Exchange and Co-Simulation) of a ship.
@@ -49,6 +62,9 @@ def make_fmu_file(
         Make every input in that package a connector, also those that nothing is joined to.
     osp : bool
         Also OspSystemStructure.xml and the OSP model description, next to the FMU (FMI 2).
+    lean : bool
+        With few variables, for game engines: inputs without ``external.*`` and failures, the states, speed, heading,
+        revolutions and validity, and where and how fast the ship starts.
     report : callable
         Called with the stage that begins.
 
@@ -58,28 +74,33 @@ def make_fmu_file(
         No compiler is found, or a platform is not known.
     """
     from tank2sim.dynamics.simulator_interface import with_simulator_interface
-    from tank2sim.fmu.export import make_fmu, without_coefficients
-    from tank2sim.fmu.osp import osp_notices, osp_system
+    from tank2sim.fmu.export import make_fmu, named_after, without_coefficients
+    from tank2sim.fmu.hosts import lean_model
+    from tank2sim.fmu.osp import osp_system
     from tank2sim.fmu.platforms import named_platforms
     from tank2sim.fmu.provenance import documents_of, documents_without_card
     from tank2sim.results.fmu import ExportResult, ExportStudy
 
     if ssp_inputs and ssp is None:
         raise ArgumentError("ssp_inputs", "", "needs an SSP package", "give ssp too")
+    if lean and ssp:
+        raise ArgumentError("lean", "", "lacks what an autopilot is designed with", "leave ssp or lean out")
     chosen = named_platforms(platforms)
     model = with_simulator_interface(ship.model)
-    if sources:
-        made = make_fmu(model, fmi=fmi, documents=documents_of(ship.card), platforms=chosen, report=report)
-    else:
-        bare, documents = without_coefficients(model), documents_without_card(ship.card)
-        made = make_fmu(bare, fmi=fmi, documents=documents, platforms=chosen, report=report, sources=False)
+    if lean:
+        model = lean_model(model)
+    documents = named_after(documents_of(ship.card) if sources else documents_without_card(ship.card), output)
+    written = model if sources else without_coefficients(model)
+    made = make_fmu(written, fmi=fmi, documents=documents, platforms=chosen, report=report, sources=sources)
     files: dict[Path, str | bytes] = {output: made.content}
     if ssp:
         from tank2sim.fmu.ssp import ship_with_autopilot
 
         files[ssp] = ship_with_autopilot(model, made, every_input=ssp_inputs, platforms=chosen, report=report)
     if osp:
-        files |= {output.parent / name: text for name, text in osp_system(model, output.name).items()}
+        files |= {
+            output.parent / name: text for name, text in osp_system(model, output.name, made.model_identifier).items()
+        }
     study = ExportStudy(
         ship=ship.name,
         fmu=str(output),
@@ -89,17 +110,24 @@ def make_fmu_file(
         token=made.token,
         platforms=made.platforms,
         size_bytes=len(made.content),
-        notices=(*ship.model.notices, *(osp_notices(model) if osp else ())),
+        notices=ship.model.notices,
     )
-    return ExportResult(study, made, files)
+    return ExportResult(study, made, files, ship.card)
 
 
 @verb(
     "an FMU validated, and compared with its reference",
     name="check",
     results=("tank2sim.results.fmu:CheckResult",),
+    choices={"host": HOSTS},
+    options={"host": "--for"},
 )
-def check_fmu(fmu: str | Path, card: Vessel | str | Path | None = None) -> CheckResult:
+def check_fmu(
+    fmu: str | Path,
+    card: Vessel | str | Path | None = None,
+    *,
+    host: Literal["unity", "unreal", "osp"] | None = None,
+) -> CheckResult:
     """Validate an FMU and compare its outputs with the model of its card, in every kind of FMI it offers.
 
     It runs the FMU's own code with your rights: check only files from sources that you trust. The command ends with
@@ -111,6 +139,8 @@ def check_fmu(fmu: str | Path, card: Vessel | str | Path | None = None) -> Check
         FMI 2.0 or 3.0, with a library for this machine.
     card : Vessel, optional
         What the FMU should be: a card, or the name of a bundled ship; by default the card inside it.
+    host : str, optional
+        A program whose conditions the FMU is to meet, too; one that is not met is a failure.
 
     Raises
     ------
@@ -129,7 +159,7 @@ def check_fmu(fmu: str | Path, card: Vessel | str | Path | None = None) -> Check
     text = embedded_card(path) if card is None else None
     inside = build(parse_card(text, f"{path}: resources/ship.toml")) if text is not None else None
     model = inside if card is None else as_vessel(card).model
-    report = compare_with_model(path, model=model and with_simulator_interface(model))
+    report = compare_with_model(path, model=model and with_simulator_interface(model), host=host)
     lacking = Notice("the FMU carries no card: only its description was validated; give a card to compare with")
     doubts = foremost(model.notices) if model else ()
     notices = (*report.notices, *doubts, *(() if report.compared else (lacking,)))

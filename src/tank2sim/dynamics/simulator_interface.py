@@ -16,10 +16,11 @@ _FORCES = (("X", "N", "Surge force"), ("Y", "N", "Sway force"), ("N", "N.m", "Ya
 
 _SIDES = {"X": "forward", "Y": "to starboard", "N": "to starboard"}
 
-EXTERNAL_INPUTS = tuple(f"external.{name}" for name in ("X", "Y", "N", "x", "y"))
+# x and X would be one variable where names do not know case, as in Unreal Engine.
+EXTERNAL_INPUTS = tuple(f"external.{name}" for name in ("X", "Y", "N", "point_x", "point_y"))
 """Inputs of :func:`with_external_forces`."""
 
-EXTERNAL_INPUTS_OF_ROLL = ("external.K", "external.z")
+EXTERNAL_INPUTS_OF_ROLL = ("external.K", "external.point_z")
 """Further inputs of a ship that rolls."""
 
 
@@ -111,13 +112,13 @@ def _bearing(name: str, description: str, angle: ca.SX) -> Quantity:
 def with_external_forces(model: Model) -> Model:
     """The model with inputs for a force and a moment from outside, zero unless set.
 
-    ``external.X``, ``external.Y`` (N, positive forward and to starboard) act at the point ``external.x``,
-    ``external.y`` (m, forward of midships and to starboard of the centreline); ``external.N`` (N m, positive to
+    ``external.X``, ``external.Y`` (N, positive forward and to starboard) act at the point ``external.point_x``,
+    ``external.point_y`` (m, forward of midships and to starboard of the centreline); ``external.N`` (N m, positive to
     starboard) is a moment in addition. About midships the moment is N + x Y - y X. They are added to ``force.X``,
     ``force.Y`` and ``force.N``, after all effects, so that no effect scales them. A model without these quantities is
     returned as it is.
 
-    A ship that rolls also has ``external.z`` (m, the point below the origin) and ``external.K`` (N m, positive to
+    A ship that rolls also has ``external.point_z`` (m, the point below the origin) and ``external.K`` (N m, positive to
     starboard); its rolling moment is K - z Y, added to ``force.K``.
     """
     if not all(f"force.{name}" in model for name in "XYN"):
@@ -127,8 +128,8 @@ def with_external_forces(model: Model) -> Model:
     )
     force = float(mass * speed**2 / length) / 100  # the order of a ship's resistance at the speed of expansion
     described = (
-        ("N", "External surge force at external.x, external.y, positive forward"),
-        ("N", "External sway force at external.x, external.y, positive to starboard"),
+        ("N", "External surge force at external.point_x, external.point_y, positive forward"),
+        ("N", "External sway force at external.point_x, external.point_y, positive to starboard"),
         ("N.m", "External yaw moment, in addition to that of the force at its point, positive to starboard"),
         ("m", "Point of the external force forward of midships"),
         ("m", "Point of the external force to starboard of the centreline"),
@@ -170,11 +171,12 @@ def external_inputs(given: Mapping[str, float], *, rolls: bool = False) -> dict[
     InputError
         A key is none of these.
     """
-    inputs = {f"external.{name}": float(value) for name, value in given.items()}
-    for name in inputs:
-        if name not in (*EXTERNAL_INPUTS, *(EXTERNAL_INPUTS_OF_ROLL if rolls else ())):
+    of_roll = dict(zip(("K", "z"), EXTERNAL_INPUTS_OF_ROLL, strict=True))
+    known = dict(zip(("X", "Y", "N", "x", "y"), EXTERNAL_INPUTS, strict=True)) | (of_roll if rolls else {})
+    for name in given:
+        if name not in known:
             remedy = "X and Y (N), N (N m), x and y (m) are known"
-            if name in EXTERNAL_INPUTS_OF_ROLL:
+            if name in of_roll:
                 remedy = "it acts on a ship that rolls: give [roll] on the card"
-            raise ArgumentError("external", name.removeprefix("external."), "is not an external force", remedy)
-    return inputs
+            raise ArgumentError("external", name, "is not an external force", remedy)
+    return {known[name]: float(value) for name, value in given.items()}

@@ -16,7 +16,7 @@ from tank2sim.analysis.heading.runs import HeadingLoop
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.fmu.export import ExportedFmu, make_fmu
+from tank2sim.fmu.export import ExportedFmu, make_fmu, named_after
 from tank2sim.fmu.libraries import ProgressReport
 from tank2sim.fmu.platforms import Platform
 from tank2sim.fmu.provenance import Documents, ValueOrigin
@@ -40,6 +40,7 @@ def make_autopilot_fmu(
     source: str,
     *,
     fmi: int = 2,
+    file: Path | None = None,
     platforms: Sequence[Platform] | None = None,
     report: ProgressReport = lambda _: None,
 ) -> ExportedFmu:
@@ -54,9 +55,12 @@ def make_autopilot_fmu(
     autopilot : Model
     source : str
         How it was found, in a sentence.
+    file : Path, optional
+        Where it goes: its modelName is that of the file.
     """
     tuned = (parameter.name for parameter in autopilot.parameters if parameter.name.startswith("autopilot."))
     documents = Documents(source=source, origins={name: ValueOrigin(source) for name in tuned})
+    documents = named_after(documents, file) if file else documents
     return make_fmu(autopilot, fmi=fmi, documents=documents, platforms=platforms, report=report)
 
 

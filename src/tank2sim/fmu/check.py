@@ -18,6 +18,7 @@ from tank2sim.arrays import Array, Number
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.fmu.export import description_text, without_coefficients
+from tank2sim.fmu.hosts import Host, HostCondition, host_conditions, lean_model
 from tank2sim.fmu.interface import CLAMP_SWITCH, MAX_STEP, interface
 from tank2sim.fmu.manoeuvre import InputSequence, manoeuvre
 from tank2sim.fmu.process import Drive, drive_apart
@@ -57,6 +58,10 @@ class CheckReport:
         Largest error of an output when the FMU repeats the reference result that it carries, relative as above.
     notices : tuple of Notice
         Why it failed, and doubts about the card.
+    host : str, optional
+        Program of whose conditions it was asked.
+    conditions : tuple of HostCondition
+        Those conditions.
     compared : bool
         False if there was no model to compare with, and the file alone was validated.
     """
@@ -74,6 +79,8 @@ class CheckReport:
     reference_error: float | None = None
     passed: bool = False
     notices: tuple[Notice, ...] = ()
+    host: str | None = None
+    conditions: tuple[HostCondition, ...] = ()
 
     def judged(self) -> CheckReport:
         """The report with its verdict, and with a notice for each kind of failure."""
@@ -92,11 +99,14 @@ class CheckReport:
             failures.append(f"errors beyond the limits: {', '.join(beyond)}")
         if self.compared and not (self.errors or failures):
             failures.append("no output was compared")
+        if unmet := [one for one in self.conditions if not one.met]:
+            named = "; ".join(f"{one.condition} ({one.found})" for one in unmet)
+            failures.append(f"{len(unmet)} of {len(self.conditions)} conditions of {self.host} are not met: {named}")
         notices = tuple(Notice(f"{self.path}: {text}", Level.STOP) for text in failures)
         return replace(self, passed=not failures, notices=(*notices, *self.notices))
 
 
-def compare_with_model(path: Path, *, model: Model | None = None) -> CheckReport:
+def compare_with_model(path: Path, *, model: Model | None = None, host: Host | None = None) -> CheckReport:
     """Validate an FMU, and drive it in every kind it offers through steps of all inputs, next to the model.
 
     The library runs in processes of its own: one that cannot be loaded, or ends its process, is a failed check.
@@ -107,6 +117,8 @@ def compare_with_model(path: Path, *, model: Model | None = None) -> CheckReport
         The FMU, FMI 2.0 or 3.0, with a library for this machine.
     model : Model, optional
         What the FMU should be. Without it, the file alone is validated.
+    host : str, optional
+        A program whose conditions the FMU is to meet, too.
 
     Raises
     ------
@@ -117,11 +129,12 @@ def compare_with_model(path: Path, *, model: Model | None = None) -> CheckReport
         unpacked = unpack(Path(path), Path(folder))
         validation = tuple(str(problem) for problem in validate_fmu(str(path)))
         about: dict[str, Any] = {"path": str(path), "fmi": unpacked.fmi, "kinds": unpacked.kinds}
-        about["validation"] = validation
+        about |= {"validation": validation, "host": host}
+        about["conditions"] = host_conditions(Path(path), host) if host else ()
         if model is None:
             differences, about["reference_error"] = _repeat_reference(unpacked)
             return CheckReport(**about, compared=False, differences=tuple(differences)).judged()
-        model = _without_hidden(unpacked, model)
+        model = _as_exported(unpacked, model)
         run = manoeuvre(model)
         differences, errors = _compare(unpacked, model, run)
         if "CoSimulation" in errors:  # else the library cannot run, which has been said
@@ -202,8 +215,11 @@ def _repeat_reference(unpacked: UnpackedFmu) -> tuple[list[str], float | None]:
     return [f"{worst} differs by {errors[worst]:.1e} of its range from the reference result in the FMU"], errors[worst]
 
 
-def _without_hidden(unpacked: UnpackedFmu, model: Model) -> Model:
-    """The model with coefficients as constants if the FMU has no parameter but those of such a model."""
+def _as_exported(unpacked: UnpackedFmu, model: Model) -> Model:
+    """The model, the lean one, or the one with coefficients as constants, by the variables that the FMU has."""
+    lean = lean_model(model)
+    if not _name_differences(unpacked, lean):
+        return lean
     bare = without_coefficients(model)
     found = {name.name for name in unpacked.description.modelVariables if name.causality == "parameter"}
     hidden = set(model.parameter_names) - set(bare.parameter_names)

@@ -10,7 +10,7 @@ import uuid
 import zipfile
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,7 +23,7 @@ from tank2sim.files import write_whole
 from tank2sim.fmu.dependencies import fmu_structure
 from tank2sim.fmu.interface import FmuVariable, Interface, interface
 from tank2sim.fmu.libraries import ProgressReport, libraries, require_compilers
-from tank2sim.fmu.osp import osp_groups
+from tank2sim.fmu.osp import OSP_FILE, osp_groups
 from tank2sim.fmu.platforms import Platform
 from tank2sim.fmu.provenance import Documents
 from tank2sim.fmu.sources import c_sources, headers_notice
@@ -34,14 +34,11 @@ from tank2sim.units import UNITS
 if TYPE_CHECKING:
     from tank2sim.fmu.acceptance import AcceptanceResult
 
-_EXPERIMENT_STEPS = 6000
+_EXPERIMENT_S = 3600.0  # project choice: some hosts end at the stop time of the default experiment
 _EXPERIMENT_TOLERANCE = 1e-6
 _NO_TOKEN = "{00000000-0000-0000-0000-000000000000}"
 _DESCRIPTION = "modelDescription.xml"
 _ICON_FILES = ("icon.png", "icon.svg")
-
-# OSP's engine looks for a copy of this next to the FMU, under the name <modelName>_OspModelDescription.xml.
-_OSP_FILE = "extra/com.open-simulation-platform/OspModelDescription.xml"
 
 _FIRST_TIME_OF_ZIP = 315532800  # 1980-01-01T00:00:00Z
 
@@ -78,9 +75,23 @@ class ExportedFmu:
 
 def write_fmu(model: Model, path: Path, *, fmi: int = 2, documents: Documents | None = None) -> ExportedFmu:
     """Write the FMU of :func:`make_fmu` to a file, whole or not at all. Raises also if it cannot be written."""
-    made = make_fmu(model, fmi=fmi, documents=documents)
+    made = make_fmu(model, fmi=fmi, documents=named_after(documents or Documents(), Path(path)))
     write_whole(Path(path), made.content)
     return made
+
+
+def named_after(documents: Documents, path: Path) -> Documents:
+    """The documents with the name of a file, which game engines look for as modelName, as the model identifier."""
+    return replace(documents, identifier=c_identifier(path.stem))
+
+
+def _identifier(model: Model, documents: Documents) -> str:
+    return documents.identifier or c_identifier(model.name)
+
+
+def _titled(model: Model) -> str:
+    """Name and description, as the description of the FMU: its modelName is the identifier."""
+    return model.description if model.name in model.description else f"{model.name}: {model.description}"
 
 
 def make_fmu(
@@ -120,7 +131,7 @@ def make_fmu(
     require_compilers(platforms)
     documents = documents or Documents()
     described = interface(model)
-    identifier = c_identifier(model.name)
+    identifier = _identifier(model, documents)
     files, token = _with_token(_texts(model, described, fmi, documents, sources))
     written = {name.removeprefix("sources/"): text for name, text in files.items() if name.startswith("sources/")}
     if not sources:
@@ -169,7 +180,7 @@ def _texts(model: Model, described: Interface, fmi: int, documents: Documents, s
     files["documentation/index.html"] = render("index.html", values)
     files["documentation/licenses/license.txt"] = bundled("LICENSE").read_text(encoding="utf-8")
     files["documentation/licenses/FMI-headers.txt"] = headers_notice(fmi)
-    files[_OSP_FILE] = render("OspModelDescription.xml", {"groups": osp_groups(described)})
+    files[OSP_FILE] = render("OspModelDescription.xml", {"groups": osp_groups(described)})
     if fmi == 3:
         files["sources/buildDescription.xml"] = render("buildDescription.xml", values)
         grouped = {"terminals": terminals(described)}
@@ -195,6 +206,7 @@ def _values(model: Model, described: Interface, fmi: int, documents: Documents) 
         "about": {
             "name": model.name,
             "description": model.description,
+            "title": _titled(model),
             "version": version("tank2sim"),
             "date": _date(),
             "source": documents.source,
@@ -203,14 +215,14 @@ def _values(model: Model, described: Interface, fmi: int, documents: Documents) 
         },
         "token": _NO_TOKEN,
         "fmi": fmi,
-        "identifier": c_identifier(model.name),
+        "identifier": _identifier(model, documents),
         "interface": described,
         "structure": fmu_structure(model, described),
         "units": [UNITS[name] for name in sorted({variable.unit for variable in described.variables})],
         "sources": [],
         "experiment": {
             "step": model.step_s,
-            "stop_time": model.step_s * _EXPERIMENT_STEPS,
+            "stop_time": _EXPERIMENT_S,
             "tolerance": _EXPERIMENT_TOLERANCE,
         },
     }

@@ -10,10 +10,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from tank2sim.dynamics.model import Model
-from tank2sim.escaping import is_file_name
 from tank2sim.fmu.interface import FmuVariable, Interface, interface
-from tank2sim.fmu.templates import c_identifier, render
-from tank2sim.notices import Notice
+from tank2sim.fmu.templates import render
 
 
 @dataclass(frozen=True)
@@ -67,11 +65,11 @@ _MOTION: dict[str, Parts] = {
 }
 
 
-def osp_system(model: Model, file: str) -> dict[str, str]:
-    """Name to text of the files that the engine of OSP wants next to the FMU `file`.
+def osp_system(model: Model, file: str, identifier: str) -> dict[str, str]:
+    """Name to text of the files that the engine of OSP wants next to the FMU `file`, whose modelName is `identifier`.
 
     ``OspSystemStructure.xml`` is a system of this ship alone, with the start of each input to change, at steps that are
-    ten times the model's; ``<name>_OspModelDescription.xml`` has the groups of variables by which ships are
+    ten times the model's; ``<identifier>_OspModelDescription.xml`` has the groups of variables by which ships are
     joined.
     """
     described = interface(model)
@@ -79,29 +77,12 @@ def osp_system(model: Model, file: str) -> dict[str, str]:
     values = {"step": step, "file": file, "inputs": described.with_causality("input")}
     return {
         "OspSystemStructure.xml": render("OspSystemStructure.xml", values),
-        f"{_osp_name(model)}_OspModelDescription.xml": render(
-            "OspModelDescription.xml", {"groups": osp_groups(described)}
-        ),
+        f"{identifier}_OspModelDescription.xml": render("OspModelDescription.xml", {"groups": osp_groups(described)}),
     }
 
 
-def osp_notices(model: Model) -> tuple[Notice, ...]:
-    """What the user should know of the files of :func:`osp_system`."""
-    name = _osp_name(model)
-    if name == model.name:
-        return ()
-    return (
-        Notice(
-            f"the ship's name is not a file name: the model description is called {name}_OspModelDescription.xml, and "
-            "the engine of OSP, which looks for the ship's name, does not find the groups of variables; rename the ship"
-        ),
-    )
-
-
-def _osp_name(model: Model) -> str:
-    """The ship's name, by which the engine of OSP looks for its description; else the modelIdentifier of the FMU."""
-    return model.name if is_file_name(model.name) else c_identifier(model.name)
-
+OSP_FILE = "extra/com.open-simulation-platform/OspModelDescription.xml"
+"""Groups of variables in the FMU. OSP's engine looks for a copy next to it, ``<modelName>_OspModelDescription.xml``."""
 
 STEPS_IN_COMMUNICATION = 10
 """Steps of the model in a communication step of the system for OSP: project choice, within a second for ships."""

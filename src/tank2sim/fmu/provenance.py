@@ -174,6 +174,8 @@ class Documents:
         Speeds through the water at which the model holds.
     origins : mapping
         Parameter or input of the model to where its value comes from.
+    identifier : str
+        modelName and modelIdentifier of the FMU; where it is empty, the model's name as an identifier.
     """
 
     card_text: str | None = None
@@ -181,6 +183,7 @@ class Documents:
     validity: str = ""
     speed_range_mps: tuple[float, float] | None = None
     origins: Mapping[str, ValueOrigin] = field(default_factory=dict)
+    identifier: str = ""
 
 
 def documents_without_card(card: Card) -> Documents:

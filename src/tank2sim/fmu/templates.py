@@ -14,6 +14,7 @@ import jinja2
 
 from tank2sim.bundled import bundled
 from tank2sim.escaping import xml_text
+from tank2sim.native.plain_c import c_number
 
 _LONGEST_IDENTIFIER = 60
 
@@ -57,4 +58,5 @@ def _environment() -> jinja2.Environment:
     )
     environment.filters["xml"] = xml_text
     environment.filters["signature"] = _signature
+    environment.filters["c"] = c_number
     return environment

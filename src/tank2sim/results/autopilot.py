@@ -128,7 +128,7 @@ class ResultWithController(Result[_S]):
         if self.piloted is None:
             raise InputError(path, "", "the JSON of a result has no model to export", "design the autopilot again")
         autopilot = self.piloted.autopilot
-        made = make_autopilot_fmu(autopilot, self.study.source, fmi=fmi, report=report)
+        made = make_autopilot_fmu(autopilot, self.study.source, fmi=fmi, file=Path(path), report=report)
         compared = None
         if verify:
             report("co-simulating ship and autopilot")

@@ -10,6 +10,8 @@ from typing import ClassVar
 from tank2sim.answer.charts.analysis import OutputError, error_chart
 from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Verdict, quantities, table
 from tank2sim.answer.result import Result
+from tank2sim.cards.card import Card
+from tank2sim.escaping import c_comment
 from tank2sim.fmu.check import CheckReport
 from tank2sim.fmu.export import ExportedFmu
 from tank2sim.notices import Notice
@@ -58,12 +60,25 @@ class ExportResult(Result[ExportStudy]):
         The FMU with its bytes; None if the result was read from its JSON.
     files : mapping
         Paths and bytes of all files.
+    card : Card, optional
+        The card of the ship; None if the result was read from its JSON.
     """
 
     study: ExportStudy
     exported: ExportedFmu | None = None
     files: Mapping[Path, str | bytes] = field(default_factory=dict)
+    card: Card | None = None
     command: ClassVar[str] = "export"
+
+    def c_files(self, folder: Path) -> dict[Path, str | bytes]:
+        """The ship in plain C99 in a folder: ``ship.h``, ``ship.c``, ``self_test.c`` and a README."""
+        from tank2sim.fmu.c99 import plain_ship
+
+        if self.card is None:
+            raise LookupError("the JSON of an export does not hold its card")
+        made = plain_ship(self.card)
+        readme = f"# {c_comment(self.study.ship)}: C99\n\n{made.use}"
+        return {folder / name: text for name, text in (*made.files.items(), ("README.md", readme))}
 
     @property
     def path(self) -> Path:
@@ -141,6 +156,9 @@ class CheckResult(Result[CheckReport]):
         if report.reference_error is not None:
             error = f"largest error {report.reference_error:.1e} of a range"
             lines.append(f"{report.path}: repeats the reference result that it carries; {error}")
+        if report.host is not None:
+            met = sum(one.met for one in report.conditions)
+            lines.append(f"{report.path}: meets {met} of {len(report.conditions)} conditions of {report.host}")
         return tuple(lines)
 
     @property
@@ -165,6 +183,10 @@ class CheckResult(Result[CheckReport]):
             listed = table("Problems", ["problem"], rows, on_screen=len(rows) <= MOST_PROBLEMS)
             tables = [listed] if listed.on_screen else [first, listed]
             sections.append(Section(heading="Problems", tables=tables))
+        if report.conditions:
+            judged: list[list[Cell]] = [[one.condition, one.met, one.found] for one in report.conditions]
+            conditions = table(f"Conditions of {report.host}", ("condition", "met", "found"), judged)
+            sections.append(Section(heading=f"Conditions of {report.host}", tables=[conditions]))
         if not report.errors:
             return sections
         rows = [[name, *(errors.get(name) for errors in report.errors.values())] for name in report.max_error]

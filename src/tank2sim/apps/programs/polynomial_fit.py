@@ -33,6 +33,7 @@ from tank2sim.dynamics.card_parameters import JointErrors, card_parameters, join
 from tank2sim.dynamics.mmg.ship import is_symmetric
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import inertial_forces
+from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.run import simulate
 
@@ -343,8 +344,10 @@ _OF_TURN = ("advance_m", "transfer_m", "tactical_diameter_m", "steady_diameter_m
 _OVERSHOOTS = ("overshoot_1_deg", "overshoot_2_deg")
 
 
-def figure_changes(before: Model, after: Model) -> tuple[FigureChange, ...]:
-    """Figures of the standard manoeuvres of one ship by two models."""
+def figure_changes(
+    before: Model, after: Model, integrators: Sequence[Integrator | None] = (None, None)
+) -> tuple[FigureChange, ...]:
+    """Figures of the standard manoeuvres of one ship by two models, each by its integrator if it is given."""
     largest = {p.name: p.start for p in before.parameters}.get("steering.max_angle", math.pi / 2)
     asked: list[tuple[str, Turn | Zigzag, Sequence[str]]] = []
     for angle in TURNS_DEG:
@@ -357,7 +360,8 @@ def figure_changes(before: Model, after: Model) -> tuple[FigureChange, ...]:
             asked.append((words, Zigzag(side * math.radians(angle), math.radians(angle)), _OVERSHOOTS))
     found = []
     for words, manoeuvre, names in asked:
-        figures = [simulate(model, manoeuvre).figures for model in (before, after)]
+        runs = zip((before, after), integrators, strict=True)
+        figures = [simulate(model, manoeuvre, integrator=integrator).figures for model, integrator in runs]
         for name in names:
             first, second = (_number(each, name) for each in figures)
             found.append(FigureChange(words, name, first, second))

@@ -34,6 +34,7 @@ from tank2sim.dynamics.rigid_body import added_mass_forces
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.escaping import xml_comment
 from tank2sim.simulation.card_range import single_figures
+from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, Spin, StraightRun
 
@@ -267,14 +268,17 @@ def gazebo_model(card: SteeredCard, _: AddedMass | None = None) -> Model:
     return build(replace(card, effects=()))
 
 
-def craft_changes(card: SteeredCard, model: Model) -> tuple[FigureChange, ...]:
+def craft_changes(card: SteeredCard, model: Model, integrator: Integrator | None = None) -> tuple[FigureChange, ...]:
     """Figures of a straight run, a turn and a spin of a card, and of another `model` of the same craft."""
     n = cruising_revolutions(card)
     before = build(card)
     found = []
     for manoeuvre in (StraightRun(n), DifferenceTurn(_DIFFERENCE * n), Spin(_SPIN * n)):
         try:
-            runs = [simulate(each, manoeuvre).figures for each in (before, model)]
+            runs = [
+                simulate(before, manoeuvre).figures,
+                simulate(model, manoeuvre, integrator=integrator).figures,
+            ]
         except InputError:
             continue  # thrusters that are not on both sides, or do not reverse as far
         first, second = map(single_figures, runs)
