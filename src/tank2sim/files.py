@@ -373,8 +373,14 @@ _BEGINNINGS: tuple[tuple[bytes, tuple[str, ...]], ...] = (
     (rb"function \[", MATLAB),
     (rb'"""', PYTHON),
     (rb"""(?:[^\n]*\n)*?format = ["']tank2sim-""", CARD),
+    (rb"# [^\n]*\n\n", (".md", *sorted(_TEXTS))),
 )
 """How contents begin, and how the names of their files end."""
+
+
+def names_folder(path: Path) -> bool:
+    """Whether a name, of a file or of a folder, is a folder's: it has no ending, or the folder exists."""
+    return not path.suffix or path.is_dir()
 
 
 def refuse_other_ending(path: Path, endings: Iterable[str]) -> None:

@@ -10,10 +10,12 @@ import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 from tank2sim.arguments import checked
 from tank2sim.errors import ArgumentError
+from tank2sim.files import names_folder
 
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -57,6 +59,8 @@ class Output:
         keyword arguments are options of the command.
     metavar : str
     required : bool
+    folder_without_ending : bool
+        Whether a name without an ending is that of a folder for several files.
     """
 
     option: str
@@ -65,6 +69,11 @@ class Output:
     write: Callable[..., Any]
     metavar: str = "FILE"
     required: bool = False
+    folder_without_ending: bool = False
+
+    def is_folder(self, path: Path) -> bool:
+        """Whether a folder of this name is written."""
+        return self.endings == () or (self.folder_without_ending and names_folder(path))
 
 
 @dataclass(frozen=True)

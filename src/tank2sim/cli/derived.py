@@ -313,7 +313,7 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
 
     values, changes = dict(given), given.get("set", ())
     named = [_value_of(output, values) for output in verb.outputs]
-    folders = [path for output, path in zip(verb.outputs, named, strict=True) if path and output.endings == ()]
+    folders = [path for output, path in zip(verb.outputs, named, strict=True) if path and output.is_folder(path)]
     outputs = [path for path in (*named, values["page"], values["json"]) if path is not None and path not in folders]
     refuse_doubled(outputs)
     _refuse_unplaced(outputs, [values["plot"], *named])

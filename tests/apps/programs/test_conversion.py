@@ -257,7 +257,7 @@ def test_a_pvs_vehicle_has_the_rates_of_the_model(name: str) -> None:
         expected = np.array(model.rhs(x, model.input_values(), model.parameter_values())).ravel()
         found = scope["rates_of"](x, scope["UI"], scope["P"])  # type: ignore[operator]
         assert found == pytest.approx(expected, rel=1e-12, abs=1e-300)
-    vehicle = scope[program_name(ship.manoeuvring())](r=20.0)  # type: ignore[operator]
+    vehicle = scope[program_name(ship.name)](r=20.0)  # type: ignore[operator]
     eta, nu, u = np.zeros(6), vehicle.nu, vehicle.u_actual
     for step in range(200):
         nu, u = vehicle.dynamics(eta, nu, u, vehicle.stepInput(step * 0.1), 0.1)
@@ -270,7 +270,7 @@ def test_a_pvs_vehicle_has_the_rates_of_the_model(name: str) -> None:
 def test_an_mss_function_has_the_rates_of_the_model(name: str, tmp_path: Path) -> None:
     model = t2s.load(name).model
     made = t2s.convert(name, to="mss")
-    function = program_name(t2s.load(name).manoeuvring())
+    function = program_name(t2s.load(name).name)
     made.save(tmp_path / f"{function}.m")
     call = f"[xd, U] = {function}([{' '.join(map(str, STATE))}]'); printf('%.17g ', xd, U)"
     command = ["octave", "--no-gui", "-q", "--eval", call]

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import tank2sim as t2s
 from tank2sim.cards import read_card
 from tests.cli.command_line import refused, tank2sim
 
@@ -42,3 +43,22 @@ def test_bad_requests_are_one_line_and_write_nothing(tmp_path: Path) -> None:
         refused(tank2sim("convert", *arguments, "-o", "made", cwd=tmp_path), word)
         assert not (tmp_path / "made").exists()
     refused(tank2sim("convert", "mariner", "--to", "mss", "-o", "no/made.m", cwd=tmp_path), "no")
+
+
+def test_a_folder_holds_the_file_and_a_readme_with_what_is_lost(tmp_path: Path) -> None:
+    done = tank2sim("convert", "otter", "--to", "gazebo", "-o", "craft", "--json", "made.json", cwd=tmp_path)
+    assert done.returncode == 0
+    assert sorted(path.name for path in (tmp_path / "craft").iterdir()) == ["README.md", "otter_usv.sdf"]
+    figures = json.loads((tmp_path / "made.json").read_text())["figures"]
+    rows = [line for line in (tmp_path / "craft" / "README.md").read_text().splitlines() if line.startswith("| ")]
+    assert len(rows) == 1 + len(figures)
+    worst = max(figures, key=lambda one: abs(one["error_percent"]))
+    assert any(f"{worst['error_percent']:+.2f}" in row and worst["figure"] in row for row in rows)
+
+
+def test_the_function_in_a_folder_is_in_the_file_of_its_name(tmp_path: Path) -> None:
+    t2s.convert("mariner", to="mss").save(tmp_path / "made")
+    written = next((tmp_path / "made").glob("*.m"))
+    assert f"= {written.stem}(x, ui, p)" in written.read_text().splitlines()[0]
+    t2s.convert("kvlcc2-l7-mmg").save(tmp_path / "card")
+    assert sorted(path.suffix for path in (tmp_path / "card").iterdir()) == [".md", ".toml"]

@@ -5,32 +5,29 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Literal
 
 from tank2sim.api.verbs import Output, verb
+from tank2sim.apps.programs.forms import FORMS
 from tank2sim.arguments import NumberArgument, Scatter
 
 if TYPE_CHECKING:
     from tank2sim.apps.programs.convert_result import ConversionResult
     from tank2sim.dynamics.vessel import Vessel
 
-LANGUAGES = {
-    "abkowitz": "a card with a third-order polynomial",
-    "mmg": "a card of the MMG method, in another scaling",
-    "shipmmg": "a Python file with the parameters of shipmmg",
-    "mmgdynamics": "a Python file with a vessel of mmgdynamics",
-    "small_craft": "a card of a small craft, in another scaling",
-    "gazebo": "SDF of Gazebo's hydrodynamics and thruster plugins for a small craft",
-    "vrx": "SDF of VRX's SimpleHydrodynamics for a small craft",
-    "mss": "a function for MATLAB or Octave, as the ships of MSS are",
-    "pvs": "a Python file with a vehicle for the Python Vehicle Simulator",
-}
-"""What a card can be converted to."""
-
 Language = Literal["abkowitz", "mmg", "shipmmg", "mmgdynamics", "small_craft", "gazebo", "vrx", "mss", "pvs"]
+"""Names of :data:`.FORMS`."""
 
 
 @verb(
     "a card in another language: MMG as a polynomial, other conventions, other programs",
-    Output("-o", None, "Write the new file.", lambda result, path: result.files(path), required=True),
-    choices={"to": LANGUAGES},
+    Output(
+        "-o",
+        None,
+        "Write the new file, or a folder with a README.",
+        lambda result, path: result.files(path),
+        "FILE|DIR",
+        required=True,
+        folder_without_ending=True,
+    ),
+    choices={"to": {name: form.words for name, form in FORMS.items()}},
     results=("tank2sim.apps.programs.convert_result:ConversionResult",),
 )
 def convert(
@@ -105,7 +102,7 @@ def convert(
         ship=ship.name,
         from_kind=ship.card.model.kind,
         to=to,
-        made=LANGUAGES[to],
+        made=FORMS[to].words,
         fit=fit,
         figures=tuple(figures),
         notices=(*doubts(ship.card), *notices),

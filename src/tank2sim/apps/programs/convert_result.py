@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
 from tank2sim.answer.parts import Cell, Section, table
 from tank2sim.answer.result import Result
+from tank2sim.apps.programs.forms import FORMS
 from tank2sim.apps.programs.languages import ConvertedText
+from tank2sim.apps.programs.program_code import program_name
 from tank2sim.cards import Card
-from tank2sim.files import write_together
+from tank2sim.errors import InputError
+from tank2sim.escaping import one_line
+from tank2sim.files import folder_made, names_folder, write_together
 from tank2sim.notices import Notice
+from tank2sim.version import __version__
 
 
 @dataclass(frozen=True)
@@ -99,9 +105,30 @@ class ConversionResult(Result[ConversionStudy]):
         return self.made
 
     def files(self, path: str | Path) -> dict[Path, str | bytes]:
-        """The file at `path`, with the covariance of a card next to it."""
-        made = self._made
-        return {Path(path): made.text} if made.card is None else made.card.files(Path(path))
+        """The file at `path`, with the covariance of a card next to it; or all files and a README in the folder.
+
+        Parameters
+        ----------
+        path : path
+            A name without an ending is that of a folder.
+
+        Raises
+        ------
+        InputError
+            The form has several files, and `path` is that of one.
+        """
+        path, made, form = Path(path), self._made, FORMS[self.study.to]
+        if not names_folder(path):
+            if made.program is not None:
+                raise InputError(path, "", f"is one file, and {self.study.to} has several", "give a folder")
+            return {path: made.text} if made.card is None else made.card.files(path)
+        if made.program is not None:
+            return {
+                **{path / name: content for name, content in made.program.files.items()},
+                path / "README.md": self._readme(made.program.use),
+            }
+        main = path / f"{program_name(self.study.ship)}{form.ending}"
+        return {**self.files(main), path / "README.md": self._readme(form.use.replace("NAME", main.stem))}
 
     def save(self, path: str | Path) -> None:
         """Write :meth:`files`, all or none.
@@ -111,7 +138,26 @@ class ConversionResult(Result[ConversionStudy]):
         InputError
             A file cannot be written.
         """
-        write_together(self.files(path), inputs=[Path(self.source)])
+        contents = self.files(path)
+        with folder_made(Path(path)) if names_folder(Path(path)) else nullcontext():
+            write_together(contents, inputs=[Path(self.source)])
+
+    def _readme(self, use: str) -> str:
+        """What the files are, how they are used, and what was lost, in Markdown."""
+        study = self.study
+        text = (
+            f"# {one_line(study.ship)}: {study.to}\n\n{study.made[0].upper()}{study.made[1:]}, written by tank2sim "
+            f"{__version__} from {one_line(Path(self.source).name)}.\n\n## Use\n\n{use.strip()}\n\n## What is lost\n\n"
+        )
+        said = [str(notice) for notice in study.notices]
+        text += "".join(f"- {one_line(line)}.\n" for line in said) if said else "Nothing that tank2sim knows of.\n"
+        if study.figures:
+            text += f"\n| manoeuvre | figure | tank2sim | {study.to} | error (%) |\n|---|---|---|---|---|\n"
+            for one in study.figures:
+                cells = ("" if value is None else f"{value:.4g}" for value in (one.before, one.after))
+                error = "" if one.error_percent is None else f"{one.error_percent:+.2f}"
+                text += f"| {one.manoeuvre} | {one.figure} | {' | '.join(cells)} | {error} |\n"
+        return text
 
     @property
     def title(self) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from tank2sim.apps.programs.conventions import Conventions, in_conventions
+from tank2sim.apps.programs.forms import FORMS
 from tank2sim.apps.programs.mmg_programs import mmgdynamics_text, shipmmg_text
 from tank2sim.apps.programs.polynomial_fit import (
     SCATTER,
@@ -17,6 +18,7 @@ from tank2sim.apps.programs.polynomial_fit import (
     scattered_motions,
 )
 from tank2sim.apps.programs.program_code import mss_function, pvs_class
+from tank2sim.apps.programs.program_files import ProgramFiles
 from tank2sim.apps.programs.robotics import (
     VRX_MASSES,
     VRX_TERMS,
@@ -43,12 +45,16 @@ _OF_MMG = {"shipmmg": shipmmg_text, "mmgdynamics": mmgdynamics_text}
 
 @dataclass(frozen=True)
 class ConvertedText:
-    """A card in another language: the text, the card if it is one, the fit and the figures that changed."""
+    """A card in another language: the text, the card if it is one, the fit and the figures that changed.
 
-    text: str
+    A form of several files has no text, and its files in `program`.
+    """
+
+    text: str = ""
     card: SteeredCard | None = None
     fit: PolynomialFit | None = None
     changes: tuple[FigureChange, ...] = ()
+    program: ProgramFiles | None = None
 
 
 def converted(
@@ -73,6 +79,8 @@ def converted(
     InputError
         The card cannot be had in that language.
     """
+    if FORMS[to].writer:
+        return _of_several_files(card, to, wanted, scatter, added_mass)
     if card.steered().steered_by is SteeredBy.THRUSTERS:
         return _of_craft(card.steered(), to, wanted, added_mass)
     if added_mass is not None:
@@ -102,6 +110,17 @@ def converted(
     made = in_conventions(given, wanted)
     build(made)
     return ConvertedText(made.text, made), notices
+
+
+def _of_several_files(
+    card: Card, to: str, wanted: Conventions, scatter: float | None, added_mass: AddedMass | None
+) -> tuple[ConvertedText, tuple[Notice, ...]]:
+    """A form that is a folder of files."""
+    if not wanted.unchanged or scatter is not None or added_mass is not None:
+        remedy = "leave scaling, rudder sign, origin, scatter and added mass out"
+        raise ArgumentError("to", to, "has conventions of its own", remedy)
+    made = FORMS[to].files(card.steered())
+    return ConvertedText(changes=made.changes, program=made), tuple(map(Notice, made.losses))
 
 
 def _of_ship(card: Card, to: str) -> ManoeuvringCard:

@@ -134,9 +134,9 @@ _MATLAB_WORDS = (
 )
 
 
-def program_name(card: ManoeuvringCard, code: Iterable[str] = ()) -> str:
-    """The ship's name as an identifier in small letters: neither a word of the language nor one of the code."""
-    stem = re.sub(r"\W+", "_", card.ship.name.lower(), flags=re.ASCII).strip("_")[:_LONGEST_NAME].rstrip("_")
+def program_name(ship: str, code: Iterable[str] = ()) -> str:
+    """A ship's name as an identifier in small letters: neither a word of the language nor one of the code."""
+    stem = re.sub(r"\W+", "_", ship.lower(), flags=re.ASCII).strip("_")[:_LONGEST_NAME].rstrip("_")
     taken = {*_MATLAB_WORDS, *keyword.kwlist, *dir(builtins), *re.findall(r"\w+", "\n".join(code))}
     return stem if stem[:1].isalpha() and stem not in taken else f"ship_{stem}"
 
@@ -169,7 +169,7 @@ def mss_function(card: ManoeuvringCard, model: Model) -> str:
         "if ~condition, value = 0; end",
         "end",
     ]
-    name = program_name(card, code)
+    name = program_name(card.ship.name, code)
     lines = [
         f"function [xdot, U] = {name}(x, ui, p)",
         one_line(f"% [xdot, U] = {name}(x, ui, p): {model.description}."),
@@ -248,7 +248,7 @@ def pvs_class(card: ManoeuvringCard, model: Model) -> str:
     start = [float(value) for value in model.initial(model.parameter_values()).full().ravel()]
     places = {name: model.state_names.index(name) for name in model.state_names}
     body = _PVS_CLASS.format(
-        name=program_name(card, [_PVS_CLASS, *_OF_PVS]),
+        name=program_name(card.ship.name, [_PVS_CLASS, *_OF_PVS]),
         title=title,
         length=card.ship.length_m,
         u=places["motion.u"],
