@@ -1,28 +1,51 @@
-"""The independent evaluator of xdyn's grammar and planar dynamics, with its trees compiled, for what is exported."""
+"""Cards as bodies of xdyn against tank2sim: accelerations at random states, and ten minutes of turns and zigzags.
+
+The files are read by an evaluator of xdyn's grammar that shares no code with tank2sim (``simulators/xdyn/evaluator.py``
+of the data folder) and refuses what xdyn would drop. Both sides are integrated by Runge-Kutta with one step and the
+rudder of the tables; next to it is how far the path by the table is from that with tank2sim's own gear. xdyn itself was
+not run.
+"""
 
 from __future__ import annotations
 
 import importlib.util
 import math
+import os
+import sys
+import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import casadi as ca
 import numpy as np
-import pytest
+import yaml
 
+from tank2sim.apps.programs.program_files import ProgramFiles
+from tank2sim.apps.programs.xdyn import xdyn_files
+from tank2sim.cards import read_card
+from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
+from tank2sim.simulation.manoeuvres import Manoeuvre, Turn, Zigzag
+from tank2sim.simulation.run import simulate
+
+EVALUATOR = (
+    Path(os.environ.get("TANK2SIM_DATA", Path(__file__).resolve().parents[2] / "shared"))
+    / "simulators"
+    / "xdyn"
+    / "evaluator.py"
+)
+SHIPS = ("mariner", "mariner-nominal", "kvlcc2", "kvlcc2-l7", "kvlcc2-mmg", "kvlcc2-l7-mmg", "esso-osaka", "container")
+ORDERS = {"turn": Turn(math.radians(35)), "zigzag": Zigzag(math.radians(20), math.radians(20))}
+DURATION_S = 600.0
+RATES = ("motion.udot", "motion.vdot", "motion.rdot")
 
 NOT_EXPRESSIONS = {"model", "name", "reference frame", "commands"}
 
 
-def evaluator_module(data: Path) -> ModuleType:
-    """The evaluator of the shared data; its strict parser refuses what xdyn would drop."""
-    path = data / "simulators" / "xdyn" / "evaluator.py"
-    if not path.is_file():
-        pytest.skip(f"the evaluator of xdyn's grammar is missing: {path}")
-    pytest.importorskip("yaml")
+def evaluator_module(path: Path) -> ModuleType:
+    """The evaluator of a file, with compiled trees; its strict parser refuses what xdyn would drop."""
     spec = importlib.util.spec_from_file_location("xdyn_evaluator", path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -74,8 +97,6 @@ class CompiledForce:
 
 def written_rates(module: ModuleType, ship: str, states: Mapping[str, Any], t: Any, commands: Mapping[str, Any]) -> Any:
     """udot, vdot, rdot (3, n) by the file: (M_RB + M_A) a = F - C_RB nu, and the forces (3, n)."""
-    import yaml
-
     document = yaml.safe_load(ship)
     body = document["bodies"][0]
     (node,) = body["controlled forces"]
@@ -114,8 +135,6 @@ def commands_of(document: Mapping[str, Any]) -> dict[str, tuple[np.ndarray, np.n
 
 def free_run(module: ModuleType, text: str, t_end: float, dt: float) -> np.ndarray:
     """x y z phi theta psi u v w p q r (n, 12) of a body with six free motions, by Runge-Kutta."""
-    import yaml
-
     document = yaml.safe_load(text)
     body = document["bodies"][0]
     assert "blocked dof" not in body
@@ -187,3 +206,114 @@ def model_run(model: Model, tables: Mapping[str, tuple[np.ndarray, np.ndarray]],
         return np.array(model.rhs(x, u, p)).ravel()[rows]
 
     return runge_kutta(rate, x[rows].copy(), t_end, dt)
+
+
+def motions(model: Model, count: int) -> dict[str, np.ndarray]:
+    """Random motions ahead and astern, with what turns and steers at random, by name of the model's state or input."""
+    rng = np.random.default_rng(7)
+    speed, length = (
+        next(one.start for one in model.parameters if one.name == f"ship.{key}") for key in ("speed", "length")
+    )
+    found = {
+        "motion.u": rng.uniform(-0.4 * speed, 1.2 * speed, count),
+        "motion.v": rng.normal(0, 0.25 * speed, count),
+        "motion.r": rng.normal(0, 0.4 * speed / length, count),
+        "motion.psi": rng.uniform(-3, 3, count),
+    }
+    for state in model.states:
+        if not state.name.startswith(("motion.", "waves.")):
+            found[state.name] = rng.normal(0, 0.4, count) * state.nominal
+    for one in model.inputs:
+        if one.name.startswith(("propeller.", "thrusters.")):
+            found[one.name] = rng.uniform(-1.2, 1.2, count) * max(abs(one.start), 1.0)
+    return found
+
+
+def accelerations(model: Model, given: Mapping[str, np.ndarray]) -> np.ndarray:
+    """udot, vdot, rdot (3, n) of the model."""
+    count = len(given["motion.u"])
+    x = np.tile(np.array(model.initial(model.parameter_values())).reshape(-1, 1), count)
+    u = np.tile(model.input_values().reshape(-1, 1), count)
+    for name, values in given.items():
+        if name in model.state_names:
+            x[model.state_names.index(name)] = values
+        else:
+            u[model.input_names.index(name)] = values
+    wanted = model.expand(ca.vcat([model.symbol(name) for name in RATES]))
+    return np.array(ca.Function("f", [model.x, model.u, model.p], [wanted])(x, u, ca.DM(model.parameter_values())))
+
+
+def commanded(text: str, given: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The values of `given` under the names of the commands of the file."""
+    return {name.replace(".", "_"): values for name, values in given.items() if name.replace(".", "_") in text}
+
+
+def motion_difference(evaluator: ModuleType, ship: str, model: Model, count: int) -> float:
+    """Largest difference of udot, vdot or rdot at random motions, over the largest of each."""
+    given = motions(model, count)
+    states = {name.removeprefix("motion."): given[name] for name in given if name.startswith("motion.")}
+    found, _ = written_rates(evaluator, ship, states, 0.0, commanded(ship, given))
+    expected = accelerations(model, given)
+    return float((np.abs(found - expected).max(axis=1) / np.abs(expected).max(axis=1)).max())
+
+
+def together(files: ProgramFiles, manoeuvre: str) -> str:
+    """The body and the commands of a manoeuvre as one input."""
+    return f"{files.files['ship.yml']}{files.files[f'{manoeuvre}_commands.yml']}"
+
+
+def model_tables(model: Model, text: str) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """The tables of a file by the names of the model."""
+    names = {name.replace(".", "_"): name for name in (*model.state_names, *model.input_names)}
+    return {names[name]: table for name, table in commands_of(yaml.safe_load(text)).items()}
+
+
+def path_differences(evaluator: ModuleType, model: Model, text: str, manoeuvre: Manoeuvre) -> tuple[float, float]:
+    """Largest distance (m) of the file's path from the model's by the same table, and of that from its own gear's."""
+    dt = 0.5 if "rudder.command" in model else 0.1
+    if "motion.phi" in model:
+        found = free_run(evaluator, text, DURATION_S, dt)[:, :2]
+    else:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "ship.yml"
+            path.write_text(text, encoding="utf-8")
+            found = evaluator.simulate(path, DURATION_S, dt)[:, 1:3]
+    by_table = model_tables(model, text)
+    expected = model_run(model, by_table, DURATION_S, dt)[:, :2]
+    # The table ends with tank2sim's run, and so does the comparison with it.
+    run, step = simulate(model, manoeuvre).trajectory, model.step_s
+    end = min(DURATION_S, run.t[-1])
+    finely = model_run(model, by_table, end, step)[::10, :2]
+    t = 10 * step * np.arange(int(end / step / 10))
+    own = np.array([[run.at(f"motion.{axis}", time) for axis in "xy"] for time in t])
+    return float(np.hypot(*(found - expected).T).max()), float(np.hypot(*(finely[: len(t)] - own).T).max())
+
+
+def main() -> None:
+    """Print the differences of each card."""
+    if not EVALUATOR.is_file():
+        sys.exit(f"{EVALUATOR} is missing; TANK2SIM_DATA names the folder of simulators")
+    evaluator = evaluator_module(EVALUATOR)
+    print(f"{'card':16s} {'acceleration':>12s} {'':8s} {'path (m)':>9s} {'table (m)':>9s}")
+    worst = {"planar": 0.0, "rolling": 0.0}
+    largest_rate, largest_table = 0.0, 0.0
+    for name in SHIPS:
+        card = read_card(name)
+        model, files = build(card), xdyn_files(card)
+        rolls = "motion.phi" in model
+        rate = math.nan if rolls else motion_difference(evaluator, str(files.files["ship.yml"]), model, 1000)
+        for words, manoeuvre in ORDERS.items():
+            path, table = path_differences(evaluator, model, together(files, words), manoeuvre)
+            print(f"{name:16s} {rate:12.1e} {words:8s} {path:9.1e} {table:9.1e}")
+            kind = "rolling" if rolls else "planar"
+            worst[kind], largest_table = max(worst[kind], path), max(largest_table, table)
+        largest_rate = max(largest_rate, 0.0 if rolls else rate)
+    print(
+        f"largest: acceleration {largest_rate:.1e} of the largest; path {worst['planar']:.1e} m, of a ship that rolls ",
+        end="",
+    )
+    print(f"{worst['rolling']:.1e} m; by the table in place of the gear {largest_table:.1e} m")
+
+
+if __name__ == "__main__":
+    main()
