@@ -19,7 +19,7 @@ from tank2sim.apps.programs.xdyn import ship_text, xdyn_files
 from tank2sim.apps.programs.xdyn_body import written_body
 from tank2sim.apps.programs.xdyn_expressions import Definitions
 from tank2sim.bundled import bundled_cards
-from tank2sim.cards import Card, read_card
+from tank2sim.cards import Card, parse_card, read_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
@@ -92,7 +92,8 @@ def test_unsymmetric_added_masses_and_a_forward_centre_of_gravity_are_not_lost(
     assert rigid[1, 5] == rigid[5, 1] == pytest.approx(body.mass * body.x_G * card.manoeuvring().scales.mass * 160.93)
     for matrix in (rigid, rigid + added):
         assert np.array_equal(matrix, matrix.T) and np.linalg.eigvalsh(matrix).min() > 0
-    assert np.linalg.eigvalsh(rigid).min() > 0 and added[1, 1] != pytest.approx(added[0, 0], rel=0.5)
+    assert added[1, 1] != pytest.approx(added[0, 0], rel=0.5)
+    assert rigid[5, 5] == pytest.approx(body.yaw_inertia * card.manoeuvring().scales.inertia)
 
 
 @first_fast("name", ["wind", *(name for name in TYPICAL if name != "wind")])
@@ -111,6 +112,40 @@ def test_the_constants_of_surroundings_can_be_changed_in_the_file(evaluator: Mod
     assert "wind_speed: 10.0 #" in text
     calm = text.replace("wind_speed: 10.0 #", "wind_speed: 0.0 #")
     assert_same_motion(evaluator, calm, build(card_with({"wind": TYPICAL["wind"] | {"speed_mps": 0.0}})), 50)
+
+
+OUTBOARD = """[[thrusters]]
+name = "stern"
+x_m = -1.0
+ahead_Ns2 = 0.02
+astern_Ns2 = 0.01
+speed_loss_kg = 0.05
+max_radps = 110.0
+dead_band_radps = 5.0
+order_exponent = 0.7
+time_constant_s = 0.3
+max_azimuth_deg = 30
+azimuth_time_constant_s = 0.4
+
+"""
+
+
+def test_a_craft_with_one_outboard_has_a_straight_run_and_its_lags_in_the_table(evaluator: ModuleType) -> None:
+    text = t2s.load("otter").card.text
+    card = parse_card(text[: text.index("[[thrusters]]")] + OUTBOARD + text[text.index("[[effects]]") :], "craft.toml")
+    files = xdyn_files(card)
+    assert_same_motion(evaluator, str(files.files["ship.yml"]), build(card))
+    assert set(files.files) == {"ship.yml", "straight_commands.yml"}
+    found = commands_of(yaml.safe_load(str(files.files["straight_commands.yml"])))
+    times, speed = found["thrusters_stern_speed"]
+    assert np.interp(0.3, times, speed) == pytest.approx((1 - math.exp(-1)) * speed[-1], rel=1e-4)  # from rest
+    assert found["thrusters_stern_azimuth"][1] == pytest.approx(0)
+
+
+def test_the_turn_has_the_largest_angle_of_the_gear() -> None:
+    card = t2s.load("mariner").replace({"steering_gear.max_angle_deg": 25.0}).card
+    text = str(xdyn_files(card).files["turn_commands.yml"])
+    assert math.degrees(commands_of(yaml.safe_load(text))["rudder_angle"][1].max()) == pytest.approx(25.0, abs=1e-3)
 
 
 # -- what the parser of xdyn would drop ------------------------------------------------------------------------------

@@ -89,8 +89,8 @@ def _losses(model: Model, after: Model, body: XdynBody, run: Trajectory) -> Iter
     lagging = [one.name for one in body.commands.values() if isinstance(one, State)]
     if lagging:
         yield (
-            "a body of xdyn has no states of its own: what the card has as such is a command, with its lags and limits "
-            f"in the tables alone ({', '.join(lagging)}); any other command acts at once"
+            f"xdyn gives a body no states of its own: lags and limits of {', '.join(lagging)} are in the tables alone; "
+            "any other command acts at once"
         )
     ground = ["motion.xdot", "motion.ydot"]
     drift = np.hypot(*(values_at(model, ground, run) - values_at(after, ground, run)).T).max()
@@ -234,10 +234,11 @@ def _use(files: Iterable[str], model: Model, body: XdynBody) -> str:
 
 `ship.yml` is the body, {names} its commands: xdyn reads all files that it is given as one input.
 {held}
-For commands of your own write another table, or run `xdyn-for-cs ship.yml --dt {step}` and send them as `hull(<name>)`
-in rad or rad/s: {", ".join(f"`hull({name})`" for name in body.commands)}. LOTUSim's xdyn (6 and later) also reads them
-from a CSV file: a section `controllers` with `type: csv`, `path`, `time column name`, `separator` and, under
-`commands`, a column for each name.
+Commands (rudder positive to starboard; a program that sends them gives rad and rad/s):
+{", ".join(f"`hull({name})`" for name in body.commands)}.
+Write another table for a manoeuvre of your own, or run `xdyn-for-cs ship.yml --dt {step}` and send them. LOTUSim's xdyn
+(6 and later) also reads them from a CSV file: a section `controllers` with `type: csv`, `path`, `time column name`,
+`separator` and, under `commands`, a column for each name.
 
 The numbers at the end of `hull` are the card's: change one, and the force changes. Long terms of numbers alone are
 worked out.
