@@ -180,7 +180,9 @@ def ship_text(card: SteeredCard, body: XdynBody, run: Trajectory) -> str:
 def _equations(body: XdynBody) -> Iterator[str]:
     """Forces, what they are made of, and data."""
     yield from (f"{name}: {body.texts.get(name, '0')}" for name in "XYZKMN")
+    yield "# what they are made of (vp, rp, du: v', r' and the change of speed, prime system)"
     yield from (f"{name}: {text}" for name, text in body.texts.items() if name not in "XYZKMN")
+    yield "# numbers of the card"
     for name, (variable, value) in body.data.items():
         yield f"{name}: {value!r} # {one_line(variable.description)} ({variable.unit})"
 
@@ -230,7 +232,9 @@ def _use(files: Iterable[str], model: Model, body: XdynBody) -> str:
             "gravity or hydrostatics is needed. `sway` and `turning` are the card's v and r."
         )
     return f"""\
-    xdyn ship.yml {tables[0]} --dt {step} --tend 600 -o out.csv
+```text
+xdyn ship.yml {tables[0]} --dt {step} --tend 600 -o out.csv
+```
 
 `ship.yml` is the body, {names} its commands: xdyn reads all files that it is given as one input.
 {held}
