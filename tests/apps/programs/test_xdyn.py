@@ -192,16 +192,64 @@ def test_operations_that_the_grammar_does_not_have_are_written_exactly(evaluator
         ),
     }
     found = Definitions()
-    names = {name: found.new_name(name) for name in cases}
-    found.add([a, b], ["a", "b"], {names[name]: value for name, (value, _) in cases.items()}, {})
+    found.add([a, b], ["a", "b"], {name: value for name, (value, _) in cases.items()}, {})
     values = np.array([-3.0, -0.7, 0.0, 1e-9, 0.4, 2.0])
     one, two = (grid.ravel() for grid in np.meshgrid(values, values))
     asked = (one != 0) | (two != 0)  # no angle at the origin
     node = found.texts | {"name": "hull", "commands": ["a", "b"], **dict.fromkeys("XYZKMN", "0")}
     for name, (_, expected) in cases.items():
-        force = CompiledForce(evaluator, node | {"X": names[name]}, {}, np)
+        force = CompiledForce(evaluator, node | {"X": name}, {}, np)
         got = np.broadcast_to(force.function({}, 0.0, {"a": one, "b": two})[0], one.shape)
         assert got[asked] == pytest.approx(expected(one, two)[asked], rel=1e-12, abs=1e-12), name
+
+
+UNARY = [
+    *(
+        lambda x: -x,
+        ca.sin,
+        ca.cos,
+        lambda x: x**2,
+        lambda x: x**3,
+        ca.fabs,
+        lambda x: ca.sqrt(ca.fabs(x) + 1),
+        ca.tanh,
+    ),
+    *(lambda x: ca.exp(-ca.fabs(x)), lambda x: 1 / (x**2 + 1), lambda x: ca.log(x**2 + 1), ca.atan, lambda x: 1.05 * x),
+]
+BINARY = [
+    *(lambda x, y: x + y, lambda x, y: x - y, lambda x, y: x * y, lambda x, y: x / (y * y + 1), ca.fmin, ca.fmax),
+    # Beyond ties, which rounding decides.
+    lambda x, y: ca.if_else(x < y + 0.00123, x, 2 * y),
+    lambda x, y: ca.if_else(ca.logic_or(x > 0.00321, y <= 0.0045), x * y, -y),
+    lambda x, y: ca.atan2(x + 0.0123, y),
+]
+
+
+def random_expression(rng: np.random.Generator, leaves: list[ca.SX], depth: int) -> ca.SX:
+    kind = rng.integers(10)
+    if depth == 0 or kind == 0:
+        return leaves[rng.integers(len(leaves))] if rng.integers(4) else ca.SX(round(rng.normal(), 2))
+    if kind < 4:
+        return UNARY[rng.integers(len(UNARY))](random_expression(rng, leaves, depth - 1))
+    first, second = (random_expression(rng, leaves, depth - 1) for _ in "ab")
+    return BINARY[rng.integers(len(BINARY))](first, second)
+
+
+@first_fast("seed", range(4))
+def test_random_expressions_have_the_value_of_the_graph(seed: int, evaluator: ModuleType) -> None:
+    rng = np.random.default_rng(seed)
+    a, b, constant, named = leaves = [ca.SX.sym(name) for name in ("a", "b", "constant", "named")]
+    for _ in range(150):
+        first, second = random_expression(rng, leaves[:3], 6), random_expression(rng, leaves, 5)
+        found = Definitions()
+        wanted = {"named": first, "X": second}
+        found.add(leaves, ["a", "b", "constant", "named"], wanted, {"constant": 0.7})
+        graph = ca.Function("f", [a, b, constant], [ca.substitute(second, named, first)])
+        node = {"name": "hull", "commands": ["a", "b"], "constant": 0.7, **dict.fromkeys("YZKMN", "0"), **found.texts}
+        values = {"a": rng.normal(size=4), "b": rng.normal(size=4)}
+        got = CompiledForce(evaluator, node, {}, np).function({}, 0.0, values)[0]
+        expected = np.array(graph(values["a"][None], values["b"][None], 0.7)).ravel()
+        assert np.broadcast_to(got, 4) == pytest.approx(expected, rel=1e-9, abs=1e-9), found.texts
 
 
 def test_an_operation_without_a_spelling_is_refused() -> None:

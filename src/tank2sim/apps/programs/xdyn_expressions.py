@@ -195,7 +195,7 @@ class Definitions:
 
     def _angle(self, stem: str, y: XdynTerm, x: XdynTerm) -> XdynTerm:
         """atan2(y, x), whose quarter turns about the axis of x are halved four times before their series."""
-        ahead = self.texts.get(x.text, x.text).startswith(("sqrt(", "1"))
+        ahead = x.text == "1" or (x.level == _ATOM and x.text.startswith("sqrt("))
         y, x = self._named(stem, y), self._named(stem, x)
         size = x.text if ahead else f"abs({x.text})"
         half = XdynTerm(f"{y.text}/(sqrt({x.text}^2 + {y.text}^2) + {size} + {_TINY})")
@@ -262,7 +262,7 @@ class Definitions:
         symbols : sequence of casadi.SX
         spelt : sequence of str
         wanted : mapping
-            Name, by :meth:`new_name`, to expression; each may hold symbols that are spelt as a name before it.
+            Name to expression; each may hold symbols that are spelt as a name before it.
         numbers : mapping
             Spelling of constants to their value: longer terms of these alone become numbers.
 
@@ -273,6 +273,7 @@ class Definitions:
         """
         function = ca.Function("f", [ca.vcat(symbols)], list(wanted.values()), {"cse": True})
         nodes, names = _nodes(function), list(wanted)
+        self.taken.update(wanted)
         uses = Counter(source for node in nodes for source in node.sources)
         outputs = {node.sources[0]: names[node.output] for node in reversed(nodes) if node.op == ca.OP_OUTPUT}
         terms: list[XdynTerm] = []
