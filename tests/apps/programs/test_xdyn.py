@@ -177,6 +177,8 @@ def test_operations_that_the_grammar_does_not_have_are_written_exactly(evaluator
         "where": (ca.if_else(a, b, 1), lambda a, b: np.where(a != 0, b, 1.0)),
         "sign": (ca.sign(a), lambda a, b: np.sign(a)),
         "angle": (ca.atan2(a, b), np.arctan2),
+        "scaled_angle": (ca.atan2(a, 1.05 * b), lambda a, b: np.arctan2(a, 1.05 * b)),
+        "root_angle": (ca.atan2(a + 0.1, ca.sqrt(b * b) - 5), lambda a, b: np.arctan2(a + 0.1, abs(b) - 5)),
         "arc": (
             ca.atan(a) - ca.asin(a / 4) + ca.acos(b / 4),
             lambda a, b: np.arctan(a) - np.arcsin(a / 4) + np.arccos(b / 4),
