@@ -178,7 +178,7 @@ def test_operations_that_the_grammar_does_not_have_are_written_exactly(evaluator
         "sign": (ca.sign(a), lambda a, b: np.sign(a)),
         "angle": (ca.atan2(a, b), np.arctan2),
         "scaled_angle": (ca.atan2(a, 1.05 * b), lambda a, b: np.arctan2(a, 1.05 * b)),
-        "root_angle": (ca.atan2(a + 0.1, ca.sqrt(b * b) - 5), lambda a, b: np.arctan2(a + 0.1, abs(b) - 5)),
+        "root_angle": (ca.atan2(a, ca.sqrt(b * b + 1) - 2.1), lambda a, b: np.arctan2(a, np.sqrt(b * b + 1) - 2.1)),
         "arc": (
             ca.atan(a) - ca.asin(a / 4) + ca.acos(b / 4),
             lambda a, b: np.arctan(a) - np.arcsin(a / 4) + np.arccos(b / 4),
