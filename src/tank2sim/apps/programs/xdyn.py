@@ -1,8 +1,9 @@
 """A ship or craft as a body of xdyn: its forces as expressions, its mass matrices, and commands for manoeuvres.
 
 ``centre of inertia`` is the origin, midships, and m x_G is in the matrix: xdyn then solves the card's own equations.
-Heave, roll and pitch are blocked. xdyn gives a body no states of its own: rudder, engine and whatever else has a lag
-are commands, with the history of tank2sim's own run.
+Heave, roll and pitch are blocked, unless the card's ship rolls (:mod:`tank2sim.apps.programs.xdyn_roll`). xdyn gives a
+body no states of its own: rudder, engine and whatever else has a lag are commands, with the history of tank2sim's own
+run.
 """
 
 from __future__ import annotations
