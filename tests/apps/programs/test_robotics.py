@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import re
+import runpy
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import tank2sim as t2s
 from tank2sim.apps.programs.robotics import growth_per_step
-from tank2sim.cards import CraftCard, parse_card
+from tank2sim.bundled import bundled_cards
+from tank2sim.cards import CraftCard, parse_card, read_card
+from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tests.dynamics.accelerations import accelerations
 
@@ -85,6 +90,43 @@ def test_the_growth_of_an_error_is_that_of_the_plugins_step(craft: CraftCard, he
         assert growth_per_step(card) == pytest.approx(largest_root(mass, added, damping, 1e-3), rel=0.01)
     assert growth_per_step(otter) == pytest.approx(1.985, abs=0.005)
     assert growth_per_step(heavy) < 1 < growth_per_step(craft)
+
+
+@pytest.mark.parametrize("name", [name for name in bundled_cards() if isinstance(read_card(name), CraftCard)])
+def test_the_growth_of_each_bundled_craft_is_that_of_an_independent_calculation(name: str, data: Path) -> None:
+    path = data / "simulators" / "gazebo" / "stability.py"
+    if not path.is_file():
+        pytest.skip(f"the calculation of a plugin's step is missing: {path}")
+    card = read_card(name)
+    assert isinstance(card, CraftCard)
+    model = build(replace(card, effects=()))
+    fastest, nothing = card.model.speed_range_mps[1], {command.name: 0.0 for command in model.inputs}
+
+    def rates(u: float, v: float, r: float) -> np.ndarray:
+        return accelerations(model, {"motion.u": u, "motion.v": v, "motion.r": r}, nothing)
+
+    d, body = card.derivatives, card.rigid_body
+    lever = body.mass * body.x_G
+    mass = np.array([[body.mass, 0, 0], [0, body.mass, lever], [0, lever, body.yaw_inertia]])
+    added = np.zeros((3, 3))
+    for term, row, column in (("Xudot", 0, 0), ("Yvdot", 1, 1), ("Yrdot", 1, 2), ("Nvdot", 2, 1), ("Nrdot", 2, 2)):
+        added[row, column] = -d.get(term, 0.0)
+    # Damping by the slope of the accelerations, without the inertial forces of a turning craft.
+    step, slopes = 1e-5, []
+    for axis in range(3):
+        moved = [np.array([fastest, 0.0, 0.0]) + side * step * np.eye(3)[axis] for side in (1, -1)]
+        slopes.append((rates(*moved[0]) - rates(*moved[1])) / (2 * step))
+    inertial = np.array(
+        [
+            [0, 0, 0],
+            [0, 0, -(mass[0, 0] + added[0, 0]) * fastest],
+            [0, (added[0, 0] - added[1, 1]) * fastest, -(lever + (added[1, 2] + added[2, 1]) / 2) * fastest],
+        ]
+    )
+    damping = inertial - (mass + added) @ np.array(slopes).T
+    module = runpy.run_path(str(path))
+    expected = module["largest_root"](mass, added, damping, 1e-3)
+    assert growth_per_step(card) == pytest.approx(expected, rel=1e-6)
 
 
 @pytest.mark.parametrize("to", ["gazebo", "vrx"])

@@ -1,0 +1,218 @@
+"""Equations of a ship or craft in the plane as xdyn has them, and read back from their text.
+
+xdyn adds -C_RB nu of the rigid body by itself, and no C_A. So X, Y and N are the right-hand sides of the card's model
+without what xdyn adds: exact whatever the card's conventions are. Where the added masses are not symmetric, or an
+effect acts on accelerations, X, Y and N are the written matrix times the accelerations of the model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from tank2sim.apps.programs.xdyn_expressions import XDYN_STATES, Definitions, read_expressions
+from tank2sim.apps.programs.xdyn_roll import ROLLED_STATES, level_motion, rolled_forces, rolled_motion, rolled_rates
+from tank2sim.arrays import Array
+from tank2sim.cards import ManoeuvringCard, SteeredCard
+from tank2sim.dynamics.hull import Hull, prime_motion
+from tank2sim.dynamics.kinematics import earth_velocity
+from tank2sim.dynamics.model import Model, Quantity, Variable
+from tank2sim.dynamics.rigid_body import inertial_forces
+from tank2sim.simulation.trajectory import Trajectory
+
+_ORDERS = ("rudder.", "propeller.", "thrusters.")
+"""First parts of the names of inputs that are orders; all others are constants of the file."""
+
+
+_PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
+"""Surge, sway and yaw among u v w p q r."""
+
+_ROLL_RADIUS = 0.05
+"""Radius of roll over L where it is blocked: xdyn asks for an inertia and does not use it."""
+
+
+@dataclass(frozen=True)
+class XdynBody:
+    """Equations of a body in the plane, as xdyn has them.
+
+    Parameters
+    ----------
+    rigid, added : array (6, 6)
+        Mass matrices in the order u v w p q r about midships, kg, kg m, kg m2.
+    texts : mapping
+        Name to expression, each in names before it; X to N are the forces (N, N m), 0 where they are missing.
+    data : mapping
+        Name to the model's variable and its value.
+    commands : mapping
+        Name to the variable that is a command.
+    density : float
+        kg/m3; ``rho`` in the expressions.
+    blocked : str
+        States that are held at zero.
+    """
+
+    rigid: Array
+    added: Array
+    texts: Mapping[str, str]
+    data: Mapping[str, tuple[Variable, float]]
+    commands: Mapping[str, Variable]
+    density: float
+    blocked: str
+
+
+def values_at(model: Model, names: Sequence[str], run: Trajectory) -> Array:
+    """Variables of a model (n, names) at the rows of a run."""
+    values = model.expand(ca.vcat([model.symbol(name) for name in names]))
+    function = ca.Function("at", [model.x, model.u, model.p], [values])
+    columns = function(run.x.T, run.u.T, ca.repmat(ca.DM(model.parameter_values()), 1, len(run.t)))
+    return np.array(columns).T
+
+
+def written_body(card: SteeredCard, model: Model, run: Trajectory) -> XdynBody:
+    """The equations of a model, checked at the rows of a run."""
+    values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    rigid, stated = _masses(model, values, run)
+    total = (stated + stated.T) / 2
+    states: dict[str, ca.SX] = {}
+    if "motion.phi" in model:
+        rigid, total, blocked = np.diag(np.diag(rigid)), np.diag(np.diag(total)), ""
+        states = {name: ca.SX.sym(name) for name in ROLLED_STATES}
+        wanted = rolled_forces(model, states, np.diag(rigid), np.diag(total))
+    else:
+        blocked = "wpq"
+        forces = _planar_forces(model, run, stated[_PLANAR], total[_PLANAR])
+        wanted = dict(zip("XYN", ca.vertsplit(forces), strict=True))
+    model = model.with_constants(name for name, value in values.items() if value == 0 and name != "ship.x_G")
+    texts, data, commands = _written(card, model, wanted, states, values)
+    return XdynBody(rigid, total - rigid, texts, data, commands, values["ship.water_density"], blocked)
+
+
+def _masses(model: Model, values: Mapping[str, float], run: Trajectory) -> tuple[Array, Array]:
+    """M_RB and its sum with the added masses (6, 6), which need not be symmetric; heave, roll and pitch are guessed."""
+    names = [f"inertia.{name}" for name in ("surge", "sway", "sway_yaw", "yaw_sway", "yaw")]
+    surge, sway, sway_yaw, yaw_sway, yaw = values_at(model, names, run)[0]
+    mass, lever, length = values["ship.mass"], values["ship.mass"] * values["ship.x_G"], values["ship.length"]
+    roll = values.get("ship.roll_inertia", mass * (_ROLL_RADIUS * length) ** 2)
+    # Any yaw inertia does, for the sum alone acts: xdyn wants a matrix that is positive.
+    own = max(values["ship.yaw_inertia"], 1.1 * lever**2 / mass)
+    rigid = np.diag([mass, mass, mass, roll, own, own])
+    rigid[1, 5] = rigid[5, 1] = lever
+    stated = np.diag([surge, sway, mass, roll, own, yaw])
+    stated[1, 5], stated[5, 1] = sway_yaw, yaw_sway
+    return rigid, stated
+
+
+def _planar_forces(model: Model, run: Trajectory, stated: Array, total: Array) -> ca.SX:
+    """X, Y, N of xdyn for the mass matrices (3, 3) of the card and of the file."""
+    forces, rates = [f"force.{name}" for name in "XYN"], [f"motion.{name}dot" for name in "uvr"]
+    acting, moving = values_at(model, forces, run), values_at(model, rates, run) @ stated.T
+    if np.allclose(acting, moving, rtol=0, atol=1e-9 * np.abs(acting).max()):
+        share, names = np.eye(3) if np.array_equal(stated, total) else total @ np.linalg.inv(stated), forces
+    else:  # an effect acts on accelerations
+        share, names = total, rates
+    known = (model.symbol(name) for name in ("ship.mass", "ship.x_G", "motion.u", "motion.v", "motion.r"))
+    return ca.sparsify(ca.DM(share)) @ ca.vcat([model.symbol(name) for name in names]) - ca.vcat(
+        inertial_forces(*known)
+    )
+
+
+def _needed(model: Model, names: Iterable[str]) -> tuple[list[Quantity], list[Variable]]:
+    """Quantities on which those of `names` depend, each after what it uses, and the other variables."""
+    quantities: dict[str, Quantity] = {}
+    others: dict[str, Variable] = {}
+
+    def visit(name: str) -> None:
+        variable = model[name]
+        if not isinstance(variable, Quantity):
+            others[name] = variable
+        elif name not in quantities:
+            for used in variable.uses.values():
+                visit(used)
+            quantities[name] = variable
+
+    for name in names:
+        visit(name)
+    return list(quantities.values()), list(others.values())
+
+
+def _motion_terms(card: SteeredCard, model: Model) -> dict[str, ca.SX]:
+    """v', r' and Du' of a ship by name, of which its polynomial is made."""
+    if not isinstance(card, ManoeuvringCard):
+        return {}
+    symbols = {variable.name: variable.symbol for variable in model.variables}
+    hull = Hull(card.model.kind == "linear", card.model.speed_scale == "nominal", False, symbols)
+    speed = hull["ship.speed"] if hull.linear or hull.nominal_scale else hull.speed
+    return dict(zip(("vp", "rp", "du"), prime_motion(hull, speed), strict=True))
+
+
+def _clocks(model: Model) -> set[str]:
+    """States that are the time."""
+    return {one.name for one in model.states if ca.is_equal(model.expand(model.symbol(one.derivative)), ca.SX(1))}
+
+
+def _written(
+    card: SteeredCard, model: Model, wanted: Mapping[str, ca.SX], states: dict[str, ca.SX], values: Mapping[str, float]
+) -> tuple[dict[str, str], dict[str, tuple[Variable, float]], dict[str, Variable]]:
+    """Expressions by name, with the data and commands that they use; `states` are those of a ship that rolls."""
+    terms = _motion_terms(card, model)
+    beforehand = ("motion.speed", "low_speed.share") if terms else ()
+    symbols = ca.symvar(ca.vcat([*terms.values(), *wanted.values()]))
+    quantities, others = _needed(model, [*beforehand, *(one.name() for one in symbols if one.name() in model)])
+    found = Definitions()
+    fixed = XDYN_STATES | dict.fromkeys(_clocks(model), "t") | {"ship.water_density": "rho"}
+    named: dict[str, ca.SX] = {}
+    if states:
+        sway, turning = found.new_name("sway"), found.new_name("turning")
+        fixed |= {"motion.v": sway, "motion.r": turning}
+        named = dict(zip((sway, turning), rolled_motion(states, model.symbol("motion.phi")), strict=True))
+    spelt = {one.name: fixed.get(one.name) or found.new_name(one.name) for one in (*others, *quantities)}
+    named |= {spelt[one.name]: one.value for one in quantities if one.name in beforehand}
+    named |= {found.new_name(name): value for name, value in terms.items()}
+    named |= {spelt[one.name]: one.value for one in quantities if one.name not in beforehand}
+    numbers = {spelt[one.name]: values[one.name] for one in others if one.name in values}
+    every = [*(one.symbol for one in (*others, *quantities)), *states.values()]
+    spellings = [*(spelt[one.name] for one in (*others, *quantities)), *(ROLLED_STATES[name] for name in states)]
+    found.add(every, spellings, {**named, **wanted}, numbers)
+    words = found.used_by(wanted)
+    used = {spelt[one.name]: one for one in others if spelt[one.name] in words and one.name not in fixed}
+    known = {one.name: one.start for one in model.inputs if not one.name.startswith(_ORDERS)} | dict(values)
+    data = {name: (one, known[one.name]) for name, one in used.items() if one.name in known}
+    texts = {name: text for name, text in found.texts.items() if name in words}
+    return texts, data, {name: one for name, one in used.items() if name not in data}
+
+
+def _at_any_time(value: ca.SX, _: ca.SX) -> ca.SX:
+    return value
+
+
+def read_back(model: Model, body: XdynBody) -> Model:
+    """The model with the motion that follows from the body's text, without a current."""
+    symbols = {
+        spelling.removesuffix("(t)"): model.symbol(name) for name, spelling in XDYN_STATES.items() if name in model
+    }
+    rolls = not body.blocked
+    seen = symbols | (level_motion(symbols["v"], symbols["r"], symbols["phi"]) if rolls else {})
+    known: dict[str, Any] = {name: partial(_at_any_time, value) for name, value in seen.items()}
+    known |= {name: value for name, (_, value) in body.data.items()} | {"rho": body.density}
+    known |= {name: variable.symbol for name, variable in body.commands.items()}
+    known["t"] = next((model.symbol(clock) for clock in _clocks(model)), ca.SX(0))
+    read = read_expressions(body.texts, known)
+    forces, total = ca.vcat([read.get(name, ca.SX(0)) for name in "XYZKMN"]), body.rigid + body.added
+    u, v, r, psi = (symbols[name] for name in ("u", "v", "r", "psi"))
+    if rolls:
+        values = rolled_rates(model, forces, np.diag(body.rigid), np.diag(total))
+        v, r = v * ca.cos(symbols["phi"]), r * ca.cos(symbols["phi"])
+    else:
+        mass, lever = body.rigid[0, 0], body.rigid[1, 5]
+        planar = forces[[0, 1, 5]] + ca.vcat(inertial_forces(mass, lever / mass, u, v, r))
+        rates = ca.DM(np.linalg.inv(total[_PLANAR])) @ planar
+        values = dict(zip(("udot", "vdot", "rdot"), ca.vertsplit(rates), strict=True))
+    values |= dict(zip(("xdot", "ydot"), earth_velocity(u, v, psi), strict=True)) | {"psidot": r}
+    for name, value in values.items():
+        model = model.redefine(f"motion.{name}", partial(_at_any_time, value))
+    return model

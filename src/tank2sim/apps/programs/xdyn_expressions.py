@@ -1,0 +1,373 @@
+"""Equations in the grammar of xdyn's manoeuvring forces: ``+ - * / ^``, brackets, and cos, sin, exp, abs, log, sqrt.
+
+xdyn drops without a word what it cannot read, above all a sign in front of a name. So a negative is ``0 - a``. What the
+grammar does not have is written with what it has, exactly: max(a, 0) is (a + abs(a))/2, the sign of a is
+a/(abs(a) + 1e-200), and an angle is halved four times before its series.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as ca
+
+_ADD, _MUL, _POW, _ATOM = range(4)
+_INLINE = 3
+"""Operations up to which a term used twice is repeated and not named (project choice: v' r'^2 stays readable)."""
+
+_TINY = "1e-200"
+"""What keeps a division by zero away; beyond 1e-184 it changes no digit."""
+
+_WORD = re.compile(r"[A-Za-z]\w*")
+
+_SERIES = "16*({0} - {0}^3/3 + {0}^5/5 - {0}^7/7 + {0}^9/9 - {0}^11/11)"
+"""An angle by the tangent of its 16th part: at a quarter turn the rest is 1e-13."""
+
+RESERVED = frozenset("X Y Z K M N t g nu rho model name commands cos sin exp abs log sqrt".split())
+"""Names that xdyn has a meaning for."""
+
+XDYN_STATES = {f"motion.{name}": f"{name}(t)" for name in "x y psi u v r phi p".split()}
+"""State of a model to its spelling."""
+
+
+@dataclass(frozen=True)
+class XdynTerm:
+    """An expression as text.
+
+    Parameters
+    ----------
+    text : str
+    level : int
+        How tightly its last operation binds: 0 sum, 1 product, 2 power, 3 name, number or call.
+    weight : int
+        Number of operations.
+    opposite : XdynTerm, optional
+        If the text is ``0 - a``: a.
+    """
+
+    text: str
+    level: int = _ATOM
+    weight: int = 0
+    opposite: XdynTerm | None = None
+
+    def within(self, level: int) -> str:
+        """The text, in brackets if it binds less tightly than `level`."""
+        return self.text if self.level >= level else f"({self.text})"
+
+
+def number_term(value: float) -> XdynTerm:
+    """A number; a negative one as ``0 - a``."""
+    text = repr(abs(value)).removesuffix(".0")
+    return _negative(XdynTerm(text)) if value < 0 else XdynTerm(text)
+
+
+def _negative(a: XdynTerm) -> XdynTerm:
+    return a.opposite or XdynTerm(f"0 - {a.within(_MUL)}", _ADD, a.weight + 1, a)
+
+
+def _sum(a: XdynTerm, b: XdynTerm) -> XdynTerm:
+    if "0" in (a.text, b.text):
+        return b if a.text == "0" else a
+    if b.opposite:
+        return _difference(a, b.opposite)
+    if a.opposite:
+        return _difference(b, a.opposite)
+    return XdynTerm(f"{a.text} + {b.text}", _ADD, a.weight + b.weight + 1)
+
+
+def _difference(a: XdynTerm, b: XdynTerm) -> XdynTerm:
+    if "0" in (a.text, b.text):
+        return a if b.text == "0" else _negative(b)
+    if b.opposite:
+        return _sum(a, b.opposite)
+    if a.opposite:
+        return _negative(_sum(a.opposite, b))
+    return XdynTerm(f"{a.text} - {b.within(_MUL)}", _ADD, a.weight + b.weight + 1)
+
+
+def _product(a: XdynTerm, b: XdynTerm, mark: str = "*") -> XdynTerm:
+    if a.opposite:
+        return _negative(_product(a.opposite, b, mark))
+    if b.opposite:
+        return _negative(_product(a, b.opposite, mark))
+    return XdynTerm(f"{a.within(_MUL)}{mark}{b.within(_MUL if mark == '*' else _POW)}", _MUL, a.weight + b.weight + 1)
+
+
+def _quotient(a: XdynTerm, b: XdynTerm) -> XdynTerm:
+    return _product(a, b, "/")
+
+
+def _power(a: XdynTerm, b: XdynTerm) -> XdynTerm:
+    return XdynTerm(f"{a.within(_ATOM)}^{b.within(_ATOM)}", _POW, a.weight + b.weight + 1)
+
+
+def _called(function: str) -> Callable[[XdynTerm], XdynTerm]:
+    return lambda a: XdynTerm(f"{function}({a.text})", _ATOM, a.weight + _INLINE + 1)
+
+
+_ONE, _TWO = XdynTerm("1"), XdynTerm("2")
+_UNARY: Mapping[int, Callable[[XdynTerm], XdynTerm]] = {
+    ca.OP_ASSIGN: lambda a: a,
+    ca.OP_NEG: _negative,
+    ca.OP_SQ: lambda a: _power(a, _TWO),
+    ca.OP_TWICE: lambda a: _product(_TWO, a),
+    ca.OP_INV: lambda a: _quotient(_ONE, a),
+    **{
+        op: _called(word)
+        for op, word in (
+            (ca.OP_COS, "cos"),
+            (ca.OP_SIN, "sin"),
+            (ca.OP_EXP, "exp"),
+            (ca.OP_FABS, "abs"),
+            (ca.OP_LOG, "log"),
+            (ca.OP_SQRT, "sqrt"),
+        )
+    },
+}
+_BINARY: Mapping[int, Callable[[XdynTerm, XdynTerm], XdynTerm]] = {
+    ca.OP_ADD: _sum,
+    ca.OP_SUB: _difference,
+    ca.OP_MUL: _product,
+    ca.OP_DIV: _quotient,
+    ca.OP_POW: _power,
+    ca.OP_CONSTPOW: _power,
+    ca.OP_AND: _product,
+}
+_TRUTHS = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP_OR)
+"""Operations whose value is 0 or 1."""
+
+
+@dataclass
+class Definitions:
+    """Named expressions in an order in which each uses only those before it.
+
+    Parameters
+    ----------
+    taken : set of str
+        Names that are in use.
+    texts : dict
+        Name to expression.
+    """
+
+    taken: set[str] = field(default_factory=lambda: set(RESERVED))
+    texts: dict[str, str] = field(default_factory=dict)
+
+    def new_name(self, wanted: str) -> str:
+        """A name of letters, digits and underscores that resembles `wanted` and is not in use, which it then is."""
+        stem = re.sub(r"\W+", "_", wanted.removeprefix("derivatives.").removeprefix("mmg."), flags=re.ASCII).strip("_")
+        stem = stem if stem[:1].isalpha() else f"n_{stem}"
+        name, count = stem, 1
+        while name in self.taken:
+            count += 1
+            name = f"{stem}_{count}"
+        self.taken.add(name)
+        return name
+
+    def define(self, wanted: str, term: XdynTerm) -> XdynTerm:
+        """The term under a name of its own."""
+        name = self.new_name(wanted)
+        self.texts[name] = term.text
+        return XdynTerm(name)
+
+    def used_by(self, names: Iterable[str]) -> set[str]:
+        """All words in the expressions of these names, and in those of their words."""
+        found: set[str] = set()
+        waiting = list(names)
+        while waiting:
+            name = waiting.pop()
+            if name not in found:
+                found.add(name)
+                waiting += _WORD.findall(self.texts.get(name, ""))
+        return found
+
+    def _named(self, stem: str, term: XdynTerm) -> XdynTerm:
+        return term if term.level == _ATOM and term.weight == 0 else self.define(stem, term)
+
+    def _sign(self, stem: str, a: XdynTerm) -> XdynTerm:
+        """-1, 0 or 1."""
+        a = self._named(stem, a)
+        return self.define(f"{stem}_sign", XdynTerm(f"{a.text}/(abs({a.text}) + {_TINY})"))
+
+    def _angle(self, stem: str, y: XdynTerm, x: XdynTerm) -> XdynTerm:
+        """atan2(y, x), whose quarter turns about the axis of x are halved four times before their series."""
+        ahead = x.text == "1" or (x.level == _ATOM and x.text.startswith("sqrt("))
+        y, x = self._named(stem, y), self._named(stem, x)
+        size = x.text if ahead else f"abs({x.text})"
+        half = XdynTerm(f"{y.text}/(sqrt({x.text}^2 + {y.text}^2) + {size} + {_TINY})")
+        tangent = self.define(f"{stem}_tan2", half).text
+        for part in (4, 8, 16):
+            tangent = self.define(f"{stem}_tan{part}", XdynTerm(f"{tangent}/(1 + sqrt(1 + {tangent}^2))")).text
+        angle = XdynTerm(_SERIES.format(tangent), _MUL, 12)
+        if ahead:
+            return angle
+        acute, across, along = self.define(stem, angle).text, self._sign(stem, y).text, self._sign(stem, x).text
+        astern = f"{along}*({along} - 1)/2"
+        turned = f"{math.pi!r}*(1 - {across}*({across} - 1)) - 2*{acute}"
+        return XdynTerm(f"{acute} + {astern}*({turned})", _ADD, 12)
+
+    def _extreme(self, stem: str, a: XdynTerm, b: XdynTerm, mark: str) -> XdynTerm:
+        """The greater (`mark` +) or lesser (-) of two."""
+        if a.text == "0":
+            a, b = b, a
+        a, b = self._named(stem, a), self._named(stem, b)
+        between = a if b.text == "0" else XdynTerm(f"{a.text} - {b.text}", _ADD)
+        both = a.text if b.text == "0" else f"{a.text} + {b.text}"
+        return XdynTerm(f"({both} {mark} abs({between.text}))/2", _MUL, _INLINE + 3)
+
+    def _composed(self, op: int, stem: str, a: XdynTerm, b: XdynTerm, *, truth: bool) -> XdynTerm:
+        """An operation that the grammar does not have; `truth` where a is 0 or 1."""
+        if op in (ca.OP_FMAX, ca.OP_FMIN):
+            return self._extreme(stem, a, b, "+" if op == ca.OP_FMAX else "-")
+        if op == ca.OP_SIGN:
+            return self._sign(stem, a)
+        if op in (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE):
+            sign = self._sign(stem, _difference(b, a)).text
+            forms = {ca.OP_LT: "{0}*(1 + {0})/2", ca.OP_LE: "1 - {0}*({0} - 1)/2", ca.OP_NE: "{0}^2"}
+            return self.define(stem, XdynTerm(forms.get(op, "1 - {0}^2").format(sign)))
+        if op == ca.OP_NOT:
+            return _difference(_ONE, a if truth else _power(self._sign(stem, a), _TWO))
+        if op == ca.OP_OR:
+            return _difference(_sum(a, b), _product(a, b))
+        if op == ca.OP_IF_ELSE_ZERO:
+            return _product(a if truth else _power(self._sign(stem, a), _TWO), b)
+        if op == ca.OP_ATAN2:
+            return self._angle(stem, a, b)
+        if op == ca.OP_ATAN:
+            return self._angle(stem, a, _ONE)
+        if op in (ca.OP_ASIN, ca.OP_ACOS):
+            a = self._named(stem, a)
+            other = XdynTerm(f"sqrt(1 - {a.text}^2)", _ATOM, _INLINE + 1)
+            return self._angle(stem, *((a, other) if op == ca.OP_ASIN else (other, a)))
+        if op == ca.OP_TAN:
+            a = self._named(stem, a)
+            return XdynTerm(f"sin({a.text})/cos({a.text})", _MUL, _INLINE + 1)
+        if op == ca.OP_TANH:
+            a = self._named(stem, a)
+            fallen = self.define(stem, XdynTerm(f"exp(0 - 2*abs({a.text}))")).text
+            return _product(self._sign(stem, a), XdynTerm(f"(1 - {fallen})/(1 + {fallen})", _MUL, _INLINE + 1))
+        raise ValueError(f"operation {op} of CasADi has no spelling in xdyn")
+
+    def add(
+        self, symbols: Sequence[ca.SX], spelt: Sequence[str], wanted: Mapping[str, ca.SX], numbers: Mapping[str, float]
+    ) -> None:
+        """Define expressions of `symbols`, which are spelt `spelt`; parts that are used often get names, too.
+
+        Parameters
+        ----------
+        symbols : sequence of casadi.SX
+        spelt : sequence of str
+        wanted : mapping
+            Name to expression; each may hold symbols that are spelt as a name before it.
+        numbers : mapping
+            Spelling of constants to their value: longer terms of these alone become numbers.
+
+        Raises
+        ------
+        ValueError
+            An operation has no spelling in xdyn.
+        """
+        function = ca.Function("f", [ca.vcat(symbols)], list(wanted.values()), {"cse": True})
+        nodes, names = _nodes(function), list(wanted)
+        self.taken.update(wanted)
+        uses = Counter(source for node in nodes for source in node.sources)
+        outputs = {node.sources[0]: names[node.output] for node in reversed(nodes) if node.op == ca.OP_OUTPUT}
+        terms: list[XdynTerm] = []
+        constant: list[bool] = []
+        for k, node in enumerate(nodes):
+            stem, into = names[node.output], [terms[source] for source in node.sources]
+            fixed = all(constant[source] for source in node.sources)
+            if node.op == ca.OP_OUTPUT:
+                (term,) = into
+                self.texts.setdefault(stem, term.text)
+            elif node.op == ca.OP_INPUT:
+                term = XdynTerm(spelt[node.place])
+                fixed = term.text in numbers
+            elif node.op == ca.OP_CONST:
+                term = number_term(function.instruction_constant(k))
+            else:
+                before = len(self.texts)
+                term = self._operation(nodes, k, stem, into)
+                if fixed:
+                    term = self._folded(term, before, numbers)
+                elif k in outputs:
+                    self.texts[outputs[k]] = term.text
+                    term = XdynTerm(outputs[k])
+                elif uses[k] > 1 and term.weight > _INLINE:
+                    term = self.define(stem, term)
+            terms.append(term)
+            constant.append(fixed)
+
+    def _operation(self, nodes: Sequence[_Node], k: int, stem: str, into: Sequence[XdynTerm]) -> XdynTerm:
+        op, sources = nodes[k].op, nodes[k].sources
+        if op in _UNARY:
+            return _UNARY[op](into[0])
+        if op in _BINARY:
+            return _BINARY[op](*into)
+        condition, last = nodes[sources[0]], nodes[sources[-1]]
+        if op == ca.OP_IF_ELSE_ZERO and last.op == ca.OP_MUL and sources[0] in last.sources:
+            return into[1]  # c*a is zero without c anyway
+        return self._composed(op, stem, into[0], into[-1], truth=condition.op in _TRUTHS)
+
+    def _folded(self, term: XdynTerm, before: int, numbers: Mapping[str, float]) -> XdynTerm:
+        """A term of constants, as a number if it is long or has definitions of its own (those after `before`)."""
+        parts = dict(list(self.texts.items())[before:])
+        named = any(name in numbers for name in _WORD.findall(term.text))
+        if named and not parts and term.weight <= _INLINE:
+            return term
+        for name in parts:
+            del self.texts[name]
+            self.taken.remove(name)
+        return number_term(float(read_expressions({**parts, "folded value": term.text}, numbers)["folded value"]))
+
+
+@dataclass(frozen=True)
+class _Node:
+    """An instruction of a function: its operation, its sources and the output for which it is, all by their number."""
+
+    op: int
+    sources: tuple[int, ...]
+    place: int
+    output: int
+
+
+def _nodes(function: ca.Function) -> list[_Node]:
+    """The instructions of a function of one vector."""
+    outputs, following = [], 0
+    for k in reversed(range(function.n_instructions())):
+        if function.instruction_id(k) == ca.OP_OUTPUT:
+            following = function.instruction_output(k)[0]
+        outputs.append(following)
+    nodes: list[_Node] = []
+    made: dict[int, int] = {}
+    for k, output in enumerate(reversed(outputs)):
+        op, out, into = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
+        if op in (ca.OP_INPUT, ca.OP_CONST):
+            sources: tuple[int, ...] = ()
+        else:
+            sources = tuple(made[place] for place in (into[:1] if op == ca.OP_OUTPUT else into))
+        if op != ca.OP_OUTPUT:
+            made[out[0]] = k
+        nodes.append(_Node(op, sources, into[1] if op == ca.OP_INPUT else 0, output))
+    return nodes
+
+
+def read_expressions(texts: Mapping[str, str], known: Mapping[str, Any]) -> dict[str, ca.SX]:
+    """The values of written expressions, read back: each in names of `known` or of those before it.
+
+    Parameters
+    ----------
+    texts : mapping
+        Name to expression.
+    known : mapping
+        ``u`` and the other states to a function of time, commands and numbers to their symbol or value.
+    """
+    functions = {"cos": ca.cos, "sin": ca.sin, "exp": ca.exp, "abs": ca.fabs, "log": ca.log, "sqrt": ca.sqrt}
+    values: dict[str, Any] = {"__builtins__": {}, **functions, **known}
+    for name, text in texts.items():
+        values[name] = eval(text.replace("^", "**"), values)
+    return {name: ca.SX(values[name]) for name in texts}
