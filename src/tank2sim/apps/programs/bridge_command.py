@@ -1,0 +1,219 @@
+"""A ship as an own ship of Bridge Command 5.11: ``boat.ini`` with fitted numbers, and a box as its mesh."""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+
+import numpy as np
+
+from tank2sim.apps.programs.bridge_command_fit import (
+    COURSE_FIGURES,
+    LARGEST_RUDDER_DEG,
+    SurgeNumbers,
+    YawNumbers,
+    courses_of_card,
+    fitted_surge,
+    fitted_yaw,
+    force_at,
+    full_ahead_order,
+    sailed,
+    start_values,
+    straight_runs,
+    straight_runs_of_card,
+)
+from tank2sim.apps.programs.polynomial_fit import FigureChange
+from tank2sim.apps.programs.program_files import ProgramFiles
+from tank2sim.cards.card import Card, MmgCard, SteeredCard
+from tank2sim.dynamics.build import build
+from tank2sim.dynamics.model import Model
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.manoeuvres import Turn
+from tank2sim.simulation.run import simulate
+from tank2sim.simulation.running import Running
+
+_FREEBOARD, _EYE_AFT = 0.04, 0.3
+"""Freeboard, and place of the eye aft of midships, over L (project choices)."""
+
+_GEAR_DEGPS = 30.0
+"""Rate of a rudder whose card states none: the default of Bridge Command."""
+
+_ASTERN_RUDDER = 0.2
+"""RudderBAstern over RudderB: a rudder in the stream of a propeller that turns astern (project choice)."""
+
+_AIR_DRAG = 0.5 * 1.225 * 0.51444**2
+"""Drag of still air on the box in Bridge Command, over area and squared speed (N s2/m4): part of the fitted drag."""
+
+_VERSION = "5.11"
+
+_USE = f"""Copy this folder, under a name of your choice, into `Models/Ownship/` of Bridge Command's user folder
+(`~/.Bridge Command/{_VERSION}/` on Linux, `%APPDATA%\\Bridge Command\\{_VERSION}\\` on Windows), and name it as
+`ShipName` in `ownship.ini` of a scenario. `boat.ini` has the numbers, `box.x` is a box of the ship's length, beam and
+height, from which Bridge Command takes draught and areas of wind.
+
+The numbers are for version {_VERSION}, whose source halves `Max_propulsion_force` of a ship with one engine
+(`PropSpace=0`) twice: the key is twice the thrust of the ship. Another version may need half of it: check the speed at
+full ahead."""
+
+
+def bridge_command_files(card: Card) -> ProgramFiles:
+    """The folder of an own ship of Bridge Command 5.11: ``boat.ini`` and its mesh ``box.x``.
+
+    Parameters
+    ----------
+    card : Card
+        Card of a ship with a rudder: polynomial or MMG, one screw or two, with or without roll.
+
+    Raises
+    ------
+    InputError
+        The vessel has no rudder, the card lacks beam or draught, or the ship does not turn.
+    """
+    ship = card.steered()
+    if ship.thrusters:
+        problem = "is steered by thrusters, and this own ship of Bridge Command by a rudder"
+        raise card.fault("model.kind", problem, "export an FMU, or convert it --to gazebo")
+    beam, draught = (_particular(ship, name) for name in ("beam_m", "draught_m"))
+    model = build(ship)
+    values = start_values(model)
+    speed, length = values["ship.speed"], values["ship.length"]
+    runs = straight_runs_of_card(model)
+    mass = (ship.rigid_body.mass - ship.derivatives.get("Xudot", 0.0)) * ship.scales.mass
+    surge = fitted_surge(runs, speed, float(mass))
+    half = ("half thrust ahead", "final_speed_mps")
+    courses, wanted = courses_of_card(model, surge.speed(0.5), runs.get(half))
+    if np.isnan(wanted[1]).all():
+        raise card.fault("derivatives", "make no turn that reaches 180 deg", "check the card with simulate")
+    gear = math.degrees(values.get("steering.max_rate", math.radians(_GEAR_DEGPS)))
+    # Two propellers walk against each other, so that only one can hold an asymmetric ship.
+    neutral = 0.0 if _screws(ship) == 2 else math.degrees(Running(Integrator(model)).neutral_rudder())
+    yaw = fitted_yaw(model, courses, wanted, gear, neutral)
+    made, straight = sailed(yaw, courses, gear, speed, 0.006 * length / speed)[:, 0], straight_runs(surge, speed)
+    changes = [FigureChange("full ahead", "final_speed_mps", speed, surge.speed(1.0))]
+    changes += [FigureChange(*key, value, straight[key]) for key, value in runs.items()]
+    for column, course in enumerate(courses):
+        for row, name in enumerate(COURSE_FIGURES):
+            before, after = float(wanted[row, column]), float(made[row, column])
+            if not math.isnan(before):
+                changes.append(FigureChange(course.manoeuvre, name, before, None if math.isnan(after) else after))
+    return ProgramFiles(
+        files={
+            "boat.ini": _ini(ship, model, surge, yaw, gear),
+            "box.x": box_mesh(length, beam, draught + _FREEBOARD * length),
+        },
+        use=_USE,
+        losses=_losses(ship, model),
+        changes=tuple(changes),
+    )
+
+
+def _particular(card: SteeredCard, name: str) -> float:
+    value = getattr(card.ship, name)
+    if value is None:
+        raise card.fault(f"ship.{name}", "is missing, and the mesh of Bridge Command needs it", "add it")
+    return float(value)
+
+
+def _screws(card: SteeredCard) -> int:
+    return card.propeller.number if isinstance(card, MmgCard) else 1
+
+
+def _ini(card: SteeredCard, model: Model, surge: SurgeNumbers, yaw: YawNumbers, gear_degps: float) -> str:
+    """``boat.ini``: the keys that 5.11 reads. No text of the card is in it."""
+    length, draught = card.ship.length_m, _particular(card, "draught_m")
+    inertia = float((card.rigid_body.yaw_inertia - card.derivatives.get("Nrdot", 0.0)) * card.scales.inertia)
+    rudder, quadratic, linear = (inertia * value.item() for value in (yaw.rudder, yaw.quadratic, yaw.linear))
+    by_speed = yaw.share.item()
+    by_thrust = rudder * (1 - by_speed) / surge.thrust_N
+    twin = _screws(card) == 2
+    y_P = card.propeller.y_P if isinstance(card, MmgCard) else None
+    numbers = {
+        **{"ScaleFactor": 1.0, "YCorrection": -draught, "AngleCorrection": 0.0, "Views": 1.0, "ViewX(1)": 0.0},
+        **{"ViewY(1)": draught + 2 * _FREEBOARD * length, "ViewZ(1)": -_EYE_AFT * length},
+        **{"HasGPS": 1.0, "HasDepthSounder": 1.0, "MaxDepth": 100.0, "HasRateOfTurnIndicator": 1.0},
+        "Mass": surge.mass_kg,
+        "Inertia": inertia,
+        # Of each of two engines; of one, 5.11 gives a quarter of the key to either side.
+        "Max_propulsion_force": surge.thrust_N / 2 if twin else 2 * surge.thrust_N,
+        "PropSpace": 2 * length * (y_P or 0.0) if twin else 0.0,
+        "AsternEfficiency": surge.astern,
+        "MaxRevs": (full_ahead_order(model) or 0.0) * 60 / math.tau or 100.0,
+        "DynamicsSpeedA": surge.A - _AIR_DRAG * _particular(card, "beam_m") * _FREEBOARD * length,
+        "DynamicsSpeedB": surge.B,
+        "DynamicsLateralDragA": -4 * force_at(model, "force.Y", {"motion.v": 0.5}, {}),
+        "DynamicsLateralDragB": 1.0,  # 0 would mean another default
+        "DynamicsTurnDragA": quadratic,
+        "DynamicsTurnDragB": linear,
+        "RudderA": rudder * by_speed / surge.speed(1.0),
+        "RudderB": by_thrust,
+        "RudderBAstern": _ASTERN_RUDDER * by_thrust,
+        "RudderAngularVelocity": gear_degps,
+        "PropWalkAhead": -rudder * yaw.neutral_deg / 2,
+        "PropWalkAstern": 0.0,
+    }
+    for effect in card.effects:
+        end, thruster, _ = effect.name.partition("_tunnel_thruster")
+        if thruster:
+            numbers[f"{end.capitalize()}ThrusterForce"] = effect.parameters["force_N"]
+            numbers[f"{end.capitalize()}ThrusterDistance"] = abs(effect.parameters["forward_m"])
+    lines = [f"{key}={_number(value)}" for key, value in numbers.items()]
+    about = f"# for Bridge Command {_VERSION}, by tank2sim; one engine has half of Max_propulsion_force there"
+    return "\n".join([about, 'FileName="box.x"', *lines]) + "\n"
+
+
+def _number(value: float) -> str:
+    """A plain decimal of six digits, without an exponent."""
+    return str(np.format_float_positional(float(f"{value:.6g}") + 0.0, trim="0"))
+
+
+def box_mesh(length_m: float, beam_m: float, height_m: float) -> str:
+    """A box as DirectX text: x to starboard, y up from the keel, z to the bow, origin midships; faces turn outwards.
+
+    Parameters
+    ----------
+    length_m, beam_m, height_m : float
+    """
+    corners = list(product((-0.5, 0.5), (0.0, 1.0), (-0.5, 0.5)))
+    rows = [f"{_number(x * beam_m)};{_number(y * height_m)};{_number(z * length_m)};" for x, y, z in corners]
+    faces = []
+    for axis, end in product(range(3), (0, 1)):
+        own, first, second = (4 >> (axis + turn) % 3 for turn in range(3))
+        square = [end * own + a * first + b * second for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
+        a, b, c, d = square if end else square[::-1]
+        faces += [f"3;{a},{b},{c};", f"3;{a},{c},{d};"]
+    places, triangles = ",\n ".join(rows), ",\n ".join(faces)
+    return f"xof 0303txt 0032\nMesh hull {{\n {len(rows)};\n {places};\n {len(faces)};\n {triangles};\n}}\n"
+
+
+def _losses(card: SteeredCard, model: Model) -> tuple[str, ...]:
+    """What Bridge Command does not have of the ship."""
+    largest = math.degrees(start_values(model).get("steering.max_angle", math.radians(35.0)))
+    turn = simulate(model, Turn(math.radians(min(largest, LARGEST_RUDDER_DEG)))).figures
+    found = []
+    if largest > LARGEST_RUDDER_DEG:
+        hard = simulate(model, Turn(math.radians(largest))).figures["tactical_diameter_m"]
+        diameter = f": the tactical diameter of {hard:.4g} m there is out of reach" if isinstance(hard, float) else ""
+        found.append(f"the rudder is held within {LARGEST_RUDDER_DEG:g} deg, the card's to {largest:.3g} deg{diameter}")
+    loss, drift = turn.get("speed_loss_percent"), turn.get("steady_drift_deg")
+    if isinstance(loss, float) and isinstance(drift, float):
+        found.append(
+            f"a ship keeps its speed in a turn and does not drift, where the card loses {loss:.0f} % with {drift:.0f} "
+            "deg of drift at the largest rudder: paths are fitted, and a turn takes less time (time_180_s)"
+        )
+    if full_ahead_order(model) is None:
+        found.append("the card has no engine: speeds at other levers follow from its resistance, stops are not fitted")
+    found += [
+        "a ship's rudder does not stall, and reacts alike to either side: only its neutral angle is kept",
+        "levers are shares of the thrust and act at once; thrust does not change with speed",
+        "wind has the force of a box with coefficient 1, times 0.265, and no yaw moment",
+        "sway has the mass of surge and the card's drag across; PropWalkAstern is 0",
+    ]
+    heel = turn.get("largest_heel_deg")
+    if isinstance(heel, float):
+        found.append(f"a ship does not heel in turns, and the card's to {abs(heel):.1f} deg")
+    lost = sorted({effect.name for effect in card.effects if not effect.name.endswith("_tunnel_thruster")})
+    if lost:
+        found.append(
+            f"effects of the card are not in Bridge Command beyond their share in these figures: {', '.join(lost)}"
+        )
+    return tuple(found)

@@ -1,0 +1,295 @@
+"""The motion of an own ship of Bridge Command 5.11, and its numbers fitted to manoeuvres of a card.
+
+Surge and yaw are apart in the source of version 5.11 (no program was run), on a quiet sea::
+
+    m du/dt = T - A u|u| - B u        I dr/dt = d (RA u + RB T) + W - TA r|r| - TB r        T = F (e_port + e_starboard)
+
+with levers e from -1 to 1, the rudder d (deg) at a constant rate, and the propeller's walk W. No term couples them: a
+ship turns without drift and keeps its speed. The fit follows the paths of turns, and not their times.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import casadi as ca
+import numpy as np
+
+from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
+from tank2sim.simulation.card_range import single_figures
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.manoeuvres import COASTING_END, Stop, Turn, Zigzag
+from tank2sim.simulation.run import simulate
+from tank2sim.simulation.running import Running
+
+LARGEST_RUDDER_DEG = 30.0
+"""Largest rudder angle in Bridge Command, fixed in its source."""
+
+COURSE_FIGURES = {"advance_m": 1.0, "tactical_diameter_m": 1.0, "overshoot_1_deg": 0.1, "time_180_s": 0.0}
+"""Figures of turns and zigzags, and their weights in the fit: paths come first (project choice)."""
+
+_TURNS_DEG, _ZIGZAGS_DEG, _HALF_TURN_DEG = (10.0, 20.0, LARGEST_RUDDER_DEG), (10.0, 20.0), 20.0
+_LEVERS = {"half thrust ahead": 0.5, "quarter thrust ahead": 0.25}
+_ASTERN, _SHARE, _SHARE_WEIGHT = 0.5, 0.5, 0.2
+"""Thrust astern over ahead, and share of the rudder's moment that a stopped engine leaves, of a card without an engine;
+weight of that share in the fit (project choices)."""
+
+Runs = dict[tuple[str, str], float]
+"""Manoeuvre and figure to its value."""
+
+
+def start_values(model: Model) -> dict[str, float]:
+    """Parameters of a model by name."""
+    return dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+
+
+def full_ahead_order(model: Model) -> float | None:
+    """Order of the engine at the start, rad/s; None without one."""
+    names = model.input_names
+    return float(model.input_values()[names.index("propeller.speed")]) if "propeller.speed" in names else None
+
+
+@dataclass(frozen=True)
+class SurgeNumbers:
+    """Numbers of surge: A (N s2/m2), B (N s/m), thrust of all engines (N), thrust astern over ahead, mass (kg)."""
+
+    A: float
+    B: float
+    thrust_N: float
+    astern: float
+    mass_kg: float
+
+    def speed(self, lever: float) -> float:
+        """Steady speed at a lever, m/s."""
+        root = math.sqrt(self.B**2 + 4 * self.A * lever * self.thrust_N)
+        return float((root - self.B) / (2 * self.A))
+
+    def run(self, lever: float, first_mps: float, last_mps: float) -> tuple[float, float]:
+        """Time (s) and way (m) between two speeds at a lever."""
+        nodes, weights = np.polynomial.legendre.leggauss(64)
+        half = (last_mps - first_mps) / 2
+        u = first_mps + half * (1 + nodes)
+        thrust = lever * self.thrust_N * (self.astern if lever < 0 else 1.0)
+        times = self.mass_kg * half * weights / (thrust - self.A * u * np.abs(u) - self.B * u)
+        return float(times.sum()), float((times * u).sum())
+
+
+def straight_runs(surge: SurgeNumbers, speed_mps: float) -> Runs:
+    """Figures of straight runs in Bridge Command; of a ship with this speed at full ahead."""
+    found = {(name, "final_speed_mps"): surge.speed(lever) for name, lever in _LEVERS.items()}
+    for name, lever, first, last, keys in (
+        ("ahead from half speed", 1.0, 0.5, 0.9, ("time_to_90_percent_s", "distance_to_90_percent_m")),
+        ("stop:0", 0.0, 1.0, COASTING_END, ("time_to_stop_s", "track_reach_m")),
+        ("stop", -1.0, 1.0, 0.0, ("time_to_stop_s", "track_reach_m")),
+    ):
+        values = surge.run(lever, first * speed_mps, last * speed_mps)
+        found |= {(name, key): value for key, value in zip(keys, values, strict=True)}
+    return found
+
+
+def _held(model: Model, speed: float, revolutions: float | None) -> Running:
+    """60 L/u0 from a speed, at an order of the engine, on a course that a helmsman holds."""
+    orders = {} if revolutions is None else {"propeller.speed": revolutions}
+    running, values = Running(Integrator(model), orders, {"initial.u": speed}), start_values(model)
+    ship_time, largest = values["ship.length"] / values["ship.speed"], values.get("steering.max_angle", 0.6)
+    for _ in range(600):
+        rudder = -running.state("motion.psi") - 1.5 * ship_time * running.state("motion.r")
+        running.order({"rudder.command": float(np.clip(rudder, -largest, largest))})
+        running.run(ship_time / 10)
+    return running
+
+
+def straight_runs_of_card(model: Model) -> Runs:
+    """Figures of straight runs of a card; those of an engine only if it has one.
+
+    A lever is a share of the thrust: the order of the engine goes with its root.
+    """
+    speed = start_values(model)["ship.speed"]
+    run = _held(model, 0.5 * speed, None).trajectory()
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(run["motion.x"]), np.diff(run["motion.y"])))])
+    found: Runs = {}
+    if fast := int(np.argmax(run["motion.u"] >= 0.9 * speed)):
+        for key, values in (("time_to_90_percent_s", run.t), ("distance_to_90_percent_m", way)):
+            found["ahead from half speed", key] = float(values[fast])
+    nominal = full_ahead_order(model)
+    if nominal is None:
+        return found
+    for name, lever in _LEVERS.items():
+        found[name, "final_speed_mps"] = _held(model, speed, nominal * math.sqrt(lever)).state("motion.u")
+    for stop in (Stop(0.0), Stop()):
+        figures = single_figures(simulate(model, stop).figures)
+        found |= {(stop.words, key): figures[key] for key in ("time_to_stop_s", "track_reach_m") if key in figures}
+    return found
+
+
+def fitted_surge(wanted: Runs, speed_mps: float, mass_kg: float) -> SurgeNumbers:
+    """The numbers that follow the straight runs of a card best, with exactly its speed at full ahead."""
+    from scipy.optimize import least_squares  # slow to import
+
+    def surge(logs: Array) -> SurgeNumbers:
+        A, B, astern = (float(number) for number in np.exp(logs))
+        A, B = A * mass_kg / (10 * speed_mps), B * mass_kg / 1000  # about their usual sizes
+        return SurgeNumbers(A, B, A * speed_mps**2 + B * speed_mps, astern, mass_kg)
+
+    def residuals(logs: Array) -> Array:
+        made = straight_runs(surge(logs), speed_mps)
+        # Positive in any case; the small ones hold numbers that nothing shows.
+        return np.array([*(math.log(made[key] / value) for key, value in wanted.items()), *(1e-3 * logs)])
+
+    fit = least_squares(residuals, [0.0, 0.0, math.log(_ASTERN)], bounds=([-8, -12, -5], [5, 8, 2]))
+    found = surge(fit.x)
+    return found if ("stop", "time_to_stop_s") in wanted else replace(found, astern=_ASTERN)
+
+
+@dataclass(frozen=True)
+class YawNumbers:
+    """Numbers of yaw over the inertia, (m, 1) for m ships: rudder's moment at full ahead (1/(deg s2)), TA (1/rad), TB
+    (1/s), share of that moment which goes with the speed (RA); and the rudder of a straight course (deg)."""
+
+    rudder: Array
+    quadratic: Array
+    linear: Array
+    share: Array
+    neutral_deg: float
+
+
+@dataclass(frozen=True)
+class Course:
+    """A turn or zigzag in Bridge Command: lever, speed, rudder (deg), heading of a zigzag (rad; infinite: a turn)."""
+
+    manoeuvre: str
+    lever: float
+    speed_mps: float
+    rudder_deg: float
+    switch_rad: float = math.inf
+
+
+def sailed(yaw: YawNumbers, courses: Sequence[Course], gear_degps: float, full_mps: float, step_s: float) -> Array:
+    """The :data:`COURSE_FIGURES` of n courses of m ships, (4, m, n), in the program's order of steps; nan if not seen.
+
+    Parameters
+    ----------
+    yaw : YawNumbers
+    courses : sequence of Course
+    gear_degps, full_mps : float
+        Rate of the rudder (deg/s), speed at full ahead.
+    step_s : float
+    """
+    names = ("lever", "speed_mps", "rudder_deg", "switch_rad")
+    lever, speed, order, switch = (np.array([getattr(course, name) for course in courses]) for name in names)
+    effect = yaw.rudder * (yaw.share * speed / full_mps + (1 - yaw.share) * lever)
+    walk = -yaw.rudder * yaw.neutral_deg * lever
+    side, shape = np.sign(order), effect.shape
+    r, psi, x, y, rudder, highest, flips = (np.zeros(shape) for _ in range(7))
+    found, way, most = np.full((4, *shape), np.nan), np.ones(shape), gear_degps * step_s
+    for step in range(6000):
+        r = r + step_s * (effect * rudder + walk - yaw.quadratic * r * np.abs(r) - yaw.linear * r)
+        before, psi = psi, psi + step_s * r
+        rudder = rudder + np.clip(way * order - rudder, -most, most)
+        ahead, across = step_s * speed * np.cos(psi), side * step_s * speed * np.sin(psi)
+        for row, level, place, gone in ((0, math.pi / 2, x, ahead), (1, math.pi, y, across)):
+            now = (side * psi >= level) & np.isnan(found[row])
+            if now.any():
+                part = (level - side * before)[now] / (side * (psi - before))[now]
+                found[row][now] = place[now] + part * gone[now]
+                found[3][now] = (step + part) * step_s
+        x, y = x + ahead, y + across
+        highest = np.where(flips == 1, np.maximum(highest, side * psi), highest)
+        turned = way * side * psi >= switch
+        way, flips = np.where(turned, -way, way), flips + turned
+        if np.where(np.isinf(switch), ~np.isnan(found[1]), flips > 1).all():
+            break
+    zigzags = np.isfinite(switch)
+    found[:, :, zigzags] = np.nan
+    found[2][:, zigzags] = np.where(flips > 1, np.degrees(highest - np.where(zigzags, switch, 0.0)), np.nan)[:, zigzags]
+    found[3] = np.where(np.isnan(found[1]), np.nan, found[3])
+    return found
+
+
+def courses_of_card(model: Model, half_mps: float, slow_mps: float | None) -> tuple[list[Course], Array]:
+    """Turns and zigzags, and their figures by the card, (4, n).
+
+    Parameters
+    ----------
+    model : Model
+    half_mps, slow_mps : float
+        Speed at half thrust in Bridge Command and of the card (None without an engine).
+    """
+    values, asked = start_values(model), []
+    largest = min(LARGEST_RUDDER_DEG, math.degrees(values.get("steering.max_angle", math.pi)))
+    for angle, side in product(_TURNS_DEG, (1, -1)):
+        if angle <= largest + 1e-9:
+            turn = Turn(math.radians(side * angle))
+            asked.append((Course(turn.words, 1.0, values["ship.speed"], side * angle), simulate(model, turn)))
+    for angle, side in product(_ZIGZAGS_DEG, (1, -1)):
+        zigzag = Zigzag(math.radians(side * angle), math.radians(angle))
+        course = Course(zigzag.words, 1.0, values["ship.speed"], side * angle, math.radians(angle))
+        asked.append((course, simulate(model, zigzag)))
+    nominal = full_ahead_order(model)
+    if nominal is not None and slow_mps is not None:
+        for side in (1, -1):
+            turn = Turn(math.radians(side * _HALF_TURN_DEG))
+            orders = {"propeller.speed": nominal * math.sqrt(0.5)}
+            run = simulate(model, turn, inputs=orders, parameters={"initial.u": slow_mps})
+            asked.append((Course(f"{turn.words} at half thrust", 0.5, half_mps, side * _HALF_TURN_DEG), run))
+    found = [[single_figures(run.figures).get(name, math.nan) for _, run in asked] for name in COURSE_FIGURES]
+    return [course for course, _ in asked], np.array(found)
+
+
+def fitted_yaw(
+    model: Model, courses: Sequence[Course], wanted: Array, gear_degps: float, neutral_deg: float
+) -> YawNumbers:
+    """The numbers of yaw that follow the paths of the card's turns best."""
+    from scipy.optimize import least_squares
+
+    values = start_values(model)
+    full, shown = values["ship.speed"], ~np.isnan(wanted)
+    ship_time, share = values["ship.length"] / full, _share_of_card(model, full)
+
+    def yaw(numbers: Array) -> YawNumbers:
+        rudder, quadratic, linear = np.exp(numbers[:, :3, None]).swapaxes(0, 1)
+        return YawNumbers(rudder / ship_time**2, quadratic, linear / ship_time, numbers[:, 3, None], neutral_deg)
+
+    def residuals(numbers: Array) -> Array:
+        """Shape (m, k) for numbers (m, 4)."""
+        found = sailed(yaw(numbers), courses, gear_degps, full, 0.03 * ship_time)
+        parts = [
+            weight * np.log(np.where(found[row] > 0, found[row], 100 * wanted[row]) / wanted[row])[:, shown[row]]
+            for row, weight in enumerate(COURSE_FIGURES.values())
+        ]
+        return np.hstack([*parts, 1e-3 * numbers[:, :3], _SHARE_WEIGHT * (numbers[:, 3:] - share)])
+
+    def slopes(numbers: Array) -> Array:
+        found = residuals(np.vstack([numbers, numbers + 1e-4 * np.eye(4)]))
+        return np.asarray((found[1:] - found[0]).T / 1e-4)
+
+    start = [math.log(0.02), 0.0, 0.0, min(0.99, max(0.01, share))]
+    bounds = ([-9, -6, -6, 0], [3, 6, 4, 1])
+    fit = least_squares(lambda numbers: residuals(numbers[None])[0], start, jac=slopes, bounds=bounds)
+    return yaw(fit.x[None])
+
+
+def _share_of_card(model: Model, speed: float) -> float:
+    """Share of the rudder's moment at full ahead that is left with a stopped engine."""
+    if full_ahead_order(model) is None:
+        return _SHARE
+    sides = [{"motion.u": speed, "rudder.angle": math.radians(angle)} for angle in (5.0, -5.0)]
+    ahead, stopped = (
+        force_at(model, "force.N", sides[0], orders) - force_at(model, "force.N", sides[1], orders)
+        for orders in ({}, {"propeller.speed": 0.0})
+    )
+    return min(1.0, max(0.0, stopped / ahead)) if ahead else _SHARE
+
+
+def force_at(model: Model, name: str, motion: Mapping[str, float], orders: Mapping[str, float]) -> float:
+    """A force of a card at a motion; velocities and rudder that are not given are zero."""
+    at = dict.fromkeys(("motion.u", "motion.v", "motion.r", "rudder.angle"), 0.0) | dict(motion)
+    x = np.array(model.initial(model.parameter_values())).ravel()
+    for state, value in at.items():
+        x[model.state_names.index(state)] = value
+    function = ca.Function("force", [model.x, model.u, model.p], [model.expand(model.symbol(name))])
+    return float(function(x, model.input_values(orders), model.parameter_values()))
