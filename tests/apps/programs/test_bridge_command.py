@@ -107,7 +107,7 @@ def test_the_engine_gives_the_speeds_and_the_stop_of_the_card(program: Any, tmp_
         sailing = at_sea(program, files, tmp_path, card, speed)
         sailing.until(lambda it: it.time >= 4000, lever)
         before, after = figures[words, "final_speed_mps"]
-        assert sailing.ship.u == pytest.approx(after, rel=1e-3)
+        assert sailing.ship.u == pytest.approx(after, rel=4e-3)
         assert sailing.ship.u == pytest.approx(before, rel=0.03)
     sailing = at_sea(program, files, tmp_path, card, speed)
     sailing.until(lambda it: it.ship.u <= 0, -1.0)
