@@ -17,7 +17,7 @@ import pytest
 from tank2sim.apps.programs.bridge_command import box_mesh, bridge_command_files
 from tank2sim.apps.programs.program_files import ProgramFiles
 from tank2sim.bundled import bundled, bundled_cards
-from tank2sim.cards import Card, ManoeuvringCard, parse_card, read_card
+from tank2sim.cards import Card, ManoeuvringCard, SteeredCard, parse_card, read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import Integrator
@@ -237,7 +237,7 @@ def test_tunnel_thrusters_of_the_card_push_at_their_places(program: Any, tmp_pat
 
 def test_what_is_lost_is_said_in_numbers() -> None:
     losses = converted("kvlcc2-mmg").losses
-    assert any("35 deg" in text and "30 deg" in text and "1043 m" in text for text in losses)
+    assert any("35 deg" in text and "30 deg" in text and "1043 m" in text for text in losses)  # as simulate prints
     assert any("63 %" in text and "18 deg" in text for text in losses)
     assert any("no engine" in text for text in converted("mariner").losses)
     assert not any("no engine" in text for text in losses)
@@ -252,9 +252,46 @@ def test_a_ship_that_heels_keeps_its_turns_and_loses_its_heel() -> None:
     assert after == pytest.approx(before, rel=0.1)
 
 
+def test_a_craft_has_an_engine_at_either_side_and_runs_and_turns_by_them(program: Any, tmp_path: Path) -> None:
+    card, files = read_card("otter"), converted("otter")
+    figures, found = table(files), keys(str(files.files["boat.ini"]))
+    assert float(found["PropSpace"]) == pytest.approx(2 * 0.395)
+    assert float(found["Max_propulsion_force"]) == pytest.approx(0.01108 * 103.930864**2, rel=1e-5)
+    assert float(found["AsternEfficiency"]) == pytest.approx(
+        0.006445 / 0.01108 * (101.736666 / 103.930864) ** 2, rel=1e-5
+    )
+
+    def lever(rpm: float) -> float:
+        share = rpm * 2 * math.pi / 60 / 103.930864  # of its largest revolutions
+        return share * abs(share)
+
+    for words, figure in figures:
+        kind, _, number = words.partition(":")
+        before, after = figures[words, figure]
+        assert after == pytest.approx(before, rel=0.2)
+        ship = at_sea(program, files, tmp_path, card, 0.0).ship
+        if (kind, figure) == ("straight", "final_speed_mps"):
+            ends = (lever(float(number)),) * 2
+        elif (kind, figure) == ("spin", "final_rate_degps"):  # thrust astern at as many revolutions: by the card
+            ends = lever(float(number)), -lever(float(number)) * (103.930864 / 101.736666) ** 2
+        elif (kind, figure) == ("difference", "steady_rate_degps"):
+            cruise = 72.45426791175355 * 30 / math.pi
+            ends = lever(cruise + float(number) / 2), lever(cruise - float(number) / 2)
+        else:
+            continue
+        for _ in range(round(60 / STEP_S)):
+            ship.step(STEP_S, *ends)
+        assert (ship.u if kind == "straight" else math.degrees(ship.r)) == pytest.approx(after, rel=0.01)
+
+
 def test_a_vessel_that_bridge_command_cannot_have_is_refused() -> None:
+    craft = read_card("otter")
+    assert isinstance(craft, SteeredCard)
     with pytest.raises(InputError) as refused:
-        bridge_command_files(read_card("otter"))
+        bridge_command_files(replace(craft, thrusters=craft.thrusters[:1]))
+    assert refused.value.place == "thrusters"
+    with pytest.raises(InputError) as refused:
+        bridge_command_files(read_card("alyshev"))
     assert refused.value.place == "model.kind"
     card = read_card("mariner")
     short = replace(card, ship=card.ship.model_copy(update={"beam_m": None}))

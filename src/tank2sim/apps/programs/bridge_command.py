@@ -7,6 +7,7 @@ from itertools import product
 
 import numpy as np
 
+from tank2sim.apps.programs.bridge_command_craft import craft_numbers
 from tank2sim.apps.programs.bridge_command_fit import (
     COURSE_FIGURES,
     LARGEST_RUDDER_DEG,
@@ -44,6 +45,9 @@ _ASTERN_RUDDER = 0.2
 _AIR_DRAG = 0.5 * 1.225 * 0.51444**2
 """Drag of still air on the box in Bridge Command, over area and squared speed (N s2/m4): part of the fitted drag."""
 
+_LEAST_DRAG = 1e-6
+"""Drag across of a card without, in SI: next to nothing, because 0 asks Bridge Command for a default."""
+
 _VERSION = "5.11"
 
 _USE = f"""Copy this folder, under a name of your choice, into `Models/Ownship/` of Bridge Command's user folder
@@ -62,47 +66,26 @@ def bridge_command_files(card: Card) -> ProgramFiles:
     Parameters
     ----------
     card : Card
-        Card of a ship with a rudder: polynomial or MMG, one screw or two, with or without roll.
+        Card of a ship with a rudder (polynomial or MMG, one screw or two, with or without roll), or of a craft with a
+        fixed thruster at either side.
 
     Raises
     ------
     InputError
-        The vessel has no rudder, the card lacks beam or draught, or the ship does not turn.
+        The vessel has neither, the card lacks beam or draught, or the ship does not turn.
     """
     ship = card.steered()
-    if ship.thrusters:
-        problem = "is steered by thrusters, and this own ship of Bridge Command by a rudder"
-        raise card.fault("model.kind", problem, "export an FMU, or convert it --to gazebo")
     beam, draught = (_particular(ship, name) for name in ("beam_m", "draught_m"))
-    model = build(ship)
-    values = start_values(model)
-    speed, length = values["ship.speed"], values["ship.length"]
-    runs = straight_runs_of_card(model)
-    mass = (ship.rigid_body.mass - ship.derivatives.get("Xudot", 0.0)) * ship.scales.mass
-    surge = fitted_surge(runs, speed, float(mass))
-    half = ("half thrust ahead", "final_speed_mps")
-    courses, wanted = courses_of_card(model, surge.speed(0.5), runs.get(half))
-    if np.isnan(wanted[1]).all():
-        raise card.fault("derivatives", "make no turn that reaches 180 deg", "check the card with simulate")
-    gear = math.degrees(values.get("steering.max_rate", math.radians(_GEAR_DEGPS)))
-    # Two propellers walk against each other, so that only one can hold an asymmetric ship.
-    neutral = 0.0 if _screws(ship) == 2 else math.degrees(Running(Integrator(model)).neutral_rudder())
-    yaw = fitted_yaw(model, courses, wanted, gear, neutral)
-    made, straight = sailed(yaw, courses, gear, speed, 0.006 * length / speed)[:, 0], straight_runs(surge, speed)
-    changes = [FigureChange("full ahead", "final_speed_mps", speed, surge.speed(1.0))]
-    changes += [FigureChange(*key, value, straight[key]) for key, value in runs.items()]
-    for column, course in enumerate(courses):
-        for row, name in enumerate(COURSE_FIGURES):
-            before, after = float(wanted[row, column]), float(made[row, column])
-            if not math.isnan(before):
-                changes.append(FigureChange(course.manoeuvre, name, before, None if math.isnan(after) else after))
+    model, length = build(ship), ship.ship.length_m
+    numbers, changes, losses = (_of_craft if ship.thrusters else _of_ship)(ship, model)
+    numbers["DynamicsSpeedA"] = max(0.0, numbers["DynamicsSpeedA"] - _AIR_DRAG * beam * _FREEBOARD * length)
     return ProgramFiles(
         files={
-            "boat.ini": _ini(ship, model, surge, yaw, gear),
+            "boat.ini": _ini(_seen(length, draught) | numbers | _across(model) | _tunnels(ship)),
             "box.x": box_mesh(length, beam, draught + _FREEBOARD * length),
         },
         use=_USE,
-        losses=_losses(ship, model),
+        losses=(*losses, *_losses_of_all(ship)),
         changes=tuple(changes),
     )
 
@@ -114,34 +97,49 @@ def _particular(card: SteeredCard, name: str) -> float:
     return float(value)
 
 
-def _screws(card: SteeredCard) -> int:
-    return card.propeller.number if isinstance(card, MmgCard) else 1
+def _of_ship(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[FigureChange], list[str]]:
+    """Numbers of a ship with a rudder, figures before and after, and losses."""
+    values = start_values(model)
+    speed, length = values["ship.speed"], values["ship.length"]
+    runs = straight_runs_of_card(model)
+    mass = (card.rigid_body.mass - card.derivatives.get("Xudot", 0.0)) * card.scales.mass
+    surge = fitted_surge(runs, speed, float(mass))
+    courses, wanted = courses_of_card(model, surge.speed(0.5), runs.get(("half thrust ahead", "final_speed_mps")))
+    if np.isnan(wanted[1]).all():
+        raise card.fault("derivatives", "make no turn that reaches 180 deg", "check the card with simulate")
+    y_P = card.propeller.y_P if isinstance(card, MmgCard) and card.propeller.number == 2 else None
+    gear = math.degrees(values.get("steering.max_rate", math.radians(_GEAR_DEGPS)))
+    # Two propellers walk against each other, so that only one can hold an asymmetric ship.
+    neutral = 0.0 if y_P else math.degrees(Running(Integrator(model)).neutral_rudder())
+    yaw = fitted_yaw(model, courses, wanted, gear, neutral)
+    made, straight = sailed(yaw, courses, gear, speed, 0.006 * length / speed)[:, 0], straight_runs(surge, speed)
+    changes = [FigureChange("full ahead", "final_speed_mps", speed, surge.speed(1.0))]
+    changes += [FigureChange(*key, value, straight[key]) for key, value in runs.items()]
+    for column, course in enumerate(courses):
+        for row, name in enumerate(COURSE_FIGURES):
+            before, after = float(wanted[row, column]), float(made[row, column])
+            if not math.isnan(before):
+                changes.append(FigureChange(course.manoeuvre, name, before, None if math.isnan(after) else after))
+    return _numbers_of_ship(card, model, surge, yaw, y_P, gear), changes, _losses_of_ship(model)
 
 
-def _ini(card: SteeredCard, model: Model, surge: SurgeNumbers, yaw: YawNumbers, gear_degps: float) -> str:
-    """``boat.ini``: the keys that 5.11 reads. No text of the card is in it."""
-    length, draught = card.ship.length_m, _particular(card, "draught_m")
+def _numbers_of_ship(
+    card: SteeredCard, model: Model, surge: SurgeNumbers, yaw: YawNumbers, y_P: float | None, gear_degps: float
+) -> dict[str, float]:
     inertia = float((card.rigid_body.yaw_inertia - card.derivatives.get("Nrdot", 0.0)) * card.scales.inertia)
     rudder, quadratic, linear = (inertia * value.item() for value in (yaw.rudder, yaw.quadratic, yaw.linear))
     by_speed = yaw.share.item()
     by_thrust = rudder * (1 - by_speed) / surge.thrust_N
-    twin = _screws(card) == 2
-    y_P = card.propeller.y_P if isinstance(card, MmgCard) else None
-    numbers = {
-        **{"ScaleFactor": 1.0, "YCorrection": -draught, "AngleCorrection": 0.0, "Views": 1.0, "ViewX(1)": 0.0},
-        **{"ViewY(1)": draught + 2 * _FREEBOARD * length, "ViewZ(1)": -_EYE_AFT * length},
-        **{"HasGPS": 1.0, "HasDepthSounder": 1.0, "MaxDepth": 100.0, "HasRateOfTurnIndicator": 1.0},
+    return {
         "Mass": surge.mass_kg,
         "Inertia": inertia,
         # Of each of two engines; of one, 5.11 gives a quarter of the key to either side.
-        "Max_propulsion_force": surge.thrust_N / 2 if twin else 2 * surge.thrust_N,
-        "PropSpace": 2 * length * (y_P or 0.0) if twin else 0.0,
+        "Max_propulsion_force": surge.thrust_N / 2 if y_P else 2 * surge.thrust_N,
+        "PropSpace": 2 * card.ship.length_m * (y_P or 0.0),
         "AsternEfficiency": surge.astern,
         "MaxRevs": (full_ahead_order(model) or 0.0) * 60 / math.tau or 100.0,
-        "DynamicsSpeedA": surge.A - _AIR_DRAG * _particular(card, "beam_m") * _FREEBOARD * length,
+        "DynamicsSpeedA": surge.A,
         "DynamicsSpeedB": surge.B,
-        "DynamicsLateralDragA": -4 * force_at(model, "force.Y", {"motion.v": 0.5}, {}),
-        "DynamicsLateralDragB": 1.0,  # 0 would mean another default
         "DynamicsTurnDragA": quadratic,
         "DynamicsTurnDragB": linear,
         "RudderA": rudder * by_speed / surge.speed(1.0),
@@ -151,13 +149,60 @@ def _ini(card: SteeredCard, model: Model, surge: SurgeNumbers, yaw: YawNumbers, 
         "PropWalkAhead": -rudder * yaw.neutral_deg / 2,
         "PropWalkAstern": 0.0,
     }
+
+
+def _of_craft(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[FigureChange], list[str]]:
+    """Numbers of a craft with two thrusters, figures before and after, and losses."""
+    made = craft_numbers(card, model)
+    numbers = {
+        "Mass": made.surge.mass_kg,
+        "Inertia": made.inertia_kgm2,
+        "Max_propulsion_force": made.surge.thrust_N / 2,
+        "PropSpace": made.spacing_m,
+        "AsternEfficiency": made.surge.astern,
+        "MaxRevs": card.thrusters[0].max_radps * 60 / math.tau,
+        "DynamicsSpeedA": made.surge.A,
+        "DynamicsSpeedB": made.surge.B,
+        "DynamicsTurnDragA": made.turn_A,
+        "DynamicsTurnDragB": made.turn_B,
+    }
+    return numbers, list(made.changes), ["a turning craft neither drifts nor loses speed"]
+
+
+def _seen(length_m: float, draught_m: float) -> dict[str, float]:
+    """Keys of the mesh, the view and the instruments."""
+    return {
+        **{"ScaleFactor": 1.0, "YCorrection": -draught_m, "AngleCorrection": 0.0, "Views": 1.0, "ViewX(1)": 0.0},
+        **{"ViewY(1)": draught_m + 2 * _FREEBOARD * length_m, "ViewZ(1)": -_EYE_AFT * length_m},
+        **{"HasGPS": 1.0, "HasDepthSounder": 1.0, "MaxDepth": 100.0, "HasRateOfTurnIndicator": 1.0},
+    }
+
+
+def _across(model: Model) -> dict[str, float]:
+    """Drag across, from the card's at 0.5 and 1 m/s."""
+    slow, fast = (-force_at(model, "force.Y", {"motion.v": v}, {}) / v for v in (0.5, 1.0))
+    quadratic = max(0.0, 2 * (fast - slow))
+    return {
+        "DynamicsLateralDragA": max(_LEAST_DRAG, quadratic),
+        "DynamicsLateralDragB": max(_LEAST_DRAG, fast - quadratic),
+    }
+
+
+def _tunnels(card: SteeredCard) -> dict[str, float]:
+    """Keys of the tunnel thrusters among the effects of a card."""
+    found = {}
     for effect in card.effects:
         end, thruster, _ = effect.name.partition("_tunnel_thruster")
         if thruster:
-            numbers[f"{end.capitalize()}ThrusterForce"] = effect.parameters["force_N"]
-            numbers[f"{end.capitalize()}ThrusterDistance"] = abs(effect.parameters["forward_m"])
-    lines = [f"{key}={_number(value)}" for key, value in numbers.items()]
+            found[f"{end.capitalize()}ThrusterForce"] = effect.parameters["force_N"]
+            found[f"{end.capitalize()}ThrusterDistance"] = abs(effect.parameters["forward_m"])
+    return found
+
+
+def _ini(numbers: dict[str, float]) -> str:
+    """``boat.ini``. No text of the card is in it."""
     about = f"# for Bridge Command {_VERSION}, by tank2sim; one engine has half of Max_propulsion_force there"
+    lines = [f"{key}={_number(value)}" for key, value in numbers.items()]
     return "\n".join([about, 'FileName="box.x"', *lines]) + "\n"
 
 
@@ -185,15 +230,19 @@ def box_mesh(length_m: float, beam_m: float, height_m: float) -> str:
     return f"xof 0303txt 0032\nMesh hull {{\n {len(rows)};\n {places};\n {len(faces)};\n {triangles};\n}}\n"
 
 
-def _losses(card: SteeredCard, model: Model) -> tuple[str, ...]:
-    """What Bridge Command does not have of the ship."""
+def _losses_of_ship(model: Model) -> list[str]:
+    """What Bridge Command does not have of a ship with a rudder, in numbers."""
+    # A card without limits of its gear turns with 35 deg, as IMO's turning circle does.
     largest = math.degrees(start_values(model).get("steering.max_angle", math.radians(35.0)))
     turn = simulate(model, Turn(math.radians(min(largest, LARGEST_RUDDER_DEG)))).figures
     found = []
     if largest > LARGEST_RUDDER_DEG:
         hard = simulate(model, Turn(math.radians(largest))).figures["tactical_diameter_m"]
-        diameter = f": the tactical diameter of {hard:.4g} m there is out of reach" if isinstance(hard, float) else ""
-        found.append(f"the rudder is held within {LARGEST_RUDDER_DEG:g} deg, the card's to {largest:.3g} deg{diameter}")
+        diameter = f" (tactical diameter {hard:.4g} m)" if isinstance(hard, float) else ""
+        found.append(
+            f"the rudder is held within {LARGEST_RUDDER_DEG:g} deg: the card's turn with {largest:.3g} deg{diameter} "
+            "is out of reach"
+        )
     loss, drift = turn.get("speed_loss_percent"), turn.get("steady_drift_deg")
     if isinstance(loss, float) and isinstance(drift, float):
         found.append(
@@ -202,18 +251,18 @@ def _losses(card: SteeredCard, model: Model) -> tuple[str, ...]:
         )
     if full_ahead_order(model) is None:
         found.append("the card has no engine: speeds at other levers follow from its resistance, stops are not fitted")
-    found += [
-        "a ship's rudder does not stall, and reacts alike to either side: only its neutral angle is kept",
-        "levers are shares of the thrust and act at once; thrust does not change with speed",
-        "wind has the force of a box with coefficient 1, times 0.265, and no yaw moment",
-        "sway has the mass of surge and the card's drag across; PropWalkAstern is 0",
-    ]
+    found.append("a ship's rudder reacts alike to either side: only its neutral angle is kept; PropWalkAstern is 0")
     heel = turn.get("largest_heel_deg")
     if isinstance(heel, float):
         found.append(f"a ship does not heel in turns, and the card's to {abs(heel):.1f} deg")
+    return found
+
+
+def _losses_of_all(card: SteeredCard) -> list[str]:
+    """What Bridge Command does not have of any vessel."""
     lost = sorted({effect.name for effect in card.effects if not effect.name.endswith("_tunnel_thruster")})
-    if lost:
-        found.append(
-            f"effects of the card are not in Bridge Command beyond their share in these figures: {', '.join(lost)}"
-        )
-    return tuple(found)
+    return [
+        "levers are shares of the thrust and act at once; thrust does not change with speed",
+        "wind has the force of a box with coefficient 1, times 0.265, and no yaw moment; sway has the mass of surge",
+        *([f"effects of the card count only in the figures that were fitted: {', '.join(lost)}"] if lost else []),
+    ]

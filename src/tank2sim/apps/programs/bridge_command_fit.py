@@ -65,8 +65,10 @@ class SurgeNumbers:
 
     def speed(self, lever: float) -> float:
         """Steady speed at a lever, m/s."""
-        root = math.sqrt(self.B**2 + 4 * self.A * lever * self.thrust_N)
-        return float((root - self.B) / (2 * self.A))
+        thrust = lever * self.thrust_N
+        return (
+            2 * thrust / (math.sqrt(self.B**2 + 4 * self.A * thrust) + self.B)
+        )  # without cancellation where A is small
 
     def run(self, lever: float, first_mps: float, last_mps: float) -> tuple[float, float]:
         """Time (s) and way (m) between two speeds at a lever."""
@@ -287,9 +289,9 @@ def _share_of_card(model: Model, speed: float) -> float:
 
 def force_at(model: Model, name: str, motion: Mapping[str, float], orders: Mapping[str, float]) -> float:
     """A force of a card at a motion; velocities and rudder that are not given are zero."""
-    at = dict.fromkeys(("motion.u", "motion.v", "motion.r", "rudder.angle"), 0.0) | dict(motion)
     x = np.array(model.initial(model.parameter_values())).ravel()
-    for state, value in at.items():
-        x[model.state_names.index(state)] = value
+    for place, state in enumerate(model.state_names):
+        if state in ("motion.u", "motion.v", "motion.r", "rudder.angle"):
+            x[place] = motion.get(state, 0.0)
     function = ca.Function("force", [model.x, model.u, model.p], [model.expand(model.symbol(name))])
     return float(function(x, model.input_values(orders), model.parameter_values()))
