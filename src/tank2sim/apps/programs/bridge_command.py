@@ -154,19 +154,7 @@ def _numbers_of_ship(
 def _of_craft(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[FigureChange], list[str]]:
     """Numbers of a craft with two thrusters, figures before and after, and losses."""
     made = craft_numbers(card, model)
-    numbers = {
-        "Mass": made.surge.mass_kg,
-        "Inertia": made.inertia_kgm2,
-        "Max_propulsion_force": made.surge.thrust_N / 2,
-        "PropSpace": made.spacing_m,
-        "AsternEfficiency": made.surge.astern,
-        "MaxRevs": card.thrusters[0].max_radps * 60 / math.tau,
-        "DynamicsSpeedA": made.surge.A,
-        "DynamicsSpeedB": made.surge.B,
-        "DynamicsTurnDragA": made.turn_A,
-        "DynamicsTurnDragB": made.turn_B,
-    }
-    return numbers, list(made.changes), ["a turning craft neither drifts nor loses speed"]
+    return dict(made.keys), list(made.changes), ["a turning craft neither drifts nor loses speed"]
 
 
 def _seen(length_m: float, draught_m: float) -> dict[str, float]:

@@ -11,7 +11,7 @@ and in turns by a difference, by least squares that keep them positive.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,7 +40,24 @@ class CraftNumbers:
     turn_A: float
     turn_B: float
     inertia_kgm2: float
-    changes: tuple[FigureChange, ...]
+    largest_radps: float
+    changes: tuple[FigureChange, ...] = ()
+
+    @property
+    def keys(self) -> dict[str, float]:
+        """Keys of ``boat.ini``."""
+        return {
+            "Mass": self.surge.mass_kg,
+            "Inertia": self.inertia_kgm2,
+            "Max_propulsion_force": self.surge.thrust_N / 2,
+            "PropSpace": self.spacing_m,
+            "AsternEfficiency": self.surge.astern,
+            "MaxRevs": self.largest_radps * 60 / math.tau,
+            "DynamicsSpeedA": self.surge.A,
+            "DynamicsSpeedB": self.surge.B,
+            "DynamicsTurnDragA": self.turn_A,
+            "DynamicsTurnDragB": self.turn_B,
+        }
 
     def rate(self, moment_Nm: float) -> float:
         """Steady rate of turn (rad/s) at a moment that is positive."""
@@ -86,7 +103,7 @@ def craft_numbers(card: SteeredCard, model: Model) -> CraftNumbers:
     rates = [(turned, math.radians(abs(rate))) for turned, rate in turning if rate]
     if not rates:
         raise card.fault("thrusters", "turn the craft in no spin and no turn", "check the card with simulate")
-    made = CraftNumbers(SurgeNumbers(A, B, 2 * force, astern, mass), spacing, *_drag(rates), inertia, ())
+    made = CraftNumbers(SurgeNumbers(A, B, 2 * force, astern, mass), spacing, *_drag(rates), inertia, most)
     changes = []
     for n, found in straight.items():
         speed = made.surge.speed(lever(n))
@@ -99,7 +116,7 @@ def craft_numbers(card: SteeredCard, model: Model) -> CraftNumbers:
         rate, speed = made.rate(moment(*ends[d])), made.surge.speed(sum(ends[d]) / 2)
         after = {"steady_rate_degps": math.degrees(rate), "steady_diameter_m": 2 * speed / rate}
         changes += _compared(DifferenceTurn(d).words, found, after)
-    return CraftNumbers(made.surge, spacing, made.turn_A, made.turn_B, inertia, tuple(changes))
+    return replace(made, changes=tuple(changes))
 
 
 def _spacing(card: SteeredCard) -> float:
