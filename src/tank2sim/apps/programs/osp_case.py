@@ -58,7 +58,7 @@ def osp_files(card: Card) -> ProgramFiles:
     """
     ship = card.steered()
     model, (mass, inertia) = hull_model(ship), _inertia(ship)
-    sway, yaw = _damping(ship, model)
+    sway, yaw = low_speed_damping(ship, model)
     made = make_fmu(model, fmi=2, documents=replace(documents_of(ship), card_text=None))
     parts, joints = case_system(f"{HULL}.fmu", ship.ship.length_m, mass, inertia)
     values = {"parts": parts, "joints": joints, "step": CASE_STEP_S, "version": version("tank2sim")}
@@ -81,6 +81,22 @@ def osp_files(card: Card) -> ProgramFiles:
     )
 
 
+def resting_model(card: SteeredCard, name: str) -> Model:
+    """The model of a card, named so, that starts at rest at the origin with stopped engines.
+
+    Parameters
+    ----------
+    card : SteeredCard
+    name : str
+    """
+    model = build(card)
+    starts = [one for one in model.parameter_names if one.startswith("initial.") and one != "initial.trim"]
+    model = replace(model.with_values(dict.fromkeys(starts, 0.0)), name=name)
+    engines = {"propeller.speed", *(command.name for command in thruster_commands(model))}
+    stopped = (same_symbol(one, replace(one, start=0.0)) if one.name in engines else one for one in model.inputs)
+    return replace(model, inputs=tuple(stopped))
+
+
 def hull_model(card: SteeredCard) -> Model:
     """The model of a card at rest with the case's names: ``Thrust_d[1..3]``, ``input[1..2]``, ``q[1..3]``.
 
@@ -88,13 +104,8 @@ def hull_model(card: SteeredCard) -> Model:
     ----------
     card : SteeredCard
     """
-    model = build(card)
+    model = resting_model(card, HULL)
     scale = card.ship.length_m / CASE_LENGTH_M
-    names = [name for name in model.parameter_names if name.startswith("initial.") and name != "initial.trim"]
-    model = replace(model.with_values(dict.fromkeys(names, 0.0)), name=HULL)
-    engines = {"propeller.speed", *(command.name for command in thruster_commands(model))}
-    stopped = (same_symbol(one, replace(one, start=0.0)) if one.name in engines else one for one in model.inputs)
-    model = replace(model, inputs=tuple(stopped))
     force = card.scales.mass * 1e-3
     words = ("port azimuth thruster", "starboard azimuth thruster", "bow tunnel thruster, positive to starboard")
     thrusts = [
@@ -136,8 +147,20 @@ def _inertia(card: SteeredCard) -> tuple[float, float]:
     )
 
 
-def _damping(card: SteeredCard, model: Model) -> tuple[float, float]:
-    """Damping of sway and yaw at 0.3 m/s (of yaw at the ends), 1/s; a hull without is refused."""
+def low_speed_damping(card: SteeredCard, model: Model) -> tuple[float, float]:
+    """Damping of sway and yaw at 0.3 m/s (of yaw at the ends), 1/s.
+
+    Parameters
+    ----------
+    card : SteeredCard
+    model : Model
+        Of :func:`resting_model`.
+
+    Raises
+    ------
+    InputError
+        There is none, or the ship pushes itself at rest.
+    """
     length, draught = card.ship.length_m, card.ship.draught_m
     if draught is None:
         raise card.fault("ship.draught_m", "is missing, and damping at low speed is judged by it", "add it")
