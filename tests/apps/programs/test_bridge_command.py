@@ -137,6 +137,15 @@ def test_an_asymmetric_ship_runs_straight_with_its_neutral_rudder(program: Any, 
         assert (abs(sailing.turned) < 0.1) == straight
 
 
+def test_a_single_screw_that_backs_turns_the_bow_as_the_card_does(program: Any, tmp_path: Path) -> None:
+    card, files = read_card("esso-osaka-ship"), converted("esso-osaka-ship")
+    before, after = table(files)["stop", "heading_change_deg"]
+    assert before == pytest.approx(92.44, abs=0.1) and after == pytest.approx(before, rel=1e-3)  # as simulate prints
+    sailing = at_sea(program, files, tmp_path, card, card.model.speed_mps)
+    sailing.until(lambda it: it.ship.u <= 0, -1.0)
+    assert sailing.turned == pytest.approx(after, rel=0.01)
+
+
 def twin_card() -> Card:
     text = bundled_cards()["kvlcc2-l7-mmg"].read_text(encoding="utf-8")
     text = text.replace("[propeller]", "[propeller]\nnumber = 2\ny_P = 0.03").replace("C_1 = 2.0", "C_1 = 0.0")

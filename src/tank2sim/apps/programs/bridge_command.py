@@ -8,20 +8,23 @@ from itertools import product
 import numpy as np
 
 from tank2sim.apps.programs.bridge_command_craft import craft_numbers
-from tank2sim.apps.programs.bridge_command_fit import (
-    COURSE_FIGURES,
-    LARGEST_RUDDER_DEG,
-    SurgeNumbers,
-    YawNumbers,
-    courses_of_card,
+from tank2sim.apps.programs.bridge_command_surge import (
+    HEADING_ASTERN,
     fitted_surge,
-    fitted_yaw,
-    force_at,
     full_ahead_order,
-    sailed,
     start_values,
     straight_runs,
     straight_runs_of_card,
+)
+from tank2sim.apps.programs.bridge_command_yaw import (
+    COURSE_FIGURES,
+    LARGEST_RUDDER_DEG,
+    courses_of_card,
+    fitted_yaw,
+    force_at,
+    heading_astern,
+    moment_astern,
+    sailed,
 )
 from tank2sim.apps.programs.polynomial_fit import FigureChange
 from tank2sim.apps.programs.program_files import ProgramFiles
@@ -38,9 +41,6 @@ _FREEBOARD, _EYE_AFT = 0.04, 0.3
 
 _GEAR_DEGPS = 30.0
 """Rate of a rudder whose card states none: the default of Bridge Command."""
-
-_ASTERN_RUDDER = 0.2
-"""RudderBAstern over RudderB: a rudder in the stream of a propeller that turns astern (project choice)."""
 
 _AIR_DRAG = 0.5 * 1.225 * 0.51444**2
 """Drag of still air on the box in Bridge Command, over area and squared speed (N s2/m4): part of the fitted drag."""
@@ -102,6 +102,7 @@ def _of_ship(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[Fi
     values = start_values(model)
     speed, length = values["ship.speed"], values["ship.length"]
     runs = straight_runs_of_card(model)
+    turned = math.radians(runs.pop(HEADING_ASTERN, 0.0))
     mass = (card.rigid_body.mass - card.derivatives.get("Xudot", 0.0)) * card.scales.mass
     surge = fitted_surge(runs, speed, float(mass))
     courses, wanted = courses_of_card(model, surge.speed(0.5), runs.get(("half thrust ahead", "final_speed_mps")))
@@ -112,43 +113,31 @@ def _of_ship(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[Fi
     # Two propellers walk against each other, so that only one can hold an asymmetric ship.
     neutral = 0.0 if y_P else math.degrees(Running(Integrator(model)).neutral_rudder())
     yaw = fitted_yaw(model, courses, wanted, gear, neutral)
+    time, _ = surge.run(-1.0, speed, 0.0)
+    astern = 0.0 if y_P else moment_astern(yaw, turned, time)
     made, straight = sailed(yaw, courses, gear, speed, 0.006 * length / speed)[:, 0], straight_runs(surge, speed)
     changes = [FigureChange("full ahead", "final_speed_mps", speed, surge.speed(1.0))]
     changes += [FigureChange(*key, value, straight[key]) for key, value in runs.items()]
+    if turned:
+        after = math.degrees(heading_astern(yaw, astern, time))
+        changes.append(FigureChange(*HEADING_ASTERN, math.degrees(turned), after))
     for column, course in enumerate(courses):
         for row, name in enumerate(COURSE_FIGURES):
             before, after = float(wanted[row, column]), float(made[row, column])
             if not math.isnan(before):
                 changes.append(FigureChange(course.manoeuvre, name, before, None if math.isnan(after) else after))
-    return _numbers_of_ship(card, model, surge, yaw, y_P, gear), changes, _losses_of_ship(model)
-
-
-def _numbers_of_ship(
-    card: SteeredCard, model: Model, surge: SurgeNumbers, yaw: YawNumbers, y_P: float | None, gear_degps: float
-) -> dict[str, float]:
     inertia = float((card.rigid_body.yaw_inertia - card.derivatives.get("Nrdot", 0.0)) * card.scales.inertia)
-    rudder, quadratic, linear = (inertia * value.item() for value in (yaw.rudder, yaw.quadratic, yaw.linear))
-    by_speed = yaw.share.item()
-    by_thrust = rudder * (1 - by_speed) / surge.thrust_N
-    return {
-        "Mass": surge.mass_kg,
-        "Inertia": inertia,
+    numbers = {
+        **surge.keys,
+        **yaw.keys(inertia, surge),
         # Of each of two engines; of one, 5.11 gives a quarter of the key to either side.
         "Max_propulsion_force": surge.thrust_N / 2 if y_P else 2 * surge.thrust_N,
-        "PropSpace": 2 * card.ship.length_m * (y_P or 0.0),
-        "AsternEfficiency": surge.astern,
+        "PropSpace": 2 * length * (y_P or 0.0),
         "MaxRevs": (full_ahead_order(model) or 0.0) * 60 / math.tau or 100.0,
-        "DynamicsSpeedA": surge.A,
-        "DynamicsSpeedB": surge.B,
-        "DynamicsTurnDragA": quadratic,
-        "DynamicsTurnDragB": linear,
-        "RudderA": rudder * by_speed / surge.speed(1.0),
-        "RudderB": by_thrust,
-        "RudderBAstern": _ASTERN_RUDDER * by_thrust,
-        "RudderAngularVelocity": gear_degps,
-        "PropWalkAhead": -rudder * yaw.neutral_deg / 2,
-        "PropWalkAstern": 0.0,
+        "RudderAngularVelocity": gear,
+        "PropWalkAstern": -astern * inertia / (2 * surge.astern),  # positive: to port going astern
     }
+    return numbers, changes, _losses_of_ship(model)
 
 
 def _of_craft(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[FigureChange], list[str]]:
@@ -239,7 +228,7 @@ def _losses_of_ship(model: Model) -> list[str]:
         )
     if full_ahead_order(model) is None:
         found.append("the card has no engine: speeds at other levers follow from its resistance, stops are not fitted")
-    found.append("a ship's rudder reacts alike to either side: only its neutral angle is kept; PropWalkAstern is 0")
+    found.append("a ship turns alike to either side, except for its neutral rudder and the walk of a single screw")
     heel = turn.get("largest_heel_deg")
     if isinstance(heel, float):
         found.append(f"a ship does not heel in turns, and the card's to {abs(heel):.1f} deg")

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tank2sim.apps.programs.bridge_command_fit import SurgeNumbers
+from tank2sim.apps.programs.bridge_command_surge import SurgeNumbers
 from tank2sim.apps.programs.polynomial_fit import FigureChange
 from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredCard
@@ -47,14 +47,11 @@ class CraftNumbers:
     def keys(self) -> dict[str, float]:
         """Keys of ``boat.ini``."""
         return {
-            "Mass": self.surge.mass_kg,
+            **self.surge.keys,
             "Inertia": self.inertia_kgm2,
             "Max_propulsion_force": self.surge.thrust_N / 2,
             "PropSpace": self.spacing_m,
-            "AsternEfficiency": self.surge.astern,
             "MaxRevs": self.largest_radps * 60 / math.tau,
-            "DynamicsSpeedA": self.surge.A,
-            "DynamicsSpeedB": self.surge.B,
             "DynamicsTurnDragA": self.turn_A,
             "DynamicsTurnDragB": self.turn_B,
         }

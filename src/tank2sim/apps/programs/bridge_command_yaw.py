@@ -1,10 +1,10 @@
-"""The motion of an own ship of Bridge Command 5.11, and its numbers fitted to manoeuvres of a card.
+"""Yaw of an own ship of Bridge Command 5.11, fitted to turns and zigzags of a card.
 
-Surge and yaw are apart in the source of version 5.11 (no program was run), on a quiet sea::
+As the source of version 5.11 has it (no program was run), on a quiet sea::
 
-    m du/dt = T - A u|u| - B u        I dr/dt = d (RA u + RB T) + W - TA r|r| - TB r        T = F (e_port + e_starboard)
+    I dr/dt = d (RA u + RB T) + W - TA r|r| - TB r
 
-with levers e from -1 to 1, the rudder d (deg) at a constant rate, and the propeller's walk W. No term couples them: a
+with the rudder d (deg) at a constant rate, the thrust T, and the propeller's walk W. No term couples it with surge: a
 ship turns without drift and keeps its speed. The fit follows the paths of turns, and not their times.
 """
 
@@ -12,19 +12,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import casadi as ca
 import numpy as np
 
+from tank2sim.apps.programs.bridge_command_surge import SurgeNumbers, full_ahead_order, start_values
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.simulation.card_range import single_figures
-from tank2sim.simulation.integrator import Integrator
-from tank2sim.simulation.manoeuvres import COASTING_END, Stop, Turn, Zigzag
+from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.run import simulate
-from tank2sim.simulation.running import Running
 
 LARGEST_RUDDER_DEG = 30.0
 """Largest rudder angle in Bridge Command, fixed in its source."""
@@ -33,118 +32,9 @@ COURSE_FIGURES = {"advance_m": 1.0, "tactical_diameter_m": 1.0, "overshoot_1_deg
 """Figures of turns and zigzags, and their weights in the fit: paths come first (project choice)."""
 
 _TURNS_DEG, _ZIGZAGS_DEG, _HALF_TURN_DEG = (10.0, 20.0, LARGEST_RUDDER_DEG), (10.0, 20.0), 20.0
-_LEVERS = {"half thrust ahead": 0.5, "quarter thrust ahead": 0.25}
-_ASTERN, _SHARE, _SHARE_WEIGHT = 0.5, 0.5, 0.2
-"""Thrust astern over ahead, and share of the rudder's moment that a stopped engine leaves, of a card without an engine;
-weight of that share in the fit (project choices)."""
-
-Runs = dict[tuple[str, str], float]
-"""Manoeuvre and figure to its value."""
-
-
-def start_values(model: Model) -> dict[str, float]:
-    """Parameters of a model by name."""
-    return dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
-
-
-def full_ahead_order(model: Model) -> float | None:
-    """Order of the engine at the start, rad/s; None without one."""
-    names = model.input_names
-    return float(model.input_values()[names.index("propeller.speed")]) if "propeller.speed" in names else None
-
-
-@dataclass(frozen=True)
-class SurgeNumbers:
-    """Numbers of surge: A (N s2/m2), B (N s/m), thrust of all engines (N), thrust astern over ahead, mass (kg)."""
-
-    A: float
-    B: float
-    thrust_N: float
-    astern: float
-    mass_kg: float
-
-    def speed(self, lever: float) -> float:
-        """Steady speed at a lever, m/s."""
-        thrust = lever * self.thrust_N
-        return (
-            2 * thrust / (math.sqrt(self.B**2 + 4 * self.A * thrust) + self.B)
-        )  # without cancellation where A is small
-
-    def run(self, lever: float, first_mps: float, last_mps: float) -> tuple[float, float]:
-        """Time (s) and way (m) between two speeds at a lever."""
-        nodes, weights = np.polynomial.legendre.leggauss(64)
-        half = (last_mps - first_mps) / 2
-        u = first_mps + half * (1 + nodes)
-        thrust = lever * self.thrust_N * (self.astern if lever < 0 else 1.0)
-        times = self.mass_kg * half * weights / (thrust - self.A * u * np.abs(u) - self.B * u)
-        return float(times.sum()), float((times * u).sum())
-
-
-def straight_runs(surge: SurgeNumbers, speed_mps: float) -> Runs:
-    """Figures of straight runs in Bridge Command; of a ship with this speed at full ahead."""
-    found = {(name, "final_speed_mps"): surge.speed(lever) for name, lever in _LEVERS.items()}
-    for name, lever, first, last, keys in (
-        ("ahead from half speed", 1.0, 0.5, 0.9, ("time_to_90_percent_s", "distance_to_90_percent_m")),
-        ("stop:0", 0.0, 1.0, COASTING_END, ("time_to_stop_s", "track_reach_m")),
-        ("stop", -1.0, 1.0, 0.0, ("time_to_stop_s", "track_reach_m")),
-    ):
-        values = surge.run(lever, first * speed_mps, last * speed_mps)
-        found |= {(name, key): value for key, value in zip(keys, values, strict=True)}
-    return found
-
-
-def _held(model: Model, speed: float, revolutions: float | None) -> Running:
-    """60 L/u0 from a speed, at an order of the engine, on a course that a helmsman holds."""
-    orders = {} if revolutions is None else {"propeller.speed": revolutions}
-    running, values = Running(Integrator(model), orders, {"initial.u": speed}), start_values(model)
-    ship_time, largest = values["ship.length"] / values["ship.speed"], values.get("steering.max_angle", 0.6)
-    for _ in range(600):
-        rudder = -running.state("motion.psi") - 1.5 * ship_time * running.state("motion.r")
-        running.order({"rudder.command": float(np.clip(rudder, -largest, largest))})
-        running.run(ship_time / 10)
-    return running
-
-
-def straight_runs_of_card(model: Model) -> Runs:
-    """Figures of straight runs of a card; those of an engine only if it has one.
-
-    A lever is a share of the thrust: the order of the engine goes with its root.
-    """
-    speed = start_values(model)["ship.speed"]
-    run = _held(model, 0.5 * speed, None).trajectory()
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(run["motion.x"]), np.diff(run["motion.y"])))])
-    found: Runs = {}
-    if fast := int(np.argmax(run["motion.u"] >= 0.9 * speed)):
-        for key, values in (("time_to_90_percent_s", run.t), ("distance_to_90_percent_m", way)):
-            found["ahead from half speed", key] = float(values[fast])
-    nominal = full_ahead_order(model)
-    if nominal is None:
-        return found
-    for name, lever in _LEVERS.items():
-        found[name, "final_speed_mps"] = _held(model, speed, nominal * math.sqrt(lever)).state("motion.u")
-    for stop in (Stop(0.0), Stop()):
-        figures = single_figures(simulate(model, stop).figures)
-        found |= {(stop.words, key): figures[key] for key in ("time_to_stop_s", "track_reach_m") if key in figures}
-    return found
-
-
-def fitted_surge(wanted: Runs, speed_mps: float, mass_kg: float) -> SurgeNumbers:
-    """The numbers that follow the straight runs of a card best, with exactly its speed at full ahead."""
-    from scipy.optimize import least_squares  # slow to import
-
-    def surge(logs: Array) -> SurgeNumbers:
-        A, B, astern = (float(number) for number in np.exp(logs))
-        A, B = A * mass_kg / (10 * speed_mps), B * mass_kg / 1000  # about their usual sizes
-        return SurgeNumbers(A, B, A * speed_mps**2 + B * speed_mps, astern, mass_kg)
-
-    def residuals(logs: Array) -> Array:
-        made = straight_runs(surge(logs), speed_mps)
-        # Positive in any case; the small ones hold numbers that nothing shows.
-        return np.array([*(math.log(made[key] / value) for key, value in wanted.items()), *(1e-3 * logs)])
-
-    fit = least_squares(residuals, [0.0, 0.0, math.log(_ASTERN)], bounds=([-8, -12, -5], [5, 8, 2]))
-    found = surge(fit.x)
-    return found if ("stop", "time_to_stop_s") in wanted else replace(found, astern=_ASTERN)
+_SHARE, _SHARE_WEIGHT, _ASTERN_RUDDER = 0.5, 0.2, 0.2
+"""Share of the rudder's moment that a stopped engine leaves, of a card without an engine; weight of that share in the
+fit; RudderBAstern over RudderB, in the stream of a propeller that turns astern (project choices)."""
 
 
 @dataclass(frozen=True)
@@ -157,6 +47,22 @@ class YawNumbers:
     linear: Array
     share: Array
     neutral_deg: float
+
+    def keys(self, inertia_kgm2: float, surge: SurgeNumbers) -> dict[str, float]:
+        """Keys of ``boat.ini`` of a single ship, with its inertia in yaw."""
+        rudder, quadratic, linear = (
+            inertia_kgm2 * value.item() for value in (self.rudder, self.quadratic, self.linear)
+        )
+        by_thrust = rudder * (1 - self.share.item()) / surge.thrust_N
+        return {
+            "Inertia": inertia_kgm2,
+            "DynamicsTurnDragA": quadratic,
+            "DynamicsTurnDragB": linear,
+            "RudderA": rudder * self.share.item() / surge.speed(1.0),
+            "RudderB": by_thrust,
+            "RudderBAstern": _ASTERN_RUDDER * by_thrust,
+            "PropWalkAhead": -rudder * self.neutral_deg / 2,
+        }
 
 
 @dataclass(frozen=True)
@@ -210,6 +116,29 @@ def sailed(yaw: YawNumbers, courses: Sequence[Course], gear_degps: float, full_m
     found[2][:, zigzags] = np.where(flips > 1, np.degrees(highest - np.where(zigzags, switch, 0.0)), np.nan)[:, zigzags]
     found[3] = np.where(np.isnan(found[1]), np.nan, found[3])
     return found
+
+
+def heading_astern(yaw: YawNumbers, moment: float, time_s: float) -> float:
+    """Change of heading (rad) from a straight course by a constant moment over the inertia (1/s2)."""
+    r = psi = 0.0
+    step_s = time_s / 2000
+    for _ in range(2000):
+        r += step_s * (moment - yaw.quadratic.item() * r * abs(r) - yaw.linear.item() * r)
+        psi += step_s * r
+    return psi
+
+
+def moment_astern(yaw: YawNumbers, heading_rad: float, time_s: float) -> float:
+    """The constant moment over the inertia (1/s2) that changes the heading so far while the ship stops."""
+    from scipy.optimize import brentq
+
+    if not heading_rad:
+        return 0.0
+    most = 2 * abs(heading_rad) / time_s**2
+    while heading_astern(yaw, most, time_s) < abs(heading_rad):
+        most *= 4
+    found = brentq(lambda moment: heading_astern(yaw, moment, time_s) - abs(heading_rad), 0.0, most, rtol=1e-6)
+    return math.copysign(float(found), heading_rad)
 
 
 def courses_of_card(model: Model, half_mps: float, slow_mps: float | None) -> tuple[list[Course], Array]:
