@@ -108,13 +108,13 @@ def _of_ship(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[Fi
     courses, wanted = courses_of_card(model, surge.speed(0.5), runs.get(("half thrust ahead", "final_speed_mps")))
     if np.isnan(wanted[1]).all():
         raise card.fault("derivatives", "make no turn that reaches 180 deg", "check the card with simulate")
-    y_P = card.propeller.y_P if isinstance(card, MmgCard) and card.propeller.number == 2 else None
+    offset = _screw_offset(card)
     gear = math.degrees(values.get("steering.max_rate", math.radians(_GEAR_DEGPS)))
     # Two propellers walk against each other, so that only one can hold an asymmetric ship.
-    neutral = 0.0 if y_P else math.degrees(Running(Integrator(model)).neutral_rudder())
+    neutral = 0.0 if offset else math.degrees(Running(Integrator(model)).neutral_rudder())
     yaw = fitted_yaw(model, courses, wanted, gear, neutral)
     time, _ = surge.run(-1.0, speed, 0.0)
-    astern = 0.0 if y_P else moment_astern(yaw, turned, time)
+    astern = 0.0 if offset else moment_astern(yaw, turned, time)
     made, straight = sailed(yaw, courses, gear, speed, 0.006 * length / speed)[:, 0], straight_runs(surge, speed)
     changes = [FigureChange("full ahead", "final_speed_mps", speed, surge.speed(1.0))]
     changes += [FigureChange(*key, value, straight[key]) for key, value in runs.items()]
@@ -131,13 +131,20 @@ def _of_ship(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[Fi
         **surge.keys,
         **yaw.keys(inertia, surge),
         # Of each of two engines; of one, 5.11 gives a quarter of the key to either side.
-        "Max_propulsion_force": surge.thrust_N / 2 if y_P else 2 * surge.thrust_N,
-        "PropSpace": 2 * length * (y_P or 0.0),
+        "Max_propulsion_force": surge.thrust_N / 2 if offset else 2 * surge.thrust_N,
+        "PropSpace": 2 * offset,
         "MaxRevs": (full_ahead_order(model) or 0.0) * 60 / math.tau or 100.0,
         "RudderAngularVelocity": gear,
         "PropWalkAstern": -astern * inertia / (2 * surge.astern),  # positive: to port going astern
     }
     return numbers, changes, _losses_of_ship(model)
+
+
+def _screw_offset(card: SteeredCard) -> float:
+    """Distance of either of two propellers from the centreline, m; 0 for one."""
+    if isinstance(card, MmgCard):
+        return card.ship.length_m * (card.propeller.y_P or 0.0) if card.propeller.number == 2 else 0.0
+    return sum(one.parameters.get("place_m", 0.0) for one in card.effects if one.name == "twin_orders")
 
 
 def _of_craft(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[FigureChange], list[str]]:

@@ -140,8 +140,8 @@ def fitted_surge(wanted: Runs, speed_mps: float, mass_kg: float) -> SurgeNumbers
 
     def residuals(logs: Array) -> Array:
         made = straight_runs(surge(logs), speed_mps)
-        # Positive in any case; the small ones hold numbers that nothing shows.
-        return np.array([*(math.log(made[key] / value) for key, value in wanted.items()), *(1e-3 * logs)])
+        # The last ones are small, and hold numbers that nothing shows.
+        return np.array([*(math.log(made[key] / value) for key, value in wanted.items() if value > 0), *(1e-3 * logs)])
 
     fit = least_squares(residuals, [0.0, 0.0, math.log(_ASTERN)], bounds=([-8, -12, -5], [5, 8, 2]))
     found = surge(fit.x)
