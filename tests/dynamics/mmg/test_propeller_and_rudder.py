@@ -169,6 +169,13 @@ def test_a_ship_with_polynomials_of_wake_and_cross_flow_turns_on_the_spot_until_
     assert abs(running.state("motion.v")) < 0.3
 
 
+def test_the_wake_of_a_ship_that_turns_on_the_spot_is_that_of_the_tightest_turn() -> None:
+    model = model_of("container")
+    (tight,) = seen(model, ["propeller.inflow"], 1.2, u=1.75, v=0.0, r=0.01)
+    (spot,) = seen(model, ["propeller.inflow"], 1.2, u=0.0175, v=0.0, r=0.01)
+    assert spot / 0.0175 == pytest.approx(tight / 1.75, rel=1e-6)
+
+
 def test_cross_flow_goes_on_with_the_yaw_rate_where_the_ship_turns_on_the_spot() -> None:
     model = model_of("container")
     given = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))

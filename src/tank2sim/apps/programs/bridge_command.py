@@ -30,23 +30,22 @@ from tank2sim.apps.programs.polynomial_fit import FigureChange
 from tank2sim.apps.programs.program_files import ProgramFiles
 from tank2sim.cards.card import Card, MmgCard, SteeredCard
 from tank2sim.dynamics.build import build
+from tank2sim.dynamics.effects.harbour import BOW_THRUSTER, STERN_THRUSTER
+from tank2sim.dynamics.effects.twin_screws import TWIN_ORDERS
 from tank2sim.dynamics.model import Model
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.running import Running
 
-_FREEBOARD, _EYE_AFT = 0.04, 0.3
-"""Freeboard, and place of the eye aft of midships, over L (project choices)."""
-
-_GEAR_DEGPS = 30.0
-"""Rate of a rudder whose card states none: the default of Bridge Command."""
+_FREEBOARD, _EYE_AFT, _LEAST_DRAG, _GEAR_DEGPS = 0.04, 0.3, 1e-6, 30.0
+"""Freeboard and place of the eye aft of midships over L (project choices); drag across of a card without, above 0, which
+asks for a default; rate of a rudder whose card states none, the default of Bridge Command."""
 
 _AIR_DRAG = 0.5 * 1.225 * 0.51444**2
 """Drag of still air on the box in Bridge Command, over area and squared speed (N s2/m4): part of the fitted drag."""
 
-_LEAST_DRAG = 1e-6
-"""Drag across of a card without, in SI: next to nothing, because 0 asks Bridge Command for a default."""
+_TUNNELS = {BOW_THRUSTER.name: "Bow", STERN_THRUSTER.name: "Stern"}
 
 _VERSION = "5.11"
 
@@ -144,7 +143,7 @@ def _screw_offset(card: SteeredCard) -> float:
     """Distance of either of two propellers from the centreline, m; 0 for one."""
     if isinstance(card, MmgCard):
         return card.ship.length_m * (card.propeller.y_P or 0.0) if card.propeller.number == 2 else 0.0
-    return sum(one.parameters.get("place_m", 0.0) for one in card.effects if one.name == "twin_orders")
+    return sum(one.parameters.get("place_m", 0.0) for one in card.effects if one.name == TWIN_ORDERS.name)
 
 
 def _of_craft(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[FigureChange], list[str]]:
@@ -176,10 +175,9 @@ def _tunnels(card: SteeredCard) -> dict[str, float]:
     """Keys of the tunnel thrusters among the effects of a card."""
     found = {}
     for effect in card.effects:
-        end, thruster, _ = effect.name.partition("_tunnel_thruster")
-        if thruster:
-            found[f"{end.capitalize()}ThrusterForce"] = effect.parameters["force_N"]
-            found[f"{end.capitalize()}ThrusterDistance"] = abs(effect.parameters["forward_m"])
+        if end := _TUNNELS.get(effect.name):
+            found[f"{end}ThrusterForce"] = effect.parameters["force_N"]
+            found[f"{end}ThrusterDistance"] = abs(effect.parameters["forward_m"])
     return found
 
 
@@ -244,7 +242,7 @@ def _losses_of_ship(model: Model) -> list[str]:
 
 def _losses_of_all(card: SteeredCard) -> list[str]:
     """What Bridge Command does not have of any vessel."""
-    lost = sorted({effect.name for effect in card.effects if not effect.name.endswith("_tunnel_thruster")})
+    lost = sorted({effect.name for effect in card.effects} - {*_TUNNELS, TWIN_ORDERS.name})
     return [
         "levers are shares of the thrust and act at once; thrust does not change with speed",
         "wind has the force of a box with coefficient 1, times 0.265, and no yaw moment; sway has the mass of surge",
