@@ -137,6 +137,7 @@ def test_an_asymmetric_ship_runs_straight_with_its_neutral_rudder(program: Any, 
         assert (abs(sailing.turned) < 0.1) == straight
 
 
+@pytest.mark.slow
 def test_a_single_screw_that_backs_turns_the_bow_as_the_card_does(program: Any, tmp_path: Path) -> None:
     card, files = read_card("esso-osaka-ship"), converted("esso-osaka-ship")
     before, after = table(files)["stop", "heading_change_deg"]
@@ -152,6 +153,7 @@ def twin_card() -> Card:
     return parse_card(text.replace("[rudder]", "[rudder]\nnumber = 2\ny_R = 0.03"), "twin.toml")
 
 
+@pytest.mark.slow
 def test_either_engine_of_two_screws_has_half_of_the_thrust_at_its_side(program: Any, tmp_path: Path) -> None:
     card = twin_card()
     files = bridge_command_files(card)
@@ -163,6 +165,18 @@ def test_either_engine_of_two_screws_has_half_of_the_thrust_at_its_side(program:
         == 2 * sailing.ship.F
     )
     assert sailing.ship.space == pytest.approx(0.06 * card.ship.length_m)
+
+
+@pytest.mark.slow
+def test_a_polynomial_with_an_order_for_each_screw_has_two_engines(program: Any, tmp_path: Path) -> None:
+    text = bundled_cards()["kvlcc2-l7"].read_text(encoding="utf-8") + '\n[[effects]]\nname = "twin_orders"\n'
+    values = "propeller_starboard_rpm = 0.0\npropeller_port_rpm = 0.0\nplace_m = 0.25\n"
+    card = parse_card(f"{text}[effects.parameters]\n{values}", "twin.toml")
+    sailing = at_sea(program, bridge_command_files(card), tmp_path, card, card.model.speed_mps)
+    sailing.until(lambda it: it.time >= 300, 1.0)
+    assert sailing.ship.space == pytest.approx(0.5)
+    assert sailing.ship.u == pytest.approx(card.model.speed_mps, rel=1e-3)
+    assert sailing.ship.r == 0.0
 
 
 def keys(text: str) -> dict[str, str]:
@@ -222,11 +236,13 @@ def test_the_mesh_is_a_closed_box_whose_faces_look_outwards(data: Path) -> None:
         assert np.sign(volume(points, faces)) == np.sign(volume(*mesh(other.read_text())))
 
 
+@pytest.mark.slow
 def test_no_text_of_a_card_comes_into_the_files(tmp_path: Path) -> None:
     path = hostile_card(tmp_path / "ship.toml", bundled("models") / "mariner" / "ship.toml", "".join(HOSTILE))
     assert bridge_command_files(read_card(str(path))).files == converted("mariner").files
 
 
+@pytest.mark.slow
 def test_tunnel_thrusters_of_the_card_push_at_their_places(program: Any, tmp_path: Path) -> None:
     card = read_card("kvlcc2-mmg")
     assert isinstance(card, ManoeuvringCard)

@@ -39,8 +39,8 @@ from tank2sim.simulation.run import simulate
 from tank2sim.simulation.running import Running
 
 _FREEBOARD, _EYE_AFT, _LEAST_DRAG, _GEAR_DEGPS = 0.04, 0.3, 1e-6, 30.0
-"""Freeboard and place of the eye aft of midships over L (project choices); drag across of a card without, above 0, which
-asks for a default; rate of a rudder whose card states none, the default of Bridge Command."""
+"""Freeboard and place of the eye aft of midships over L (project choices); drag across of a card without, above 0,
+which asks for a default; rate of a rudder whose card states none, the default of Bridge Command."""
 
 _AIR_DRAG = 0.5 * 1.225 * 0.51444**2
 """Drag of still air on the box in Bridge Command, over area and squared speed (N s2/m4): part of the fitted drag."""
