@@ -80,7 +80,14 @@ class SurgeNumbers:
 
 
 def straight_runs(surge: SurgeNumbers, speed_mps: float) -> Runs:
-    """Figures of straight runs in Bridge Command; of a ship with this speed at full ahead."""
+    """Figures of straight runs in Bridge Command.
+
+    Parameters
+    ----------
+    surge : SurgeNumbers
+    speed_mps : float
+        Speed at full ahead, from which the ship stops and to whose parts it gathers way.
+    """
     found = {(name, "final_speed_mps"): surge.speed(lever) for name, lever in _LEVERS.items()}
     for name, lever, first, last, keys in (
         ("ahead from half speed", 1.0, 0.5, 0.9, ("time_to_90_percent_s", "distance_to_90_percent_m")),
@@ -108,6 +115,15 @@ def straight_runs_of_card(model: Model) -> Runs:
     """Figures of straight runs of a card and the change of heading in its crash stop; with an engine only, those of it.
 
     A lever is a share of the thrust: the order of the engine goes with its root.
+
+    Parameters
+    ----------
+    model : Model
+
+    Raises
+    ------
+    InputError
+        A run leaves all bounds.
     """
     speed = start_values(model)["ship.speed"]
     run = _held(model, 0.5 * speed, None).trajectory()
@@ -130,7 +146,15 @@ def straight_runs_of_card(model: Model) -> Runs:
 
 
 def fitted_surge(wanted: Runs, speed_mps: float, mass_kg: float) -> SurgeNumbers:
-    """The numbers that follow the straight runs of a card best, with exactly its speed at full ahead."""
+    """The numbers that follow the straight runs of a card best, with exactly its speed at full ahead.
+
+    Parameters
+    ----------
+    wanted : mapping
+        As of :func:`straight_runs_of_card`, without the change of heading.
+    speed_mps, mass_kg : float
+        Speed at full ahead; mass with that of the water in surge.
+    """
     from scipy.optimize import least_squares  # slow to import
 
     def surge(logs: Array) -> SurgeNumbers:

@@ -39,8 +39,16 @@ fit; RudderBAstern over RudderB, in the stream of a propeller that turns astern 
 
 @dataclass(frozen=True)
 class YawNumbers:
-    """Numbers of yaw over the inertia, (m, 1) for m ships: rudder's moment at full ahead (1/(deg s2)), TA (1/rad), TB
-    (1/s), share of that moment which goes with the speed (RA); and the rudder of a straight course (deg)."""
+    """Numbers of yaw over the inertia, of m ships.
+
+    Parameters
+    ----------
+    rudder, quadratic, linear, share : arrays (m, 1)
+        Moment of the rudder at full ahead, 1/(deg s2); TA, 1/rad; TB, 1/s; share of that moment which goes with the
+        speed (RA).
+    neutral_deg : float
+        Rudder of a straight course, deg to starboard.
+    """
 
     rudder: Array
     quadratic: Array
@@ -119,7 +127,16 @@ def sailed(yaw: YawNumbers, courses: Sequence[Course], gear_degps: float, full_m
 
 
 def heading_astern(yaw: YawNumbers, moment: float, time_s: float) -> float:
-    """Change of heading (rad) from a straight course by a constant moment over the inertia (1/s2)."""
+    """Change of heading (rad) from a straight course.
+
+    Parameters
+    ----------
+    yaw : YawNumbers
+        Of one ship.
+    moment : float
+        Constant moment over the inertia, 1/s2, positive to starboard.
+    time_s : float
+    """
     r = psi = 0.0
     step_s = time_s / 2000
     for _ in range(2000):
@@ -129,7 +146,14 @@ def heading_astern(yaw: YawNumbers, moment: float, time_s: float) -> float:
 
 
 def moment_astern(yaw: YawNumbers, heading_rad: float, time_s: float) -> float:
-    """The constant moment over the inertia (1/s2) that changes the heading so far while the ship stops."""
+    """The constant moment over the inertia (1/s2) that changes the heading so far while the ship stops.
+
+    Parameters
+    ----------
+    yaw : YawNumbers
+        Of one ship.
+    heading_rad, time_s : float
+    """
     from scipy.optimize import brentq
 
     if not heading_rad:
@@ -174,7 +198,16 @@ def courses_of_card(model: Model, half_mps: float, slow_mps: float | None) -> tu
 def fitted_yaw(
     model: Model, courses: Sequence[Course], wanted: Array, gear_degps: float, neutral_deg: float
 ) -> YawNumbers:
-    """The numbers of yaw that follow the paths of the card's turns best."""
+    """The numbers of yaw that follow the paths of the card's turns best.
+
+    Parameters
+    ----------
+    model : Model
+    courses, wanted
+        As of :func:`courses_of_card`.
+    gear_degps, neutral_deg : float
+        Rate of the rudder; rudder of a straight course, to starboard.
+    """
     from scipy.optimize import least_squares
 
     values = start_values(model)
@@ -217,7 +250,17 @@ def _share_of_card(model: Model, speed: float) -> float:
 
 
 def force_at(model: Model, name: str, motion: Mapping[str, float], orders: Mapping[str, float]) -> float:
-    """A force of a card at a motion; velocities and rudder that are not given are zero."""
+    """A force of a card (N, N m) at a motion.
+
+    Parameters
+    ----------
+    model : Model
+    name : str
+    motion : mapping
+        ``motion.u``, ``motion.v``, ``motion.r``, ``rudder.angle``, SI; zero where not given.
+    orders : mapping
+        Inputs that are not as at the start.
+    """
     x = np.array(model.initial(model.parameter_values())).ravel()
     for place, state in enumerate(model.state_names):
         if state in ("motion.u", "motion.v", "motion.r", "rudder.angle"):
