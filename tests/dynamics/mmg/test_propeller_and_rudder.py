@@ -14,6 +14,8 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.mmg.propeller import thrust_over_density, torque_over_density
 from tank2sim.dynamics.mmg.rudder import normal_force, rudder_inflow
 from tank2sim.dynamics.model import Model
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.running import Running
 
 ASTERN = 0.6
 SLOW = 1e-6
@@ -149,3 +151,34 @@ def test_the_rudder_outside_the_race_meets_the_stream_alone() -> None:
         flows.append((u_R / 1.09) ** 2)
     race = (u_P + 0.5 * (math.sqrt(u_P**2 + 8 * thrust / (1000 * math.pi * 0.216**2)) - u_P)) ** 2
     assert flows == pytest.approx([race, (race + u_P**2) / 2], rel=1e-6)
+
+
+@pytest.mark.parametrize("n_rps", [0.0, 1.2])
+@pytest.mark.parametrize("speed", [0.0, 0.01, 0.3])
+def test_a_ship_with_polynomials_of_wake_and_cross_flow_turns_on_the_spot_until_it_lies_still(
+    n_rps: float, speed: float
+) -> None:
+    """At rest r' = r L/U has no bound: cubic terms of it would push the rudder without end."""
+    running = Running(
+        Integrator(model_of("container")),
+        {"propeller.speed": 2 * math.pi * n_rps},
+        {"initial.u": speed, "initial.r": 0.005},
+    )
+    running.run(60.0)
+    assert 0.0 < running.state("motion.r") < 0.005
+    assert abs(running.state("motion.v")) < 0.3
+
+
+def test_the_wake_of_a_ship_that_turns_on_the_spot_is_that_of_the_tightest_turn() -> None:
+    model = model_of("container")
+    (tight,) = seen(model, ["propeller.inflow"], 1.2, u=1.75, v=0.0, r=0.01)
+    (spot,) = seen(model, ["propeller.inflow"], 1.2, u=0.0175, v=0.0, r=0.01)
+    assert spot / 0.0175 == pytest.approx(tight / 1.75, rel=1e-6)
+
+
+def test_cross_flow_goes_on_with_the_yaw_rate_where_the_ship_turns_on_the_spot() -> None:
+    model = model_of("container")
+    given = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    (first,), (second,) = (seen(model, ["rudder.cross_flow"], 0.0, u=0.0, v=0.0, r=r) for r in (0.001, 0.002))
+    assert second == pytest.approx(2 * first, rel=1e-6)
+    assert first == pytest.approx(-0.001 * 175.0 * (given["mmg.C_Rr"] + given["mmg.C_Rrrr"]), rel=1e-6)

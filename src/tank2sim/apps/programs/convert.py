@@ -12,7 +12,10 @@ if TYPE_CHECKING:
     from tank2sim.apps.programs.convert_result import ConversionResult
     from tank2sim.dynamics.vessel import Vessel
 
-Language = Literal["abkowitz", "mmg", "shipmmg", "mmgdynamics", "small_craft", "gazebo", "vrx", "mss", "pvs"]
+Language = Literal[
+    *("abkowitz", "mmg", "small_craft", "shipmmg", "mmgdynamics", "gazebo", "vrx", "mss", "pvs"),
+    *("c99", "xdyn", "bridge_command", "osp", "osp_gunnerus"),
+]
 """Names of :data:`.FORMS`."""
 
 

@@ -80,5 +80,13 @@ FORMS = {
         PYTHON[0],
         use="Copy the file into the folder `vehicles` of the simulator, and make the vehicle in its main program.",
     ),
+    "c99": Form("a folder with the ship in plain C99, for firmware and test benches", writer="c99:c99_files"),
+    "xdyn": Form("a folder with a body of xdyn and LOTUSim and tables of commands", writer="xdyn:xdyn_files"),
+    "bridge_command": Form(
+        "a folder with an own ship of Bridge Command, with fitted numbers",
+        writer="bridge_command:bridge_command_files",
+    ),
+    "osp": Form("a folder with the hull and the system of OSP's case dp-ship", writer="osp_case:osp_files"),
+    "osp_gunnerus": Form("a folder with the hull of OSP's case gunnerus-dp", writer="osp_gunnerus:gunnerus_files"),
 }
 """Name on the command line to the form."""

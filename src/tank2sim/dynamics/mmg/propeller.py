@@ -3,7 +3,7 @@
     T = rho n^2 D^4 K_T,   K_T = k_0 + k_1 J + k_2 J^2,   J = u_P/(n D),   u_P = (1 - w_P) u,   X_P = (1 - t_P) T
     Q = rho n^2 D^5 K_Q/eta_R,   P_D = 2 pi n Q
     (1 - w_P)/(1 - w_P0) = 1 + (1 - exp(-C_1 abs(beta_P))) (C_2 - 1),   beta_P = beta - x_P' r'
-    or   1 - w_P = (1 - w_P0) + tau ((v' + x_P' r')^2 + C_Pv v' + C_Pr r')        (Son and Nomoto 1982)
+    or   1 - w_P = (1 - w_P0) + tau ((v' + x_P' r')^2 + C_Pv v' + C_Pr r')        (Son and Nomoto 1982), abs(r') <= 1
 
 C_2 is C_2+ for beta_P > 0, else C_2-. The ratio has a kink there: at beta_P = 0 its slopes are those of beta_P < 0.
 
@@ -24,6 +24,10 @@ from typing import Any
 
 import casadi as ca
 
+LARGEST_PRIME_RATE = 1.0
+"""r' = r L/U beyond which the polynomials of wake and cross flow are not followed: a ship that turns on the spot has no
+bound of r'. Project choice: that of the tightest turns."""
+
 
 def wake_ratio(p: Mapping[str, Any], beta_P: ca.SX) -> ca.SX:
     """(1 - w_P)/(1 - w_P0) at a drift angle beta_P (rad) at the propeller; `p` has C_1, C_2_plus, C_2_minus."""
@@ -36,6 +40,7 @@ def wake_ratio(p: Mapping[str, Any], beta_P: ca.SX) -> ca.SX:
 
 def wake_by_polynomial(p: Mapping[str, Any], v: ca.SX, r: ca.SX) -> ca.SX:
     """1 - w_P at v' and r' (prime); `p` has w_P0, x_P, tau, C_Pv, C_Pr."""
+    r = ca.fmax(-LARGEST_PRIME_RATE, ca.fmin(r, LARGEST_PRIME_RATE))
     ratio: ca.SX = (1 - p["w_P0"]) + p["tau"] * ((v + p["x_P"] * r) ** 2 + p["C_Pv"] * v + p["C_Pr"] * r)
     return ratio
 

@@ -4,7 +4,7 @@
     X_R = -(1 - t_R) F_N sin(delta)
     Y_R = -(1 + a_H) F_N cos(delta),   N_R = -(x_R + a_H x_H) F_N cos(delta)
     v_R = gamma_R (U beta - l_R' L r),   gamma_R+ where that is positive (beta_R > 0), else gamma_R-
-    or   v_R = -U (C_Rv v' + C_Rr r' + C_Rrrr r'^3 + C_Rrrv r'^2 v')        (Son and Nomoto 1982)
+    or   v_R = -U (C_Rv v' + C_Rr r' + C_Rrrr r'^3 + C_Rrrv r'^2 v')        (Son and Nomoto 1982), r'^2 <= 1
     u_R = eps sqrt(eta (u_P + kappa (sqrt(u_P^2 + 8 T/(rho pi D^2)) - u_P))^2 + (1 - eta) u_P^2),   eta = D_P/H_R
     unless the card states eta; at kappa = 1 it is eps sqrt(u_P^2 + eta 8 T/(rho pi D^2)), Son and Nomoto's
 
@@ -22,6 +22,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import casadi as ca
+
+from tank2sim.dynamics.mmg.propeller import LARGEST_PRIME_RATE
 
 
 def rudder_inflow(p: Mapping[str, Any], eta: ca.SX, u_P: ca.SX, race: ca.SX, still: ca.SX) -> ca.SX:
@@ -56,7 +58,8 @@ def rudder_cross_flow(p: Mapping[str, Any], drift_speed: ca.SX, swing: ca.SX) ->
 
 def cross_flow_by_polynomial(p: Mapping[str, Any], speed: ca.SX, v: ca.SX, r: ca.SX) -> ca.SX:
     """v_R (m/s), positive from port, at a speed U (m/s), v' and r' (prime); `p` has C_Rv, C_Rr, C_Rrrr, C_Rrrv."""
-    across: ca.SX = -speed * (p["C_Rv"] * v + p["C_Rr"] * r + p["C_Rrrr"] * r**3 + p["C_Rrrv"] * r**2 * v)
+    square = ca.fmin(r**2, LARGEST_PRIME_RATE**2)
+    across: ca.SX = -speed * (p["C_Rv"] * v + p["C_Rr"] * r + square * (p["C_Rrrr"] * r + p["C_Rrrv"] * v))
     return across
 
 

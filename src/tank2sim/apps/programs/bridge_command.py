@@ -1,0 +1,250 @@
+"""A ship as an own ship of Bridge Command 5.11: ``boat.ini`` with fitted numbers, and a box as its mesh."""
+
+from __future__ import annotations
+
+import math
+from itertools import product
+
+import numpy as np
+
+from tank2sim.apps.programs.bridge_command_craft import craft_numbers
+from tank2sim.apps.programs.bridge_command_surge import (
+    HEADING_ASTERN,
+    fitted_surge,
+    full_ahead_order,
+    start_values,
+    straight_runs,
+    straight_runs_of_card,
+)
+from tank2sim.apps.programs.bridge_command_yaw import (
+    COURSE_FIGURES,
+    LARGEST_RUDDER_DEG,
+    courses_of_card,
+    fitted_yaw,
+    force_at,
+    heading_astern,
+    moment_astern,
+    sailed,
+)
+from tank2sim.apps.programs.polynomial_fit import FigureChange
+from tank2sim.apps.programs.program_files import ProgramFiles
+from tank2sim.cards.card import Card, MmgCard, SteeredCard
+from tank2sim.dynamics.build import build
+from tank2sim.dynamics.effects.harbour import BOW_THRUSTER, STERN_THRUSTER
+from tank2sim.dynamics.effects.twin_screws import TWIN_ORDERS
+from tank2sim.dynamics.model import Model
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.manoeuvres import Turn
+from tank2sim.simulation.run import simulate
+from tank2sim.simulation.running import Running
+
+_FREEBOARD, _EYE_AFT, _LEAST_DRAG, _GEAR_DEGPS = 0.04, 0.3, 1e-6, 30.0
+"""Freeboard and place of the eye aft of midships over L (project choices); drag across of a card without, above 0,
+which asks for a default; rate of a rudder whose card states none, the default of Bridge Command."""
+
+_AIR_DRAG = 0.5 * 1.225 * 0.51444**2
+"""Drag of still air on the box in Bridge Command, over area and squared speed (N s2/m4): part of the fitted drag."""
+
+_TUNNELS = {BOW_THRUSTER.name: "Bow", STERN_THRUSTER.name: "Stern"}
+
+_VERSION = "5.11"
+
+_USE = f"""Copy this folder, under a name of your choice, into `Models/Ownship/` of Bridge Command's user folder
+(`~/.Bridge Command/{_VERSION}/` on Linux, `%APPDATA%\\Bridge Command\\{_VERSION}\\` on Windows), and name it as
+`ShipName` in `ownship.ini` of a scenario. `boat.ini` has the numbers, `box.x` is a box of the ship's length, beam and
+height, from which Bridge Command takes draught and areas of wind.
+
+The numbers are for version {_VERSION}, whose source halves `Max_propulsion_force` of a ship with one engine
+(`PropSpace=0`) twice: the key is twice the thrust of the ship. Another version may need half of it: check the speed at
+full ahead."""
+
+
+def bridge_command_files(card: Card) -> ProgramFiles:
+    """The folder of an own ship of Bridge Command 5.11: ``boat.ini`` and its mesh ``box.x``.
+
+    Parameters
+    ----------
+    card : Card
+        Card of a ship with a rudder (polynomial or MMG, one screw or two, with or without roll), or of a craft with a
+        fixed thruster at either side.
+
+    Raises
+    ------
+    InputError
+        The vessel has neither, the card lacks beam or draught, or the ship does not turn.
+    """
+    ship = card.steered()
+    beam, draught = (_particular(ship, name) for name in ("beam_m", "draught_m"))
+    model, length = build(ship), ship.ship.length_m
+    numbers, changes, losses = (_of_craft if ship.thrusters else _of_ship)(ship, model)
+    numbers["DynamicsSpeedA"] = max(0.0, numbers["DynamicsSpeedA"] - _AIR_DRAG * beam * _FREEBOARD * length)
+    return ProgramFiles(
+        files={
+            "boat.ini": _ini(_seen(length, draught) | numbers | _across(model) | _tunnels(ship)),
+            "box.x": box_mesh(length, beam, draught + _FREEBOARD * length),
+        },
+        use=_USE,
+        losses=(*losses, *_losses_of_all(ship)),
+        changes=tuple(changes),
+    )
+
+
+def _particular(card: SteeredCard, name: str) -> float:
+    value = getattr(card.ship, name)
+    if value is None:
+        raise card.fault(f"ship.{name}", "is missing, and the mesh of Bridge Command needs it", "add it")
+    return float(value)
+
+
+def _of_ship(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[FigureChange], list[str]]:
+    """Numbers of a ship with a rudder, figures before and after, and losses."""
+    values = start_values(model)
+    speed, length = values["ship.speed"], values["ship.length"]
+    runs = straight_runs_of_card(model)
+    turned = math.radians(runs.pop(HEADING_ASTERN, 0.0))
+    mass = (card.rigid_body.mass - card.derivatives.get("Xudot", 0.0)) * card.scales.mass
+    surge = fitted_surge(runs, speed, float(mass))
+    courses, wanted = courses_of_card(model, surge.speed(0.5), runs.get(("half thrust ahead", "final_speed_mps")))
+    if np.isnan(wanted[1]).all():
+        raise card.fault("derivatives", "make no turn that reaches 180 deg", "check the card with simulate")
+    offset = _screw_offset(card)
+    gear = math.degrees(values.get("steering.max_rate", math.radians(_GEAR_DEGPS)))
+    # Two propellers walk against each other, so that only one can hold an asymmetric ship.
+    neutral = 0.0 if offset else math.degrees(Running(Integrator(model)).neutral_rudder())
+    yaw = fitted_yaw(model, courses, wanted, gear, neutral)
+    time, _ = surge.run(-1.0, speed, 0.0)
+    astern = 0.0 if offset else moment_astern(yaw, turned, time)
+    made, straight = sailed(yaw, courses, gear, speed, 0.006 * length / speed)[:, 0], straight_runs(surge, speed)
+    changes = [FigureChange("full ahead", "final_speed_mps", speed, surge.speed(1.0))]
+    changes += [FigureChange(*key, value, straight[key]) for key, value in runs.items()]
+    if turned:
+        after = math.degrees(heading_astern(yaw, astern, time))
+        changes.append(FigureChange(*HEADING_ASTERN, math.degrees(turned), after))
+    for column, course in enumerate(courses):
+        for row, name in enumerate(COURSE_FIGURES):
+            before, after = float(wanted[row, column]), float(made[row, column])
+            if not math.isnan(before):
+                changes.append(FigureChange(course.manoeuvre, name, before, None if math.isnan(after) else after))
+    inertia = float((card.rigid_body.yaw_inertia - card.derivatives.get("Nrdot", 0.0)) * card.scales.inertia)
+    numbers = {
+        **surge.keys,
+        **yaw.keys(inertia, surge),
+        # Of each of two engines; of one, 5.11 gives a quarter of the key to either side.
+        "Max_propulsion_force": surge.thrust_N / 2 if offset else 2 * surge.thrust_N,
+        "PropSpace": 2 * offset,
+        "MaxRevs": (full_ahead_order(model) or 0.0) * 60 / math.tau or 100.0,
+        "RudderAngularVelocity": gear,
+        "PropWalkAstern": -astern * inertia / (2 * surge.astern),  # positive: to port going astern
+    }
+    return numbers, changes, _losses_of_ship(model)
+
+
+def _screw_offset(card: SteeredCard) -> float:
+    """Distance of either of two propellers from the centreline, m; 0 for one."""
+    if isinstance(card, MmgCard):
+        return card.ship.length_m * (card.propeller.y_P or 0.0) if card.propeller.number == 2 else 0.0
+    return sum(one.parameters.get("place_m", 0.0) for one in card.effects if one.name == TWIN_ORDERS.name)
+
+
+def _of_craft(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[FigureChange], list[str]]:
+    """Numbers of a craft with two thrusters, figures before and after, and losses."""
+    made = craft_numbers(card, model)
+    return dict(made.keys), list(made.changes), ["a turning craft neither drifts nor loses speed"]
+
+
+def _seen(length_m: float, draught_m: float) -> dict[str, float]:
+    """Keys of the mesh, the view and the instruments."""
+    return {
+        **{"ScaleFactor": 1.0, "YCorrection": -draught_m, "AngleCorrection": 0.0, "Views": 1.0, "ViewX(1)": 0.0},
+        **{"ViewY(1)": draught_m + 2 * _FREEBOARD * length_m, "ViewZ(1)": -_EYE_AFT * length_m},
+        **{"HasGPS": 1.0, "HasDepthSounder": 1.0, "MaxDepth": 100.0, "HasRateOfTurnIndicator": 1.0},
+    }
+
+
+def _across(model: Model) -> dict[str, float]:
+    """Drag across, from the card's at 0.5 and 1 m/s."""
+    slow, fast = (-force_at(model, "force.Y", {"motion.v": v}, {}) / v for v in (0.5, 1.0))
+    quadratic = max(0.0, 2 * (fast - slow))
+    return {
+        "DynamicsLateralDragA": max(_LEAST_DRAG, quadratic),
+        "DynamicsLateralDragB": max(_LEAST_DRAG, fast - quadratic),
+    }
+
+
+def _tunnels(card: SteeredCard) -> dict[str, float]:
+    """Keys of the tunnel thrusters among the effects of a card."""
+    found = {}
+    for effect in card.effects:
+        if end := _TUNNELS.get(effect.name):
+            found[f"{end}ThrusterForce"] = effect.parameters["force_N"]
+            found[f"{end}ThrusterDistance"] = abs(effect.parameters["forward_m"])
+    return found
+
+
+def _ini(numbers: dict[str, float]) -> str:
+    """``boat.ini``. No text of the card is in it."""
+    about = f"# for Bridge Command {_VERSION}, by tank2sim; one engine has half of Max_propulsion_force there"
+    lines = [f"{key}={_number(value)}" for key, value in numbers.items()]
+    return "\n".join([about, 'FileName="box.x"', *lines]) + "\n"
+
+
+def _number(value: float) -> str:
+    """A plain decimal of six digits, without an exponent."""
+    return str(np.format_float_positional(float(f"{value:.6g}") + 0.0, trim="0"))
+
+
+def box_mesh(length_m: float, beam_m: float, height_m: float) -> str:
+    """A box as DirectX text: x to starboard, y up from the keel, z to the bow, origin midships; faces turn outwards.
+
+    Parameters
+    ----------
+    length_m, beam_m, height_m : float
+    """
+    corners = list(product((-0.5, 0.5), (0.0, 1.0), (-0.5, 0.5)))
+    rows = [f"{_number(x * beam_m)};{_number(y * height_m)};{_number(z * length_m)};" for x, y, z in corners]
+    faces = []
+    for axis, end in product(range(3), (0, 1)):
+        own, first, second = (4 >> (axis + turn) % 3 for turn in range(3))
+        square = [end * own + a * first + b * second for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
+        a, b, c, d = square if end else square[::-1]
+        faces += [f"3;{a},{b},{c};", f"3;{a},{c},{d};"]
+    places, triangles = ",\n ".join(rows), ",\n ".join(faces)
+    return f"xof 0303txt 0032\nMesh hull {{\n {len(rows)};\n {places};\n {len(faces)};\n {triangles};\n}}\n"
+
+
+def _losses_of_ship(model: Model) -> list[str]:
+    """What Bridge Command does not have of a ship with a rudder, in numbers."""
+    # A card without limits of its gear turns with 35 deg, as IMO's turning circle does.
+    largest = math.degrees(start_values(model).get("steering.max_angle", math.radians(35.0)))
+    turn = simulate(model, Turn(math.radians(min(largest, LARGEST_RUDDER_DEG)))).figures
+    found = []
+    if largest > LARGEST_RUDDER_DEG:
+        hard = simulate(model, Turn(math.radians(largest))).figures["tactical_diameter_m"]
+        diameter = f" (tactical diameter {hard:.4g} m)" if isinstance(hard, float) else ""
+        found.append(
+            f"the rudder is held within {LARGEST_RUDDER_DEG:g} deg: the card's turn with {largest:.3g} deg{diameter} "
+            "is out of reach"
+        )
+    loss, drift = turn.get("speed_loss_percent"), turn.get("steady_drift_deg")
+    if isinstance(loss, float) and isinstance(drift, float):
+        found.append(
+            f"a ship keeps its speed in a turn and does not drift, where the card loses {loss:.0f} % with {drift:.0f} "
+            "deg of drift at the largest rudder: paths are fitted, and a turn takes less time (time_180_s)"
+        )
+    if full_ahead_order(model) is None:
+        found.append("the card has no engine: speeds at other levers follow from its resistance, stops are not fitted")
+    found.append("a ship turns alike to either side, except for its neutral rudder and the walk of a single screw")
+    heel = turn.get("largest_heel_deg")
+    if isinstance(heel, float):
+        found.append(f"a ship does not heel in turns, and the card's to {abs(heel):.1f} deg")
+    return found
+
+
+def _losses_of_all(card: SteeredCard) -> list[str]:
+    """What Bridge Command does not have of any vessel."""
+    lost = sorted({effect.name for effect in card.effects} - {*_TUNNELS, TWIN_ORDERS.name})
+    return [
+        "levers are shares of the thrust and act at once; thrust does not change with speed",
+        "wind has the force of a box with coefficient 1, times 0.265, and no yaw moment; sway has the mass of surge",
+        *([f"effects of the card count only in the figures that were fitted: {', '.join(lost)}"] if lost else []),
+    ]
