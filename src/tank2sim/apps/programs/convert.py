@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from tank2sim.dynamics.vessel import Vessel
 
 Language = Literal[
-    *("abkowitz", "mmg", "small_craft", "shipmmg", "mmgdynamics", "gazebo", "vrx", "mss", "pvs"),
-    *("c99", "xdyn", "bridge_command", "osp", "osp_gunnerus"),
-]
+    "abkowitz", "mmg", "small_craft", "shipmmg", "mmgdynamics", "gazebo", "vrx", "mss", "pvs", "c99", "xdyn",
+    "bridge_command", "osp", "osp_gunnerus",
+]  # fmt: skip
 """Names of :data:`.FORMS`."""
 
 
