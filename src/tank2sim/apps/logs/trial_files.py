@@ -39,8 +39,8 @@ SHORTEST_STEP_S = 0.1
 LONGEST_STEP_S = 1.0
 """Largest step of a trial, s: slower streams leave empty cells. Project choice: rudders move within seconds."""
 
-LONGEST_RUN_S = 120.0
-"""Longest trial of a craft, s. Project choice: current and mean wind, steady within a trial, hold for two minutes."""
+LONGEST_RUN_S = 60.0
+"""Longest trial of a craft, s. Project choice: current and mean wind, steady within a trial, hold for a minute."""
 
 _HELD = ("rudder_order", "rpm_order", "thrust_order_port", "thrust_order_starboard")
 
