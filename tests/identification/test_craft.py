@@ -204,9 +204,9 @@ def test_the_deviation_of_the_compass_is_found_and_does_not_bend_the_coefficient
     compass = deviating.study.compass
     for letter, truth in (("a", 1.0), ("b", 7.0), ("c", -5.0)):
         value, error = getattr(compass, f"{letter}_deg"), getattr(compass, f"{letter}_error_deg")
-        assert abs(value - truth) < 3 * error and error < 2.0, letter
+        assert abs(value - truth) < 3 * error, letter
     assert compass.b_deg > 3.5 and compass.c_deg < -2.5
-    assert compass.notices and not found.study.compass.notices
+    assert found.study.compass is None
     for name in ("port.ahead", "Xuabsu", "Nrabsr"):
         entry = deviating.study.coefficients[name]
         assert abs(entry.value - craft[name.rpartition(".")[2]]) < 3 * entry.standard_error, name

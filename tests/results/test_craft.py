@@ -6,6 +6,7 @@ from tank2sim.cards import SteeredBy
 from tank2sim.identification.craft.fit import CoefficientVerdict
 from tank2sim.identification.craft.next_trial import CandidateTrial
 from tank2sim.identification.craft.study import (
+    CompassDeviation,
     CraftCoefficient,
     CraftIdentificationStudy,
     PredictionStudy,
@@ -38,6 +39,7 @@ IDENTIFIED = CraftIdentificationStudy(
             by=None,
         ),
     },
+    compass=CompassDeviation(a_deg=0.1, a_error_deg=0.5, b_deg=6.0, b_error_deg=1.0, c_deg=0.3, c_error_deg=1.1),
     noise={"x_m": 0.1},
     determination={"u": 0.98, "v": 0.9, "r": 0.95},
     driven_by="revolutions",
@@ -92,10 +94,11 @@ VALIDATED = ValidationStudy(
 
 def test_coefficients_have_their_verdicts_and_the_next_trial_is_named() -> None:
     result = CraftIdentificationResult(IDENTIFIED)
-    coefficients, following, responses = (table.df for table in result.tables)
+    coefficients, following, responses, compass = (table.df for table in result.tables)
     assert coefficients["verdict"].to_list() == ["identified", "not determined"]
     assert following["would determine"].to_list() == ["port.astern"]
     assert responses["turned at (rpm)"].to_list() == [90.0]
+    assert compass.iloc[0].to_list() == [0.1, 0.5, 6.0, 1.0, 0.3, 1.1]
     assert "2 trials determine 1 of 2 coefficients" in result.headline[0] and "going astern" in result.headline[2]
 
 

@@ -91,12 +91,12 @@ class CraftIdentificationResult(Result[CraftIdentificationStudy]):
         fields = dict.fromkeys(("lag_s", "lag_error_s", "dead_band_rpm", "dead_band_error_rpm"), "")
         fields |= {"rest_rpm": "rested at", "turning_rpm": "turned at"}
         shown = [records_table(heading, responses, first="thruster", fields=fields)] if responses else []
-        compass = records_table("Compass", [self.study.compass], folded=False)
         parts = "A is constant, B goes with the sine of the heading and C with its cosine (shown less true)."
+        found = [] if self.study.compass is None else [records_table("Compass", [self.study.compass], folded=False)]
         return [
             *craft_sections(self.study),
             *([Section(heading=heading, tables=shown)] if shown else []),
-            Section(heading="Deviation of the compass", text=parts, tables=[compass]),
+            *([Section(heading="Deviation of the compass", text=parts, tables=found)] if found else []),
         ]
 
     @property

@@ -15,7 +15,13 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.identification.craft.first_values import PREDICTED_S, estimate_by_velocities
-from tank2sim.identification.craft.problem import DISTURBANCES, FORCE_SPREAD, with_disturbances
+from tank2sim.identification.craft.problem import (
+    DISTURBANCES,
+    FORCE_SPREAD,
+    deviates,
+    with_disturbances,
+    without_compass,
+)
 from tank2sim.identification.trials.methods.gauss_newton import StoppedSearchError
 from tank2sim.identification.trials.methods.kalman import KalmanEstimate, KalmanSettings, Smoothed, estimate_at, kalman
 from tank2sim.identification.trials.methods.kalman_gains import FilterFault, smooth_states
@@ -57,6 +63,9 @@ FEWEST_TRIALS = 5
 
 _DISTURBED_SHARES = (1.0, 0.3, 0.1, 0.03, 0.01)
 """Spreads of current and wind, over the usual ones, that are tried with an estimate that knows neither."""
+
+_WAYS = (1.0, 0.75, 0.5)
+"""Shares of the way from the card to an estimate that are tried, the first that a filter follows being taken."""
 
 _STEPS_FROM_NEAR = 20
 """Most steps of a search that begins at the estimate by velocities, each of the filter over all trials."""
@@ -134,10 +143,10 @@ class CraftFit:
 def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
     """Estimate the free parameters of a craft with the noise levels.
 
-    The search begins at the estimate by velocities, which is taken itself where the model does not hold
-    (:func:`_holds`). With :data:`FEWEST_TRIALS` the filter searches twice: the second time current, wind
-    and bias of each trial are known beforehand as well as they agreed between trials the first time (empirical Bayes),
-    for they change slowly.
+    The compass has a deviation where the estimate by velocities shows one. The search begins at that estimate, which is
+    taken itself where the model does not hold (:func:`_holds`). With :data:`FEWEST_TRIALS` the filter searches twice:
+    the second time current, wind and bias of each trial are known beforehand as well as they agreed between trials the
+    first time (empirical Bayes), for they change slowly.
 
     Parameters
     ----------
@@ -147,6 +156,9 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
         Called with each better estimate.
     """
     found = estimate_by_velocities(problem)
+    if found is None or not deviates(found):
+        problem = without_compass(problem)
+        found = estimate_by_velocities(problem)
     steps = KalmanSettings.iterations if found is None else _STEPS_FROM_NEAR
     settings = KalmanSettings(drifting=True, scale_prior=False, iterations=steps)
     try:
@@ -181,10 +193,21 @@ def _holds(problem: Problem, estimate: KalmanEstimate) -> bool:
 
 
 def _at_velocities(problem: Problem, found: Estimate) -> CraftFit | None:
-    """Errors of predictions and fit with the estimate by velocities, with the spread of current and wind that is best.
+    """The fit with the estimate by velocities, with the spread of current and wind that predicts best.
 
-    None where the filter loses the motion with all of them.
+    Where the filter loses the motion, the estimate goes only a part of the way from the card (:data:`_WAYS`); None if
+    it loses it still.
     """
+    for way in _WAYS:
+        values = problem.prior_mean + way * (found.values - problem.prior_mean)
+        fits = _filtered_with(problem, replace(found, values=values))
+        if fits:
+            return min(fits, key=_unpredicted)
+    return None
+
+
+def _filtered_with(problem: Problem, found: Estimate) -> list[CraftFit]:
+    """Fits with an estimate, for each spread of current and wind with which the filter follows the motion."""
     wide = np.array([problem.model[name].nominal for name in DISTURBANCES])
     outside = np.array([name != "gyro.bias" for name in DISTURBANCES])
     fits = []
@@ -203,7 +226,7 @@ def _at_velocities(problem: Problem, found: Estimate) -> CraftFit | None:
             filtered, method=found.method, covariance=found.covariance, information=found.information, cost=found.cost
         )
         fits.append(CraftFit(posed, estimate, point.levels, by_run))
-    return min(fits, key=_unpredicted, default=None)
+    return fits
 
 
 def _unpredicted(fit: CraftFit) -> float:

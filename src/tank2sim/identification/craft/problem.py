@@ -24,7 +24,7 @@ from tank2sim.dynamics.build import build
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model, Parameter, Quantity, State, same_symbol
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.problem.estimation_problem import Problem
+from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
 from tank2sim.identification.trials.problem.sampled_runs import prepare
 from tank2sim.records.trials import Trial
 
@@ -275,6 +275,26 @@ def craft_problem(card: SteeredCard, trials: Sequence[Trial]) -> Problem:
         runs.append(replace(run, seen=(*shown, *(["gyro.rate"] if rated else []))))
     means, errors = (np.array(column) for column in zip(*prior.values(), strict=True))
     return Problem(model, tuple(prior), means, errors, tuple(runs))
+
+
+CERTAIN_ERRORS = 3.0
+"""Standard errors beyond which a part of the deviation by the heading is taken for real (project choice: by chance in
+one craft of 200)."""
+
+
+def deviates(estimate: Estimate) -> bool:
+    """Whether a part of the compass's deviation that goes with the heading is beyond :data:`CERTAIN_ERRORS`."""
+    found = zip(estimate.free, estimate.values, estimate.standard_errors, strict=True)
+    return any(
+        abs(value) > CERTAIN_ERRORS * error for name, value, error in found if name in ("compass.B", "compass.C")
+    )
+
+
+def without_compass(problem: Problem) -> Problem:
+    """The problem of a compass without deviation: parameters that the trials do not show only widen the others."""
+    kept = np.array([name not in COMPASS_SPREADS for name in problem.free])
+    free = tuple(name for name in problem.free if name not in COMPASS_SPREADS)
+    return replace(problem, free=free, prior_mean=problem.prior_mean[kept], prior_error=problem.prior_error[kept])
 
 
 def craft_driven_by(card: SteeredCard, trials: Sequence[Trial]) -> str:

@@ -35,10 +35,6 @@ NOT_ITS_OWN = (
 """Notice of each validation: a card of a craft does not say what it was identified from."""
 
 
-CERTAIN_ERRORS = 3.0
-"""Standard errors beyond which a deviation of the compass is said (project choice: one craft in 400 by chance)."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class CraftCoefficient:
     """A coefficient of a craft, SI.
@@ -102,18 +98,6 @@ class CompassDeviation:
     c_deg: Number
     c_error_deg: Number
 
-    @property
-    def notices(self) -> list[Notice]:
-        """A sentence where a part by the heading is beyond :data:`CERTAIN_ERRORS` of its standard errors."""
-        parts = ((self.b_deg, self.b_error_deg), (self.c_deg, self.c_error_deg))
-        if not any(abs(value) > CERTAIN_ERRORS * error for value, error in parts):
-            return []
-        words = (
-            f"the compass of these trials deviates by A {self.a_deg:+.1f}, B {self.b_deg:+.1f} sin(heading), "
-            f"C {self.c_deg:+.1f} cos(heading) deg: the headings were corrected by it; swing the compass"
-        )
-        return [Notice(words)]
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CraftIdentificationStudy:
@@ -126,7 +110,8 @@ class CraftIdentificationStudy:
         Names of the trials that were fitted, and held out (also those too short to be predicted).
     coefficients : dict
         By name without ``derivatives.`` and ``thrusters.``.
-    compass : CompassDeviation
+    compass : CompassDeviation or None
+        None where the trials show none.
     noise : dict
         Standard deviation of the noise by signal, SI.
     determination : dict or None
@@ -144,7 +129,7 @@ class CraftIdentificationStudy:
     method: str
     trials: tuple[str, ...]
     coefficients: dict[str, CraftCoefficient]
-    compass: CompassDeviation
+    compass: CompassDeviation | None
     noise: dict[str, Number]
     determination: dict[str, Number] | None
     driven_by: str
@@ -196,7 +181,12 @@ def study_craft(
         )
     notices += _dead_band_notices(card, responses, driven_by)
     compass = _compass(fit)
-    notices += compass.notices
+    if compass is not None:
+        words = (
+            f"the compass of these trials deviates by A {compass.a_deg:+.1f}, B {compass.b_deg:+.1f} sin(heading), "
+            f"C {compass.c_deg:+.1f} cos(heading) deg: the headings were corrected by it; swing the compass"
+        )
+        notices.append(Notice(words))
     notices.append(
         Notice(
             "the mass on the card is taken as exact: motion determines forces over masses, so that an error of the "
@@ -257,8 +247,10 @@ def _dead_band_notices(card: SteeredCard, responses: Mapping[str, OrderResponse]
     return notices
 
 
-def _compass(fit: CraftFit) -> CompassDeviation:
+def _compass(fit: CraftFit) -> CompassDeviation | None:
     found = {}
+    if not COMPASS_SPREADS.keys() <= set(fit.problem.free):
+        return None
     for name in COMPASS_SPREADS:
         place, letter = fit.problem.free.index(name), name[-1].lower()
         found[f"{letter}_deg"] = math.degrees(fit.estimate.values[place])
