@@ -4,7 +4,7 @@ The logs are read as they are: the channels are found in one of them and serve f
 were chosen by their names before any fit: random steps (224), mixed (230), astern (233). Printed: what `tank2sim log`
 finds, the seconds of each command, and R^2 of u, v, r of predictions of 30 s of the runs held out.
 
-    python benchmarks/blueboat.py [RUNS TO FIT, separated by commas]
+    python benchmarks/blueboat.py [--rotate]   # with --rotate three more choices of held-out runs
 
 The logs are not in the checkout; the script reads them from TANK2SIM_DATA.
 """
@@ -23,7 +23,8 @@ from tank2sim.errors import InputError
 
 DATA = Path(os.environ.get("TANK2SIM_DATA", Path(__file__).resolve().parents[2] / "shared")) / "data" / "blueboat"
 HELD_OUT = ("224", "230", "233")
-FITTED = ("216", "218", "220", "221", "222", "226", "232", "234")
+OTHERS_HELD_OUT = (("216", "222", "232"), ("218", "226", "234"), ("220", "221", "230"))
+RUNS = ("216", "218", "220", "221", "222", "224", "226", "230", "232", "233", "234")
 CHANNELS_FROM = "220"
 """The run that shows speed ahead and turns well."""
 
@@ -71,38 +72,46 @@ def main() -> None:
     if not DATA.is_dir():
         print(f"no logs in {DATA}")
         return
-    fitted = sys.argv[1].split(",") if len(sys.argv) > 1 else FITTED
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        begin = time.perf_counter()
-        found = t2s.log(DATA / f"fixed_00000{CHANNELS_FROM}.csv", folder / CHANNELS_FROM)
-        print(f"log of {CHANNELS_FROM}: {time.perf_counter() - begin:.1f} s")
-        for channel in found.voyage.channels.channels:
-            if channel.use:
-                print(
-                    f"  {channel.quantity}: {channel.sign:+d} {channel.stream}, zero {channel.offset:g}: {channel.why}"
-                )
-        channels = folder / CHANNELS_FROM / "channels.toml"
-        trials, held = {}, {}
-        for run in (*fitted, *HELD_OUT):
-            cut = t2s.log(DATA / f"fixed_00000{run}.csv", folder / run, channels=channels)
-            files = sorted((folder / run).glob("*.csv"))
-            print(f"  run {run}: {len(files)} trials, {cut.stretches['duration_s'].sum():.0f} s")
-            (held if run in HELD_OUT else trials)[run] = files
-        begin = time.perf_counter()
-        try:
-            result = t2s.identify(
-                first_card(),
-                [file for files in trials.values() for file in files],
-                holdout=[file for files in held.values() for file in files],
-            )
-        except InputError as error:
-            print(f"identify, {time.perf_counter() - begin:.1f} s: {error}")
-            return
-        print(f"identify {', '.join(fitted)}, by {result.study.method}: {time.perf_counter() - begin:.1f} s")
-        for name_of, entry in result.study.coefficients.items():
-            print(f"  {name_of}: {entry.value:.4g} ± {entry.standard_error:.2g}, {entry.verdict}")
-        print(f"R^2 over 30 s of {', '.join(HELD_OUT)}: {result.study.determination}")
+        trials = cut_runs(Path(name))
+        for held in (HELD_OUT, *(OTHERS_HELD_OUT if "--rotate" in sys.argv else ())):
+            identified(trials, held)
+
+
+def cut_runs(folder: Path) -> dict[str, list[Path]]:
+    """The trials of each run, with the channels that one of them shows."""
+    begin = time.perf_counter()
+    found = t2s.log(DATA / f"fixed_00000{CHANNELS_FROM}.csv", folder / CHANNELS_FROM)
+    print(f"log of {CHANNELS_FROM}: {time.perf_counter() - begin:.1f} s")
+    for channel in found.voyage.channels.channels:
+        if channel.use:
+            print(f"  {channel.quantity}: {channel.sign:+d} {channel.stream}, zero {channel.offset:g}: {channel.why}")
+    trials = {}
+    for run in RUNS:
+        if run != CHANNELS_FROM:
+            channels = folder / CHANNELS_FROM / "channels.toml"
+            t2s.log(DATA / f"fixed_00000{run}.csv", folder / run, channels=channels)
+        trials[run] = sorted((folder / run).glob("*.csv"))
+        print(f"  run {run}: {len(trials[run])} trials")
+    return trials
+
+
+def identified(trials: dict[str, list[Path]], held: tuple[str, ...]) -> None:
+    """Print what is found without some runs, and how well these are predicted."""
+    begin = time.perf_counter()
+    fitted = [file for run, files in trials.items() if run not in held for file in files]
+    try:
+        result = t2s.identify(first_card(), fitted, holdout=[file for run in held for file in trials[run]])
+    except InputError as error:
+        print(f"without {', '.join(held)}, {time.perf_counter() - begin:.1f} s: {error}")
+        return
+    study = result.study
+    print(
+        f"identify without {', '.join(held)}, by {study.method}: {time.perf_counter() - begin:.1f} s; {study.compass}"
+    )
+    for name, entry in study.coefficients.items():
+        print(f"  {name}: {entry.value:.4g} ± {entry.standard_error:.2g}, {entry.verdict}")
+    print(f"R^2 over 30 s of {', '.join(held)}: {study.determination}")
 
 
 if __name__ == "__main__":

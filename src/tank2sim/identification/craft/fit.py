@@ -64,6 +64,9 @@ FEWEST_TRIALS = 5
 _DISTURBED_SHARES = (1.0, 0.3, 0.1, 0.03, 0.01)
 """Spreads of current and wind, over the usual ones, that are tried with an estimate that knows neither."""
 
+_NEARLY_NONE = 0.1
+"""Largest of these shares with which there is next to no current and wind: 0.03 m/s (project choice)."""
+
 _WAYS = (1.0, 0.75, 0.5)
 """Shares of the way from the card to an estimate that are tried, the first that a filter follows being taken."""
 
@@ -161,13 +164,8 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
         found = estimate_by_velocities(problem)
     steps = KalmanSettings.iterations if found is None else _STEPS_FROM_NEAR
     settings = KalmanSettings(drifting=True, scale_prior=False, iterations=steps)
-    try:
-        estimate = _first_estimate(problem, settings, progress, found)
-        fit = _fit_of(problem, estimate)
-    except InputError:
-        if found is None or (other := _at_velocities(problem, found)) is None:
-            raise
-        return other
+    estimate = _first_estimate(problem, settings, progress, found)
+    fit = _fit_of(problem, estimate)
     if found is not None and not _holds(problem, estimate) and (other := _at_velocities(problem, found)):
         return other
     if len(problem.runs) < FEWEST_TRIALS:
@@ -195,22 +193,23 @@ def _holds(problem: Problem, estimate: KalmanEstimate) -> bool:
 def _at_velocities(problem: Problem, found: Estimate) -> CraftFit | None:
     """The fit with the estimate by velocities, with the spread of current and wind that predicts best.
 
-    Where the filter loses the motion, the estimate goes only a part of the way from the card (:data:`_WAYS`); None if
-    it loses it still.
+    Where the filter loses the motion, the estimate goes only a part of the way from the card (:data:`_WAYS`). None if
+    it loses it still, or if predictions are best with current or wind, of which the estimate does not know.
     """
     for way in _WAYS:
         values = problem.prior_mean + way * (found.values - problem.prior_mean)
         fits = _filtered_with(problem, replace(found, values=values))
         if fits:
-            return min(fits, key=_unpredicted)
+            best = min(fits, key=lambda share: _unpredicted(fits[share]))
+            return fits[best] if best <= _NEARLY_NONE else None
     return None
 
 
-def _filtered_with(problem: Problem, found: Estimate) -> list[CraftFit]:
-    """Fits with an estimate, for each spread of current and wind with which the filter follows the motion."""
+def _filtered_with(problem: Problem, found: Estimate) -> dict[float, CraftFit]:
+    """Fits with an estimate, by the share of the usual current and wind, where the filter follows the motion."""
     wide = np.array([problem.model[name].nominal for name in DISTURBANCES])
     outside = np.array([name != "gyro.bias" for name in DISTURBANCES])
-    fits = []
+    fits = {}
     for share in _DISTURBED_SHARES:
         posed = with_disturbances(problem, np.zeros(len(wide)), np.where(outside, share * wide, wide))
         task = task_of(posed, drifting=True)
@@ -225,7 +224,7 @@ def _filtered_with(problem: Problem, found: Estimate) -> list[CraftFit]:
         estimate = replace(
             filtered, method=found.method, covariance=found.covariance, information=found.information, cost=found.cost
         )
-        fits.append(CraftFit(posed, estimate, point.levels, by_run))
+        fits[share] = CraftFit(posed, estimate, point.levels, by_run)
     return fits
 
 
