@@ -54,7 +54,7 @@ class Trial:
     origin_deg : tuple or None
         Latitude and longitude of x = y = 0, deg, where the file states them.
     folder : str
-        Folder that tells trials of one file name apart (:func:`distinctly_named`).
+        Folder of a trial whose file name another trial has, too (:func:`distinctly_named`).
     """
 
     path: Path

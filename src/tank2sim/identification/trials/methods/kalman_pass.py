@@ -12,7 +12,7 @@ from scipy.ndimage import uniform_filter1d
 from tank2sim.arrays import Array
 from tank2sim.identification.trials.methods.kalman_gains import Gains, Variances, first_place, gains
 from tank2sim.identification.trials.methods.process_noise import Disturbed, Tangents
-from tank2sim.identification.trials.methods.shooting import SENSORS, cut
+from tank2sim.identification.trials.methods.shooting import SENSED_BY, cut
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 
 _LARGEST = 1e9
@@ -206,7 +206,7 @@ def measured_trajectory(problem: Problem, batch: Batch) -> tuple[Array, Array]:
     for number in range(len(states)):
         columns = {}
         for place, name in enumerate(names):
-            shown = name if name in problem.seen else SENSORS.get(name)
+            shown = name if name in problem.seen else SENSED_BY.get(name)
             if shown not in problem.seen:
                 continue
             column = problem.seen.index(shown)

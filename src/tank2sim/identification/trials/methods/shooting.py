@@ -44,7 +44,7 @@ class Pieces:
     starts: Array
 
 
-SENSORS = {
+SENSED_BY = {
     "motion.psi": "compass.heading",
     "motion.r": "gyro.rate",
     "motion.u": "compass.u",
@@ -73,7 +73,7 @@ def _start(problem: Problem, run: SampledRun, first: int) -> Array:
     default = np.array(model.initial(p)).ravel()
     state = []
     for place, variable in enumerate(model.states):
-        value = values.get(variable.name, values.get(SENSORS.get(variable.name, "")))
+        value = values.get(variable.name, values.get(SENSED_BY.get(variable.name, "")))
         if value is None and variable.name == "motion.u":
             value = values.get("motion.u_ground", values.get("motion.sog"))
         if value is None and variable.name == "motion.v":
