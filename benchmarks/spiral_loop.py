@@ -1,4 +1,4 @@
-"""Width of the loop of an unstable ship: by direct spirals of ever finer rudder steps, and by the folds of its steady turns.
+"""Width of the loop of an unstable ship: by spirals of ever finer rudder steps, and by the folds of its steady turns.
 
 ``python benchmarks/spiral_loop.py`` prints the widths of the bundled ``kvlcc2``.
 """
