@@ -126,6 +126,46 @@ def test_definitions_that_would_grow_are_refused(tmp_path: Path) -> None:
         read_table(path)
 
 
+@pytest.mark.parametrize("packed", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])
+def test_damaged_bytes_give_a_table_or_one_clear_refusal(tmp_path: Path, packed: int) -> None:
+    good = workbook(tmp_path / "good.xlsx", TRIAL)
+    chance = np.random.default_rng(1)
+    with zipfile.ZipFile(good) as book, zipfile.ZipFile(tmp_path / "packed.xlsx", "w", packed) as other:
+        for name in book.namelist():
+            other.writestr(name, book.read(name))
+    data = (tmp_path / "packed.xlsx").read_bytes()
+    path, refused = tmp_path / "bad.xlsx", 0
+    for _ in range(200):
+        bad = bytearray(data)
+        for place in chance.integers(4, len(bad), size=chance.integers(1, 4)):
+            bad[place] = chance.integers(0, 256)
+        path.write_bytes(bad)
+        try:
+            read_table(path)
+        except InputError as error:
+            assert error.source == str(path)
+            refused += 1
+    assert refused > 100
+
+
+def test_damaged_texts_give_a_table_or_one_clear_refusal(tmp_path: Path) -> None:
+    good = workbook(tmp_path / "good.xlsx", TRIAL)
+    chance = np.random.default_rng(2)
+    for _ in range(200):
+        with zipfile.ZipFile(good) as book, zipfile.ZipFile(tmp_path / "bad.xlsx", "w") as other:
+            chosen = book.namelist()[chance.integers(len(book.namelist()))]
+            for name in book.namelist():
+                text = bytearray(book.read(name))
+                if name == chosen:
+                    begin = int(chance.integers(len(text)))
+                    text[begin : begin + int(chance.integers(1, 12))] = b"" if chance.random() < 0.5 else b'9"'
+                other.writestr(name, bytes(text))
+        try:
+            read_table(tmp_path / "bad.xlsx")
+        except InputError as error:
+            assert error.source == str(tmp_path / "bad.xlsx")
+
+
 def test_another_zip_file_is_no_spreadsheet(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "ship.csv", "w") as book:
         book.writestr("modelDescription.xml", "<a/>")

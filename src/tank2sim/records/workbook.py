@@ -6,6 +6,7 @@ import csv
 import io
 import re
 import zipfile
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,6 +21,8 @@ _BEGINS = b"PK\x03\x04"
 _LARGEST_PART = 1 << 29
 """Bytes of an unpacked part that are read at most. Project choice: a full sheet of numbers has half of that."""
 _LAST_ROW, _LAST_COLUMN = 1 << 20, 1 << 14  # the size of a sheet in Excel
+_DAMAGE = (zipfile.BadZipFile, zlib.error, LookupError, ValueError, RuntimeError, EOFError, OSError)
+"""Errors of Python's libraries for a damaged file."""
 _PLACE = re.compile(r"([A-Z]{1,3})([0-9]{1,7})")
 
 
@@ -47,7 +50,7 @@ def workbook_text(path: Path) -> str:
             strings = ["".join(_texts(item)) for item in _part(path, book, "xl/sharedStrings.xml", wanted=False)]
             sheet = _part(path, book, _first_sheet(path, book))
             rows = dict(_rows(path, sheet, strings))
-    except (zipfile.BadZipFile, ParseError, KeyError, ValueError, IndexError, NotImplementedError, EOFError) as error:
+    except (*_DAMAGE, ParseError) as error:
         problem = f"is not a spreadsheet that can be read ({' '.join(str(error).split())[:80]})"
         raise InputError(path, "", problem, "save it as .xlsx or .csv again") from None
     return _lines(rows)
@@ -85,8 +88,10 @@ def _part(path: Path, book: zipfile.ZipFile, name: str, *, wanted: bool = True) 
 
 def _first_sheet(path: Path, book: zipfile.ZipFile) -> str:
     """Name of the part with the first sheet."""
-    sheet = next(one for one in _every(_part(path, book, "xl/workbook.xml"), "sheet"))
-    reference = next(value for key, value in sheet.attrib.items() if key.endswith("}id"))
+    sheet = next(_every(_part(path, book, "xl/workbook.xml"), "sheet"), None)
+    if sheet is None:
+        raise KeyError("no sheet")
+    reference = next((value for key, value in sheet.attrib.items() if key.endswith("}id")), "")
     for relation in _every(_part(path, book, "xl/_rels/workbook.xml.rels"), "Relationship"):
         if relation.get("Id") == reference:
             target = relation.get("Target", "")
