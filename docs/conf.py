@@ -46,8 +46,8 @@ napoleon_use_rtype = False
 add_module_names = False
 
 _LIVE = Path(__file__).parent / "live"  # what page_pictures.py wrote, if it was run
-exclude_patterns = ["_build", "live"]
-html_extra_path = [str(_LIVE)] if _LIVE.is_dir() else []
+exclude_patterns = ["_build", "live", "packaging"]
+html_extra_path = ["llms.txt", *([str(_LIVE)] if _LIVE.is_dir() else [])]
 html_theme = "furo"
 html_title = "tank2sim"
 html_static_path = ["static"]

@@ -184,11 +184,12 @@ def read_bytes(path: str | Path) -> bytes:
     Raises
     ------
     InputError
-        It is a device, which may have no end.
+        It is a folder, or a device, which may have no end.
     OSError
         It cannot be read.
     """
     refuse_device(Path(path))
+    refuse_folder(Path(path))
     return Path(path).read_bytes()
 
 
@@ -196,6 +197,12 @@ def refuse_device(path: Path) -> None:
     """Raise InputError if a path is a device, which may have no end."""
     if path.is_char_device() or path.is_block_device():
         raise InputError(path, "", "is a device and may have no end", "give a file")
+
+
+def refuse_folder(path: Path) -> None:
+    """Raise InputError if a path is a folder."""
+    if path.is_dir():
+        raise InputError(path, "", "is a folder, and a file was expected", "give the file in it")
 
 
 def read_text(path: Path) -> str:

@@ -312,7 +312,7 @@ def test_files_that_are_no_fmu_are_reported_in_one_line(
         archive.writestr("readme.txt", "nothing here")
     with pytest.raises(InputError, match=r"no modelDescription\.xml"):
         compare_with_model(tmp_path / "bare.fmu", model=hull)
-    for path, problem in ((tmp_path / "none.fmu", "does not exist"), (tmp_path, "cannot be read")):
+    for path, problem in ((tmp_path / "none.fmu", "does not exist"), (tmp_path, "is a folder")):
         with pytest.raises(InputError, match=problem):
             compare_with_model(path, model=hull)
         with pytest.raises(InputError, match=problem):

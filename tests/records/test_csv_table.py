@@ -131,6 +131,27 @@ def test_a_comment_that_must_be_a_number_is_checked(write, comment, said):
         table.comment_number("force_N")
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "# note: 1,5; 2\nt_s;u_mps;v_mps\n0;1,5;-0,25\n\n1;;1e-2\n",
+        "# note: 1,5; 2\nt_s;u_mps;v_mps\n0;1.5;-0.25\n\n1;;1e-2\n",
+        "# note: 1,5; 2\nt_s\tu_mps\tv_mps\n0\t1,5\t-0,25\n\n1\t\t1e-2\n",
+        "\ufeff# note: 1,5; 2\r\nt_s ; u_mps ; v_mps\r\n0 ; 1,5 ; -0,25\r\n\r\n1 ; ; 0,01\r\n",
+    ],
+)
+def test_semicolons_tabs_and_decimal_commas_are_understood(write, text):
+    table = read_table(write(text))
+    np.testing.assert_array_equal(table.column("t_s"), [0, 1])
+    np.testing.assert_array_equal(table.column("u_mps"), [1.5, np.nan])
+    np.testing.assert_array_equal(table.column("v_mps"), [-0.25, 0.01])
+    assert table.lines.tolist() == [3, 5] and table.comments == {"note": "1,5; 2"}
+
+
+def test_a_folder_is_refused_as_one(tmp_path):
+    assert refusal(tmp_path) == "is a folder, and a file was expected; give the file in it"
+
+
 def test_missing_file(tmp_path):
     assert refusal(tmp_path / "none.csv") == "the file does not exist; check the name"
 
@@ -144,7 +165,8 @@ def test_missing_file(tmp_path):
         ("t_s,u_mps\n\n# end\n", "there are no rows under the header"),
         ("# a\nt_s,,u\n0,1,2\n", "line 2: column 2 has no name"),
         ("t_s,u_mps, t_s\n0,1,2\n", "line 1, column t_s: is given twice"),
-        ("t_s;u_mps\n0;1,5\n", "line 1: the columns are not separated by commas"),
+        ("t_s;u_mps\n0;1,5\n1;2.5\n", "line 3: has a point, and other numbers have decimal commas"),
+        ("t_s;u_mps\n0;1,5;2\n", "line 2: the number of cells is 3, and that of columns 2"),
         ("t_s,u_mps\n0,1\n\n1,2,3\n", "line 4: the number of cells is 3, and that of columns 2"),
         ("t_s,u_mps\n0,1\n1\n", "line 3: the number of cells is 1, and that of columns 2"),
         ("t_s,u_mps\n0,1\n1,fast\n2,slow\n", "line 3, column u_mps: 'fast' is not a number; write digits"),

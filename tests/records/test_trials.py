@@ -48,6 +48,15 @@ def test_a_foreign_column_is_left_out_and_named(write):
     assert "thrust_N" in read.notices[0]
 
 
+def test_all_misspelt_columns_are_in_one_message(write):
+    text = GOOD.replace("u_mps,r_degps", "u_m,r_deg,thrust_N").replace(",1,0,", ",1,0,5,")
+    text = text.replace(",2,1,", ",2,1,5,").replace(",3,-1,", ",3,-1,5,")
+    with pytest.raises(InputError) as refused:
+        read_trial_file(write(text))
+    assert refused.value.place == "columns u_m, r_deg"
+    assert "thrust_N" not in str(refused.value) and "u_mps, r_degps" in refused.value.remedy
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

@@ -26,7 +26,7 @@ from tank2sim.cards.form_faults import form_fault, short
 from tank2sim.cards.kinds import CARD_KINDS
 from tank2sim.errors import InputError, close_name
 from tank2sim.escaping import one_line
-from tank2sim.files import BYTE_ORDER_MARK, read_exact_text, refuse_deep
+from tank2sim.files import BYTE_ORDER_MARK, read_exact_text, refuse_deep, refuse_folder
 from tank2sim.units import to_si
 
 _SHIP_CARD = "give a ship card (kind linear, abkowitz or mmg); tank2sim influence shows steering cards"
@@ -51,6 +51,7 @@ def find_card(name: str) -> Path:
         return ships[name.lower()]
     if name and (others := sorted(file.name for file in (bundled("models") / name.lower()).glob("*.toml"))):
         raise InputError(name, "", f"is bundled as {', '.join(others)}, not as a ship card", _SHIP_CARD)
+    refuse_folder(path)
     raise InputError(name, "", "is neither a file nor a bundled ship", close_name(name.lower(), ships))
 
 

@@ -14,7 +14,7 @@ import fmpy
 from fmpy.model_description import read_model_description
 
 from tank2sim.errors import InputError
-from tank2sim.files import refuse_device
+from tank2sim.files import refuse_device, refuse_folder
 
 FmuType = Literal["ModelExchange", "CoSimulation"]
 
@@ -83,6 +83,7 @@ def unpack(path: Path, folder: Path) -> UnpackedFmu:
         library outside the archive, or has none for this machine.
     """
     refuse_device(Path(path))
+    refuse_folder(Path(path))
     try:
         with zipfile.ZipFile(path) as archive:
             _require_bounded(path, archive)
@@ -125,6 +126,7 @@ def embedded_card(path: Path) -> str | None:
         The file is missing or no FMU.
     """
     refuse_device(Path(path))
+    refuse_folder(Path(path))
     try:
         with zipfile.ZipFile(path) as archive:
             _require_bounded(Path(path), archive)

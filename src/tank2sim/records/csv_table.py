@@ -1,7 +1,8 @@
 """Tables of numbers from CSV files, with comment lines, and rows of numbers as other laboratories write them.
 
-A table is one header line and rows of numbers, separated by commas; an empty cell is a value not recorded. Lines that
-begin with ``#`` are comments; ``# key: value`` with a single word before the colon can be looked up by its key.
+A table is one header line and rows of numbers, separated by commas; or by semicolons or tabs, with points or decimal
+commas; or the first sheet of a spreadsheet. An empty cell is a value not recorded. Lines that begin with ``#`` are
+comments; ``# key: value`` with a single word before the colon can be looked up by its key.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.files import read_bytes, read_text
+from tank2sim.records.workbook import is_workbook, workbook_text
 from tank2sim.units import to_si
 
 if TYPE_CHECKING:
@@ -32,6 +34,7 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _OF_NUMBERS = b"0123456789eE+-., \t\n"
 _BLOCK = 1 << 22
 """Characters of a file that are read at once: memory then goes with its numbers, not with its text."""
+_FIRST_ROW = re.compile(r"^[^\S\n]*[^\s#].*$", re.MULTILINE)
 _EMPTY_CELL = re.compile(r"(?<![^,\n])(?=[,\n])", re.ASCII)
 _QUOTED_LENGTH = 30
 
@@ -232,18 +235,21 @@ def table_of_frame(frame: pd.DataFrame, name: str) -> CsvTable:
 def read_table(path: Path | str | CsvTable) -> CsvTable:
     """Read a CSV table of numbers; a table is returned unchanged.
 
-    A byte order mark, CRLF, blank lines, and spaces around names and numbers do not matter.
+    A byte order mark, CRLF, blank lines, and spaces around names and numbers do not matter. A header with semicolons or
+    tabs and no commas shows the separator; decimals may then have commas. Of a spreadsheet (``.xlsx``) the first sheet
+    is read, whose rows are the lines of messages.
 
     Raises
     ------
     InputError
         The file is missing or not UTF-8; there is no header, a column has no name or the name of another; there are
-        no rows; a row has too many or too few cells; a cell is not a finite number in digits and a decimal point.
+        no rows; a row has too many or too few cells; a cell is not a finite number in digits and a decimal sign; a
+        file has points and decimal commas.
     """
     if isinstance(path, CsvTable):
         return path
     path = Path(path)
-    text = read_text(path)
+    text = text_with_commas(path, _table_text(path))
     plain = _plain_table(path, text)
     if plain is not None:
         return plain
@@ -258,6 +264,42 @@ def read_table(path: Path | str | CsvTable) -> CsvTable:
     rows = [stripped[number - 1] for number in numbers[1:]]
     comments, remarks = _comments([line for line in stripped if line.startswith("#")])
     return replace(table_of_rows(path, names, rows, lines), comments=comments, remarks=remarks)
+
+
+def _table_text(path: Path) -> str:
+    """Text of a table, of a spreadsheet as comma-separated lines; raises as :func:`read_table`."""
+    try:
+        if path.is_file():
+            with path.open("rb") as file:
+                if is_workbook(file.read(4)):
+                    return workbook_text(path)
+    except OSError:
+        pass  # said by read_text
+    return read_text(path)
+
+
+def text_with_commas(path: Path, text: str) -> str:
+    """The text with commas between cells and points in numbers, if its header has semicolons or tabs instead.
+
+    Raises
+    ------
+    InputError
+        There are points in numbers, and decimal commas.
+    """
+    header = _FIRST_ROW.search(text)
+    separator = next((one for one in ";\t" if header and one in header[0]), None)
+    if header is None or separator is None or "," in header[0]:
+        return text
+    lines = text.split("\n")
+    body = [(n, line) for n, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
+    comma = any("," in line for _, line in body)
+    points = next((n for n, line in body[1:] if "." in line), None)
+    if comma and points is not None:
+        remedy = "write numbers with one decimal sign and nothing between thousands"
+        raise InputError(path, f"line {points + 1}", "has a point, and other numbers have decimal commas", remedy)
+    for number, line in body:
+        lines[number] = (line.replace(",", ".") if comma else line).replace(separator, ",")
+    return "\n".join(lines)
 
 
 def _plain_table(path: Path, text: str) -> CsvTable | None:
@@ -310,9 +352,6 @@ def _header(path: Path, number: int, line: str) -> list[str]:
     if any(_number(name) is not None for name in names):
         problem = "there is no header: the first line has numbers"
         raise InputError(path, place, problem, "put a line of column names above it, such as t_s,u_mps")
-    if len(names) == 1 and (";" in line or "\t" in line):
-        problem = "the columns are not separated by commas"
-        raise InputError(path, place, problem, "save the file with commas between columns and points in numbers")
     for position, name in enumerate(names, start=1):
         if not name:
             raise InputError(path, place, f"column {position} has no name", "name it or delete it")

@@ -14,6 +14,7 @@ from tank2sim.records.esso_osaka import ESSO_OSAKA
 from tank2sim.records.simman import SIMMAN
 from tank2sim.records.trial_csv import TRIAL_CSV, read_trial_csv
 from tank2sim.records.trials import Trial, TrialReader, fault_of
+from tank2sim.records.workbook import is_workbook, workbook_text
 
 HEAD_BYTES = 4096
 """Bytes of a file that are read to decide whether it is a trial."""
@@ -33,6 +34,8 @@ def reader_of(path: Path) -> TrialReader:
         The file is missing or unreadable, or the reader of a package fails.
     """
     text = read_bytes_as_text(path)
+    if is_workbook(text[:4].encode("latin-1")):
+        text = workbook_text(path)
     for reader in READERS.values():
         if _recognises(reader, text):
             return reader
@@ -95,6 +98,11 @@ def looks_like_a_trial(path: Path) -> bool:
         return False
     with path.open("rb") as file:
         text = file.read(HEAD_BYTES).decode("latin-1")
+    if is_workbook(text[:4].encode("latin-1")):
+        try:
+            text = workbook_text(path)
+        except InputError:
+            return False
     return any(_recognises(reader, text) for reader in READERS.values())
 
 

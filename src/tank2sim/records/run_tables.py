@@ -1,4 +1,4 @@
-"""Tables of captive runs in the files of any tank: text of any layout, MATLAB, HDF5, TDMS, with a map of columns.
+"""Tables of captive runs in the files of any tank: text of any layout, spreadsheets, MATLAB, HDF5, TDMS.
 
 MATLAB files, HDF5 and TDMS need the extra ``tank2sim[tank]``.
 """
@@ -18,11 +18,12 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError, close_name
-from tank2sim.files import read_bytes
+from tank2sim.files import read_bytes, refuse_folder
 from tank2sim.records.campaign_form import ColumnEntry, FilesSection
 from tank2sim.records.csv_table import LARGEST, CsvTable, read_table, table_of_rows
 from tank2sim.records.spelt_units import unit_factor
 from tank2sim.records.text_layout import WHITESPACE, cells_of, decoded_text, text_layout
+from tank2sim.records.workbook import is_workbook, workbook_text
 from tank2sim.units import to_si
 
 RUN_QUANTITIES = {
@@ -90,6 +91,9 @@ def read_run_table(path: Path, columns: Mapping[str, ColumnEntry | str], files: 
 
 def _is_plain(path: Path) -> bool:
     """True for the CSV that needs no map; also for a file that :func:`read_table` explains best."""
+    with path.open("rb") as beginning:
+        if is_workbook(beginning.read(4)):
+            return False
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         head = next((line for line in file if line.strip() and not line.lstrip().startswith("#")), "")
     names = [name.strip() for name in head.split(",")]
@@ -106,7 +110,8 @@ def _table_of_arrays(path: Path, raw: Sequence[RawColumn]) -> CsvTable:
 
 def _text_table(path: Path, files: FilesSection) -> tuple[CsvTable, dict[str, str]]:
     """Columns by their names in the file, and the units of its row of units."""
-    text = decoded_text(read_bytes(path))[0]
+    data = read_bytes(path)
+    text = workbook_text(path) if is_workbook(data) else decoded_text(data)[0]
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     lines = [*[""] * min(files.skip_lines, len(lines)), *lines[files.skip_lines :]]
     separator = _SEPARATORS.get(files.separator or "", files.separator or "")
@@ -319,6 +324,7 @@ def binary_columns(path: Path) -> list[RawColumn] | None:
     InputError
         The file is missing or broken, it has no columns, or the library for its format is not installed.
     """
+    refuse_folder(path)
     try:
         with path.open("rb") as file:
             head = file.read(_FIRST_BYTES)

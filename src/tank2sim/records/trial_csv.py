@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from pathlib import Path
 
 import numpy as np
@@ -42,8 +43,7 @@ def read_trial_csv(path: Path | str | CsvTable) -> Trial:
         raise InputError(table.path, table.place(int(empty[0]), "t_s"), "is empty", "give each row its time")
     signals = {name: values for name, values in table.columns.items() if name in TRIAL_SIGNALS}
     omitted = [name for name in table.columns if name != "t_s" and name not in TRIAL_SIGNALS]
-    for name in omitted:
-        _refuse_slip(table, name)
+    _refuse_slips(table, omitted)
     _check_content(table, signals)
     notices = []
     if omitted:
@@ -70,15 +70,26 @@ def _origin(table: CsvTable) -> tuple[float, float] | None:
     return (latitude, longitude) if abs(latitude) <= 90 and abs(longitude) <= 360 else None
 
 
-def _refuse_slip(table: CsvTable, name: str) -> None:
-    """Refuse what looks like a signal of the format misspelt or with a unit that it cannot have."""
+def _refuse_slips(table: CsvTable, names: list[str]) -> None:
+    """Refuse columns that look like signals misspelt or with a unit that they cannot have, all in one message."""
+    near = {name: SignalName(signal).file for name in names if (signal := _meant(name)) is not None}
+    if not near:
+        return
+    if len(near) == 1:
+        ((name, right),) = near.items()
+        remedy = f"call it as {right} (or with another unit of that kind), or delete the column"
+        raise InputError(table.path, f"column {table.heading(name)}", "is not a signal of a trial", remedy)
+    columns = ", ".join(table.heading(name) for name in near)
+    remedy = "call them as " + ", ".join(near.values()) + " (or with other units of that kind), or delete the columns"
+    raise InputError(table.path, f"columns {columns}", "are not signals of a trial", remedy)
+
+
+def _meant(name: str) -> str | None:
+    """The signal that the name of a column resembles, if any."""
     stem = name.rpartition("_")[0] or name
     stems = {signal: signal.rpartition("_")[0] for signal in TRIAL_SIGNALS}
     same = [signal for known in (name, stem) for signal in TRIAL_SIGNALS if stems[signal] == known]
-    near = same or difflib.get_close_matches(name, TRIAL_SIGNALS, n=1, cutoff=0.85)
-    if near:
-        remedy = f"call it as {SignalName(near[0]).file} (or with another unit of that kind), or delete the column"
-        raise InputError(table.path, f"column {table.heading(name)}", "is not a signal of a trial", remedy)
+    return next(iter(same or difflib.get_close_matches(name, TRIAL_SIGNALS, n=1, cutoff=0.85)), None)
 
 
 def _check_content(table: CsvTable, signals: dict[str, Array]) -> None:
@@ -133,13 +144,13 @@ def _has_time_column(text: str) -> bool:
     """Whether the first line that is not a comment names a column ``t_s``."""
     lines = text.removeprefix("\xef\xbb\xbf").splitlines()
     header = next((line for line in lines if line.strip() and not line.startswith("#")), "")
-    return "t_s" in (name.strip() for name in header.split(","))
+    return "t_s" in (name.strip(' "\r') for name in re.split("[,;\t]", header))
 
 
 TRIAL_CSV = TrialReader(
     name="trial_csv",
-    description="CSV whose column names have the units",
-    suffixes=(".csv",),
+    description="CSV whose column names have the units, or a spreadsheet with such a first sheet",
+    suffixes=(".csv", ".xlsx"),
     recognises=_has_time_column,
     read=read_trial_csv,
 )

@@ -190,7 +190,10 @@ class ManoeuvreResult(Result[ManoeuvreStudy]):
         width = study.figures.get("loop_width_deg")
         if study.kind == "spiral" and isinstance(width, float):
             if width > 0:
-                return ("Within the loop the ship keeps turning to its side: it is unstable on a straight course.",)
+                return (
+                    "Within the loop the ship keeps turning to its side: it is unstable on a straight course.",
+                    "Its width is read between the rudder angles of the spiral; that of stability is exact.",
+                )
             return ("The curve has no loop: at each rudder angle the ship has one steady turn.",)
         shown = [
             f"{each.label.lower()} {format_number(float(each.value), 3)} {each.unit}".strip() for each in figures[:3]

@@ -111,7 +111,7 @@ def _figures(chosen: TowIdentification, misses: list[dict[str, float]], reports:
             label="Vehicle's mass with added mass",
             value=f"{fit.estimates['total_mass_kg']:.0f} ± {fit.standard_errors['total_mass_kg']:.0f}",
             unit="kg",
-            note="from five tows, one standard error",
+            note="from five tows, without a start delay; ± one standard error",
         ),
         KeyFigure(
             label="FMU against the tows",

@@ -99,6 +99,9 @@ def read_log(path: Path | str) -> VesselLog:
     """
     path = Path(path)
     if path.is_dir():
+        if not (path / "metadata.yaml").is_file():
+            problem = "is a folder, and neither a log nor a bag of ROS 2 (no metadata.yaml)"
+            raise InputError(path, "", problem, "give the log in it")
         return read_ros_bag(path)
     try:
         with path.open("rb") as file:

@@ -17,11 +17,12 @@ from tank2sim.files import BYTE_ORDER_MARK, read_exact_text
 from tank2sim.gap.outcome.improve_card import Found, in_short
 from tank2sim.notices import Notice, caution
 from tank2sim.records.audit import repair_trial
-from tank2sim.records.csv_table import read_table
+from tank2sim.records.csv_table import read_table, text_with_commas
 from tank2sim.records.reading import read_trial_file, reader_of
 from tank2sim.records.signals.writing import trial_text
 from tank2sim.records.trial_csv import TRIAL_CSV
 from tank2sim.records.trials import RUDDERS, Trial
+from tank2sim.records.workbook import is_workbook
 from tank2sim.units import from_si
 
 DIGITS_OF_A_CORRECTION = 2
@@ -126,10 +127,12 @@ def _equal_signal(first: Trial, second: Trial, name: str) -> bool:
 
 
 def _sheet(path: Path) -> str | None:
-    """Text of a trial CSV; None if it is another format, or has quoted cells."""
-    if reader_of(path) is not TRIAL_CSV or b'"' in path.read_bytes():
+    """Text of a trial CSV; None if it is another format, or has quoted cells or no commas between them."""
+    data = path.read_bytes()
+    if reader_of(path) is not TRIAL_CSV or b'"' in data or is_workbook(data):
         return None
-    return read_exact_text(path)
+    text = read_exact_text(path)
+    return text if text_with_commas(path, text) == text else None
 
 
 @dataclass(frozen=True, eq=False)

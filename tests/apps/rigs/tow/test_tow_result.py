@@ -45,7 +45,7 @@ def test_the_paper_stands_next_to_what_its_tows_give(result):
 
 
 def test_estimates_stand_by_method_with_their_errors(result):
-    estimates = table_rows(result, "Estimates by method")
+    estimates = table_rows(result, "Estimates by method, ± one standard error")
     fit = result.study.methods["output_error"]
     mass, error = (float(text) for text in estimates["M (kg)"][3].split(" ± "))
     assert mass == pytest.approx(fit.estimates["total_mass_kg"], abs=0.05)

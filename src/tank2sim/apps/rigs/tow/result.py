@@ -222,7 +222,7 @@ class TowResult(Result[TowStudy]):
         ):
             rows.append([words, *(f"{getattr(fit, field):.4g}" for fit in fits)])
         heads = ("", *(_METHODS[method] for method in self.study.methods))
-        tables = [table("Estimates by method", heads, rows), self._polynomials()]
+        tables = [table("Estimates by method, ± one standard error", heads, rows), self._polynomials()]
         return Section(heading="Estimates by method", text=_ESTIMATES, tables=tables)
 
     def _polynomials(self) -> Table:
