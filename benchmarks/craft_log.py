@@ -333,7 +333,10 @@ def shared_craft(folder: Path) -> None:
         print(
             f"usv_22/{name}:", ", ".join(f"{key} {error:+.1f}" for key, error in errors.items()), "standard errors off"
         )
-        print(f"usv_22/{name}: R^2 of u, v, r:", ", ".join(f"{value:.3f}" for value in r_squared(pairs)), flush=True)
+        predicted, true = np.concatenate(pairs, axis=1)
+        rms, spread = np.sqrt(((predicted - true) ** 2).mean(axis=0)), true.std(axis=0)
+        words = ", ".join(f"{one:.4f} of {all_of_it:.4f}" for one, all_of_it in zip(rms, spread, strict=True))
+        print(f"usv_22/{name}: rms errors of u, v, r (m/s, m/s, rad/s) and spread of the motion:", words, flush=True)
 
 
 def trials(log: Path, folder: Path) -> list[Path]:
