@@ -6,6 +6,7 @@ from tank2sim.cards import SteeredBy
 from tank2sim.identification.craft.fit import CoefficientVerdict
 from tank2sim.identification.craft.next_trial import CandidateTrial
 from tank2sim.identification.craft.study import (
+    CompassDeviation,
     CraftCoefficient,
     CraftIdentificationStudy,
     PredictionStudy,
@@ -51,6 +52,7 @@ IDENTIFIED = CraftIdentificationStudy(
             turning_rpm=90.0,
         )
     },
+    compass=CompassDeviation(a_deg=-1.0, a_error_deg=0.5, b_deg=4.0, b_error_deg=0.5, c_deg=0.2, c_error_deg=0.5),
     held_out=("zigzag",),
     next_trials=(CandidateTrial("going astern", (0.0, 20.0), (-0.4, 0.4), (-0.4, 0.4), ("port.astern",)),),
     notices=(Notice("a notice"),),
@@ -92,8 +94,9 @@ VALIDATED = ValidationStudy(
 
 def test_coefficients_have_their_verdicts_and_the_next_trial_is_named() -> None:
     result = CraftIdentificationResult(IDENTIFIED)
-    coefficients, following, responses = (table.df for table in result.tables)
+    coefficients, following, responses, compass = (table.df for table in result.tables)
     assert coefficients["verdict"].to_list() == ["identified", "not determined"]
+    assert compass["b (deg)"].to_list() == [4.0]
     assert following["would determine"].to_list() == ["port.astern"]
     assert responses["turned at (rpm)"].to_list() == [90.0]
     assert "2 trials determine 1 of 2 coefficients" in result.headline[0] and "going astern" in result.headline[2]
