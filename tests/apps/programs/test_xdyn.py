@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
+from tank2sim.apps.programs import xdyn
 from tank2sim.apps.programs.program_files import ProgramFiles
 from tank2sim.apps.programs.xdyn import ship_text, xdyn_files
 from tank2sim.apps.programs.xdyn_body import written_body
@@ -58,6 +59,13 @@ def made(name: str) -> ProgramFiles:
     return xdyn_files(read_card(name))
 
 
+@pytest.fixture
+def figures_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files without the table of figures, which simulates every standard manoeuvre twice."""
+    for name in ("figure_changes", "craft_changes"):
+        monkeypatch.setattr(xdyn, name, lambda *_: ())
+
+
 def assert_same_motion(evaluator: ModuleType, text: str, model: Model, count: int = 1000) -> None:
     assert motion_difference(evaluator, text, model, count) < 1e-12
 
@@ -80,6 +88,7 @@ def skew() -> Card:
 
 
 @first_fast("kind", ["abkowitz", "linear"])
+@pytest.mark.usefixtures("figures_left_out")
 def test_unsymmetric_added_masses_and_a_forward_centre_of_gravity_are_not_lost(
     kind: str, evaluator: ModuleType
 ) -> None:
@@ -130,6 +139,7 @@ azimuth_time_constant_s = 0.4
 """
 
 
+@pytest.mark.usefixtures("figures_left_out")
 def test_a_craft_with_one_outboard_has_a_straight_run_and_its_lags_in_the_table(evaluator: ModuleType) -> None:
     text = t2s.load("otter").card.text
     card = parse_card(text[: text.index("[[thrusters]]")] + OUTBOARD + text[text.index("[[effects]]") :], "craft.toml")
@@ -142,6 +152,7 @@ def test_a_craft_with_one_outboard_has_a_straight_run_and_its_lags_in_the_table(
     assert found["thrusters_stern_azimuth"][1] == pytest.approx(0)
 
 
+@pytest.mark.usefixtures("figures_left_out")
 def test_the_turn_has_the_largest_angle_of_the_gear() -> None:
     card = t2s.load("mariner").replace({"steering_gear.max_angle_deg": 25.0}).card
     text = str(xdyn_files(card).files["turn_commands.yml"])
@@ -271,6 +282,7 @@ CASES = [("skew", "turn"), ("skew", "zigzag"), ("kvlcc2-mmg", "turn"), ("kvlcc2-
 
 
 @first_fast(("name", "manoeuvre"), [*CASES, ("otter", "turn")])
+@pytest.mark.usefixtures("figures_left_out")
 def test_manoeuvres_of_ten_minutes_end_where_the_model_does(
     name: str, manoeuvre: str, evaluator: ModuleType, tmp_path: Path
 ) -> None:
