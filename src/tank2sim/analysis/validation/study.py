@@ -398,5 +398,5 @@ def _with_another_lag(what: Recorded, generator: np.random.Generator) -> Recorde
     """A recorded zigzag with a lag drawn within its standard error; a turn as it is."""
     if isinstance(what.manoeuvre, Turn):
         return what
-    lag = max(0.0, what.manoeuvre.lag_s + what.errors["lag_s"] * generator.standard_normal())
+    lag = max(0.0, what.manoeuvre.lag_s + what.errors.get("lag_s", 0.0) * generator.standard_normal())
     return replace(what, manoeuvre=replace(what.manoeuvre, lag_s=lag))
