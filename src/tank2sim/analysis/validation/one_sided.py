@@ -1,4 +1,4 @@
-"""Figures whose errors are on one side in so many trials that chance is no explanation: the sign test.
+"""Errors of a figure that are on one side in more trials than by chance: the sign test.
 
 A figure is validated where its error hides in its uncertainty, and a model that errs to the same side in every trial
 passes each comparison. Without such an error either sign is as probable in each trial, and the number k of the rarer
