@@ -61,6 +61,28 @@ def test_a_log_without_orders_says_nothing_of_the_gear(tmp_path) -> None:
     assert voyage(tmp_path, order=False) is None
 
 
+def test_an_order_that_was_recorded_at_another_time_says_nothing_of_the_gear(tmp_path) -> None:
+    """The order ends before the angle begins: nothing is simulated, and nothing fails."""
+    time = np.arange(0.0, 200.0, 0.2)
+    lines = ["time_s,rudder_order_deg,rudder_angle_deg,heading_deg"]
+    for each in time:
+        angle = f"{10 * math.sin(each / 5):.3f}"
+        early, late = (angle, "") if each < 90 else ("", angle)
+        lines.append(f"{each:.1f},{early},{late},90.{int(each) % 7}")
+    path = tmp_path / "apart.csv"
+    path.write_text("\n".join(lines) + "\n")
+    assert t2s.log(path).study.gear is None
+
+
+def test_a_rudder_that_does_not_follow_the_order_has_no_gear(tmp_path) -> None:
+    time = np.arange(0.0, 200.0, 0.2)
+    columns = (time, 10 * np.sign(np.sin(time / 4)), 12 * np.sin(time / 2.7 + 1), 90 + 0.01 * np.cos(time))
+    rows = [",".join(f"{value:.4f}" for value in row) for row in zip(*columns, strict=True)]
+    path = tmp_path / "other.csv"
+    path.write_text("\n".join(["time_s,rudder_order_deg,rudder_angle_deg,heading_deg", *rows]) + "\n")
+    assert t2s.log(path).study.gear is None
+
+
 def test_the_gear_of_a_boat_at_the_dock_is_found_though_no_turn_confirms_its_rudder(data: Path) -> None:
     """Commissioning of an autopilot: swept by hand to -38 and +35 deg, then steered by orders of 6 deg."""
     result = t2s.log(data / "data/canboat_n2k/ac42-commissioning.raw")

@@ -144,8 +144,11 @@ def logged_gear(voyage: Voyage) -> LoggedGear | None:
     (angle_name, time_s, angle), (order_name, order_s, order) = of_angle, of_order
     begin, end = _busiest(max(time_s[0], order_s[0]), min(time_s[-1], order_s[-1]), order_s, order)
     inside = (time_s >= begin) & (time_s <= end)
-    moves = _moves(order[(order_s >= begin) & (order_s <= end)])
-    if np.count_nonzero(inside) < 10 * _BLOCKS or moves < _FEWEST_MOVES:
+    asked = order[(order_s >= begin) & (order_s <= end)]
+    if np.count_nonzero(inside) < 10 * _BLOCKS or len(asked) < _FEWEST_MOVES:
+        return None
+    moves = _moves(asked)
+    if moves < _FEWEST_MOVES:
         return None
     record = _Record(time_s[inside], angle[inside], order_s, order)
     blocks = np.array_split(np.arange(np.count_nonzero(inside)), _BLOCKS)
@@ -193,10 +196,13 @@ def _rudder(voyage: Voyage, quantity: str) -> tuple[str, Array, Array] | None:
     chosen: LogChannel | None = next((channel for channel in channels if channel.stream in streams), None)
     if chosen is None or (not chosen.use and not streams[chosen.stream].quantity):
         return None
-    stream = streams[chosen.stream]
-    values = chosen.si(stream.values)
-    good = np.isfinite(stream.time_s) & np.isfinite(values)
-    time_s, first = np.unique(stream.time_s[good], return_index=True)
+    if chosen.use and quantity in voyage.series:
+        time_s, values = voyage.series[quantity].time_s, voyage.series[quantity].values
+    else:
+        stream = streams[chosen.stream]
+        time_s, values = stream.time_s - chosen.delay_s, chosen.si(stream.values)
+    good = np.isfinite(time_s) & (np.abs(values) < math.pi)  # nan is not
+    time_s, first = np.unique(time_s[good], return_index=True)
     return (chosen.stream, time_s, values[good][first]) if len(time_s) > 1 else None
 
 
