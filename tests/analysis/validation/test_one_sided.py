@@ -44,9 +44,21 @@ def test_one_to_the_other_side_of_nine_is_nine_and_one_of_five_hundred_and_twelv
 
 def test_few_trials_say_nothing_and_do_not_weaken_the_figures_of_many() -> None:
     assert one_sided_errors(figures(TIME, [-1.0] * 5), FAMILIES) == ()  # 2/32
-    many = [*figures(TIME, [-1.0] * 6), *(each for name in (FIRST, SECOND) for each in figures(name, [1.0, -1.0]))]
+    many = [
+        *figures(TIME, [-1.0] * 6),
+        *(each for name in (FIRST, SECOND) for each in figures(name, [1.0, -1.0] * 2 + [1.0])),
+    ]
     (found,) = one_sided_errors(many, FAMILIES)
-    assert found.probability == pytest.approx(2 / 64)
+    assert found.probability == pytest.approx(2 / 64)  # five trials can never be significant
+
+
+def test_the_second_figure_is_corrected_for_one_figure_less() -> None:
+    """Holm: the smallest of two probabilities counts twice, the other once, and not less than the first."""
+    both = [*figures(TIME, [-1.0] * 9), *figures(FIRST, [2.0] * 8)]
+    first, second = one_sided_errors(both, FAMILIES)
+    assert (first.name, second.name) == (TIME, FIRST) and second.mean_error > 0
+    assert first.probability == pytest.approx(2 * 2 / 512)
+    assert second.probability == pytest.approx(2 / 256)
 
 
 def test_a_figure_that_no_simulation_reached_is_left_out() -> None:
