@@ -53,7 +53,6 @@ IDENTIFIED = CraftIdentificationStudy(
             turning_rpm=90.0,
         )
     },
-    compass=CompassDeviation(a_deg=-1.0, a_error_deg=0.5, b_deg=4.0, b_error_deg=0.5, c_deg=0.2, c_error_deg=0.5),
     held_out=("zigzag",),
     next_trials=(CandidateTrial("going astern", (0.0, 20.0), (-0.4, 0.4), (-0.4, 0.4), ("port.astern",)),),
     notices=(Notice("a notice"),),
@@ -97,7 +96,6 @@ def test_coefficients_have_their_verdicts_and_the_next_trial_is_named() -> None:
     result = CraftIdentificationResult(IDENTIFIED)
     coefficients, following, responses, compass = (table.df for table in result.tables)
     assert coefficients["verdict"].to_list() == ["identified", "not determined"]
-    assert compass["b (deg)"].to_list() == [4.0]
     assert following["would determine"].to_list() == ["port.astern"]
     assert responses["turned at (rpm)"].to_list() == [90.0]
     assert compass.iloc[0].to_list() == [0.1, 0.5, 6.0, 1.0, 0.3, 1.1]
