@@ -5,9 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from statsmodels.regression.linear_model import OLS
 
 from tank2sim.records.audit import audit_and_repair, audit_trial, record_noise, repair_trial
 from tank2sim.records.audit.rudder import rudder_clock_findings, rudder_response
+from tank2sim.records.audit.weak import fit
 from tank2sim.records.reading import read_trial_file
 from tank2sim.records.trials import select_rows
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
@@ -611,3 +613,16 @@ def test_another_motion_is_found_behind_a_rounded_heading(heading):
     signals = {"psi_rad": three_digits(psi) * DEG, "r_radps": other * DEG, "delta_rad": 0.1 * np.sign(other)}
     found = audit_trial(trial({"t_s": t, **signals}, noise={"r_radps": 0.005 * DEG}))
     assert [one for one in found if "same motion" in one.what and one.kind == "fault"]
+
+
+def test_errors_of_a_regression_are_those_of_newey_and_west():
+    """As statsmodels has them, of residuals that are moving averages."""
+    rng = np.random.default_rng(1)
+    design = rng.normal(size=(80, 3))
+    target = design @ [1.0, -2.0, 0.5] + np.convolve(rng.normal(size=85), np.ones(6) / 3, "valid")
+    found = fit(target, list(design.T))
+    plain = OLS(target, design, hasconst=False).fit()
+    robust = plain.get_robustcov_results(cov_type="HAC", maxlags=4, use_correction=True)
+    assert found is not None
+    assert found.values == pytest.approx(plain.params, rel=1e-9)
+    assert found.errors == pytest.approx(np.maximum(plain.bse, robust.bse), rel=1e-9)

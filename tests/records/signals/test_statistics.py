@@ -1,6 +1,9 @@
+import sys
+
 import numpy as np
 import pytest
 
+from tank2sim.errors import InputError
 from tank2sim.records.signals.statistics import (
     Stationary,
     autocorrelation,
@@ -106,3 +109,11 @@ def test_directions_have_mean_and_deviation_on_the_circle():
     assert np.degrees(found.mean_of_halves) == pytest.approx((340.0, 340.0), abs=2.0)
     assert found.variance_of_halves == pytest.approx((0.16, 0.16), rel=0.1)
     assert mean_and_deviation("psi_rad", np.full(60, 2 * np.pi))[0] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_without_the_extra_the_tests_are_refused_by_its_name(monkeypatch):
+    monkeypatch.setitem(sys.modules, "statsmodels.tsa.stattools", None)
+    one = series(first_order(1, 5.0))
+    with pytest.raises(InputError) as refused:
+        stationarity(one, autocorrelation(one))
+    assert "tank2sim[signals]" in refused.value.remedy

@@ -163,8 +163,6 @@ def fit(target: Array | Complex, regressors: Sequence[Array | Complex]) -> WeakF
     with residuals correlated over four half-overlapping windows, so that they hold for coloured noise, or the
     ordinary ones where these are larger: where few windows decide (the entry of a turn), the former are too small.
     """
-    from statsmodels.regression.linear_model import OLS  # here, for it takes half a second to import
-
     table = np.column_stack(regressors)
     whole = np.isfinite(target) & np.isfinite(table).all(axis=1)
     if np.count_nonzero(whole) < 2 * FEWEST_WINDOWS:
@@ -175,7 +173,7 @@ def fit(target: Array | Complex, regressors: Sequence[Array | Complex]) -> WeakF
         design = np.stack([both.real, both.imag], axis=1).reshape(-1, both.shape[1])
         wanted = np.stack([wanted.real, wanted.imag], axis=1).ravel()
     else:
-        design = table.real
+        design, wanted = table.real, np.real(wanted)
     independent = int(np.count_nonzero(whole)) / 2
     freedom = independent - design.shape[1]
     size = np.sqrt(np.mean(design**2, axis=0)) if len(design) else np.zeros(1)
@@ -185,12 +183,23 @@ def fit(target: Array | Complex, regressors: Sequence[Array | Complex]) -> WeakF
     if np.linalg.matrix_rank(design) < design.shape[1]:
         return None
     lags = 4 * (len(wanted) // int(np.count_nonzero(whole)))
-    # No figure used here depends on a constant among the regressors, and looking for one takes two decompositions.
-    result = OLS(wanted, design, hasconst=False).fit()
-    robust = result.get_robustcov_results(cov_type="HAC", maxlags=lags, use_correction=True)
-    residual = float(np.sqrt(np.mean(np.asarray(result.resid) ** 2)))
-    errors = np.maximum(np.asarray(result.bse), np.asarray(robust.bse))
-    return WeakFit(np.asarray(result.params) / size, errors / size, residual, freedom)
+    values = np.linalg.lstsq(design, wanted, rcond=None)[0]
+    residual = wanted - design @ values
+    inverse = np.linalg.inv(design.T @ design)
+    rows, terms = design.shape
+    plain = inverse * (residual @ residual) / (rows - terms)
+    robust = inverse @ _newey_west(design * residual[:, None], lags) @ inverse * rows / (rows - terms)
+    errors = np.sqrt(np.maximum(np.diag(plain), np.diag(robust)))
+    return WeakFit(values / size, errors / size, float(np.sqrt(np.mean(residual**2))), freedom)
+
+
+def _newey_west(scores: Array, lags: int) -> Array:
+    """Covariance of the sum of scores (n, k) that are correlated over some rows (statsmodels takes 65 MB for it)."""
+    found = scores.T @ scores
+    for lag in range(1, min(lags, len(scores) - 1) + 1):
+        product = scores[lag:].T @ scores[:-lag]
+        found += (1 - lag / (lags + 1)) * (product + product.T)
+    return np.asarray(found)
 
 
 def on_uniform_time(trial: Trial) -> tuple[float, dict[str, Array]]:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 from scipy import signal, stats
 
 from tank2sim.arrays import Array, Number
+from tank2sim.errors import InputError
 from tank2sim.records.signals.columns import DIRECTION_COLUMNS
 from tank2sim.records.signals.sampling import Series, at_common_times
 
@@ -193,8 +197,7 @@ def stationarity(series: Series, correlation: Autocorrelation) -> Stationarity:
 
 def normality(series: Series, correlation: Autocorrelation) -> Normality:
     """Tests of D'Agostino-Pearson, Jarque-Bera, Shapiro-Wilk and Anderson-Darling on independent samples."""
-    from statsmodels.stats.diagnostic import normal_ad
-
+    normal_ad = _of_statsmodels("stats.diagnostic", "normal_ad")
     values = series.values
     apart = max(1, round(len(values) / correlation.effective_count))
     thinned = values[::apart]
@@ -226,10 +229,18 @@ def probability_density(series: Series) -> Density:
     return Density(across, stats.gaussian_kde(values)(across), stats.norm.pdf(across, mean, spread))
 
 
-def _unit_root_tests(values: Array, about: str) -> UnitRootTests:
-    # Loaded where it is used: it takes more than a second.
-    from statsmodels.tsa.stattools import adfuller, kpss
+def _of_statsmodels(module: str, name: str) -> Callable[..., Any]:
+    """A test of the extra ``tank2sim[signals]``, loaded where it is used: it takes more than a second."""
+    try:
+        found: Callable[..., Any] = getattr(import_module(f"statsmodels.{module}"), name)
+    except ImportError:
+        remedy = "install it with: pip install 'tank2sim[signals]'"
+        raise InputError("signals", "", "needs statsmodels, which is not installed", remedy) from None
+    return found
 
+
+def _unit_root_tests(values: Array, about: str) -> UnitRootTests:
+    adfuller, kpss = _of_statsmodels("tsa.stattools", "adfuller"), _of_statsmodels("tsa.stattools", "kpss")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # p-values beyond the table of KPSS, as Stationarity states
         return UnitRootTests(float(adfuller(values, regression=about)[1]), float(kpss(values, regression=about)[1]))
