@@ -30,6 +30,7 @@ from tank2sim.apps.programs.polynomial_fit import FigureChange
 from tank2sim.apps.programs.program_files import ProgramFiles
 from tank2sim.cards.card import Card, MmgCard, SteeredCard
 from tank2sim.dynamics.build import build
+from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.effects.fields import CURRENT_FIELD, WIND_FIELD
 from tank2sim.dynamics.effects.harbour import BOW_THRUSTER, STERN_THRUSTER
 from tank2sim.dynamics.effects.surroundings import CURRENT, WAVE_DRIFT, WIND, in_calm
@@ -251,7 +252,7 @@ def _losses_of_ship(model: Model) -> list[str]:
 
 def _losses_of_all(card: SteeredCard) -> list[str]:
     """What Bridge Command does not have of any vessel."""
-    names = {effect.name for effect in card.effects}
+    names = {effect.name for effect in card.effects if EFFECTS[effect.name].acts_on != "sensor"}
     lost = sorted(names - {*_TUNNELS, *_WEATHER, TWIN_ORDERS.name})
     return [
         "levers are shares of the thrust and act at once; thrust does not change with speed",
