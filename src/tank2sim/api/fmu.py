@@ -110,9 +110,20 @@ def make_fmu_file(
         token=made.token,
         platforms=made.platforms,
         size_bytes=len(made.content),
-        notices=ship.model.notices,
+        notices=(*ship.model.notices, *(_renamed(output, made.model_identifier) if lean else ())),
     )
     return ExportResult(study, made, files, ship.card)
+
+
+def _renamed(output: Path, identifier: str) -> tuple[Notice, ...]:
+    """A notice to users of game engines where the file has a name that the model cannot have."""
+    if output.stem == identifier:
+        return ()
+    text = (
+        f"modelName is {identifier}, which differs from the name of the file: Unity and Unreal do not find such an FMU "
+        "(letters, digits and _, at most 60, a letter first)"
+    )
+    return (Notice(text),)
 
 
 @verb(
