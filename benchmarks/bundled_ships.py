@@ -6,6 +6,7 @@ wind where the card has wind. Trials marked as fitted are among those that the c
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 from dataclasses import dataclass
@@ -14,8 +15,11 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.dynamics import build
 from tank2sim.identification.trials.assessment.evaluation import FigureComparison, predicted_figures
 from tank2sim.identification.trials.problem.prepare_trials import measured
+from tank2sim.simulation.manoeuvres import Turn
+from tank2sim.simulation.run import simulate
 
 DATA = Path(os.environ.get("TANK2SIM_DATA", Path(__file__).resolve().parents[2] / "shared")) / "data"
 
@@ -40,6 +44,29 @@ COMPARISONS = (
 )
 
 
+MARIN_TO_STARBOARD = {"advance_m": 3.08, "transfer_m": 1.36, "tactical_diameter_m": 3.34}
+"""The other turn of MARIN at 35 deg, to starboard, in lengths: evaluated from its record of SIMMAN 2008, the advance
+from the rudder's first movement. The record is not among the trials."""
+
+MARIN_SPEED_MPS, MARIN_RPM = 8.01, 91.4
+"""Approach and revolutions of that turn at full scale."""
+
+
+def marin_to_starboard(ship: str) -> tuple[FigureComparison, ...]:
+    """Figures of that turn and of a bundled ship from the same speed and revolutions, m."""
+    card = read_card(ship)
+    assert isinstance(card, ManoeuvringCard)
+    model, length = build(card), card.ship.length_m
+    revolutions = {"propeller.speed": MARIN_RPM * math.pi / 30} if "propeller.speed" in model.input_names else {}
+    turn = Turn(math.radians(35))
+    found = simulate(model, turn, inputs=revolutions, parameters={"initial.u": MARIN_SPEED_MPS}).figures
+    simulated = {name: value if isinstance(value := found[name], float) else None for name in MARIN_TO_STARBOARD}
+    return tuple(
+        FigureComparison("MARIN, 35 deg to starboard", name, lengths * length, simulated[name])
+        for name, lengths in MARIN_TO_STARBOARD.items()
+    )
+
+
 def figures(comparison: Comparison) -> tuple[FigureComparison, ...]:
     """Measured figures and those of the bundled ship."""
     card = read_card(comparison.ship)
@@ -55,6 +82,8 @@ def main() -> int:
     for comparison in COMPARISONS:
         print(f"{comparison.ship}, {'fitted to' if comparison.fitted else 'not fitted to'} {comparison.pattern}")
         found = figures(comparison)
+        if comparison.pattern.startswith("kvlcc2_marin"):
+            found = (*found, *marin_to_starboard(comparison.ship))
         for figure in found:
             share = 100 * figure.error if figure.name.endswith("_m") else figure.error
             unit = "%" if figure.name.endswith("_m") else "deg"

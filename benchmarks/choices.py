@@ -53,7 +53,6 @@ COMMANDS = {
         " --effects current --effects wind --effects rudder_bias",
     ],
     "identification.captive": ["reduce campaign/campaign.toml"],
-    "identification.trials.methods.recursive": [f"{IDENTIFY} --method recursive"],
     "identification.trials.methods.kalman": [f"{IDENTIFY} --method kalman"],
     "identification.trials.methods.weak_form": [f"{IDENTIFY} --method equation_error"],
     "identification.trials.problem.measured_motion": [f"{IDENTIFY} --method equation_error"],

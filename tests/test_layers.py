@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from .conftest import ROOT
+from .sources import tree
 
 SOURCES = ROOT / "src"
 
@@ -45,10 +46,10 @@ def modules(sources: Path) -> dict[str, Path]:
     }
 
 
-def imported(tree: ast.AST, names: dict[str, Path]) -> set[str]:
+def imported(module: ast.AST, names: dict[str, Path]) -> set[str]:
     """The modules that a module imports, inside functions and for types, too."""
     found = set()
-    for node in ast.walk(tree):
+    for node in ast.walk(module):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -60,7 +61,7 @@ def imported(tree: ast.AST, names: dict[str, Path]) -> set[str]:
 
 def imports(sources: Path) -> dict[str, set[str]]:
     names = modules(sources)
-    return {name: imported(ast.parse(path.read_text("utf-8")), names) - {name} for name, path in names.items()}
+    return {name: imported(tree(path), names) - {name} for name, path in names.items()}
 
 
 def is_known(name: str, other: str) -> bool:

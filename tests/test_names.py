@@ -8,13 +8,14 @@ from collections import defaultdict
 from pathlib import Path
 
 from .conftest import ROOT
+from .sources import tree
 
 SOURCES = ROOT / "src" / "tank2sim"
 
 
 def public_names(path: Path) -> list[str]:
     names = []
-    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+    for node in tree(path).body:
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
             names.append(node.name)
         elif isinstance(node, ast.Assign):

@@ -38,7 +38,7 @@ def drawn(labels: list[tuple[str, list[Spot]]], lines: tuple[tuple[np.ndarray, n
     ],
 )
 def test_labels_of_manoeuvres_are_apart(ship: str, manoeuvre: str) -> None:
-    charts = t2s.load(ship).simulate(manoeuvre).charts()
+    charts = t2s.load(ship).simulate(manoeuvre)._charts()
     assert charts
     assert {name: found for name, chart in charts.items() if (found := faults(chart))} == {}
 
@@ -52,7 +52,7 @@ def test_every_figure_of_a_turn_is_on_its_chart() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", marked(name for name in RESULTS if name.split()[0] not in (*OWN_DOCUMENTS, "export")))
 def test_texts_of_every_result_are_apart(name: str, tmp_path) -> None:
-    charts = RESULTS[name](tmp_path).charts()
+    charts = RESULTS[name](tmp_path)._charts()
     assert {title: found for title, chart in charts.items() if (found := faults(chart))} == {}
 
 

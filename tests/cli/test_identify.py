@@ -100,7 +100,7 @@ def test_a_trial_of_a_model_identifies_the_ship(folder: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", ["equation_error", pytest.param("recursive", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("method", ["equation_error"])
 def test_other_methods_answer_the_same_question(folder: Path, method: str) -> None:
     result = tank2sim("identify", "off.toml", *FITTED[::2], "--method", method, "--json", f"{method}.json", cwd=folder)
     assert result.returncode == 0, result.stderr

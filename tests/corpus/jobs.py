@@ -50,7 +50,6 @@ RECIPES: dict[str, list[Recipe]] = {
     ],
     "identify": [
         (["card.toml", "zigzag.csv", *FAST, "equation_error", "-o", "out.toml"], ["card.toml", "zigzag.csv"]),
-        (["card.toml", "zigzag.csv", *FAST, "recursive"], ["zigzag.csv"]),
         (["card.toml", "zigzag.csv", "turn.csv", *FAST, "output_error", "-o", "out.toml"], ["turn.csv"]),
         (["card.toml", "zigzag.csv", *FAST, "equation_error", "--holdout", "turn.csv"], ["turn.csv"]),
         (["craft.toml", "craft.csv", "-o", "out.toml", "--json", "out.json"], ["craft.csv", "craft.toml"]),

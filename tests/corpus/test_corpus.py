@@ -80,7 +80,7 @@ def test_the_corpus_has_3000_jobs_and_they_are_the_same_again(crew: Crew) -> Non
     ]
 
 
-LENGTHY = ("autopilot", "design", "influence")
+LENGTHY = ("autopilot", "design", "glide", "influence")
 
 
 @pytest.mark.parametrize(

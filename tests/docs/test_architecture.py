@@ -12,6 +12,7 @@ from types import ModuleType
 import pytest
 
 from tests.conftest import ROOT
+from tests.sources import tree
 
 from .examples import MANUAL
 
@@ -61,7 +62,7 @@ def test_the_modules_that_the_page_names_are_there() -> None:
             path = ROOT.joinpath("src", "tank2sim", *parts[:length])
             file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
             if file.is_file():
-                names = {getattr(node, "name", None) for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))}
+                names = {getattr(node, "name", None) for node in ast.walk(tree(file))}
                 rest = parts[length:]
                 found.append(name if not rest or rest[0] in names or rest[0].isupper() else None)
                 break

@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import ROOT
+from tests.sources import tree
 
 from .examples import MANUAL
 
@@ -24,11 +25,6 @@ _UNIT = re.compile(
 )
 _DOCUMENTED = re.compile(r'^class (\w+)(?:\([^)]*\))?:.*\n    r?"""', re.MULTILINE)
 Function = ast.FunctionDef | ast.AsyncFunctionDef
-
-
-@cache
-def tree(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 @cache

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
+import sys
 import zipfile
 from collections.abc import Callable
 from dataclasses import asdict, replace
@@ -370,3 +372,9 @@ def test_the_exact_solution_is_that_of_another_integrator(models: dict[str, Mode
     np.testing.assert_allclose(exactly(body, run), expected, rtol=1e-8)
     numeric = solve_ivp(lambda _, x: [x[1], -0.05 * x[1] ** 2], (0, run.times[-1]), [0, 2.0], "DOP853", rtol=1e-12)
     np.testing.assert_allclose(by_scheme(body, run)[-1], numeric.y[:, -1], rtol=1e-7)
+
+
+def test_a_process_that_drives_an_fmu_waits_for_no_equations_or_cards() -> None:
+    code = "import sys, tank2sim.fmu.process; print({'casadi', 'pydantic'} & {*sys.modules})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "set()"

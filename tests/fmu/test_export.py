@@ -20,7 +20,7 @@ from lxml import etree
 from tank2sim.bundled import bundled
 from tank2sim.dynamics.model import Model, Parameter
 from tank2sim.errors import InputError
-from tank2sim.fmu import sources
+from tank2sim.fmu import export, sources
 from tank2sim.fmu.check import compare_with_model
 from tank2sim.fmu.export import Documents, write_fmu
 from tank2sim.fmu.interface import interface
@@ -229,7 +229,9 @@ def test_without_a_compiler_nothing_is_written(hull: Model, tmp_path: Path, monk
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_that_is_missing_is_reported(hull: Model, tmp_path: Path) -> None:
+def test_a_folder_that_is_missing_is_reported(hull: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = export.ExportedFmu(content=b"PK\x03\x04", fmi=2, model_identifier="x", token="", platforms=())
+    monkeypatch.setattr(export, "make_fmu", lambda *_, **__: made)
     with pytest.raises(InputError, match="cannot be written"):
         write_fmu(hull, tmp_path / "missing" / "x.fmu")
 

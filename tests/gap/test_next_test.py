@@ -41,8 +41,8 @@ def explanation(card: ManoeuvringCard, name: str = "none", **parameters: float) 
     return Explanation(name, card, tuple(spread), np.diag(np.square(list(spread.values()))))
 
 
-def asked(*explanations: Explanation) -> NextTest:
-    found = next_test(explanations, NOISE, duration_s=250.0)
+def asked(*explanations: Explanation, duration_s: float = 250.0) -> NextTest:
+    found = next_test(explanations, NOISE, duration_s=duration_s)
     assert found is not None
     return found
 
@@ -55,7 +55,8 @@ def rudders(found: NextTest, folder: Path) -> np.ndarray:
 
 
 def test_a_stall_of_the_rudder_asks_for_large_rudders(mariner_card: ManoeuvringCard, tmp_path: Path) -> None:
-    found = asked(explanation(mariner_card, "rudder_stall", angle_rad=0.35, loss=0.3), explanation(mariner_card))
+    stalled = explanation(mariner_card, "rudder_stall", angle_rad=0.35, loss=0.3)
+    found = asked(stalled, explanation(mariner_card), duration_s=120.0)
     assert np.abs(rudders(found, tmp_path)).max() > 20
     assert found.manoeuvre in ("turn:35", "turn:-35")
     assert found.expected["turn:10"] < 1e-6 and found.expected[found.manoeuvre] > 10

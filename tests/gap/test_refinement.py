@@ -55,4 +55,4 @@ def test_a_card_that_is_surer_moves_less(wrong) -> None:
         after = refined(wrong, width)
         return sum(abs(after.derivatives[name] / wrong.derivatives[name] - 1) for name in OFF)
 
-    assert moved(1e-4) < 0.1 * moved(1e-2) and moved(1e-2) < moved(5.0)
+    assert moved(1e-4) < 0.1 * moved(1e-2)

@@ -84,8 +84,7 @@ def times_of(hertz: int, uneven: str) -> np.ndarray:
     return even
 
 
-@pytest.mark.parametrize("hertz", [10, 2, 1])
-@pytest.mark.parametrize("uneven", ["even", "events", "jitter"])
+@pytest.mark.parametrize(("hertz", "uneven"), [(10, "jitter"), (2, "events"), (1, "even")])
 def test_the_very_ship_leaves_noise_however_uneven_the_times(hertz: int, uneven: str) -> None:
     card = parse_card(TEXT, "made_up.toml")
     assert isinstance(card, ManoeuvringCard)

@@ -19,13 +19,17 @@ def made(tmp_path_factory):
     return write(Campaign(seed=3, size="linear", rate_hz=5.0), tmp_path_factory.mktemp("made") / "plain")
 
 
+@pytest.fixture(scope="module")
+def plain(made):
+    return read_campaign(made.path)
+
+
 @pytest.mark.parametrize("name", FORMATS)
-def test_runs_are_the_same_in_every_format(made, tmp_path, name):
+def test_runs_are_the_same_in_every_format(made, plain, tmp_path, name):
     if name.endswith(("h5", "73.mat")):
         pytest.importorskip("h5py")
     if name.endswith("tdms"):
         pytest.importorskip("nptdms")
-    plain = read_campaign(made.path)
     again = read_campaign(converted(made.path, tmp_path / "again", name))
     for run, other in zip(plain.runs, again.runs, strict=True):
         assert run.sheet.type == other.sheet.type

@@ -54,7 +54,7 @@ STUDY = AuditStudy(
 
 
 def test_places_of_findings_are_marked_in_the_panel_of_their_column_and_those_of_the_time_in_all() -> None:
-    specification = chart_specification(AuditResult(STUDY).charts()["record_turn_csv"])
+    specification = chart_specification(AuditResult(STUDY)._charts()["record_turn_csv"])
     marked = []
     for panel in specification["vconcat"]:
         layers = [layer for layer in panel["layer"] if layer["mark"].get("style") == "region"]

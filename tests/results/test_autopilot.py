@@ -66,7 +66,7 @@ STUDY = AutopilotStudy(
 
 
 def test_the_charts_show_the_loop_and_the_course_change() -> None:
-    charts = AutopilotResult(STUDY).charts()
+    charts = AutopilotResult(STUDY)._charts()
     assert list(charts) == [
         "course_change_by_20_deg",
         "a_change_that_takes_the_rudder_to_its_limit",

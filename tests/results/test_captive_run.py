@@ -35,7 +35,7 @@ def test_tables_hold_coefficients_and_derivatives(yaw: CaptiveRunResult) -> None
 
 
 def test_charts_hold_the_cycle_and_the_residual(yaw: CaptiveRunResult) -> None:
-    charts = yaw.charts()
+    charts = yaw._charts()
     assert list(charts) == ["cycle", "forces_1", "residual_1"]
     (run,) = yaw.runs
     means = [row["v"] for row in whole_panel(charts["cycle"], 1) if "low" in row]

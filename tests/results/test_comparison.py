@@ -31,7 +31,7 @@ def test_the_sections_tell_what_differs_and_draw_both_tracks(result) -> None:
 
 
 def test_the_chart_of_errors_has_a_point_for_each_difference(result) -> None:
-    specification = chart_specification(result.charts()["coefficients"])
+    specification = chart_specification(result._charts()["coefficients"])
     points = [row for data in specification["datasets"].values() for row in data if "name" in row]
     assert len(points) == result.study.summary[0].compared > 0
 

@@ -26,7 +26,7 @@ def result_of(gap):
 
 
 def charts_of(gap):
-    return result_of(gap).charts()
+    return result_of(gap)._charts()
 
 
 def words_of(gap):
@@ -51,7 +51,7 @@ def test_every_verdict_has_a_whole_page_which_its_json_gives_again(verdict) -> N
     result = result_of(made_up.EVERY[verdict]())
     html = result.page()
     assert verdict in html and "nan" not in html.partition("<script")[0].lower()
-    assert sum(len(section.charts) for section in result.sections) == len(result.charts())
+    assert sum(len(section.charts) for section in result.sections) == len(result._charts())
     assert all(section.text or section.tables or section.charts for section in result.sections)
     first = result.key_figures[0]
     assert (first.value, first.note) == ("current", verdict) if verdict == MISSING else first.value == verdict

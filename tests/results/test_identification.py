@@ -69,7 +69,7 @@ def found(trials):
     held = Measured((trials["turn"],), "angle", ())
     result = identify_trials(known, fitted, held, IdentificationOptions(method="equation_error", members=20))
     found = IdentificationResult(study_identification(known, result, fitted, held), None, result)
-    return result, found, found.charts()
+    return result, found, found._charts()
 
 
 def held_out(found) -> list[CardReplay]:
@@ -266,7 +266,7 @@ def test_of_many_trials_those_are_shown_that_are_followed_worst(found, monkeypat
         errors_over_windows={"fit": (), "holdout": trials},
     )
     shown = replace(found[1], study=study)
-    charts = shown.charts()
+    charts = shown._charts()
     sheets = [chart_specification(charts[stem])["concat"] for stem in ("histories_held_out", "histories_held_out_2")]
     assert [[panel["title"]["text"] for panel in sheet] for sheet in sheets] == [["b"], ["a"]]
     notes = [section.text for section in shown.sections if section.heading == "Trials held out"]
@@ -300,9 +300,7 @@ def test_a_forced_result_is_marked_on_its_page(trials, found) -> None:
 def test_one_trial_takes_little_of_the_page(found) -> None:
     """Pictures of as many trials as are shown, fitted and held out, stay below 3 MB; the page's script has 1 MB."""
     _, _, charts = found
-    sizes = [
-        len(json.dumps(charts[stem].to_dict(validate=False))) for stem in ("tracks_held_out", "histories_held_out")
-    ]
+    sizes = [len(json.dumps(chart_specification(charts[stem]))) for stem in ("tracks_held_out", "histories_held_out")]
     assert sum(sizes) * 2 * MOST_TRIALS < 3e6
 
 

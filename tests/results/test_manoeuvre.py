@@ -65,7 +65,7 @@ def shown(rows: list[dict[str, Any]], run: str) -> list[dict[str, Any]]:
 
 def test_a_manoeuvre_has_its_track_and_its_histories_in_their_units() -> None:
     result = ManoeuvreResult(STUDY)
-    charts = result.charts()
+    charts = result._charts()
     assert list(charts) == [TURN, OVER_TIME]
     track = [(row["x"], row["y"]) for row in shown(rows_of(charts[TURN]), "track")]
     assert track[:4] == list(zip(NORTH, EAST, strict=True))
@@ -83,7 +83,7 @@ def test_a_manoeuvre_has_its_track_and_its_histories_in_their_units() -> None:
 
 
 def test_an_ensemble_is_drawn_as_bands_next_to_the_run() -> None:
-    charts = BANDED.charts()
+    charts = BANDED._charts()
     speeds = shown(rows_of(charts[OVER_TIME]), "band")
     assert [row["low"] for row in speeds] == pytest.approx(SPEED.p5) and len(speeds) == 4
     assert [row["high"] for row in speeds] == pytest.approx(SPEED.p95)
@@ -93,7 +93,7 @@ def test_an_ensemble_is_drawn_as_bands_next_to_the_run() -> None:
 
 def test_a_spiral_is_drawn_against_its_rudder() -> None:
     figures: dict[str, Any] = {"rudder_deg": [10.0, 0.0, -10.0], "rate_degps": [0.5, 0.1, -0.4]}
-    charts = ManoeuvreResult(replace(STUDY, manoeuvre="spiral", figures=figures)).charts()
+    charts = ManoeuvreResult(replace(STUDY, manoeuvre="spiral", figures=figures))._charts()
     rows = dict.fromkeys((row["x"], row["v"]) for row in rows_of(charts["direct_spiral"]) if "i" in row)
     assert [value for row in rows for value in row] == pytest.approx([10.0, 0.5, 0.0, 0.1, -10.0, -0.4])
 

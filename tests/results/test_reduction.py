@@ -35,7 +35,7 @@ def test_every_derivative_of_the_card_is_in_the_table(polynomial: ReductionResul
 
 
 def test_charts_have_the_stems_of_their_files_and_the_fits(polynomial: ReductionResult) -> None:
-    charts = polynomial.charts()
+    charts = polynomial._charts()
     assert list(charts) == ["certainty", *polynomial.study.plots, "residuals"]
     (series,) = polynomial.study.plots["static_drift_Y"].series
     assert line(charts["static_drift_Y"], "v")[: len(series.x)]
@@ -66,7 +66,7 @@ def test_coefficients_and_residuals_of_the_mmg_method_are_tables(mmg: MmgReducti
 
 
 def test_readings_are_drawn_as_computed_over_measured(mmg: MmgReductionResult) -> None:
-    points = rows_of(mmg.charts()["sway_force"])
+    points = rows_of(mmg._charts()["sway_force"])
     readings = mmg.study.readings["Y"]
     drawn = {(row["x"], row["v"]) for row in points}
     both = zip(readings.measured.tolist(), readings.computed.tolist(), strict=True)

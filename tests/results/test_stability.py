@@ -70,7 +70,7 @@ def test_spirals_are_points_in_the_panel_of_the_yaw_rate_alone(study: StabilityS
 
 
 def test_influences_and_trims_are_drawn_as_they_were_found(study: StabilityStudy) -> None:
-    charts = StabilityResult(study).charts()
+    charts = StabilityResult(study)._charts()
     bars = [row for row in rows_of(charts["influence_on_c"]) if "name" in row]
     strongest = study.margins.derivatives[0]
     assert bars[0]["name"] == strongest.short_name and bars[0]["v"] == pytest.approx(strongest.percent, rel=1e-5)

@@ -64,13 +64,13 @@ def test_each_figure_has_its_verdict() -> None:
     assert verdicts == ["validated", "not validated", "not validated"]
     first = result.key_figures[0]
     assert first.value == "1 of 3" and first.verdict is Verdict.FAILED
-    drawn = chart_specification(result.charts()["validation"])["datasets"].values()
+    drawn = chart_specification(result._charts()["validation"])["datasets"].values()
     assert sorted(row["v"] for data in drawn for row in data if "most" in row)[:1] == [2.0]
     assert tables["Prime system, rudder positive to starboard, times 1000"]["value"].to_list() == [-10.0]
 
 
 def test_replays_are_drawn_next_to_the_measured_signals() -> None:
-    speeds = panels(validation().charts()["replays"])["surge velocity (m/s)"]
+    speeds = panels(validation()._charts()["replays"])["surge velocity (m/s)"]
     assert [row["v"] for row in speeds if row["run"] == "simulated"] == [7.0, 6.95, 6.9, 6.85]
 
 

@@ -131,6 +131,70 @@ def test_course_nominal_heading_and_lag_come_from_all_reversals_together(model, 
     assert 0 < what.errors["heading_rad"] < np.deg2rad(0.5)
 
 
+def by_hand(angle, headings, begin=12.0):
+    """A zigzag that is reversed at these changes of heading (rad, one after the other, all positive)."""
+    state = {"side": np.sign(angle), "number": 0}
+
+    def order(t, turned, before):
+        if t < begin:
+            return 0.0
+        if state["number"] < len(headings) and state["side"] * turned >= headings[state["number"]]:
+            state["side"], state["number"] = -state["side"], state["number"] + 1
+        return state["side"] * abs(angle)
+
+    return order
+
+
+def beyond_reversals(trial, headings, side):
+    """Largest headings beyond those of the reversals, by the extremes between them, deg."""
+    turned = side * (trial.signals["psi_rad"] - trial.signals["psi_rad"][0])
+    found, row = [], 0
+    for number, heading in enumerate(headings):
+        way = (-1) ** number * turned
+        row += int(np.argmax(way[row:] >= heading))
+        row += int(np.argmax(np.diff(way[row:]) < 0))
+        found.append(np.degrees(way[row] - heading))
+    return found
+
+
+@pytest.mark.parametrize(("side", "noise"), [(-1, 0.0), (1, 1.0)])
+def test_a_zigzag_that_is_reversed_at_other_headings_on_either_side_has_them_and_its_overshoots(model, side, noise):
+    """A helmsman's zigzag of a real vessel: one heading with an offset of the course took 4.5 deg off an overshoot."""
+    headings = np.deg2rad([30.8, 22.4, 33.8, 22.5])
+    trial = sail(by_hand(side * np.deg2rad(20), headings), 800.0)
+    truth = beyond_reversals(trial, headings, side)
+    if noise:  # of the rudder, 0.2 deg, and of the heading
+        trial = sail(by_hand(side * np.deg2rad(20), headings), 800.0, noise)
+        rudder = trial.signals["delta_rad"] + np.deg2rad(0.2) * np.random.default_rng(2).standard_normal(
+            len(trial.time_s)
+        )
+        trial = replace(trial, signals={**trial.signals, "delta_rad": rudder})
+    what = recorded(trial, model)
+    assert isinstance(what.manoeuvre, Zigzag)
+    assert np.degrees(what.manoeuvre.headings) == pytest.approx([32.3, 22.45], abs=0.5)
+    assert math.degrees(what.manoeuvre.course) == pytest.approx(math.degrees(0.4), abs=0.3)
+    np.testing.assert_allclose(what.figures["overshoots_deg"][:4], truth[:4], atol=0.4)
+    again = repeat(what, Integrator(model)).figures["overshoots_deg"]
+    np.testing.assert_allclose(again[:2], truth[:2], atol=0.5)  # reversed at the mean of a side
+
+
+def test_a_helmsman_who_scatters_about_one_heading_has_overshoots_beyond_each_reversal(model):
+    headings = np.deg2rad([21.5, 18.2, 20.4, 21.8])
+    trial = sail(by_hand(np.deg2rad(20), headings), 800.0)
+    what = recorded(trial, model)
+    assert what.manoeuvre.headings == (pytest.approx(np.deg2rad(20)),) * 2
+    truth = beyond_reversals(trial, headings, 1)
+    np.testing.assert_allclose(what.figures["overshoots_deg"][:4], truth, atol=0.4)
+
+
+def test_an_offset_of_the_course_is_no_difference_of_the_sides(model):
+    """The ship was 0.5 deg off its course at the execute; a controller reverses 20 deg to both sides of the course."""
+    trial = sail(controller(np.deg2rad(20), np.deg2rad(20), 0.5, off=np.deg2rad(0.5)), 420.0, noise=0.5)
+    what = recorded(trial, model)
+    assert what.manoeuvre.opposite_heading is None
+    assert what.manoeuvre.course == pytest.approx(0.4 + np.deg2rad(0.5), abs=np.deg2rad(0.1))
+
+
 def test_figures_change_with_the_measured_point_and_the_zero_of_the_heading_as_their_reading_errors_say(model):
     trial = sail(lambda t, turned, before: np.deg2rad(35) * (t >= 12.0), 240.0)
     psi, zero = trial.signals["psi_rad"], 0.25
@@ -353,6 +417,21 @@ def test_each_measured_turn_and_zigzag_is_recognised_from_its_execute(data: Path
         assert what is not None and isinstance(what.manoeuvre, form), name
         assert what.begin_s == pytest.approx(execute, abs=0.3)
         assert math.degrees(what.manoeuvre.rudder) == pytest.approx(rudder, abs=0.2)
+
+
+def test_a_zigzag_by_hand_has_overshoots_beyond_the_heading_at_which_its_rudder_was_put_over(data: Path) -> None:
+    """The 3 m Esso Osaka, reversed at 19, -16 and 25 deg: from the raw heading, extreme less that at the rudder's move.
+
+    Beyond 20 deg they were 1.4, 5.9 and 10.7 deg.
+    """
+    trial = read_trial_file(data / "data/esso_osaka/zigzag/zigzag_31-Jul-2020_13_57_45.csv")
+    what = recorded(trial, build(read_card("esso-osaka-estimated")))
+    psi, rudder = np.degrees(trial.signals["psi_rad"]), np.degrees(trial.signals["delta_rad"])
+    expected = []
+    for side, arrives in ((1, 43.8), (-1, 60.3), (1, 92.2)):  # at the other side, s
+        leaves = np.flatnonzero((trial.time_s < arrives) & (side * rudder > 19.0))[-1]
+        expected.append(np.max(side * psi[leaves : leaves + 100]) - side * psi[leaves])
+    np.testing.assert_allclose(what.figures["overshoots_deg"][:3], expected, atol=0.4)
 
 
 @pytest.mark.slow

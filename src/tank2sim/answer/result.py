@@ -144,11 +144,11 @@ class Result(ABC, Generic[_S]):
             write_together({Path(path): text})
         return text
 
-    def charts(self) -> dict[str, alt.TopLevelMixin]:
+    def charts(self) -> Mapping[str, alt.TopLevelMixin]:
         """Charts of all sections by name (Altair), the main one first; empty where there are none."""
-        from tank2sim.answer.charts.picture import altair_chart
+        from tank2sim.answer.charts.picture import AltairCharts
 
-        return {name: altair_chart(chart) for name, chart in self._charts().items()}
+        return AltairCharts(self._charts())
 
     def _charts(self) -> dict[str, ChartSpec | alt.TopLevelMixin]:
         """Charts of all sections by name, as the sections have them."""

@@ -34,6 +34,7 @@ def find_gap(
     without: Sequence[str] = (),
     max_effects: Effects = MOST_EFFECTS,
     false_discovery: FalseDiscovery = 0.5,
+    force: bool = False,
     executor: str = "processes",
     workers: Count | None = None,
     report: Progress = lambda _: None,
@@ -65,6 +66,9 @@ def find_gap(
     false_discovery : float
         Largest probability with which an effect that is named alone may be wrong; otherwise several candidates are
         named.
+    force : bool
+        Write the improved card even if it cannot do a turn or zigzag that the given card does, or follows a held-out
+        trial clearly worse.
     executor : str
         Where explanations are fitted: ``processes``, or ``dask://host:port``.
     workers : int, optional
@@ -80,6 +84,6 @@ def find_gap(
     """
     from tank2sim.api.gap_search import gap_options, search_ship
 
-    options = gap_options(effects, without, max_effects, false_discovery, workers)
+    options = gap_options(effects, without, max_effects, false_discovery, workers, force=force)
     folder = None if output is None else Path(output)
     return search_ship(ship.card, trials, holdout, folder, options, executor, report)

@@ -29,20 +29,26 @@ if TYPE_CHECKING:
 
 
 def gap_options(
-    effects: Sequence[str], without: Sequence[str], max_effects: int, false_discovery: float, workers: int | None
+    effects: Sequence[str],
+    without: Sequence[str],
+    max_effects: int,
+    false_discovery: float,
+    workers: int | None,
+    *,
+    force: bool = False,
 ) -> GapOptions:
     """Options of the search. Raises ArgumentError for an effect that is not known.
 
     Parameters
     ----------
-    effects, without, max_effects, false_discovery, workers
+    effects, without, max_effects, false_discovery, workers, force
         As of :func:`.find_gap`.
     """
     for argument, names in (("effects", effects), ("without", without)):
         for name in names:
             if EFFECTS.get(name) is None:
                 raise ArgumentError(argument, "", f"{name!r} is not an effect", EFFECTS.remedy(name))
-    return GapOptions(tuple(effects) or None, tuple(without), max_effects, workers, false_discovery)
+    return GapOptions(tuple(effects) or None, tuple(without), max_effects, workers, false_discovery, force)
 
 
 def search_ship(
@@ -79,7 +85,8 @@ def search_ship(
     with nullcontext() if output is None else folder_made(output), _workers(executor, options.workers) as pool:
         fitted, held = fitted_and_held(trials, holdout, ship, report_unused=False)  # a search uses them
         fitted = replace(fitted, notices=(*fitted.notices, *identified_from(ship, fitted)))
-        result = gap_result(run_gap_workflow(ship, fitted, held, options, report, pool), fitted, held)
+        gap = run_gap_workflow(ship, fitted, held, options, report, pool)
+        result = gap_result(gap, fitted, held, force=options.force)
         if output is None:
             return result
         report("writing")

@@ -82,6 +82,7 @@ def _of_ship(ready: TrialShip, records: Sequence[Trial], members: int, required_
         "verdict": found.verdict,
         "counts": found.counts,
         "figures": found.figures,
+        "one_sided": found.one_sided,
         "imo": tuple(imo_criteria(ready.model)),
         "replays": replays,
         "notices": (*notices, *not_replayed),

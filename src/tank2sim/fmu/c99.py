@@ -90,7 +90,7 @@ def plain_ship(card: Card) -> PlainShip:
     described = interface(model)
     prefix = code_prefix(card.ship.name)
     functions = _functions(model)
-    used = {name: function for name, function in functions.items() if name != "trim" or described.trim_switch}
+    used = {name: function for name, function in functions.items() if name != "settle" or described.trim_switch}
     values = _values(card, model, described, prefix) | {
         "code": _code(card, functions, prefix),
         "constants": max(1, functions["constants"].numel_out(0)),
@@ -129,7 +129,7 @@ def _functions(model: Model) -> dict[str, ca.Function]:
     x, u, p = model.x, model.u, model.p
     outputs = ca.Function("outputs", [x, u, p], [ca.densify(model.output_values)], {"cse": True})
     chosen = {name: equations[name] for name in ("constants", "initial", "step")}
-    return {**chosen, "outputs": outputs, "trim": equations["trim_step"]}
+    return {**chosen, "outputs": outputs, "settle": equations["trim_step"]}
 
 
 _NAMES = {
@@ -137,7 +137,7 @@ _NAMES = {
     "initial": (("p",), ("x",)),
     "step": (("x", "in", "p", "c", "length"), ("next",)),
     "outputs": (("x", "in", "p"), ("out",)),
-    "trim": (("x", "in", "p"), ("next",)),
+    "settle": (("x", "in", "p"), ("next",)),
 }
 """Arguments and results of each function in the template."""
 
@@ -169,7 +169,7 @@ def _values(card: Card, model: Model, described: Interface, prefix: str) -> dict
         "version": version("tank2sim"),
         "card_hash": hashlib.sha256(card.text.encode("utf-8")).hexdigest(),
         "step_s": float(model.step_s),
-        "trim": _word(TRIM_SWITCH) if described.trim_switch else "",
+        "trim_switch": _word(TRIM_SWITCH) if described.trim_switch else "",
         **named,
     }
 

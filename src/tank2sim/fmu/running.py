@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import fmpy.fmi2
 import fmpy.fmi3
@@ -17,9 +17,11 @@ import numpy as np
 from fmpy.sundials import CVodeSolver
 
 from tank2sim.arrays import Array
-from tank2sim.dynamics.model import Model
 from tank2sim.fmu.manoeuvre import InputSequence
 from tank2sim.fmu.unpacking import FmuType, UnpackedFmu, unpack
+
+if TYPE_CHECKING:  # the processes that drive an FMU import this module, and would wait for CasADi
+    from tank2sim.dynamics.model import Model
 
 _TOLERANCE = 1e-10
 _MOST_SOLVER_STEPS = 1_000_000

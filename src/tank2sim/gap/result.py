@@ -361,6 +361,8 @@ class Gap:
     notices : tuple of Notice
     doubts : tuple of RecordDoubt
         Findings of the audit on fitted trials that were left as they are.
+    objections : tuple of str
+        Reasons for which the improved card should not replace the given one (:func:`.improvement_objections`).
     """
 
     card: ManoeuvringCard
@@ -386,6 +388,7 @@ class Gap:
     next_test: NextTest | None
     notices: tuple[Notice, ...] = ()
     doubts: tuple[RecordDoubt, ...] = ()
+    objections: tuple[str, ...] = ()
 
     def misfit(self, version: str, *, held_out: bool) -> float | None:
         """Root mean square over all fitting (or held-out) trials of (simulated - measured)/noise; None without any.

@@ -32,6 +32,7 @@ from tank2sim.gap.outcome.combine import combine_passes, without_effect
 from tank2sim.gap.outcome.improve_card import Found, at_rest
 from tank2sim.gap.outcome.next_test import Explanation, next_test
 from tank2sim.gap.outcome.notices import gap_notices, of_tried_effects
+from tank2sim.gap.proof.card_fitness import improvement_objections
 from tank2sim.gap.proof.cross_check import MUCH, REMAINS, BlackBox, black_box, closes_gap
 from tank2sim.gap.proof.improvement import BETTER, Proof, Prover, corrected, sensor_faults
 from tank2sim.gap.proof.judge import CLEARLY, Judge, Judged
@@ -92,6 +93,8 @@ class GapOptions:
         Processes; by default as many as there are processors.
     false_discovery : float
         Largest probability with which a name that is given alone may be wrong, 0.01 to 0.5.
+    force : bool
+        Write the improved card in spite of objections.
     """
 
     effects: tuple[str, ...] | None = None
@@ -99,6 +102,7 @@ class GapOptions:
     max_effects: int = MOST_EFFECTS
     workers: int | None = None
     false_discovery: float = 1 - LIKELY
+    force: bool = False
 
 
 def nonlinear_card(card: Card) -> ManoeuvringCard:
@@ -185,7 +189,12 @@ def run_gap_workflow(
         if gap is first.gap:
             gap = _with_refined_coefficients(first, progress)
         tried = of_tried_effects(_names(card, fitted, options), candidate_explanations(card, fitted.driven_by))
-        return replace(gap, notices=(*doubts(given), *lowered_bound_notice(given, card), *tried, *gap.notices))
+        progress("trying the improved card")
+        return replace(
+            gap,
+            notices=(*doubts(given), *lowered_bound_notice(given, card), *tried, *gap.notices),
+            objections=improvement_objections(card, gap.improved, gap.passed),
+        )
 
 
 def _without_heel(group: Measured) -> Measured:

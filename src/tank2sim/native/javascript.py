@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import casadi as ca
 
-_OF_TWO = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/", ca.OP_FMOD: "%"}
-_COMPARISONS = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "===", ca.OP_NE: "!=="}
-_NAMED = {
-    **{ca.OP_SQRT: "sqrt", ca.OP_FABS: "abs", ca.OP_SIGN: "sign", ca.OP_FMIN: "min", ca.OP_FMAX: "max"},
-    **{ca.OP_SIN: "sin", ca.OP_COS: "cos", ca.OP_TAN: "tan", ca.OP_ASIN: "asin", ca.OP_ACOS: "acos"},
-    **{ca.OP_ATAN: "atan", ca.OP_ATAN2: "atan2", ca.OP_EXP: "exp", ca.OP_LOG: "log", ca.OP_FLOOR: "floor"},
-    **{ca.OP_CEIL: "ceil", ca.OP_SINH: "sinh", ca.OP_COSH: "cosh", ca.OP_TANH: "tanh", ca.OP_LOG1P: "log1p"},
-    **{ca.OP_EXPM1: "expm1", ca.OP_ASINH: "asinh", ca.OP_ACOSH: "acosh", ca.OP_ATANH: "atanh"},
-    **{ca.OP_POW: "pow", ca.OP_CONSTPOW: "pow", ca.OP_HYPOT: "hypot"},
-}
+from tank2sim.native.operations import COMPARISONS, FUNCTIONS, OPERATORS, Instruction, instructions
+
+_OF_TWO = {**OPERATORS, ca.OP_FMOD: "%"}
+_STRICT = {"==": "===", "!=": "!=="}
+_RENAMED = {"fabs": "abs", "fmin": "min", "fmax": "max"}
+_NAMED = {operation: _RENAMED.get(word, word) for operation, word in FUNCTIONS.items()} | {ca.OP_SIGN: "sign"}
+del _NAMED[ca.OP_COPYSIGN]
 _FORMS = {
     ca.OP_NEG: "-{0}",
     ca.OP_INV: "1/{0}",
@@ -44,23 +41,22 @@ def javascript_function(function: ca.Function, name: str) -> str:
     ValueError
         An operation has no JavaScript.
     """
-    lines = [_instruction(function, number) for number in range(function.n_instructions())]
+    lines = [_statement(step) for step in instructions(function)]
     arguments = [f"i{place}" for place in range(function.n_in())] + [f"o{place}" for place in range(function.n_out())]
     work = ",".join(f"w{place}" for place in range(function.sz_w()))
     declared = f"let {work};" if work else ""
     return f"function {name}({','.join(arguments)}){{{declared}\n" + "\n".join(lines) + "\n}\n"
 
 
-def _instruction(function: ca.Function, number: int) -> str:
+def _statement(step: Instruction) -> str:
     """A statement. Variables are the places of CasADi's work vector, so that few of them live at a time."""
-    operation, to = function.instruction_id(number), function.instruction_output(number)
-    given = function.instruction_input(number)
+    operation, to, given, constant = step
     if operation == ca.OP_OUTPUT:
         return f"o{to[0]}[{to[1]}]=w{given[0]};"
     if operation == ca.OP_INPUT:
         return f"w{to[0]}=i{given[0]}[{given[1]}];"
     if operation == ca.OP_CONST:
-        return f"w{to[0]}={function.instruction_constant(number)!r};".replace("inf", "Infinity").replace("nan", "NaN")
+        return f"w{to[0]}={constant!r};".replace("inf", "Infinity").replace("nan", "NaN")
     sources = [f"w{place}" for place in given]
     return f"w{to[0]}={_expression(operation, sources)};"
 
@@ -68,8 +64,9 @@ def _instruction(function: ca.Function, number: int) -> str:
 def _expression(operation: int, sources: list[str]) -> str:
     if operation in _OF_TWO:
         return _OF_TWO[operation].join(sources)
-    if operation in _COMPARISONS:
-        return f"({_COMPARISONS[operation].join(sources)}?1:0)"
+    if operation in COMPARISONS:
+        sign = COMPARISONS[operation]
+        return f"({_STRICT.get(sign, sign).join(sources)}?1:0)"
     if operation in _NAMED:
         return f"Math.{_NAMED[operation]}({','.join(sources)})"
     if operation in _FORMS:

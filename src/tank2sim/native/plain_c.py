@@ -7,16 +7,8 @@ from collections.abc import Iterable
 
 import casadi as ca
 
-_OF_TWO = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/"}
-_COMPARISONS = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "!="}
-_OF_MATH = {
-    **{ca.OP_SQRT: "sqrt", ca.OP_FABS: "fabs", ca.OP_FMIN: "fmin", ca.OP_FMAX: "fmax", ca.OP_FMOD: "fmod"},
-    **{ca.OP_SIN: "sin", ca.OP_COS: "cos", ca.OP_TAN: "tan", ca.OP_ASIN: "asin", ca.OP_ACOS: "acos"},
-    **{ca.OP_ATAN: "atan", ca.OP_ATAN2: "atan2", ca.OP_EXP: "exp", ca.OP_LOG: "log", ca.OP_FLOOR: "floor"},
-    **{ca.OP_CEIL: "ceil", ca.OP_SINH: "sinh", ca.OP_COSH: "cosh", ca.OP_TANH: "tanh", ca.OP_LOG1P: "log1p"},
-    **{ca.OP_EXPM1: "expm1", ca.OP_ASINH: "asinh", ca.OP_ACOSH: "acosh", ca.OP_ATANH: "atanh"},
-    **{ca.OP_POW: "pow", ca.OP_CONSTPOW: "pow", ca.OP_HYPOT: "hypot", ca.OP_COPYSIGN: "copysign"},
-}
+from tank2sim.native.operations import COMPARISONS, FUNCTIONS, OPERATORS, instructions
+
 _FORMS = {
     ca.OP_ASSIGN: "{0}",
     ca.OP_NEG: "-{0}",
@@ -33,7 +25,7 @@ _KINDS = {
     **dict.fromkeys((ca.OP_ADD, ca.OP_SUB, ca.OP_NEG), "additions"),
     **dict.fromkeys((ca.OP_MUL, ca.OP_SQ, ca.OP_TWICE), "multiplications"),
     **dict.fromkeys((ca.OP_DIV, ca.OP_INV), "divisions"),
-    **dict.fromkeys(_COMPARISONS, "comparisons"),
+    **dict.fromkeys(COMPARISONS, "comparisons"),
     **dict.fromkeys((ca.OP_SIGN, ca.OP_NOT, ca.OP_AND, ca.OP_OR, ca.OP_IF_ELSE_ZERO), "comparisons"),
 }
 _MOVES = (ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST, ca.OP_ASSIGN)
@@ -60,15 +52,13 @@ def plain_c(function: ca.Function, prefix: str, arguments: Iterable[str], result
         An operation has no C.
     """
     sources, targets, lines = tuple(arguments), tuple(results), []
-    for number in range(function.n_instructions()):
-        operation, to = function.instruction_id(number), function.instruction_output(number)
-        given = function.instruction_input(number)
+    for operation, to, given, constant in instructions(function):
         if operation == ca.OP_OUTPUT:
             lines.append(f"    {targets[to[0]]}[{to[1]}] = w{given[0]};")
         elif operation == ca.OP_INPUT:
             lines.append(f"    w{to[0]} = {sources[given[0]]}[{given[1]}];")
         elif operation == ca.OP_CONST:
-            lines.append(f"    w{to[0]} = {c_number(function.instruction_constant(number), prefix)};")
+            lines.append(f"    w{to[0]} = {c_number(constant, prefix)};")
         else:
             lines.append(f"    w{to[0]} = {_expression(operation, [f'w{place}' for place in given], prefix)};")
     declared = [f"    {prefix}_real w{place};" for place in range(function.sz_w())]
@@ -79,12 +69,12 @@ def plain_c(function: ca.Function, prefix: str, arguments: Iterable[str], result
 def _expression(operation: int, names: list[str], prefix: str) -> str:
     macro = prefix.upper()
     constants = {word: f"{macro}_C({value})" for word, value in (("zero", "0.0"), ("one", "1.0"), ("two", "2.0"))}
-    if operation in _OF_TWO:
-        return f" {_OF_TWO[operation]} ".join(names)
-    if operation in _COMPARISONS:
-        return f"({f' {_COMPARISONS[operation]} '.join(names)}) ? {constants['one']} : {constants['zero']}"
-    if operation in _OF_MATH:
-        return f"{macro}_{_OF_MATH[operation].upper()}({', '.join(names)})"
+    if operation in OPERATORS:
+        return f" {OPERATORS[operation]} ".join(names)
+    if operation in COMPARISONS:
+        return f"({f' {COMPARISONS[operation]} '.join(names)}) ? {constants['one']} : {constants['zero']}"
+    if operation in FUNCTIONS:
+        return f"{macro}_{FUNCTIONS[operation].upper()}({', '.join(names)})"
     if operation in _FORMS:
         return _FORMS[operation].format(*names, **constants)
     raise ValueError(f"operation {operation} has no C")
@@ -102,16 +92,15 @@ def c_number(value: float, prefix: str) -> str:
 
 def math_functions(functions: Iterable[ca.Function]) -> tuple[str, ...]:
     """Names of the functions of ``math.h`` that :func:`plain_c` of these functions calls, in alphabetical order."""
-    found = {function.instruction_id(k) for function in functions for k in range(function.n_instructions())}
-    return tuple(sorted({_OF_MATH[operation] for operation in found if operation in _OF_MATH}))
+    found = {step.operation for function in functions for step in instructions(function)}
+    return tuple(sorted({FUNCTIONS[operation] for operation in found if operation in FUNCTIONS}))
 
 
 def operation_counts(function: ca.Function) -> dict[str, int]:
     """Kind of operation (``additions``, ``sin``) to how many of them one call of a function does, most first."""
     counts: dict[str, int] = {}
-    for number in range(function.n_instructions()):
-        operation = function.instruction_id(number)
+    for operation, *_ in instructions(function):
         if operation not in _MOVES:
-            kind = _KINDS.get(operation) or _OF_MATH[operation]
+            kind = _KINDS.get(operation) or FUNCTIONS[operation]
             counts[kind] = counts.get(kind, 0) + 1
     return dict(sorted(counts.items(), key=lambda pair: (-pair[1], pair[0])))

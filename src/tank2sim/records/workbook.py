@@ -40,7 +40,7 @@ def workbook_text(path: Path) -> str:
     Raises
     ------
     InputError
-        The file is no spreadsheet, is broken, or a cell holds an error such as ``#DIV/0!`` or a formula without its
+        The file is not a spreadsheet, is broken, or a cell holds an error such as ``#DIV/0!`` or a formula without its
         result.
     """
     from xml.etree.ElementTree import ParseError
@@ -57,7 +57,7 @@ def workbook_text(path: Path) -> str:
 
 
 def _lines(rows: dict[int, list[str]]) -> str:
-    """Text of the rows, padded to the width of the first that is no comment."""
+    """Text of the rows, padded to the width of the first that is not a comment."""
     width = next((len(cells) for _, cells in sorted(rows.items()) if cells and not cells[0].startswith("#")), 0)
     text = io.StringIO()
     written = csv.writer(text, lineterminator="\n")

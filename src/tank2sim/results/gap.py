@@ -158,6 +158,8 @@ class GapResult(Result[GapStudy]):
         Files that were written.
     remarks : tuple of Notice
         Messages about them.
+    force : bool
+        Whether the improved card is written in spite of objections.
     """
 
     study: GapStudy
@@ -166,6 +168,7 @@ class GapResult(Result[GapStudy]):
     held: Measured = NO_TRIALS
     written: tuple[Path, ...] = ()
     remarks: tuple[Notice, ...] = ()
+    force: bool = False
     command: ClassVar[str] = "gap"
 
     @property
@@ -259,9 +262,11 @@ class GapResult(Result[GapStudy]):
 
     @property
     def headline(self) -> tuple[str, ...]:
-        """The verdict with its probability, explanations that these data cannot distinguish, and the next test."""
+        """Objections to the improved card, the verdict with its probability, explanations that these data cannot
+        distinguish, and the next test."""
         study, test = self.study, self.study.next_test
         return (
+            *self._objections,
             f"{study.ship}: {found_in_words(study)}",
             *probabilities_in_words(study)[:1],
             *([others_in_words(study)] if study.alternatives and study.verdict != AMBIGUOUS else []),
@@ -347,13 +352,15 @@ class GapResult(Result[GapStudy]):
     def files(self, folder: Path) -> tuple[GapFiles, list[Notice]]:
         """Path to content of the files that belong into a folder, and messages about them.
 
-        ``gap.json``, ``improved.toml`` with its covariance, ``report.html``, ``next_test.csv`` where a test would
-        decide, ``corrected/`` where a sensor is at fault, and ``surroundings/`` with the winds and currents of single
-        trials as columns, with which the improved card follows them.
+        ``gap.json``, ``improved.toml`` with its covariance (without objections, or by force), ``report.html``,
+        ``next_test.csv`` where a test would decide, ``corrected/`` where a sensor is at fault, and ``surroundings/``
+        with the winds and currents of single trials as columns, with which the improved card follows them.
         """
         gap, trials = self._gap, (*self.fitted.trials, *self.held.trials)
         text = self._improved_text(str(folder / IMPROVED))
         improved, notices = improved_files(gap.base, text, folder / IMPROVED)
+        if self.study.card_objections and not self.force:
+            improved, notices = {}, []
         files: GapFiles = {**improved, folder / REPORT: self.page()}
         if gap.next_test:
             files[folder / NEXT_TEST_FILE] = gap.next_test.orders
@@ -394,6 +401,14 @@ class GapResult(Result[GapStudy]):
         return replace(self, study=study, written=tuple(files), remarks=(*notices, *removed))
 
     @property
+    def _objections(self) -> list[str]:
+        """The line on an improved card that should not replace the given one."""
+        if not self.study.card_objections:
+            return []
+        rule = "should not replace the given one, and is only written by force"
+        return [f"The improved card {rule}: {'; '.join(self.study.card_objections)}."]
+
+    @property
     def _gap(self) -> Gap:
         if self.gap is None:
             raise LookupError("a result that was read from its JSON has no card")
@@ -426,16 +441,18 @@ class GapResult(Result[GapStudy]):
         return text
 
 
-def gap_result(gap: Gap, fitted: Measured, held: Measured) -> GapResult:
+def gap_result(gap: Gap, fitted: Measured, held: Measured, *, force: bool = False) -> GapResult:
     """The result of a search with its trials.
 
     Parameters
     ----------
     gap : Gap
     fitted, held : Measured
+    force : bool
+        Write the improved card in spite of objections.
     """
     files = {trial.name: trial.path.name for trial in (*fitted.trials, *held.trials)}
-    return GapResult(gap_study(gap, files), gap, fitted, held)
+    return GapResult(gap_study(gap, files), gap, fitted, held, force=force)
 
 
 def improved_files(card: Card, text: str, path: Path) -> tuple[GapFiles, list[Notice]]:
@@ -705,7 +722,8 @@ def _next_test(study: GapStudy) -> str:
         return "" if sure else "No manoeuvre was found that would decide more."
     # The command has a line of its own: among other words it is broken at its hyphens.
     command = f"tank2sim simulate improved.toml --manoeuvre {test.manoeuvre}"
-    return f"{capital(test.why)}\n\nIts orders are in {NEXT_TEST_FILE}. To see it beforehand:\n\n{command}"
+    begin = f"{capital(test.why)}\n\nIts orders are in {NEXT_TEST_FILE}."
+    return begin if study.card_objections else f"{begin} To see it beforehand:\n\n{command}"
 
 
 def _noise(study: GapStudy) -> Table:

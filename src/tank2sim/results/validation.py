@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from tank2sim.analysis.stability.imo import ImoCriterion
+from tank2sim.analysis.validation.one_sided import OneSidedError
 from tank2sim.analysis.validation.study import ComparisonOutcome, Validated, Verified
 from tank2sim.answer.charts.motion import motions
 from tank2sim.answer.charts.parts import with_unit
 from tank2sim.answer.charts.rows import RowPlot, names_of, row_layers
 from tank2sim.answer.charts.vega import SIDE, ChartSpec, PlotAxis, Rule, channel, layer, layered
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Verdict, records_table, table
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, records_table, table
 from tank2sim.answer.result import Result
 from tank2sim.arrays import Columns, Number
 from tank2sim.cards import SteeredBy, SteeredCard
@@ -137,6 +138,8 @@ class ValidationStudy:
     replays : tuple of TrialReplay
     predictions : PredictionStudy, optional
         Trials of a craft with thrusters.
+    one_sided : tuple of OneSidedError
+        Figures whose errors are on one side in nearly all trials, the most significant first.
     notices : tuple of Notice
     kind : str
         Always ``validate``.
@@ -157,6 +160,7 @@ class ValidationStudy:
     replays: tuple[TrialReplay, ...]
     notices: tuple[Notice, ...]
     predictions: PredictionStudy | None = None
+    one_sided: tuple[OneSidedError, ...] = ()
     kind: str = "validate"
 
 
@@ -306,6 +310,7 @@ class ValidationResult(Result[ValidationStudy]):
             tables=[
                 table("Trials", ("no.", "trial", "manoeuvre, as recognised"), benchmark, folded=False),
                 replace(table(caption, [*heads, "verdict"], rows, folded=True), wide=True),
+                *_one_sided(self.study.one_sided),
             ],
             charts=[
                 Illustration(
@@ -401,6 +406,24 @@ def _predictions(found: PredictionStudy) -> Section:
         "a filter has found, and uses nothing measured later.",
         tables=[records_table(caption, found.trials, first="trial", fields=fields)],
     )
+
+
+def _one_sided(errors: Sequence[OneSidedError]) -> list[Table]:
+    """Figures whose errors are on one side in nearly all trials."""
+    rows: list[list[Cell]] = [
+        [
+            with_unit(*in_words(error.name)),
+            f"{error.same_side} of {error.trials}",
+            error.mean_error,
+            error.mean_percent,
+            error.probability,
+        ]
+        for error in errors
+    ]
+    percent = Column(title="mean error", unit="% of D", digits=2)
+    heads = ("figure", "errors on one side", Column(title="mean E", digits=3), percent, Column(title="p", digits=2))
+    caption = "Errors to one side (sign test; p corrected for the number of figures)"
+    return [table(caption, heads, rows, on_screen=False)] if rows else []
 
 
 def _method(figures: Sequence[Validated]) -> Section:

@@ -179,7 +179,7 @@ def _is_steady(run: Trajectory, length: float) -> bool:
 
 
 def _zigzag(run: Trajectory, zigzag: Zigzag, length: float) -> Figures:
-    side, heading = math.copysign(1.0, zigzag.rudder), zigzag.heading
+    side = math.copysign(1.0, zigzag.rudder)
     execute = _Execute(run, side)
     course = execute.heading if zigzag.course is None else zigzag.course
     command = run["rudder.command"]
@@ -187,7 +187,7 @@ def _zigzag(run: Trajectory, zigzag: Zigzag, length: float) -> Figures:
     turns = run.crossings("motion.r", "motion.rdot", 0.0)
     peaks = [later[0] for time in executes if len(later := turns[turns > time])]
     overshoots = [
-        math.degrees(side * (-1) ** number * (run.at("motion.psi", time) - course) - heading)
+        math.degrees(side * (-1) ** number * (run.at("motion.psi", time) - course) - zigzag.headings[number % 2])
         for number, time in enumerate(peaks)
     ]
     returns = run.crossings("motion.psi", "motion.r", course)

@@ -123,7 +123,8 @@ def runs_in_lanes(manoeuvre: Manoeuvre, duration_s: float | None = None) -> Type
         return manoeuvre.wait_s == 0
     if not isinstance(manoeuvre, Zigzag):
         return False
-    return manoeuvre.lag_s == manoeuvre.wait_s == 0 and manoeuvre.course is None and manoeuvre.heading > 0
+    plain = manoeuvre.course is None and manoeuvre.opposite_heading is None
+    return plain and manoeuvre.lag_s == manoeuvre.wait_s == 0 and manoeuvre.heading > 0
 
 
 class LaneManoeuvres:

@@ -128,7 +128,8 @@ class Zigzag:
     delay of a helmsman or of a model basin's controller (0.1 to 0.6 s at model scale), and the rudder begins to move
     `wait_s` after each order (a gear's dead time). Headings count from `course` (rad), by default from that at the
     execute. On the other side the rudder is held at `opposite` (rad, of the other sign), by default at -`rudder`: the
-    two angles of a measured zigzag differ where the zero of its rudder is off.
+    two angles of a measured zigzag differ where the zero of its rudder is off. The rudder's second side is reversed
+    at a change of `opposite_heading` (positive), by default `heading`: a helmsman's differ from side to side.
 
     Raises
     ------
@@ -142,6 +143,7 @@ class Zigzag:
     course: float | None = None
     wait_s: float = 0.0
     opposite: float | None = None
+    opposite_heading: float | None = None
 
     def __post_init__(self) -> None:
         _check_angles("Zigzag", rudder=self.rudder, heading=self.heading)
@@ -151,17 +153,23 @@ class Zigzag:
         """The text form of :func:`parse_manoeuvre`, in deg."""
         return f"zigzag:{_degrees(self.rudder)}/{_degrees(self.heading)}"
 
+    @property
+    def headings(self) -> tuple[float, float]:
+        """Changes of heading at which the first and the second side of the rudder are reversed, rad."""
+        return self.heading, self.heading if self.opposite_heading is None else self.opposite_heading
+
     def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
         """Run for `duration` s, or to the heading's return after the fifth execute (at most 150 L/u0)."""
         begin = running.state("motion.psi") if self.course is None else self.course
         end = LONGEST_LENGTHS * ship_time if duration is None else duration
         side = math.copysign(1.0, self.rudder)
         angles = cycle((self.rudder, -self.rudder if self.opposite is None else self.opposite))
+        headings = cycle(self.headings)
         executes = 0
         running.run(min(self.wait_s, end))
         while running.time < end and (duration is not None or executes < ZIGZAG_EXECUTES):
             running.order({"rudder.command": next(angles)})
-            goal = begin + side * self.heading
+            goal = begin + side * next(headings)
             if not running.run_until("motion.psi", goal, rising=side > 0, at_most=end - running.time):
                 return
             running.run(max(0.0, min(self.lag_s + self.wait_s, end - running.time)))

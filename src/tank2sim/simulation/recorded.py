@@ -93,7 +93,8 @@ class Recorded:
         late = f"{self.manoeuvre.lag_s:.2g} s late"
         if "lag_s" in self.errors:
             late += f" (± {self.errors['lag_s']:.1g} s)"
-        return f"zigzag {rudder:.3g}/{math.degrees(self.manoeuvre.heading):.3g}, reversed {late}"
+        headings = " and ".join(f"{math.degrees(each):.3g}" for each in dict.fromkeys(self.manoeuvre.headings))
+        return f"zigzag {rudder:.3g}/{headings}, reversed {late}"
 
 
 TURNS_AT_EXECUTE = 0.2
@@ -154,6 +155,7 @@ def recognise(trial: Trial, model: Model) -> Recorded | str:
     inputs = _fed(trial, model)
     late = _order_error(trial, first)
     if zigzag:
+        figures = zigzag.from_reversals(figures)
         errors, reading = zigzag.errors, dict(zigzag.reading_errors)
         reading["initial_turning_time_s"] = math.hypot(reading["initial_turning_time_s"], late)
     else:

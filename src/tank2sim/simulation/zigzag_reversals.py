@@ -1,6 +1,7 @@
 """The heading at which a recorded zigzag was reversed, the course it is counted from, and the lag of the reversals.
 
-They are fitted to all reversals together by least squares.
+They are fitted to all reversals together by least squares. Headings that differ from side to side, by more than their
+scatter and the error of the course, are estimated for each side.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from scipy.optimize import least_squares
 from scipy.stats import t as student
 
 from tank2sim.arrays import Array
+from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.manoeuvres import Zigzag
 from tank2sim.simulation.rudder_record import HeldAngle
 
@@ -48,12 +50,28 @@ class FittedZigzag:
     errors : dict
         Standard errors of the fit: ``heading_rad``, ``course_rad``, ``lag_s``.
     reading_errors : dict
-        Standard errors of figures by that of the course: rad for overshoots, s for times.
+        Standard errors of figures by that of the course and of the reversals: rad for overshoots, s for times.
+    late_by : array (k,)
+        Heading beyond the manoeuvre's at which each reversal was made, rad: 0 for a controller, a helmsman's scatter.
     """
 
     manoeuvre: Zigzag
     errors: dict[str, float]
     reading_errors: dict[str, float]
+    late_by: Array
+
+    def from_reversals(self, figures: Figures) -> Figures:
+        """Figures with overshoots beyond the heading of their reversal in place of the manoeuvre's.
+
+        Parameters
+        ----------
+        figures : Figures
+            Overshoots in deg.
+        """
+        overshoots = figures["overshoots_deg"]
+        assert isinstance(overshoots, list)
+        late = np.degrees(self.late_by).tolist()
+        return figures | {"overshoots_deg": [size - by for size, by in zip(overshoots, late, strict=False)]}
 
 
 def fitted_zigzag(
@@ -64,7 +82,8 @@ def fitted_zigzag(
     At each reversal k, ordered at t_k, the heading `lag` s earlier was that of the reversal: psi(t_k - lag) = course +
     s_k nominal, s_k = 1 while the rudder was to starboard. Course, nominal heading and lag are fitted to all reversals
     together by least squares, with the approach's heading as another reading of the course, and :data:`LAG` as prior of
-    the lag. The nominal heading is then that of a usual zigzag, if one agrees.
+    the lag. The nominal heading is then that of a usual zigzag, if one agrees. Sides that disagree (:func:`_sides`)
+    have a heading each, counted from the course of the approach.
 
     Parameters
     ----------
@@ -85,16 +104,26 @@ def fitted_zigzag(
         return None
     approach = _approach(time, held[0], smooth)
     reversals = _Reversals(time, smooth["psi_rad"], times, sides, approach, LAG * ship_time)
-    found = _usual(reversals, math.hypot(noise, _dating_noise(time, times, smooth)), round(_degrees(held)))
-    if found is None:
-        return None
-    free, fitted = found
+    noise = math.hypot(noise, _dating_noise(time, times, smooth))
     first, second = (float(np.median([held_angle.angle for held_angle in held[side::2]])) for side in (0, 1))
-    errors = {"heading_rad": free.errors[1], "course_rad": fitted.errors[0], "lag_s": fitted.errors[-1]}
+    by_side = _sides(reversals, noise)
+    if by_side is not None:
+        (heading, opposite), error = by_side
+        manoeuvre = Zigzag(first, heading, 0.0, approach[0], opposite=second, opposite_heading=opposite)
+        errors = {"heading_rad": error, "course_rad": approach[1]}
+    else:
+        found = _usual(reversals, noise, round(_degrees(held)))
+        if found is None:
+            return None
+        free, fitted = found
+        manoeuvre = Zigzag(first, fitted.nominal, fitted.lag, fitted.course, opposite=second)
+        errors = {"heading_rad": free.errors[1], "course_rad": fitted.errors[0], "lag_s": fitted.errors[-1]}
+    late, share = reversals.late_by(manoeuvre, noise)
     crossing = errors["course_rad"] / _yaw_rate(time, times, smooth)
-    reading = {f"overshoot_{number}_deg": errors["course_rad"] for number in (1, 2)}
+    overshoot = math.hypot((1 - share) * errors["course_rad"], share * noise)
+    reading = {"overshoot_1_deg": overshoot, "overshoot_2_deg": overshoot}
     reading |= {"initial_turning_time_s": crossing, "reach_s": crossing}
-    return FittedZigzag(Zigzag(first, fitted.nominal, fitted.lag, fitted.course, opposite=second), errors, reading)
+    return FittedZigzag(manoeuvre, errors, reading, late)
 
 
 def _degrees(held: list[HeldAngle]) -> float:
@@ -137,6 +166,19 @@ class _Reversals:
     approach: tuple[float, float]
     lag_scale: float
 
+    def late_by(self, manoeuvre: Zigzag, noise: float) -> tuple[Array, float]:
+        """Headings beyond a zigzag's at which the reversals were made (k,), rad, and their share of what was read.
+
+        They are read with an error `noise` (rad); the part of their scatter above it is the helmsman's.
+        """
+        assert manoeuvre.course is not None
+        before = np.interp(self.times - manoeuvre.lag_s, self.time, self.heading)
+        nominal = np.resize(manoeuvre.headings, len(self.times))
+        off: Array = self.sides * (before - manoeuvre.course) - nominal
+        scatter = float(np.mean(off**2))
+        share = max(0.0, 1 - noise**2 / scatter) if scatter > 0 else 0.0
+        return share * off, share
+
     def fit(self, noise: float, nominal: float | None = None) -> _Fit:
         """The least-squares fit for a standard deviation of the reversal headings, rad; with a given `nominal` one."""
         course, error = self.approach
@@ -160,6 +202,28 @@ class _Reversals:
         lag = lag if lag > NO_LAG * self.lag_scale else 0.0
         squares = float(np.sum(off(found.x, heading) ** 2))
         return _Fit(float(found.x[0]), heading, lag, tuple(map(float, errors)), 2 * float(found.cost), squares)
+
+
+def _sides(reversals: _Reversals, noise: float) -> tuple[tuple[float, float], float] | None:
+    """Heading changes of the two sides, rad, and their standard error; None unless the sides differ significantly.
+
+    One side must have been reversed twice, so that the scatter is known; `noise` is its least value, rad.
+    """
+    course, course_error = reversals.approach
+    reached = reversals.sides * (np.interp(reversals.times, reversals.time, reversals.heading) - course)
+    spare = len(reached) - 2
+    if spare < 1:
+        return None
+    sides = reached[0::2], reached[1::2]
+    means = float(np.mean(sides[0])), float(np.mean(sides[1]))
+    scatter = math.sqrt(sum(float(np.sum((side - np.mean(side)) ** 2)) for side in sides) / spare)
+    if min(means) <= 0 or scatter > ASTRAY * min(means):
+        return None
+    error = max(scatter, noise) * math.sqrt(sum(1 / len(side) for side in sides))
+    # A course that is off makes one side's changes larger and the other's smaller by as much.
+    if abs(means[0] - means[1]) <= float(student.ppf(CONFIDENT, spare)) * math.hypot(error, 2 * course_error):
+        return None
+    return means, error
 
 
 def _usual(reversals: _Reversals, noise: float, rudder_deg: int) -> tuple[_Fit, _Fit] | None:

@@ -113,7 +113,10 @@ def sixth_order(study: Study, column: int, h: float) -> np.ndarray:
     return 10 * difference / (60 * h) / study.base
 
 
-@pytest.mark.parametrize("name", ["Nd", "Nr", "Yv", "Xu", "mass", "steering.max_rate"])
+SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in ("Nr", "Yv", "Xu")]
+
+
+@pytest.mark.parametrize("name", ["Nd", "mass", "steering.max_rate", *SLOW])
 def test_slopes_through_the_events_of_manoeuvres_are_those_of_differences(simulated, name) -> None:
     """Simulated figures of zigzags ripple a little with the place of kinks between steps; their slopes do not."""
     _, slopes = simulated.slopes_at(simulated.values)

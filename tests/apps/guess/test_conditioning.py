@@ -10,7 +10,7 @@ import pytest
 
 from tank2sim.analysis.ensemble.draws import draws_of
 from tank2sim.apps.guess import conditioning
-from tank2sim.apps.guess.conditioning import FIGURE_KEYS, GivenFigure, GuessMembers, conditioned
+from tank2sim.apps.guess.conditioning import FIGURE_KEYS, GivenFigure, GuessMembers, PosterFigures, conditioned
 from tank2sim.apps.guess.prior import ShipDimensions, prior_card, rudder_by_rules
 from tank2sim.apps.guess.study import guess_ship, study_members
 from tank2sim.cards import ManoeuvringCard, read_card
@@ -203,17 +203,47 @@ def test_the_next_figure_is_the_one_that_takes_most_variance_away() -> None:
 
 @pytest.mark.parametrize(
     ("name", "low", "high"),
-    [("length_m", 20.0, 500.0), ("speed_kn", 1.0, 45.0), ("block", 0.35, 1.0)],
+    [("length_m", 1.0, 500.0), ("speed_kn", 1.0, 45.0), ("block", 0.35, 1.0)],
 )
 def test_dimensions_are_bounded_at_what_ships_have(name: str, low: float, high: float) -> None:
     for value, other in ((low, -1), (high, 1)):
         size = {**vars(TANKER), name: value}
         if name == "length_m":
             size |= {"beam_m": value / 6, "draught_m": value / 15}
+            size |= {"speed_kn": 1.5} if value < 20 else {}
         ShipDimensions(**size)
         with pytest.raises(InputError) as refused:
             ShipDimensions(**{**size, name: value * (1 + 0.01 * other)})
         assert refused.value.source == name
+
+
+@pytest.mark.parametrize(("speed_kn", "taken"), [(2.29, True), (15.5, False), (0.05, False)])
+def test_a_model_runs_at_a_speed_of_models(speed_kn: float, taken: bool) -> None:
+    """1.18 m/s of a model of 5.01 m, 1 : 63.9, are 18 kn of the ship of 320 m; 15.5 kn would be those of the ship."""
+    size = {"length_m": 5.01, "beam_m": 0.908, "draught_m": 0.326, "block": 0.81, "speed_kn": speed_kn}
+    if taken:
+        ShipDimensions(**size)
+        return
+    with pytest.raises(InputError) as refused:
+        ShipDimensions(**size)
+    assert refused.value.source == "speed_kn" and "models of this length" in refused.value.remedy
+
+
+def test_a_model_is_its_ship_by_froude() -> None:
+    """A ship of 200 m and its model 1 : 40: the same coefficients, the gear and yaw rates faster by the root of 40."""
+    ship = ShipDimensions(length_m=200.0, beam_m=32.0, draught_m=12.0, block=0.8, speed_kn=15.0)
+    model = ShipDimensions(length_m=5.0, beam_m=0.8, draught_m=0.3, block=0.8, speed_kn=15.0 / math.sqrt(40.0))
+    large, small = prior_card(ship, "ship"), prior_card(model, "model")
+    assert small.derivatives == pytest.approx(large.derivatives, rel=1e-5)
+    assert large.steering_gear and small.steering_gear
+    assert small.steering_gear.max_rate_radps == pytest.approx(
+        large.steering_gear.max_rate_radps * math.sqrt(40.0), rel=1e-3
+    )
+    values = np.array([[]]).reshape(1, 0)
+    of_ship, of_model = (PosterFigures(card, []).at(values) for card in (large, small))
+    for name, value in of_ship.items():
+        lengths = 40.0 if name.split("@")[0].endswith("_m") else 1.0
+        assert of_model[name][0] == pytest.approx(value[0] / lengths, rel=2e-3), name
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,7 @@ STUDY = GuessStudy(
 
 
 def test_the_chart_shows_bands_and_figures_given_over_the_median_found() -> None:
-    (chart,) = GuessResult(STUDY).charts().values()
+    (chart,) = GuessResult(STUDY)._charts().values()
     rows = rows_of(chart)
     assert [(row["run"], row["low"], row["high"]) for row in rows if "low" in row] == [
         ("by dimensions", 700 / 980, 1400 / 980),

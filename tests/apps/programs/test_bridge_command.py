@@ -24,6 +24,7 @@ from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.running import Running
 from tests.hostile_text import HOSTILE, hostile_card
+from tests.marks import first_fast
 
 STEP_S = 0.1
 
@@ -80,7 +81,7 @@ def table(files: ProgramFiles) -> dict[tuple[str, str], tuple[float, float]]:
     return {(row.manoeuvre, row.figure): (row.before, row.after) for row in files.changes}
 
 
-@pytest.mark.parametrize("name", ["kvlcc2-mmg", "mariner"])
+@first_fast("name", ["kvlcc2-mmg", "mariner"])
 def test_the_ship_turns_as_the_table_says_and_as_the_card_within_ten_percent(
     name: str, program: Any, tmp_path: Path
 ) -> None:

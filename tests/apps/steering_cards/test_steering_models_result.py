@@ -42,7 +42,7 @@ def test_the_steering_diagram_shows_models_and_trials(found: SteeringComparison)
 
 
 def test_the_bars_are_the_influence_of_each_model(found: SteeringComparison) -> None:
-    rows = rows_of(SteeringModelsResult(found).charts()["influence_of_each_coefficient"])
+    rows = rows_of(SteeringModelsResult(found)._charts()["influence_of_each_coefficient"])
     japanese = {row["name"]: row["v"] for row in rows if row.get("run") == "Japanese model, 9 m"}
     assert japanese["C_m_b"] == pytest.approx(-5.81, abs=0.01)
     assert len(japanese) == 12

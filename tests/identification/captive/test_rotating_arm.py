@@ -13,6 +13,7 @@ from tank2sim.identification.captive.reduction import reduce_campaign
 from tank2sim.records.campaigns import read_campaign
 from tests.identification.captive.rotating_arm import HEEL, TRUTH, L, conditions, gauges, write_arm
 from tests.identification.captive_mmg.tank import KVLCC2, write_campaign
+from tests.marks import first_fast
 
 
 def reduced(path):
@@ -70,7 +71,7 @@ def as_runs(folder, *, with_rate: bool):
     return folder / "campaign.toml"
 
 
-@pytest.mark.parametrize("with_rate", [True, False])
+@first_fast("with_rate", [True, False])
 def test_a_file_for_each_turn_gives_the_derivatives_of_the_table(tmp_path, with_rate):
     found = reduced(as_runs(tmp_path, with_rate=with_rate))
     for name in ("Yr", "Nr", "Yvvr", "Nvvr", "Yvrr", "Xvr", "Xrr", "Yv", "Nd"):

@@ -173,6 +173,11 @@ def test_measured_campaigns_show_no_systematic_error(data):
         assert implausible(reduce_campaign(read_campaign(data / "data" / name / "campaign.toml"))) == (), name
 
 
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    return write(replace(SOUND, size="linear", rate_hz=5.0), tmp_path_factory.mktemp("small"))
+
+
 def number(written, key):
     return next(line for line in written.path.read_text().splitlines() if line.startswith(f"{key} = "))
 
@@ -191,23 +196,23 @@ def number(written, key):
         ("water_density_kgpm3", 1e-3, "test.water_density_kgpm3"),
     ],
 )
-def test_numbers_that_cannot_be_are_refused_by_their_key(tmp_path, key, factor, place):
-    written = write(replace(SOUND, size="linear", rate_hz=5.0), tmp_path)
-    old = number(written, key)
+def test_numbers_that_cannot_be_are_refused_by_their_key(small, key, factor, place):
+    old = number(small, key)
     value = float(old.partition(" = ")[2])
+    changed = small.path.with_name("changed.toml")
+    changed.write_text(small.path.read_text().replace(old, f"{key} = {value * factor!r}"))
     with pytest.raises(InputError) as error:
-        written.path.write_text(written.path.read_text().replace(old, f"{key} = {value * factor!r}"))
-        reduce_campaign(read_campaign(written.path))
+        reduce_campaign(read_campaign(changed))
     assert error.value.place == place
-    assert error.value.source == str(written.path)
+    assert error.value.source == str(changed)
 
 
-def test_a_mass_of_1_kg_is_refused_without_beam_and_draught_too(tmp_path):
-    written = write(replace(SOUND, size="linear", rate_hz=5.0), tmp_path)
-    lines = [one for one in written.path.read_text().splitlines() if not one.startswith(("beam_m", "draught_m"))]
-    written.path.write_text("\n".join("mass_kg = 1.0" if one.startswith("mass_kg") else one for one in lines))
+def test_a_mass_of_1_kg_is_refused_without_beam_and_draught_too(small):
+    lines = [one for one in small.path.read_text().splitlines() if not one.startswith(("beam_m", "draught_m"))]
+    changed = small.path.with_name("changed.toml")
+    changed.write_text("\n".join("mass_kg = 1.0" if one.startswith("mass_kg") else one for one in lines))
     with pytest.raises(InputError) as error:
-        reduce_campaign(read_campaign(written.path))
+        reduce_campaign(read_campaign(changed))
     assert error.value.place == "model.mass_kg"
 
 

@@ -174,8 +174,24 @@ def test_a_gap_takes_its_windows_only(noisy):
 def test_a_run_without_long_stretches_is_refused(noisy):
     holed = noisy[0].signals["r_radps"].copy()
     holed[::20] = holed[1::20] = holed[2::20] = holed[3::20] = np.nan
+    holed_trial = replace(noisy[0], signals={**noisy[0].signals, "r_radps": holed})
     with pytest.raises(InputError, match="no stretch long enough"):
-        equation_error(problem([replace(noisy[0], signals={**noisy[0].signals, "r_radps": holed})]))
+        equation_error(problem([holed_trial], seen=("motion.u", "motion.v", "motion.r")))
+    derived = WeakForm(problem([holed_trial])).runs[0]  # by the heading, which has no gaps
+    assert len(derived.change) and any("readings of r" in notice for notice in derived.motion.notices)
+
+
+def test_velocities_that_were_read_in_short_bursts_are_derived_from_heading_and_positions(noisy):
+    """A log that had a fix now and then: rows exist, and u, v and r are in a quarter of them."""
+    bursts = []
+    for one in noisy:
+        known = one.time_s % 20.0 < 5.0
+        seldom = {name: np.where(known, one.signals[name], np.nan) for name in ("u_mps", "v_mps", "r_radps")}
+        bursts.append(replace(one, signals={**one.signals, **seldom}))
+    found = equation_error(problem(bursts))
+    by_positions = equation_error(problem(noisy, seen=("motion.psi", "motion.x", "motion.y")))
+    np.testing.assert_allclose(found.values, by_positions.values, rtol=1e-6)
+    assert any("readings of u, v, r are too far apart" in notice for notice in found.notices)
 
 
 def test_noise_left_in_regressors_is_reported():

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
-import control
 import numpy as np
 
 from tank2sim.analysis.ensemble.questions import ShipText
@@ -186,6 +185,8 @@ def branches(turning: SteadyTurning, rudder_rad: Sequence[float] | Array) -> tup
 
 def _responses(model: Model, speed_mps: float | None, grid: Grid) -> list[Array]:
     """Magnitude (dB) and phase (deg) of yaw rate by rudder angle, and the step, 1/s."""
+    import control  # slow to load
+
     point = straight_course(model, speed_mps)
     hull = state_space(model, point, states=steering_states(model), inputs=["rudder.angle"], outputs=["motion.r"])
     response = np.asarray(hull(1j * grid.omega_radps), dtype=complex).ravel()

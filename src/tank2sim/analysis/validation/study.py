@@ -28,6 +28,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from tank2sim.analysis.validation.one_sided import OneSidedError, one_sided_errors
 from tank2sim.analysis.validation.standard_trials import (
     SEED,
     TrialShip,
@@ -180,11 +181,12 @@ class Verified:
 
 @dataclass(frozen=True)
 class Validation:
-    """All figures of all trials, and notices on trials that could not be compared."""
+    """All figures of all trials, notices on trials that could not be compared, and errors to one side."""
 
     figures: tuple[Validated, ...]
     members: int
     notices: tuple[Notice, ...] = ()
+    one_sided: tuple[OneSidedError, ...] = ()
 
     @property
     def counts(self) -> dict[str, int]:
@@ -259,7 +261,9 @@ def validate_card(
         )
     if not count:
         messages.append(Notice("no ensemble was run: u_input and U_val are not known, and no figure can be judged"))
-    return Validation(tuple(figures), count, tuple(dict.fromkeys(messages)))
+    one_sided = one_sided_errors(figures, (TURN_FIGURES, ZIGZAG_FIGURES))
+    messages = [*(error.notice for error in one_sided), *messages]
+    return Validation(tuple(figures), count, tuple(dict.fromkeys(messages)), one_sided)
 
 
 def made_card(card: ManoeuvringCard, trial: str) -> bool:
@@ -398,5 +402,5 @@ def _with_another_lag(what: Recorded, generator: np.random.Generator) -> Recorde
     """A recorded zigzag with a lag drawn within its standard error; a turn as it is."""
     if isinstance(what.manoeuvre, Turn):
         return what
-    lag = max(0.0, what.manoeuvre.lag_s + what.errors["lag_s"] * generator.standard_normal())
+    lag = max(0.0, what.manoeuvre.lag_s + what.errors.get("lag_s", 0.0) * generator.standard_normal())
     return replace(what, manoeuvre=replace(what.manoeuvre, lag_s=lag))

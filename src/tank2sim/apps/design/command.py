@@ -163,7 +163,8 @@ def design_campaign(
     model_length_m : float, optional
         Length of the model, m, in place of the file's.
     usual : path, optional
-        A ``campaign.toml`` whose runs are compared, in place of the usual matrix.
+        A ``campaign.toml`` whose runs are compared, in place of the usual matrix; or a tank's own matrix as a CSV table
+        with columns of drift (``beta_deg``), rudder (``delta_deg``), ``v_prime`` and ``r_prime``, a row for each run.
     largest : tuple, optional
         Largest drift (deg), rudder (deg) and r'; by default those of the manoeuvres of the figures. On the command line
         ``12/35/0.6``.

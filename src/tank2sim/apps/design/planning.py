@@ -11,6 +11,7 @@ from tank2sim.analysis.influence.figures import InfluenceFigure, parse_figure
 from tank2sim.apps.design.captive_design import CaptiveDesign, CaptiveDesigner, CaptiveDesignSettings, tank_runs
 from tank2sim.apps.design.figure_slopes import range_of_figures
 from tank2sim.apps.design.plan_files import run_rows, runs_of_campaign
+from tank2sim.apps.design.run_matrix import runs_of_matrix
 from tank2sim.apps.design.study import (
     CampaignStudy,
     GaugeStudy,
@@ -74,9 +75,13 @@ def planned_campaign(
     asked = _figures_of(figures)
     reach = range_of_figures(polynomial, asked) if largest is None else _tested_range(largest)
     runs = tank_runs(polynomial, limits, reach, settings.source)
-    own = None if usual is None else runs_of_campaign(Path(usual), runs)
+    own, assumed = None, list[Notice]()
+    if usual is not None and Path(usual).suffix.lower() == ".csv":
+        own, assumed = runs_of_matrix(Path(usual), runs)
+    elif usual is not None:
+        own = runs_of_campaign(Path(usual), runs)
     design = CaptiveDesigner(polynomial, limits, asked, replace(settings, usual=own, largest=reach)).design()
-    notices = dict.fromkeys((*doubts(card), *_notices(design, settings.draws), *converted))
+    notices = dict.fromkeys((*doubts(card), *_notices(design, settings.draws), *assumed, *converted))
     return _campaign_study(card.ship.name, design, tuple(notices)), design
 
 

@@ -161,7 +161,7 @@ def _compute(course: _Course, request: FleetRequest, report: StageReport) -> Non
     with _working(request, len(course.wanted)) as (find, executor):
         for ship, found in find(_read(course), request.options, report, executor):
             report(f"{ship.folder.name}: writing")
-            fault = found if isinstance(found, Fault) else _write(ship, found, course, request.output)
+            fault = found if isinstance(found, Fault) else _write(ship, found, course, request)
             if fault:
                 course.faults[ship.folder.name] = fault.line
 
@@ -192,12 +192,12 @@ def _read(course: _Course) -> Iterator[ShipTask]:
             course.faults[ship.name] = str(error)
 
 
-def _write(ship: ShipTask, gap: Gap, course: _Course, output: Path) -> Fault | None:
+def _write(ship: ShipTask, gap: Gap, course: _Course, request: FleetRequest) -> Fault | None:
     """Write a ship's results and their record, all or none; return the fault if there are none."""
-    folder = output / ship.folder.name
+    folder = request.output / ship.folder.name
     record, why = course.wanted[ship.folder]
     try:
-        files, notices = gap_result(gap, ship.fitted, ship.held).files(folder)
+        files, notices = gap_result(gap, ship.fitted, ship.held, force=request.options.force).files(folder)
     except InputError as error:
         return Fault(str(error))
     except OSError:
@@ -258,6 +258,7 @@ def fleet_run_record(ship: ShipFolder, options: GapOptions) -> dict[str, object]
         "options": {
             "effects": None if options.effects is None else list(options.effects),
             "without": list(options.without),
+            "force": options.force,
             "max_effects": options.max_effects,
             "false_discovery": options.false_discovery,
         },

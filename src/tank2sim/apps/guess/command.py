@@ -44,7 +44,7 @@ def guess(
     Parameters
     ----------
     length_m : float
-        Length between perpendiculars, m.
+        Length between perpendiculars, m. Below 20 m it is taken for a model of a ship.
     beam_m : float
         Moulded beam, m.
     draught_m : float
@@ -70,7 +70,8 @@ def guess(
     Raises
     ------
     InputError
-        A number is not one of a ship, figures are impossible or contradict each other, or there is no C compiler.
+        A number is not one of a ship or model, figures are impossible or contradict each other, or there is no C
+        compiler.
 
     Examples
     --------

@@ -74,18 +74,23 @@ _GEAR_RATE, _GEAR_ANGLE = 65.0 / 28.0, 35.0
 II-1/29)."""
 
 _LIMITS: Mapping[str, tuple[float, float]] = {
-    "length": (20.0, 500.0),
-    "beam": (3.0, 100.0),
-    "draught": (0.5, 40.0),
+    "length": (1.0, 500.0),
+    "beam": (0.08, 100.0),
+    "draught": (0.02, 40.0),
     "block": (0.35, 1.0),
     "speed": (1.0, 45.0),
 }
-"""What a merchant ship can be, m, -, kn. Project choice: wider than any ship."""
+"""What a merchant ship or its model can be, m, -, and the ship's speed, kn. Project choice: wider than any ship; models
+below 1 m are toys."""
+
+SHORTEST_SHIP_GUESSED_M, SHIP_OF_MODEL_M = 20.0, 200.0
+"""Length (m) below which a guess is one of a model, and the length of the ship whose model it is taken for: speeds and
+the rate of the steering gear follow Froude. Project choice: few ships are shorter, few models longer."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ShipDimensions:
-    """Main dimensions of a ship.
+    """Main dimensions of a ship, or of a model of a ship (shorter than :data:`SHORTEST_SHIP_GUESSED_M`).
 
     Parameters
     ----------
@@ -99,7 +104,7 @@ class ShipDimensions:
     Raises
     ------
     InputError
-        A number is not one of a ship, or the numbers are not those of one ship.
+        A number is not one of a ship or model, or the numbers are not those of one ship.
     """
 
     length_m: float
@@ -109,10 +114,15 @@ class ShipDimensions:
     speed_kn: float
 
     def __post_init__(self) -> None:
+        what, froude = ("models", math.sqrt(self.scale)) if self.scale > 1 else ("ships", 1.0)
         for (low, high), (name, value) in zip(_LIMITS.values(), vars(self).items(), strict=True):
-            if not low <= value <= high:
+            least, most = (low / froude, high / froude) if name == "speed_kn" else (low, high)
+            if not least <= value <= most:
                 unit = in_words(name)[1]
-                remedy = f"ships have {low:g} to {high:g} {unit}".rstrip()
+                of = f"{what} of this length have" if name == "speed_kn" and self.scale > 1 else "ships have"
+                remedy = f"{of} {least:.3g} to {most:.3g} {unit}".rstrip()
+                if name == "length_m":
+                    remedy += f", models of ships {low:g} m at least"
                 raise ArgumentError(name, "", f"is {value:g} {unit}".rstrip(), remedy)
         if not 2.2 <= self.length_m / self.beam_m <= 12.0:  # harbour tugs have 2.6
             problem = f"is 1/{self.length_m / self.beam_m:.3g} of the length"
@@ -120,6 +130,11 @@ class ShipDimensions:
         if not 1.5 <= self.beam_m / self.draught_m <= 8.0:
             problem = f"is 1/{self.beam_m / self.draught_m:.3g} of the beam"
             raise ArgumentError("draught_m", "", problem, "ships have 1/8 to 1/1.5: give metres")
+
+    @property
+    def scale(self) -> float:
+        """Length of the ship by that of its model, assumed (:data:`SHIP_OF_MODEL_M`); 1 for a ship."""
+        return SHIP_OF_MODEL_M / self.length_m if self.length_m < SHORTEST_SHIP_GUESSED_M else 1.0
 
     @property
     def speed_mps(self) -> float:
@@ -178,14 +193,15 @@ def prior_card(ship: ShipDimensions, name: str) -> ManoeuvringCard:
         },
         source="guessed by tank2sim from main dimensions and manoeuvring figures",
         notes="No number was measured: each is an estimate with a wide standard error.",
-        environment={"water_density_kgpm3": 1025.0},
+        environment={"water_density_kgpm3": 1025.0 if ship.scale == 1.0 else 998.0},
         speed_mps=ship.speed_mps,
         largest=TestedRange(math.radians(30.0), math.radians(_GEAR_ANGLE), 1.2),
         rigid_body={"mass": particulars.mass_prime, "yaw_inertia": inertia[0], "x_G": x_G},
         inertia_source=inertia_source.removeprefix("ESTIMATED: ") or GYRATION,
         derivatives={key: DerivativeEntry(*entry) for key, entry in found.items()},
     )
-    lines = [manoeuvring_card_text(result), "[steering_gear]", f"max_rate_degps = {_GEAR_RATE:.4g}"]
+    rate = _GEAR_RATE * math.sqrt(ship.scale)
+    lines = [manoeuvring_card_text(result), "[steering_gear]", f"max_rate_degps = {rate:.4g}"]
     lines.append(f"max_angle_deg = {_GEAR_ANGLE:g}")
     for effect, values in _EFFECTS.items():
         lines += ["", "[[effects]]", f'name = "{effect}"', "[effects.parameters]"]

@@ -13,7 +13,7 @@ import tomlkit
 
 from tank2sim.analysis.ensemble.draws import by_file_name
 from tank2sim.apps.guess.conditioning import FIGURE_KEYS, FIGURES, GivenFigure, GuessMembers, conditioned
-from tank2sim.apps.guess.prior import ShipDimensions, prior_card
+from tank2sim.apps.guess.prior import SHIP_OF_MODEL_M, ShipDimensions, prior_card
 from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics.card_parameters import CardParameter, card_parameters, study_model
@@ -188,7 +188,7 @@ def study_members(
         figures=figures,
         parameters=_parameters(found),
         next_figures=_next_figures(found, by_key),
-        notices=(*_outside(figures), *_notices(given, members, members - len(found.prior))),
+        notices=(*_of_model(ship), *_outside(figures), *_notices(given, members, members - len(found.prior))),
     )
 
 
@@ -240,6 +240,17 @@ def _outside(figures: Mapping[str, GuessedFigure]) -> Iterator[Notice]:
                 f"{'; ' + ', '.join(units) if units else '; check it, the dimensions and the speed'}."
             )
         )
+
+
+def _of_model(ship: ShipDimensions) -> Iterator[Notice]:
+    """The scale effects and the gear that are assumed of a model."""
+    if ship.scale == 1.0:
+        return
+    yield caution(
+        f"{ship.length_m:g} m is the length of a model: the formulas are those of ships, whose friction, wake and "
+        "loading of the propeller a model does not have; the rudder turns as fast as the gear of a ship of "
+        f"{SHIP_OF_MODEL_M:g} m does by Froude's law, in fresh water. State the gear on the card if it is another"
+    )
 
 
 def _notices(given: Sequence[GivenFigure], members: int, lost: int) -> Iterator[Notice]:

@@ -102,6 +102,10 @@ _ASTERN_SHARE, _ASTERN_S = 0.15, 8.0
 """Shares of the usual speed and of the usual revolutions, and a time, s, from which a vessel goes astern against them.
 Project choice: beyond what a current or a coasting propeller does."""
 
+HEADINGS_APART_DEG = 5.0
+"""Mean difference of two headings, deg, from which they contradict each other (project choice: beyond the deviation of
+a compass that was swung)."""
+
 _MUCH_LESS = 0.7
 """Ratio of deviations from which the lesser one decides (project choice)."""
 
@@ -930,6 +934,7 @@ class _Search:
                 used.discard(channel.stream + channel.quantity)
             channels.append(self._of_pulses(replace(channel, use=use)))
         self._twins(channels)
+        self._headings_apart(channels)
         self._set_back(channels)
         order = {name: place for place, name in enumerate(QUANTITIES)}
         channels.sort(key=lambda c: (order[c.quantity], not c.use, -c.confidence))
@@ -949,6 +954,26 @@ class _Search:
                 text = f"{used.stream} is used, and not {other.stream}, another {QUANTITIES[used.quantity].words}, "
                 text += f"{apart:.3g} {used.unit} apart (median)"
                 self.findings.append(LogFinding("note", text, other.stream, {"apart": apart}))
+
+    def _headings_apart(self, channels: list[LogChannel]) -> None:
+        """Name a second heading that differs from the one in use: one of the two is off, or looks elsewhere."""
+        used = next((channel for channel in channels if channel.use and channel.quantity == "heading"), None)
+        if used is None:
+            return
+        first = self._stream(used.stream)
+        for other in channels:
+            if other.quantity != "heading" or other.use or other.confidence < USED_FROM:
+                continue
+            second = self._stream(other.stream)
+            nearest = np.clip(np.searchsorted(second.time_s, first.time_s), 0, len(second.time_s) - 1)
+            apart = np.angle(np.exp(1j * (other.si(second.values[nearest]) - used.si(first.values))))
+            size = float(np.degrees(np.angle(np.mean(np.exp(1j * apart)))))
+            if abs(size) > HEADINGS_APART_DEG:
+                text = (
+                    f"{used.stream} is used, and {other.stream}, another heading, is {size:+.0f} deg from it: state "
+                    "the right one (a fault of one source, or it is mounted at an angle)"
+                )
+                self.findings.append(LogFinding("fault", text, other.stream, {"apart_deg": size}))
 
     def _set_back(self, channels: list[LogChannel]) -> None:
         """Give the later of heading and rate of turn its delay, where it is certain: neither can be early."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import theilslopes
 
 from tank2sim.apps.logs.clock import continued_clock, rollover_s
 from tank2sim.apps.logs.lines import mostly, text_lines
@@ -44,6 +45,13 @@ _SYSTEM_TIME, _VARIATION, _RUDDER, _ENGINE = 126992, 127258, 127245, 127488
 _EPOCHS = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
 _OFTEN = 0.1
 """Share of time stamps that fall from which they are differences. Project choice: messages rarely change places."""
+
+_CLOCKS_APART_S = 1.5
+"""Difference of the clocks of two sources that is reported, s: they send whole seconds (project choice)."""
+
+_PACE_OFF, _PACE_FROM, _PACE_FROM_S = 0.05, 8, 10.0
+"""Share by which the pace of two clocks must differ, and the number and span (s) of system times from which it is known
+(project choice: whole seconds over ten leave 3 %)."""
 
 _CLOCK = re.compile(r"^(?:A(\d\d)(\d\d)(\d\d\.\d+)|(\d\d):(\d\d):(\d\d\.\d+)) ")
 """Time of day of Actisense's ASCII and of the raw format of gateways, without a date."""
@@ -131,6 +139,7 @@ class _Reader:
         self.columns: dict[tuple[int, int, str, str, str], _Column] = defaultdict(_Column)
         self.units: dict[tuple[int, str], str] = {}
         self.ticks = _Column()
+        self.clocks: dict[int, _Column] = defaultdict(_Column)
         self.sums = _Column()
         self.variation = math.nan
         self.days, self.last_s = 0, 0.0
@@ -159,7 +168,7 @@ class _Reader:
         values = {entry.id: entry.value for entry in message.fields}
         if message.PGN == _SYSTEM_TIME and isinstance(values.get("date"), dt.date):
             moment = dt.datetime.combine(values["date"], values["time"], tzinfo=dt.UTC)
-            _append(self.ticks, stamp, moment.timestamp(), number)
+            _append(self.clocks[message.source], stamp, moment.timestamp(), number)
         if message.PGN == _VARIATION and isinstance(values.get("variation"), float):
             self.variation = values["variation"]
         self._keep(message.PGN, message.source, values, stamp, number)
@@ -204,8 +213,8 @@ class _Reader:
 
     def log(self) -> VesselLog:
         """The log after the last line."""
-        ticks = self.ticks
-        findings: list[LogFinding] = []
+        ticks, findings = self._one_clock()
+        self.ticks = ticks
         if not any(quantity for _, _, _, quantity, _ in self.columns):
             raise InputError(self.path, "", "no message of it is understood", "give a log of candump or of Actisense")
         timed = self.counts["timed"] > _SAME * (self.counts["timed"] + self.counts["untimed"])
@@ -222,12 +231,15 @@ class _Reader:
         if len(clock) > 1:
             clock, found = continued_clock(clock, "system time")
             findings += found
-        shift = 0.0
+        shift, pace = 0.0, 1.0
         if timed and len(clock):
+            pace, found = _pace(stamps[-1], clock)
+            findings += found
+            stamps = [pace * stamp for stamp in stamps]
             shift = float(np.nanmedian(clock - stamps[-1]))
-            if dated:
+            if dated and pace == 1.0:
                 turned, found = rollover_s(shift)
-                shift, findings = shift + turned, [*findings, *found]
+                shift, findings = shift + turned, [*findings, *(found or _recorder_off(shift))]
         streams = []
         for (key, column), stamp in zip(self.columns.items(), stamps, strict=False):
             time = stamp + shift if timed else steady_times(np.interp(column.lines, ticks.lines, clock))
@@ -245,6 +257,26 @@ class _Reader:
         return VesselLog(
             self.path, "NMEA 2000", tuple(streams), counts, tuple(findings), dated or len(ticks.values) > 0
         )
+
+    def _one_clock(self) -> tuple[_Column, list[LogFinding]]:
+        """The system times of the source with most of them, and findings on other sources whose clocks differ.
+
+        Of sources that send equally often (within a fifth) it is the one whose clock is in the middle.
+        """
+        if not self.clocks:
+            return self.ticks, []
+        most = max(len(column.values) for column in self.clocks.values())
+        often = {source: column for source, column in self.clocks.items() if len(column.values) > 0.8 * most}
+        ahead = {source: _ahead_s(column, often) for source, column in self.clocks.items()}
+        chosen = min(often, key=lambda source: abs(ahead[source] - float(np.median([ahead[key] for key in often]))))
+        findings = []
+        for source, by in ahead.items():
+            late = ahead[chosen] - by
+            if abs(late) > _CLOCKS_APART_S:
+                word = "behind" if late > 0 else "ahead of"
+                text = f"the clock of source {source} is {abs(late):.2g} s {word} that of {chosen}, which is used"
+                findings.append(LogFinding("note", text, evidence={"behind_s": late}))
+        return self.clocks[chosen], findings
 
     def _stream(
         self, key: tuple[int, int, str, str, str], column: _Column, time: Array, findings: list[LogFinding]
@@ -264,6 +296,39 @@ class _Reader:
         label += f" from {source}" if len(alike) > 1 else ""
         unit = self.units[pgn, name]
         return LogStream(label, time, np.array(column.values), unit, quantity, "format" if quantity else "")
+
+
+def _pace(stamps: Array, clock: Array) -> tuple[float, list[LogFinding]]:
+    """Time of the receiver's clock for a second of the recorder's, 1 where they agree, and what to say of it.
+
+    Times of a conversion, or of a replay, run at another pace than those of the messages.
+    """
+    good = np.isfinite(stamps)
+    if np.count_nonzero(good) < _PACE_FROM or np.ptp(stamps[good]) <= 0 or np.ptp(clock[good]) < _PACE_FROM_S:
+        return 1.0, []
+    pace = float(theilslopes(clock[good], stamps[good])[0])
+    if abs(pace - 1) < _PACE_OFF or pace <= 0:
+        return 1.0, []
+    text = f"the clock of the satellites runs {pace:.3g} times as fast as that of the recorder, and is used"
+    return pace, [LogFinding("fault", text, evidence={"pace": pace})]
+
+
+def _recorder_off(ahead_s: float) -> list[LogFinding]:
+    """A note on a recorder's clock that differs by more than the steps of the system time."""
+    if abs(ahead_s) <= _CLOCKS_APART_S:
+        return []
+    word = "behind" if ahead_s > 0 else "ahead of"
+    text = f"the clock of the recorder is {abs(ahead_s):.3g} s {word} that of the satellites, which is used"
+    return [LogFinding("note", text, evidence={"behind_s": ahead_s})]
+
+
+def _ahead_s(column: _Column, every: dict[int, _Column]) -> float:
+    """Median of a clock less the time stamps; of lines without, less the mean clock of all sources at these lines."""
+    clock, stamps = np.array(column.values), np.array(column.stamps)
+    if np.isfinite(stamps).all():
+        return float(np.median(clock - stamps))
+    means = [np.interp(column.lines, other.lines, other.values) for other in every.values()]
+    return float(np.median(clock - np.mean(means, axis=0)))
 
 
 def _engine(instance: str) -> tuple[int, str]:

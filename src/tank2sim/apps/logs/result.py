@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from tank2sim.answer.charts.motion import History, Signal, TimeMark, TrackData, history_chart, track_chart
-from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, records_table, table
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, records_table, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.logs.channels import CHANNELS_FILE, channels_text
 from tank2sim.apps.logs.current import DriftCurrent
+from tank2sim.apps.logs.gear import LoggedGear
 from tank2sim.apps.logs.stretches import Stretch
 from tank2sim.apps.logs.study import LogStudy, StretchStudy
 from tank2sim.apps.logs.trial_files import TrialCut, remove_earlier_trials
@@ -177,6 +178,7 @@ class LogResult(Result[LogStudy]):
         ]
         if self._faults:
             lines.append(f"{self._faults} faults of the log are noted.")
+        lines += [study.gear.words] if study.gear else []
         return (*lines, *(self.identified.headline if self.identified else ()))
 
     @property
@@ -205,6 +207,7 @@ class LogResult(Result[LogStudy]):
             *self._time_line(),
             Section(heading="Channels", tables=self._channel_tables()),
             Section(heading="Stretches", tables=[self._stretch_table()]),
+            *([_gear_section(study.gear)] if study.gear else []),
             *(craft_sections(study.identified) if study.identified else []),
             Section(heading="Logs", tables=[self._log_table()], folded=True),
         ]
@@ -299,6 +302,26 @@ class LogResult(Result[LogStudy]):
             for log in self.study.logs
         ]
         return table("Logs", ("file", "format", "streams", "read and lost"), rows, on_screen=False)
+
+
+def _gear_section(gear: LoggedGear) -> Section:
+    """The steering gear with standard errors."""
+    pairs: dict[str, tuple[str, float | None, float | None]] = {
+        "rate": ("deg/s", gear.rate_degps, gear.rate_error_degps),
+        "fastest movement": ("deg/s", gear.fastest_degps, None),
+        "lag": ("s", gear.lag_s, gear.lag_error_s),
+        "dead band": ("deg", gear.dead_band_deg, gear.dead_band_error_deg),
+    }
+    for side, limit in (("port", gear.port), ("starboard", gear.starboard)):
+        if limit:
+            pairs[f"largest angle held to {side}"] = "deg", limit.angle_deg, limit.standard_error_deg
+    rows: list[list[Cell]] = [[name, unit, value, error] for name, (unit, value, error) in pairs.items()]
+    text = (
+        f"{gear.angle} follows {gear.order} as a gear of one rate does, with a lag and a dead band; what remains is "
+        f"{gear.residual_deg:.2g} deg rms over {gear.duration_s:.3g} s."
+    )
+    heads = ("quantity", "unit", "value", Column(title="standard error", digits=2))
+    return Section(heading="Steering gear", text=text, tables=[table("Steering gear by this log", heads, rows)])
 
 
 def _cut_in_words(cut: Sequence[StretchStudy]) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from tank2sim.apps.logs.channels import CHANNELS_FILE, LogChannel
 from tank2sim.apps.logs.clock import utc_text
 from tank2sim.apps.logs.current import DriftCurrent, drift_current
+from tank2sim.apps.logs.gear import LoggedGear, logged_gear
 from tank2sim.apps.logs.quantities import QUANTITIES
 from tank2sim.apps.logs.streams import LogFinding
 from tank2sim.apps.logs.stretches import Stretch, StretchKind
@@ -127,6 +128,8 @@ class LogStudy:
         ``t_s`` from the begin, ``x_m`` north and ``y_m`` east; None without positions.
     time_line : dict
         ``t_s`` and ``value`` (SI) by quantity.
+    gear : LoggedGear or None
+        Steering gear by the rudder's angle and order; None without both, or with too few movements.
     identified : CraftIdentificationStudy or None
         Coefficients of the craft, if its card was given.
     findings : tuple of LogFinding
@@ -145,6 +148,7 @@ class LogStudy:
     findings: tuple[LogFinding, ...]
     notices: tuple[Notice, ...]
     identified: CraftIdentificationStudy | None = None
+    gear: LoggedGear | None = None
 
 
 def study_log(voyage: Voyage, stretches: Sequence[Stretch], cuts: Sequence[TrialCut]) -> LogStudy:
@@ -171,6 +175,7 @@ def study_log(voyage: Voyage, stretches: Sequence[Stretch], cuts: Sequence[Trial
         time_line=_time_line(voyage),
         findings=voyage.findings,
         notices=_notices(voyage, stretches, cuts, current),
+        gear=logged_gear(voyage),
     )
 
 

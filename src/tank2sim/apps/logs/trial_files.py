@@ -39,8 +39,8 @@ SHORTEST_STEP_S = 0.1
 LONGEST_STEP_S = 1.0
 """Largest step of a trial, s: slower streams leave empty cells. Project choice: rudders move within seconds."""
 
-LONGEST_CRAFT_TRIAL_S = 60.0
-"""Longest trial of a craft, s. Project choice: current and mean wind, steady within a trial, hold for a minute."""
+PREDICTABLE_S = 40.0
+"""Length from which a trial of a craft is one by itself, s: ten in which a filter finds its state, and a prediction."""
 
 _HELD = ("rudder_order", "rpm_order", "thrust_order_port", "thrust_order_starboard")
 
@@ -60,7 +60,7 @@ class TrialCut:
     Parameters
     ----------
     stretches : tuple of Stretch
-        One; of a craft all between two rests.
+        One; of a craft several that follow each other.
     trial : Trial
         Times from its begin; signals in SI.
     begins_s : float
@@ -86,7 +86,7 @@ def cut_trials(voyage: Voyage, stretches: tuple[Stretch, ...]) -> list[TrialCut]
     the time of the row; rows without a sample are empty. Orders hold. Nothing is bridged over gaps.
 
     A craft without a rudder does not make the manoeuvres of ships, and its motion is predicted for longer than one of
-    them: what it does between two rests is one trial, to :data:`LONGEST_CRAFT_TRIAL_S`.
+    them: stretches that follow each other go together until they last :data:`PREDICTABLE_S`.
     """
     cuts: list[TrialCut] = []
     steered = any(name in voyage.series for name in ("rudder_angle", "rudder_order"))
@@ -100,7 +100,7 @@ def cut_trials(voyage: Voyage, stretches: tuple[Stretch, ...]) -> list[TrialCut]
 
 
 def _places(stretches: Sequence[Stretch], whole: bool) -> Iterator[tuple[int, int]]:
-    """First stretch of each trial and how many it has: one that excites the vessel, or all between two rests."""
+    """First stretch of each trial and how many it has: one that excites the vessel, or several."""
     place = 0
     while place < len(stretches):
         end = place + 1
@@ -109,7 +109,7 @@ def _places(stretches: Sequence[Stretch], whole: bool) -> Iterator[tuple[int, in
                 end < len(stretches)
                 and stretches[end].kind is not StretchKind.REST
                 and stretches[end].begin_s == stretches[end - 1].end_s
-                and stretches[end].end_s - stretches[place].begin_s <= LONGEST_CRAFT_TRIAL_S
+                and stretches[end - 1].end_s - stretches[place].begin_s < PREDICTABLE_S
             ):
                 end += 1
             while end > place + 1 and not stretches[end - 1].kind.excites:

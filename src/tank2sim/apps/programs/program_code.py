@@ -11,60 +11,33 @@ import keyword
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.model import Model, Variable
 from tank2sim.escaping import one_line, python_text
+from tank2sim.native.operations import COMPARISONS, FUNCTIONS, OPERATORS, instructions
 
-_BINARY = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/"}
-_COMPARED = {ca.OP_LT: "<", ca.OP_LE: "<=", ca.OP_EQ: "==", ca.OP_NE: "~="}
-_CALLED = {
-    ca.OP_EXP: "exp",
-    ca.OP_LOG: "log",
-    ca.OP_SQRT: "sqrt",
-    ca.OP_SIN: "sin",
-    ca.OP_COS: "cos",
-    ca.OP_TAN: "tan",
-    ca.OP_ASIN: "asin",
-    ca.OP_ACOS: "acos",
-    ca.OP_ATAN: "atan",
-    ca.OP_TANH: "tanh",
-    ca.OP_SINH: "sinh",
-    ca.OP_COSH: "cosh",
-    ca.OP_ATAN2: "atan2",
-    ca.OP_FABS: "abs",
-    ca.OP_FMIN: "min",
-    ca.OP_FMAX: "max",
-    ca.OP_SIGN: "sign",
-    ca.OP_FLOOR: "floor",
-    ca.OP_CEIL: "ceil",
-}
+_RENAMED = {"fabs": "abs", "fmin": "min", "fmax": "max", "fmod": "rem"}
+_CALLED = {op: _RENAMED.get(word, word) for op, word in FUNCTIONS.items()} | {ca.OP_SIGN: "sign"}
 """Operations of CasADi to functions of MATLAB; those of Python are the same or in :data:`_PYTHON`."""
 
-_PYTHON = {
-    **{name: f"math.{name}" for name in ("exp", "log", "sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "tanh")},
-    **{name: f"math.{name}" for name in ("sinh", "cosh", "atan2", "floor", "ceil")},
-    "sign": "_sign",
-    "~=": "!=",
-}
+_PYTHON = {word: f"math.{word}" for word in _CALLED.values() if word not in ("abs", "min", "max")}
+_PYTHON |= {"rem": "math.fmod", "sign": "_sign", "~=": "!="}
 
 Spelling = Callable[[str], str]
 
 
-def _operation(op: int, a: str, b: str, spelt: Spelling) -> str:
+def _operation(op: int, names: list[str], spelt: Spelling) -> str:
     """An operation on one or two names, as an expression of MATLAB or Python."""
-    if op in _BINARY:
-        return f"{a} {_BINARY[op]} {b}"
-    if op in _COMPARED:
-        return f"1.0 * ({a} {spelt(_COMPARED[op])} {b})"
-    if op in _CALLED:
-        return (
-            f"{spelt(_CALLED[op])}({a}, {b})"
-            if op in (ca.OP_ATAN2, ca.OP_FMIN, ca.OP_FMAX)
-            else (f"{spelt(_CALLED[op])}({a})")
-        )
+    a, b = names[0], names[-1]
+    if op in OPERATORS:
+        return f"{a} {OPERATORS[op]} {b}"
+    if op in COMPARISONS:
+        return f"1.0 * ({a} {spelt(COMPARISONS[op].replace('!', '~'))} {b})"
+    python = spelt("^") == "**"
     others: Mapping[int, str] = {
         ca.OP_ASSIGN: a,
         ca.OP_NEG: f"-{a}",
@@ -74,15 +47,16 @@ def _operation(op: int, a: str, b: str, spelt: Spelling) -> str:
         ca.OP_POW: f"{a} {spelt('^')} {b}",
         ca.OP_CONSTPOW: f"{a} {spelt('^')} {b}",
         ca.OP_NOT: f"1.0 * ({a} == 0)",
-        ca.OP_AND: f"1.0 * ({a} != 0 and {b} != 0)" if spelt("^") == "**" else f"1.0 * ({a} ~= 0 && {b} ~= 0)",
-        ca.OP_OR: f"1.0 * ({a} != 0 or {b} != 0)" if spelt("^") == "**" else f"1.0 * ({a} ~= 0 || {b} ~= 0)",
-        ca.OP_IF_ELSE_ZERO: f"_if({a}, {b})" if spelt("^") == "**" else f"if_else_zero({a}, {b})",
+        ca.OP_AND: f"1.0 * ({a} != 0 and {b} != 0)" if python else f"1.0 * ({a} ~= 0 && {b} ~= 0)",
+        ca.OP_OR: f"1.0 * ({a} != 0 or {b} != 0)" if python else f"1.0 * ({a} ~= 0 || {b} ~= 0)",
+        ca.OP_IF_ELSE_ZERO: f"_if({a}, {b})" if python else f"if_else_zero({a}, {b})",
         ca.OP_COPYSIGN: f"abs({a}) * (1 - 2 * ({b} < 0))",
-        ca.OP_FMOD: f"math.fmod({a}, {b})" if spelt("^") == "**" else f"rem({a}, {b})",
     }
-    if op not in others:
-        raise ValueError(f"operation {op} of CasADi has no spelling in other programs")
-    return others[op]
+    if op in others:
+        return others[op]
+    if op in _CALLED:
+        return f"{spelt(_CALLED[op])}({', '.join(names)})"
+    raise ValueError(f"operation {op} of CasADi has no spelling in other programs")
 
 
 def operations(model: Model, spelt: Spelling, first: int) -> list[str]:
@@ -97,18 +71,16 @@ def operations(model: Model, spelt: Spelling, first: int) -> list[str]:
         0 for Python, with square brackets; 1 for MATLAB, with round ones.
     """
     opening, closing = ("[", "]") if first == 0 else ("(", ")")
-    function, arrays, lines = model.rhs, ("x", "ui", "p"), []
-    for k in range(function.n_instructions()):
-        op, out, into = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
+    arrays, lines = ("x", "ui", "p"), []
+    for op, out, into, constant in instructions(model.rhs):
         if op == ca.OP_OUTPUT:
             lines.append(f"xdot{opening}{out[1] + first}{closing} = w{into[0]}")
         elif op == ca.OP_INPUT:
             lines.append(f"w{out[0]} = {arrays[into[0]]}{opening}{into[1] + first}{closing}")
         elif op == ca.OP_CONST:
-            lines.append(f"w{out[0]} = {float(function.instruction_constant(k))!r}")
+            lines.append(f"w{out[0]} = {constant!r}")
         else:
-            names = [f"w{place}" for place in into]
-            lines.append(f"w{out[0]} = {_operation(op, names[0], names[-1], spelt)}")
+            lines.append(f"w{out[0]} = {_operation(op, [f'w{place}' for place in into], spelt)}")
     return lines
 
 
@@ -174,7 +146,7 @@ def mss_function(card: ManoeuvringCard, model: Model) -> str:
         f"function [xdot, U] = {name}(x, ui, p)",
         one_line(f"% [xdot, U] = {name}(x, ui, p): {model.description}."),
         "% Written by tank2sim convert, operation by operation, from the equations of the card",
-        one_line(f"% {card.source}."),
+        one_line(f"% {Path(card.source).name}: {card.ship.name}."),
         "% SI and rad; rudder positive to starboard (MSS: to port). U is the speed through the water.",
         "% States x (rates in xdot), started by default from",
         f"%   x0 = [{' '.join(repr(value) for value in start)}]'",

@@ -93,6 +93,7 @@ def gap_study(gap: Gap, files: Mapping[str, str] | None = None) -> GapStudy:
         replays=tuple(_replay(replay, names[replay.name]) for replay in gap.passed),
         notices=(*proof_cautions(gap), *hidden_effects_caution(gap), *gap.notices),
         record_doubts=gap.doubts,
+        card_objections=gap.objections,
     )
 
 

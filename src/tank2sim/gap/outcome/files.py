@@ -17,10 +17,10 @@ GAP, IMPROVED, REPORT = "gap.json", "improved.toml", "report.html"
 """Files of the results of a ship."""
 
 ALWAYS = (GAP, IMPROVED, REPORT, NEXT_TEST_FILE)
-"""Files that are written into the folder, the last one if there is such a test."""
+"""Files that are written into the folder, the last one if there is such a test, the card if nothing objects."""
 
-SOMETIMES = (NEXT_TEST_FILE, covariance_file(Path(IMPROVED)).name)
-"""Files that only some runs write: the orders of a test, and the covariance of the improved card."""
+SOMETIMES = (NEXT_TEST_FILE, IMPROVED, covariance_file(Path(IMPROVED)).name)
+"""Files that only some runs write: the orders of a test, the improved card if nothing objects, and its covariance."""
 
 CORRECTED = "corrected"
 """Folder of trials without the faults of their sensors."""
@@ -70,7 +70,7 @@ def put(files: Mapping[Path, str | bytes], folder: Path, inputs: Sequence[Path])
 
 
 def _of_earlier_run(folder: Path) -> set[Path]:
-    """Orders, written trials and covariance that an earlier run lists in its ``gap.json``."""
+    """Orders, card, written trials and covariance that an earlier run lists in its ``gap.json``."""
     try:
         earlier = json.loads((folder / GAP).read_text(encoding="utf-8"))
         names = [*earlier.get("files", ()), (earlier.get("next_test") or {}).get("orders", "")]

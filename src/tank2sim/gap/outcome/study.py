@@ -294,6 +294,9 @@ class GapStudy:
         Files written next to ``gap.json``.
     record_doubts : tuple of RecordDoubt
         Findings of the audit on fitted trials that were left as they are.
+    card_objections : tuple of str
+        Reasons for which the improved card is not written without force: standard manoeuvres that it cannot do and the
+        given card can, and trials held out that it follows clearly worse.
     """
 
     ship: str
@@ -318,6 +321,7 @@ class GapStudy:
     notices: tuple[Notice, ...]
     files: tuple[str, ...] = ()
     record_doubts: tuple[RecordDoubt, ...] = ()
+    card_objections: tuple[str, ...] = ()
 
     def set_misfit(self, version: str, *, held_out: bool, signal: str | None = None) -> float | None:
         """Root mean square of the misfits of all fitting (or held-out) trials, noise units; None without any.

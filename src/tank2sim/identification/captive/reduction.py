@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
@@ -210,7 +211,12 @@ def reduce_campaign(campaign: Campaign, options: ReductionOptions | None = None)
         Runs have faults without `keep_going` (all are reported), no run remains, a necessary key is missing, or a
         number of ``[model]`` or the sign of the resistance is impossible.
     """
-    options = options or ReductionOptions()
+    with threadpool_limits(limits=1, user_api="blas"):  # several threads take four times as long
+        return _reduction(campaign, options or ReductionOptions())
+
+
+def _reduction(campaign: Campaign, options: ReductionOptions) -> Reduction:
+    """Derivatives from a campaign, on one thread."""
     _refuse_impossible_body(campaign)
     runs, faults = _credible_runs(campaign, options)
     used, not_used = _used_runs(campaign, moderated(runs), options)

@@ -26,6 +26,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
+from threadpoolctl import threadpool_limits
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import TORQUE_COEFFICIENTS, MmgCard
@@ -192,10 +193,11 @@ def fit_mmg(tests: SteadyTests) -> MmgFit:
     _refuse_poor(tests)
     names, not_excited = _fitted_names(tests)
     model = build(start_card(tests))
-    found = _Regression(tests, model, tuple(names)).fit(not_excited)
-    while weak := {name: t for name in OFFSETS if name in names and (t := found.in_errors(name)) < KEPT_FROM}:
-        names.remove(min(weak, key=lambda name: weak[name]))
+    with threadpool_limits(limits=1, user_api="blas"):  # several threads take ten times as long
         found = _Regression(tests, model, tuple(names)).fit(not_excited)
+        while weak := {name: t for name in OFFSETS if name in names and (t := found.in_errors(name)) < KEPT_FROM}:
+            names.remove(min(weak, key=lambda name: weak[name]))
+            found = _Regression(tests, model, tuple(names)).fit(not_excited)
     return found
 
 

@@ -17,7 +17,7 @@ from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.methods.coloured_noise import white
 from tank2sim.identification.trials.methods.equation_error import EquationErrorSettings, equation_error
-from tank2sim.identification.trials.methods.gauss_newton import is_minimum, refuse_stopped
+from tank2sim.identification.trials.methods.gauss_newton import StoppedSearchError, is_minimum, refuse_stopped
 from tank2sim.identification.trials.methods.kalman_pass import velocities_of
 from tank2sim.identification.trials.methods.shooting import Shooting, cut
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
@@ -62,8 +62,8 @@ def estimate_by_velocities(problem: Problem) -> Estimate | None:
         search = _Search(problem.with_runs(tuple(replace(run, seen=_SHOWN) for run in runs)))
         noise = _FIRST_NOISE * np.nanstd(np.concatenate([run.measured for run in runs]), axis=0)
         starts = [np.clip(each, *problem.bounds) for each in (first.values, problem.prior_mean)]
-        values = min(starts, key=lambda each: search.loss(each, noise))
-        for _ in range(_ROUNDS):
+        values = search.best_of(starts, noise)
+        for _ in range(_ROUNDS - 1):
             found = search.least(values, noise)
             values, errors = found.x, search.errors(found.x)
             noise = np.sqrt(np.nanmean(np.concatenate([of_run.reshape(-1, 4) for of_run in errors]) ** 2, axis=0))
@@ -117,9 +117,17 @@ class _Search:
         away = (values - self.problem.prior_mean) / self.problem.prior_error
         return np.concatenate([held, away * np.sqrt(1 + away**2 / 4)])
 
-    def loss(self, values: Array, noise: Array) -> float:
-        """What :meth:`least` makes least."""
-        return float(np.sum(np.sqrt(1 + self.weighted(values, noise) ** 2) - 1))
+    def best_of(self, starts: Sequence[Array], noise: Array) -> Array:
+        """The best values of the searches from several starts; raises StoppedSearchError if all stop at theirs."""
+        found, stopped = [], None
+        for start in starts:
+            try:
+                found.append(self.least(start, noise))
+            except StoppedSearchError as error:
+                stopped = error
+        if not found:
+            raise stopped or ValueError("no start")
+        return np.asarray(min(found, key=lambda each: each.cost).x)
 
     def least(self, start: Array, noise: Array) -> OptimizeResult:
         """Values with the least robust sum of errors and of the distance from what was known before."""

@@ -44,13 +44,11 @@ from tank2sim.identification.trials.assessment.structure_choice import (
 from tank2sim.identification.trials.methods.equation_error import equation_error
 from tank2sim.identification.trials.methods.kalman import KalmanSettings, kalman
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
-from tank2sim.identification.trials.methods.posterior import scaled_prior
 from tank2sim.identification.trials.methods.posterior_sampling import (
     PosteriorSamples,
     check_sampler,
     sample_posterior,
 )
-from tank2sim.identification.trials.methods.recursive import recursive
 from tank2sim.identification.trials.options import (
     AUTO,
     AVERAGE,
@@ -368,8 +366,6 @@ def estimate_parameters(problem: Problem, options: IdentificationOptions, progre
     """The estimate by the method of the options, output error for :data:`BY_RESIDUALS`."""
     if options.method == "kalman":
         return _filtered(problem, options, progress)
-    if options.method == "recursive":
-        return _recursive(problem, options, progress)
     if options.method == "equation_error":
         return equation_error(problem, progress=progress)
     return _over_whole_runs(problem, _over_pieces(problem, options, progress), options, progress)
@@ -470,7 +466,7 @@ def _fitted(
     unseen = refuse_unseen(problem) if trials.captive is None else ()  # what trials do not show, the tank may
     problem = problem.without(unseen)
     current = None
-    if drifts and options.method not in ("equation_error", "recursive"):
+    if drifts and options.method != "equation_error":
         joint, choice = _estimate_and_choice(with_current(problem), trials, options, progress)
         estimate, current = without_current(joint, started)
         started = card_in(started, current)
@@ -529,15 +525,6 @@ def _start(problem: Problem) -> Array | None:
         return equation_error(problem).values
     except InputError:
         return None
-
-
-def _recursive(problem: Problem, options: IdentificationOptions, progress: SearchReport) -> Estimate:
-    """The recursive estimate with the prior widened by the weak form, because recursion does not scale it."""
-    if not options.scale_prior:
-        return recursive(problem, progress=progress)
-    scale = equation_error(problem).prior_scale
-    widened = replace(problem, prior_error=scaled_prior(problem, scale))
-    return replace(recursive(widened, progress=progress), prior_scale=scale)
 
 
 def _follows_whole_runs(problem: Problem, estimate: Estimate) -> bool:

@@ -9,7 +9,7 @@ PIECE = 5.0
 """Length of the pieces of output error, in L/u0: on the KVLCC2 30 s of model time, in which the model's error stays
 small against the motion; shorter pieces show less of the derivatives, longer ones diverge on unstable ships."""
 
-TrialMethod = Literal["residuals", "output_error", "equation_error", "kalman", "recursive"]
+TrialMethod = Literal["residuals", "output_error", "equation_error", "kalman"]
 """Methods of the fit, by name."""
 
 BY_RESIDUALS: TrialMethod = "residuals"

@@ -31,7 +31,7 @@ def test_angles_give_states(tmp_path) -> None:
 
 
 def test_a_programme_gives_a_path_and_the_transient_next_to_it(tmp_path) -> None:
-    result = tank2sim("glide", "--programme", PROGRAMME, "--as-printed", "--json", "g.json", cwd=tmp_path)
+    result = tank2sim("glide", "--programme", PROGRAMME, "--as-printed", "--no-views", "--json", "g.json", cwd=tmp_path)
     assert result.returncode == 0 and "transient model" in result.stdout, result.stderr
     found = json.loads((tmp_path / "g.json").read_text())
     last = found["path"][-1]

@@ -61,7 +61,7 @@ def test_what_cannot_be_asked_is_refused_at_its_place(glider: t2s.Ship, tmp_path
         t2s.load("mariner").glide(30)
     assert refusal.value.place == "model.kind" and "glider" in refusal.value.remedy
     with pytest.raises(t2s.InputError) as refusal:
-        glider.glide(budget_kg=10)
+        glider.glide(budget_kg=10, views=False)
     assert str(refusal.value.source) == "depth_m" and refusal.value.remedy
     with pytest.raises(t2s.InputError) as refusal:
         glider.glide(programme=tmp_path / "none.csv", views=False)

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
 
 from tank2sim.answer.charts.picture import chart_specification
+from tank2sim.apps.rigs.glider import study
 from tank2sim.apps.rigs.glider.charts import SpacePath, elevation_chart, isometric_chart, plan_chart, polar_chart
 from tank2sim.apps.rigs.glider.programme import read_programme
+from tank2sim.apps.rigs.glider.quasi_steady_error import swing_errors
 from tank2sim.apps.rigs.glider.result import GlideResult
-from tank2sim.apps.rigs.glider.study import GlideQuestion, study_glider
+from tank2sim.apps.rigs.glider.study import GlideQuestion
 from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
 from tests.answer.drawn import line
@@ -31,7 +34,9 @@ def result():
         depth_m=200.0,
         views=True,
     )
-    return GlideResult(study_glider(PROBE, asked))
+    with pytest.MonkeyPatch.context() as patch:  # the long swings take most of the time
+        patch.setattr(study, "swing_errors", partial(swing_errors, periods_s=(20.0, 50.0, 100.0)))
+        return GlideResult(study.study_glider(PROBE, asked))
 
 
 def lines(chart, layer=0):

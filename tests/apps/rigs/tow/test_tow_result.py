@@ -65,7 +65,7 @@ def test_other_tows_are_not_held_next_to_the_paper(table_1):
 
 
 def test_charts_hold_the_speeds_and_the_models(result):
-    charts, study = result.charts(), result.study
+    charts, study = result._charts(), result.study
     assert list(charts) == [
         "measured_and_computed_speeds",
         "what_these_tows_determine",

@@ -24,7 +24,7 @@ def result(found):
 
 @pytest.fixture(scope="module")
 def charts(result):
-    return result.charts()
+    return result._charts()
 
 
 def test_charts_have_the_names_of_their_files(charts):

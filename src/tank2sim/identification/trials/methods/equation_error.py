@@ -146,7 +146,10 @@ def refuse_empty(form: WeakForm) -> None:
     """Raise InputError if no run has a window."""
     if all(run.averaging.shape[0] == 0 for run in form.runs):
         names = ", ".join(run.run.name for run in form.runs)
-        remedy = f"velocities without gaps over {2 * form.half:.3g} s at least are needed"
+        remedy = (
+            f"heading and positions, or u, v and r, are needed without gaps over {2 * form.half:.3g} s at least: add "
+            "the rows that are missing, with straight lines where a gap is short, or the readings of another sensor"
+        )
         raise InputError(names, "", "has no stretch long enough", remedy)
 
 

@@ -38,6 +38,11 @@ _SPARSE = 0.5
 their noise (project choice)."""
 
 
+_LEAST_STRETCH = 2.4
+"""Stretch without gaps, in smoothing windows, below which a velocity is derived from heading and positions, if these
+have it: a window of the weak form is 2.33 of them."""
+
+
 @dataclass(frozen=True, eq=False)
 class MeasuredMotion:
     """Measured motion of a run.
@@ -79,9 +84,17 @@ def measured_motion(problem: Problem, run: SampledRun) -> MeasuredMotion:
 def _measured_motion(model: Model, window: int, run: SampledRun) -> MeasuredMotion:
     columns = {name: run.column(name) for name in MEASURED_STATES}
     missing = {name for name, column in columns.items() if np.isnan(column).all()}
+    seldom = _seldom(columns, _LEAST_STRETCH * window)
+    missing |= seldom
+    columns |= {name: np.full(len(run.measured), np.nan) for name in seldom}
     if len(run.measured) <= window:
         raise InputError(run.origin, "", f"has only {len(run.measured)} steps", f"at least {window + 1} are needed")
     notices = []
+    if seldom:
+        names = ", ".join(name[7:] for name in VELOCITIES if name in seldom)
+        notices.append(
+            Notice(f"{run.name}: the readings of {names} are too far apart, and heading and positions are not")
+        )
     if "motion.r" in missing:
         if "motion.psi" in missing:
             raise InputError(run.origin, "header", "has neither yaw rate nor heading", "give r_degps or psi_deg")
@@ -100,6 +113,24 @@ def _measured_motion(model: Model, window: int, run: SampledRun) -> MeasuredMoti
     position = [_filled(columns[name]) for name in POSITION]
     every = np.column_stack([*smooth, *position])
     return MeasuredMotion(velocities, every, np.array(noise), np.array(remaining), tuple(notices))
+
+
+def _seldom(columns: dict[str, Array], least: float) -> set[str]:
+    """Velocities with readings that nowhere last for `least` steps, where heading and positions have them."""
+    lasting = {name for name, column in columns.items() if _longest(column) >= least}
+    seldom = {name for name in VELOCITIES if name not in lasting and not np.isnan(columns[name]).all()}
+    if "motion.psi" not in lasting:
+        return set()
+    return seldom if {"motion.x", "motion.y"} <= lasting else seldom & {"motion.r"}
+
+
+def _longest(column: Array) -> int:
+    """Steps of the longest stretch of a signal without gaps."""
+    if np.isnan(column).all():
+        return 0
+    known = np.concatenate([[0], (~np.isnan(_bridged(column))).astype(int), [0]])
+    edges = np.flatnonzero(np.diff(known))
+    return int(np.max(edges[1::2] - edges[::2]))
 
 
 def sensor_noise(problem: Problem, run: SampledRun) -> Array:
