@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -80,3 +83,12 @@ def test_the_readme_of_a_robot_says_what_else_its_model_needs(to: str, words: tu
     t2s.convert("otter", to=to).save(tmp_path / "craft")
     use = (tmp_path / "craft" / "README.md").read_text().partition("## What is lost")[0]
     assert all(word in use for word in (*words, "otter_usv.sdf")) and "NAME" not in use
+
+
+def test_a_vehicle_is_made_as_its_readme_says(tmp_path: Path) -> None:
+    t2s.convert("kvlcc2", to="pvs").save(tmp_path / "made")
+    (call,) = re.findall(r"`(\w+\([^)]*\))`", (tmp_path / "made" / "README.md").read_text())
+    names: dict[str, Any] = {}
+    exec((tmp_path / "made" / "kvlcc2.py").read_text(), names)
+    vehicle = eval(call, names)
+    assert vehicle.stepInput(1.0)[0] == pytest.approx(math.radians(20))

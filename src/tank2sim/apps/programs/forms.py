@@ -84,12 +84,15 @@ Copy the plugin into the `<model>`. Thrusters are not in the file: take those of
     "mss": Form(
         "a function for MATLAB or Octave, as the ships of MSS are",
         MATLAB[0],
-        use="Put the file into a folder on the path of MATLAB or Octave, and call `[xdot, U] = NAME(x, ui, p)`.",
+        use="Put the file into a folder on the path of MATLAB or Octave, and call `[xdot, U] = NAME(x, ui, p)`. "
+        "Its comments list states, inputs and parameters, with units and signs; `ui` and `p` may be left out.",
     ),
     "pvs": Form(
         "a Python file with a vehicle for the Python Vehicle Simulator",
         PYTHON[0],
-        use="Copy the file into the folder `vehicles` of the simulator, and make the vehicle in its main program.",
+        use="""Copy the file into the folder `vehicles` of the simulator. In its main program import the class of this name from
+it, and make the vehicle: `NAME("stepInput", 20)` steps the rudder to 20 deg (positive to starboard). It needs NumPy
+alone. The comments of the file list states, inputs and parameters.""",
     ),
     "c99": Form("a folder with the ship in plain C99, for firmware and test benches", writer="c99:c99_files"),
     "xdyn": Form("a folder with a body of xdyn and LOTUSim and tables of commands", writer="xdyn:xdyn_files"),
