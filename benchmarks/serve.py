@@ -1,7 +1,7 @@
 """Time of a core in which ``serve`` answers a frame of ArduPilot's SITL, by UDP over loopback, in lock-step.
 
-SITL asks for 400 frames a second in real time, or for more if it runs faster. Frames with moving orders are sent by this
-process, which waits for each reply as SITL does; the time is that of ``serve``, receiving and sending included.
+SITL asks for 400 frames a second in real time, or for more if it runs faster. Frames with moving orders are sent by
+this process, which waits for each reply as SITL does; the time is that of ``serve``, receiving and sending included.
 """
 
 from __future__ import annotations

@@ -90,9 +90,9 @@ Copy the plugin into the `<model>`. Thrusters are not in the file: take those of
     "pvs": Form(
         "a Python file with a vehicle for the Python Vehicle Simulator",
         PYTHON[0],
-        use="""Copy the file into the folder `vehicles` of the simulator. In its main program import the class of this name from
-it, and make the vehicle: `NAME("stepInput", 20)` steps the rudder to 20 deg (positive to starboard). It needs NumPy
-alone. The comments of the file list states, inputs and parameters.""",
+        use="""Copy the file into the folder `vehicles` of the simulator. In its main program import the class of this
+name from it, and make the vehicle: `NAME("stepInput", 20)` steps the rudder to 20 deg (positive to starboard). It
+needs NumPy alone. The comments of the file list states, inputs and parameters.""",
     ),
     "c99": Form("a folder with the ship in plain C99, for firmware and test benches", writer="c99:c99_files"),
     "xdyn": Form("a folder with a body of xdyn and LOTUSim and tables of commands", writer="xdyn:xdyn_files"),

@@ -230,4 +230,7 @@ cosim run OspSystemStructure.xml --duration 600
 `hull.fmu` (FMI 2, Co-Simulation) takes the place of `OSOM.fmu`: forces of the two azimuth thrusters `Thrust_d[1]`,
 `Thrust_d[2]` (N) at angles `input[1]`, `input[2]` (rad, from ahead to starboard), force of the bow tunnel `Thrust_d[3]`
 (N, to starboard); north, east (m) and heading (rad, not wrapped) `q[1]`, `q[2]`, `q[3]`. All start at zero, steps are
-of 0.04 s. Way-points are inputs of the Reference Generator (`x_wp`, `x_tp`, ...), as in the case's scenarios."""
+of 0.04 s. Way-points are inputs of the Reference Generator (`x_wp`, `x_tp`, ...), as in the case's scenarios.
+
+`tank2sim check hull.fmu --for osp` looks at its description and groups. Its variables are those of the case and not of
+the card: the two cannot be compared."""
