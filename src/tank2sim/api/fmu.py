@@ -171,7 +171,9 @@ def check_fmu(
     inside = build(parse_card(text, f"{path}: resources/ship.toml")) if text is not None else None
     model = inside if card is None else as_vessel(card).model
     report = compare_with_model(path, model=model and with_simulator_interface(model), host=host)
-    lacking = Notice("the FMU carries no card: only its description was validated; give a card to compare with")
+    lacking = Notice(
+        "the FMU carries no card, so that its equations were not compared; for an FMU without sources give its card"
+    )
     doubts = foremost(model.notices) if model else ()
     notices = (*report.notices, *doubts, *(() if report.compared else (lacking,)))
     return CheckResult(replace(report, notices=notices))
