@@ -71,8 +71,8 @@ FORMS = {
         MODEL[0],
         use=f"""{_ROBOT_LINK}
 Copy the plugins into the `<model>`. Each thruster plugin moves a revolute joint, `<name>_joint`, at the place in the
-comment above it, x forward and y to port of midships: make these joints, or write the names of yours. Commands are
-newtons. gz-sim 7 (Garden) or later.""",
+comment above it, x forward and y to port of midships, with its axis: make these joints, or write the names of yours.
+Commands are newtons. gz-sim 7 (Garden) or later.""",
     ),
     "vrx": Form(
         "SDF of VRX's SimpleHydrodynamics for a small craft",

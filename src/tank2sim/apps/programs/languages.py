@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 from tank2sim.apps.programs.conventions import Conventions, in_conventions
@@ -173,6 +174,15 @@ def _lost_by(card: SteeredCard, to: str, place: AddedMass) -> list[str]:
             "the hull is whole; the thruster plugin takes a thrust in N and has neither the loss by speed, nor the "
             "dead band, nor the lag of the card"
         )
+        turning = [
+            f"{thruster.name} by {math.degrees(thruster.max_azimuth_rad):.3g} deg"
+            for thruster in card.thrusters
+            if thruster.max_azimuth_rad is not None
+        ]
+        if turning:
+            notices.append(
+                f"thrusters do not turn in the file, where the card's do ({', '.join(turning)} to either side)"
+            )
     else:
         kept = {*VRX_TERMS, *VRX_MASSES}
         if place == "inertial":
