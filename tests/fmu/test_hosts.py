@@ -206,6 +206,14 @@ def test_check_knows_a_lean_fmu_without_sources(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout
 
 
+def test_export_names_the_model_where_a_game_engine_would_look_for_the_file(tmp_path: Path) -> None:
+    ship = t2s.load("mariner")
+    for file, said in (("mariner.fmu", ()), ("my ship.fmu", ("my_ship",))):
+        notices = [str(one) for one in make_fmu_file(ship, tmp_path / file, lean=True).study.notices]
+        found = [text for text in notices if "modelName" in text]
+        assert len(found) == len(said) and all(name in text for name, text in zip(said, found, strict=True))
+
+
 def test_lean_has_nothing_to_design_an_autopilot_with(tmp_path: Path) -> None:
     done = tank2sim("export", "mariner", "-o", "a.fmu", "--lean", "--ssp", "a.ssp", cwd=tmp_path)
     assert done.returncode == 2 and done.stderr.startswith("tank2sim: --lean") and not list(tmp_path.iterdir())

@@ -110,9 +110,20 @@ def make_fmu_file(
         token=made.token,
         platforms=made.platforms,
         size_bytes=len(made.content),
-        notices=ship.model.notices,
+        notices=(*ship.model.notices, *(_renamed(output, made.model_identifier) if lean else ())),
     )
     return ExportResult(study, made, files, ship.card)
+
+
+def _renamed(output: Path, identifier: str) -> tuple[Notice, ...]:
+    """A notice to users of game engines where the file has a name that the model cannot have."""
+    if output.stem == identifier:
+        return ()
+    text = (
+        f"modelName is {identifier}, which differs from the name of the file: Unity and Unreal do not find such an FMU "
+        "(letters, digits and _, at most 60, a letter first)"
+    )
+    return (Notice(text),)
 
 
 @verb(
@@ -160,7 +171,9 @@ def check_fmu(
     inside = build(parse_card(text, f"{path}: resources/ship.toml")) if text is not None else None
     model = inside if card is None else as_vessel(card).model
     report = compare_with_model(path, model=model and with_simulator_interface(model), host=host)
-    lacking = Notice("the FMU carries no card: only its description was validated; give a card to compare with")
+    lacking = Notice(
+        "the FMU carries no card, so that its equations were not compared; for an FMU without sources give its card"
+    )
     doubts = foremost(model.notices) if model else ()
     notices = (*report.notices, *doubts, *(() if report.compared else (lacking,)))
     return CheckResult(replace(report, notices=notices))

@@ -179,9 +179,28 @@ def test_the_parameter_file_has_the_steady_figures_of_the_card(boat: t2s.Ship) -
     assert 0 < ship.lateral_g < 0.1
 
 
+def test_wind_of_the_card_moves_the_boat_and_not_its_parameters() -> None:
+    calm = t2s.load("otter")
+    wind = [{"name": "wind", "parameters": {"speed_mps": 8.0, "direction_deg": 90.0}}]
+    windy = calm.replace({"effects": wind}).model
+    still = calm.replace({"effects": [{"name": "wind", "parameters": {"speed_mps": 0.0, "direction_deg": 90.0}}]}).model
+    assert boat_parameters(windy) == boat_parameters(still)
+    ship = SitlShip(windy)
+    for count in range(400):
+        drifting = motion(ship.answer(packet(count, 1500, 1500)))
+    assert drifting["position"][1] < -0.01  # wind from the east
+
+
+def test_a_boat_that_steering_turns_the_other_way_is_refused() -> None:
+    wrong = t2s.load("kvlcc2-l7").replace({"derivatives.Nd": -2.3e-3, "derivatives.Yd": 4.7e-3})
+    with pytest.raises(t2s.InputError, match="steering to starboard"):
+        boat_parameters(wrong.model)
+
+
 def test_what_cannot_be_steered_and_a_port_that_is_taken_are_refused() -> None:
-    with pytest.raises(t2s.InputError, match="thrusters"):
-        t2s.serve("mariner", silence_s=0.1)  # a rudder, and no engine
+    for name in ("mariner", "alyshev", "kulikovsky-velikanov"):  # a rudder, and no engine; neither
+        with pytest.raises(t2s.InputError, match="thrusters"):
+            t2s.serve(name, silence_s=0.1)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 9002 + 620))
         with pytest.raises(t2s.InputError) as fault:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import tank2sim as t2s
 from tank2sim.apps.programs.bridge_command import box_mesh, bridge_command_files
 from tank2sim.apps.programs.program_files import ProgramFiles
 from tank2sim.bundled import bundled, bundled_cards
@@ -259,6 +260,25 @@ def test_tunnel_thrusters_of_the_card_push_at_their_places(program: Any, tmp_pat
         sailing.ship.step(STEP_S, **orders)
         assert sailing.ship.r == pytest.approx(moment / sailing.ship.I * STEP_S)
         assert sailing.ship.v > 0
+
+
+def test_wind_current_and_waves_of_the_card_are_not_fitted() -> None:
+    def with_effects(**effects: float) -> ProgramFiles:
+        """Of effects by their speed or height, from the east."""
+        keys = {"wave_drift": "height_m"}
+        entries = [
+            {"name": name, "parameters": {keys.get(name, "speed_mps"): size, "direction_deg": 90.0}}
+            for name, size in effects.items()
+        ]
+        return bridge_command_files(t2s.load("otter").replace({"effects": entries}).card)
+
+    still, files = with_effects(wind=0.0), with_effects(wind=6.0, current=0.5, wave_drift=0.3)
+    assert files.files == still.files and files.changes == still.changes
+    assert any("calm water" in text for text in files.losses)
+
+
+def test_the_readme_speaks_of_the_engines_that_the_vessel_has() -> None:
+    assert "twice the thrust" in converted("kvlcc2-mmg").use and "twice the thrust" not in converted("otter").use
 
 
 def test_what_is_lost_is_said_in_numbers() -> None:

@@ -21,7 +21,8 @@ from fmpy.fmi2 import FMU2Slave
 from fmpy.ssp.ssd import read_ssd
 from lxml import etree
 
-from tank2sim.apps.programs.osp_case import hull_model, osp_files
+import tank2sim as t2s
+from tank2sim.apps.programs.osp_case import hull_model, low_speed_damping, osp_files
 from tank2sim.apps.programs.program_files import ProgramFiles
 from tank2sim.bundled import bundled, bundled_cards
 from tank2sim.cards import SteeredCard, parse_card, read_card
@@ -284,6 +285,24 @@ def refused(card: SteeredCard) -> InputError:
 
 def test_a_ship_whose_engine_cannot_be_stopped_is_refused() -> None:
     assert refused(steered("mariner")).place == "propulsion"
+
+
+def test_damping_is_that_of_calm_water() -> None:
+    ship = t2s.load("kvlcc2")
+    windy, calm = (
+        ship.replace(
+            {
+                "effects": [
+                    {"name": "cross_flow_drag", "parameters": {"drag_coefficient": 0.65}},
+                    {"name": "wind", "parameters": {"speed_mps": speed, "direction_deg": 90.0}},
+                ]
+            }
+        ).card
+        for speed in (10.0, 0.0)
+    )
+    assert isinstance(windy, SteeredCard) and isinstance(calm, SteeredCard)
+    found = low_speed_damping(windy, hull_model(windy))
+    assert found == pytest.approx(low_speed_damping(calm, hull_model(calm)))
 
 
 def test_a_hull_without_damping_at_low_speed_is_refused() -> None:

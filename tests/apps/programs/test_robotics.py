@@ -201,3 +201,19 @@ def test_a_card_goes_to_prime_and_back_to_the_last_digits(craft: CraftCard) -> N
 def test_what_cannot_be_had_is_refused(card: str, to: str, options: dict) -> None:
     with pytest.raises(InputError):
         t2s.convert(card, to, **options)
+
+
+def test_a_thruster_that_is_turned_has_the_axis_of_its_joint() -> None:
+    """30 deg to starboard at the port side: in Gazebo y is to port, so that the axis leans to minus y."""
+    turned = t2s.load("otter").replace({"thrusters.0.azimuth_rad": np.pi / 6})
+    text = t2s.convert(turned, to="gazebo").text
+    found = re.findall(r"x (\S+), y (\S+) m \(to port\), axis of the joint (\S+) (\S+) (\S+);", text)
+    expected = [[0, 0.395, np.cos(np.pi / 6), -0.5, 0], [0, -0.395, 1, 0, 0]]
+    assert np.array(found, float) == pytest.approx(np.array(expected), abs=1e-5)
+
+
+def test_a_thruster_that_turns_is_a_loss_in_gazebo() -> None:
+    values = {"thrusters.0.max_azimuth_rad": np.pi / 6, "thrusters.0.azimuth_time_constant_s": 0.4}
+    notices = t2s.convert(t2s.load("otter").replace(values), to="gazebo").study.notices
+    assert any("port by 30 deg" in str(one) for one in notices)
+    assert not any("turn" in str(one) for one in t2s.convert("otter", to="gazebo").study.notices)

@@ -334,6 +334,14 @@ def test_figures_after_are_those_of_the_written_equations() -> None:
 # -- losses, texts and refusals --------------------------------------------------------------------------------------
 
 
+def test_the_run_of_the_readme_writes_each_file_once() -> None:
+    """xdyn opens the file of ``-o`` and each file of ``output`` by itself, also if they are one."""
+    files = made("mariner")
+    written = {one["filename"] for one in yaml.safe_load(str(files.files["ship.yml"]))["output"]}
+    (run,) = re.findall(r"(?m)^xdyn .*$", files.use)
+    assert written == {"out.csv"} and not written & set(run.split())
+
+
 def test_states_and_a_current_that_xdyn_does_not_have_are_losses() -> None:
     assert [("rudder.angle" in line) for line in made("mariner").losses] == [True]
     assert made("otter").losses == ()

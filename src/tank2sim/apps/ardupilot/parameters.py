@@ -6,7 +6,9 @@ import math
 from dataclasses import dataclass
 
 from tank2sim.apps.ardupilot.physics import NEUTRAL_US, REACH_US, REST_FORCE_MPS2, SitlShip
+from tank2sim.dynamics.effects.surroundings import in_calm
 from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
 
 CRUISE_PERCENT = 50
 """Throttle of the cruise, per cent: ArduPilot's own default of CRUISE_THROTTLE."""
@@ -59,7 +61,7 @@ class BoatParameters:
 
 
 def boat_parameters(model: Model) -> BoatParameters:
-    """Return the parameters of a boat, from its steady motion straight ahead and with full steering.
+    """Return the parameters of a boat, from its steady motion in calm water, straight ahead and with full steering.
 
     Parameters
     ----------
@@ -68,8 +70,11 @@ def boat_parameters(model: Model) -> BoatParameters:
     Raises
     ------
     InputError
-        The model has neither thrusters at both sides, nor a rudder and an engine.
+        The model has neither thrusters at both sides, nor a rudder and an engine, or steering to starboard does not
+        turn it there.
     """
+    model = in_calm(model)
+    SitlShip(model)  # refuses a vessel that has not even a length
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
     settle = _SETTLING * values["ship.length"] / values["ship.speed"]
     part = CRUISE_PERCENT / 100
@@ -80,7 +85,10 @@ def boat_parameters(model: Model) -> BoatParameters:
     # Steering adds to the throttle of one side and takes from the other, each within its range.
     ship.u = ship.orders(1.0, part - 1.0) if ship.skid else ship.orders(1.0, part)
     ship.advance(settle)
-    rate, speed = abs(ship.state("motion.r")), math.hypot(ship.state("motion.u"), ship.state("motion.v"))
+    rate, speed = ship.state("motion.r"), math.hypot(ship.state("motion.u"), ship.state("motion.v"))
+    if not rate > 0:
+        problem = f"turns with {math.degrees(rate):.3g} deg/s at full steering to starboard"
+        raise InputError(model.origin, "", problem, "check the signs and sizes of the card with simulate")
     return BoatParameters(
         skid=ship.skid,
         cruise_throttle_percent=CRUISE_PERCENT,

@@ -30,8 +30,12 @@ from tank2sim.apps.programs.polynomial_fit import FigureChange
 from tank2sim.apps.programs.program_files import ProgramFiles
 from tank2sim.cards.card import Card, MmgCard, SteeredCard
 from tank2sim.dynamics.build import build
+from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.effects.fields import CURRENT_FIELD, WIND_FIELD
 from tank2sim.dynamics.effects.harbour import BOW_THRUSTER, STERN_THRUSTER
+from tank2sim.dynamics.effects.surroundings import CURRENT, WAVE_DRIFT, WIND, in_calm
 from tank2sim.dynamics.effects.twin_screws import TWIN_ORDERS
+from tank2sim.dynamics.effects.waves import WAVES
 from tank2sim.dynamics.model import Model
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn
@@ -45,6 +49,7 @@ which asks for a default; rate of a rudder whose card states none, the default o
 _AIR_DRAG = 0.5 * 1.225 * 0.51444**2
 """Drag of still air on the box in Bridge Command, over area and squared speed (N s2/m4): part of the fitted drag."""
 
+_WEATHER = {CURRENT.name, CURRENT_FIELD.name, WAVES.name, WAVE_DRIFT.name, WIND.name, WIND_FIELD.name}
 _TUNNELS = {BOW_THRUSTER.name: "Bow", STERN_THRUSTER.name: "Stern"}
 
 _VERSION = "5.11"
@@ -54,9 +59,14 @@ _USE = f"""Copy this folder, under a name of your choice, into `Models/Ownship/`
 `ShipName` in `ownship.ini` of a scenario. `boat.ini` has the numbers, `box.x` is a box of the ship's length, beam and
 height, from which Bridge Command takes draught and areas of wind.
 
-The numbers are for version {_VERSION}, whose source halves `Max_propulsion_force` of a ship with one engine
-(`PropSpace=0`) twice: the key is twice the thrust of the ship. Another version may need half of it: check the speed at
-full ahead."""
+"""
+
+_ONE_ENGINE = f"""The numbers are for version {_VERSION}, whose source halves `Max_propulsion_force` of a ship with one
+engine (`PropSpace=0`) twice: the key is twice the thrust of the ship. Another version may need half of it: check the
+speed at full ahead."""
+
+_TWO_ENGINES = f"""The numbers are for version {_VERSION}. `Max_propulsion_force` is the thrust of each of the two
+engines, which are `PropSpace` (m) apart."""
 
 
 def bridge_command_files(card: Card) -> ProgramFiles:
@@ -75,7 +85,7 @@ def bridge_command_files(card: Card) -> ProgramFiles:
     """
     ship = card.steered()
     beam, draught = (_particular(ship, name) for name in ("beam_m", "draught_m"))
-    model, length = build(ship), ship.ship.length_m
+    model, length = in_calm(build(ship)), ship.ship.length_m
     numbers, changes, losses = (_of_craft if ship.thrusters else _of_ship)(ship, model)
     numbers["DynamicsSpeedA"] = max(0.0, numbers["DynamicsSpeedA"] - _AIR_DRAG * beam * _FREEBOARD * length)
     return ProgramFiles(
@@ -83,7 +93,7 @@ def bridge_command_files(card: Card) -> ProgramFiles:
             "boat.ini": _ini(_seen(length, draught) | numbers | _across(model) | _tunnels(ship)),
             "box.x": box_mesh(length, beam, draught + _FREEBOARD * length),
         },
-        use=_USE,
+        use=_USE + (_TWO_ENGINES if numbers["PropSpace"] else _ONE_ENGINE),
         losses=(*losses, *_losses_of_all(ship)),
         changes=tuple(changes),
     )
@@ -242,9 +252,11 @@ def _losses_of_ship(model: Model) -> list[str]:
 
 def _losses_of_all(card: SteeredCard) -> list[str]:
     """What Bridge Command does not have of any vessel."""
-    lost = sorted({effect.name for effect in card.effects} - {*_TUNNELS, TWIN_ORDERS.name})
+    names = {effect.name for effect in card.effects if EFFECTS[effect.name].acts_on != "sensor"}
+    lost = sorted(names - {*_TUNNELS, *_WEATHER, TWIN_ORDERS.name})
     return [
         "levers are shares of the thrust and act at once; thrust does not change with speed",
         "wind has the force of a box with coefficient 1, times 0.265, and no yaw moment; sway has the mass of surge",
         *([f"effects of the card count only in the figures that were fitted: {', '.join(lost)}"] if lost else []),
+        *(["the figures are those of calm water: wind, waves and current are the scenario's"] * bool(names & _WEATHER)),
     ]

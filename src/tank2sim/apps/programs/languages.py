@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 from tank2sim.apps.programs.conventions import Conventions, in_conventions
@@ -36,10 +37,12 @@ from tank2sim.cards.card import MmgCard
 from tank2sim.cards.craft_terms import CRAFT_ADDED_MASSES
 from tank2sim.cards.reading import changed_text, craft_in_scaling, parse_card
 from tank2sim.dynamics import build
+from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import ArgumentError
 from tank2sim.notices import Notice
 
 _OF_CRAFT = ("small_craft", "gazebo", "vrx")
+_FOLDERS = ", ".join(name for name, form in FORMS.items() if form.writer)
 _OF_MMG = {"shipmmg": shipmmg_text, "mmgdynamics": mmgdynamics_text}
 
 
@@ -120,13 +123,21 @@ def _of_several_files(
         remedy = "leave scaling, rudder sign, origin, scatter and added mass out"
         raise ArgumentError("to", to, "has conventions of its own", remedy)
     made = FORMS[to].files(card.steered())
-    return ConvertedText(changes=made.changes, program=made), tuple(map(Notice, made.losses))
+    losses = (*made.losses, *_lost_sensors(card.steered()))
+    return ConvertedText(changes=made.changes, program=made), tuple(map(Notice, losses))
+
+
+def _lost_sensors(card: SteeredCard) -> list[str]:
+    """What no program has of the sensors of a card."""
+    names = [entry.name for entry in card.effects if EFFECTS[entry.name].acts_on == "sensor"]
+    return [f"faults of sensors are left out: {', '.join(names)}"] if names else []
 
 
 def _of_ship(card: Card, to: str) -> ManoeuvringCard:
     """The card of a ship; raises InputError if it is none, or the language is one of small craft."""
     if to in _OF_CRAFT:
-        raise card.fault("model.kind", f"is {card.model.kind}, and {to} is for small_craft", "use mss or pvs")
+        problem = f"is {card.model.kind}, and {to} takes cards of small craft"
+        raise card.fault("model.kind", problem, f"convert it to {_FOLDERS}, mss or pvs")
     return card.manoeuvring()
 
 
@@ -135,7 +146,7 @@ def _of_craft(
 ) -> tuple[ConvertedText, tuple[Notice, ...]]:
     if to not in _OF_CRAFT:
         problem = "is small_craft, whose damping is not a polynomial about a speed"
-        raise card.fault("model.kind", problem, f"convert it to {', '.join(_OF_CRAFT)}")
+        raise card.fault("model.kind", problem, f"convert it to {', '.join(_OF_CRAFT)}, {_FOLDERS}")
     if wanted.rudder_sign is not None or wanted.origin_m:
         raise ArgumentError("to", to, "has neither a rudder nor another origin", "leave rudder sign and origin out")
     if to == "small_craft":
@@ -163,6 +174,15 @@ def _lost_by(card: SteeredCard, to: str, place: AddedMass) -> list[str]:
             "the hull is whole; the thruster plugin takes a thrust in N and has neither the loss by speed, nor the "
             "dead band, nor the lag of the card"
         )
+        turning = [
+            f"{thruster.name} by {math.degrees(thruster.max_azimuth_rad):.3g} deg"
+            for thruster in card.thrusters
+            if thruster.max_azimuth_rad is not None
+        ]
+        if turning:
+            notices.append(
+                f"thrusters do not turn in the file, where the card's do ({', '.join(turning)} to either side)"
+            )
     else:
         kept = {*VRX_TERMS, *VRX_MASSES}
         if place == "inertial":
@@ -211,4 +231,4 @@ def _program(card: ManoeuvringCard, to: str) -> tuple[ConvertedText, tuple[Notic
             notices.append("the card states no beam_m: B is nan (shipmmg does not use it)")
         return ConvertedText(_OF_MMG[to](card)), tuple(map(Notice, notices))
     write = mss_function if to == "mss" else pvs_class
-    return ConvertedText(write(card, build(card))), ()
+    return ConvertedText(write(card, build(card))), tuple(map(Notice, _lost_sensors(card)))

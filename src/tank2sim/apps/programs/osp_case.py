@@ -23,6 +23,7 @@ from tank2sim.apps.programs.program_files import ProgramFiles
 from tank2sim.cards.card import Card, SteeredCard
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.effects.forces import with_forces
+from tank2sim.dynamics.effects.surroundings import in_calm
 from tank2sim.dynamics.model import Input, Model, Quantity, same_symbol
 from tank2sim.fmu.export import make_fmu
 from tank2sim.fmu.interface import Interface, interface
@@ -148,7 +149,7 @@ def _inertia(card: SteeredCard) -> tuple[float, float]:
 
 
 def low_speed_damping(card: SteeredCard, model: Model) -> tuple[float, float]:
-    """Damping of sway and yaw at 0.3 m/s (of yaw at the ends), 1/s.
+    """Damping of sway and yaw in calm water at 0.3 m/s (of yaw at the ends), 1/s.
 
     Parameters
     ----------
@@ -161,6 +162,7 @@ def low_speed_damping(card: SteeredCard, model: Model) -> tuple[float, float]:
     InputError
         There is none, or the ship pushes itself at rest.
     """
+    model = in_calm(model)
     length, draught = card.ship.length_m, card.ship.draught_m
     if draught is None:
         raise card.fault("ship.draught_m", "is missing, and damping at low speed is judged by it", "add it")
@@ -228,4 +230,7 @@ cosim run OspSystemStructure.xml --duration 600
 `hull.fmu` (FMI 2, Co-Simulation) takes the place of `OSOM.fmu`: forces of the two azimuth thrusters `Thrust_d[1]`,
 `Thrust_d[2]` (N) at angles `input[1]`, `input[2]` (rad, from ahead to starboard), force of the bow tunnel `Thrust_d[3]`
 (N, to starboard); north, east (m) and heading (rad, not wrapped) `q[1]`, `q[2]`, `q[3]`. All start at zero, steps are
-of 0.04 s. Way-points are inputs of the Reference Generator (`x_wp`, `x_tp`, ...), as in the case's scenarios."""
+of 0.04 s. Way-points are inputs of the Reference Generator (`x_wp`, `x_tp`, ...), as in the case's scenarios.
+
+`tank2sim check hull.fmu --for osp` looks at its description and groups. Its variables are those of the case and not of
+the card: the two cannot be compared."""

@@ -17,6 +17,7 @@ The mass, the inertia and the centre of gravity belong into ``<inertial>``.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import combinations_with_replacement
@@ -27,6 +28,7 @@ import numpy as np
 from tank2sim.apps.programs.polynomial_fit import FigureChange
 from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.craft_terms import CRAFT_ADDED_MASSES, VELOCITY_TERMS
+from tank2sim.cards.form import ThrusterSection
 from tank2sim.cards.small_craft import cruising_revolutions
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.model import Model
@@ -193,7 +195,7 @@ def gazebo_text(card: SteeredCard, added_mass: AddedMass | None = None) -> str:
         least = -thruster.astern_Ns2 * thruster.lowest_radps**2
         coefficient = thruster.ahead_Ns2 / card.environment.water_density_kgpm3  # of T = rho C_T n^2 D^4, n in rad/s
         lines += [
-            f"<!-- {thruster.name}: x {thruster.x_m:g}, y {-thruster.y_m:g} m (to port); command in N -->",
+            f"<!-- {thruster.name}: {_joint(thruster)}; command in N -->",
             '<plugin filename="gz-sim-thruster-system" name="gz::sim::systems::Thruster">',
             f"  <joint_name>{thruster.name}_joint</joint_name>",
             f"  <thrust_coefficient>{_NUMBER.format(coefficient)}</thrust_coefficient>",
@@ -204,6 +206,13 @@ def gazebo_text(card: SteeredCard, added_mass: AddedMass | None = None) -> str:
             "</plugin>",
         ]
     return "\n".join(lines) + "\n"
+
+
+def _joint(thruster: ThrusterSection) -> str:
+    """Place of a thruster from midships and the axis in which it pushes ahead, x forward and y to port."""
+    along, across = math.cos(thruster.azimuth_rad), -math.sin(thruster.azimuth_rad)
+    axis = " ".join(f"{round(value, 9) + 0.0:g}" for value in (along, across, 0.0))
+    return f"x {thruster.x_m:g}, y {-thruster.y_m + 0.0:g} m (to port), axis of the joint {axis}"
 
 
 def vrx_text(card: SteeredCard, added_mass: AddedMass | None = None) -> str:
@@ -217,7 +226,7 @@ def vrx_text(card: SteeredCard, added_mass: AddedMass | None = None) -> str:
     """
     in_plugin = place_of_added_mass(card, added_mass) == "plugin"
     masses = {VRX_MASSES[name]: -card.derivatives.get(name, 0.0) if in_plugin else 0.0 for name in VRX_MASSES}
-    damping = {VRX_TERMS[name]: -card.derivatives.get(name, 0.0) for name in VRX_TERMS}
+    damping = {VRX_TERMS[name]: 0.0 - card.derivatives.get(name, 0.0) for name in VRX_TERMS}
     lines = [
         *_head(card, "VRX: put it into <model>"),
         *([] if in_plugin else _inertial(card)),

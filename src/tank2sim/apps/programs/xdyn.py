@@ -234,10 +234,11 @@ def _use(files: Iterable[str], model: Model, body: XdynBody) -> str:
         )
     return f"""\
 ```text
-xdyn ship.yml {tables[0]} --dt {step} --tend 600 -o out.csv
+xdyn ship.yml {tables[0]} --dt {step} --tend 600
 ```
 
 `ship.yml` is the body, {names} its commands: xdyn reads all files that it is given as one input.
+The motion is written to `out.csv` (`output` at the end of `ship.yml`): do not give that name with `-o` as well.
 {held}
 Commands (rudder positive to starboard; a program that sends them gives rad and rad/s):
 {", ".join(f"`hull({name})`" for name in body.commands)}.

@@ -205,7 +205,7 @@ RUDDER_TIME_OFFSET = Effect(
     parameters=(
         EffectParameter(
             "delay_s",
-            "the ship acts at t on what the record shows at t less this; positive: it answers late",
+            "delay of the ship behind the recorded rudder: at t it acts on what the record shows at t less this",
             -60.0,
             60.0,
             absent=0.0,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import casadi as ca
 
@@ -13,10 +14,28 @@ from tank2sim.dynamics.effects.forces import scales, with_forces
 from tank2sim.dynamics.effects.froude_scale import DIRECTION_SIGNS, lengths, speeds, wave_speeds
 from tank2sim.dynamics.effects.particulars import AREA_ERROR, with_particulars
 from tank2sim.dynamics.kinematics import earth_velocity
-from tank2sim.dynamics.model import Model
+from tank2sim.dynamics.model import Model, same_symbol
 
 STILL_MPS = 1e-6
 """Added to the square of a relative speed, so that its root has a slope at rest; far below any speed of air."""
+
+_WEATHER = {
+    *("current.speed", "current.north", "current.east", "initial.current_north", "initial.current_east"),
+    *("wind.speed", "wind.north", "wind.east", "waves.height", "wave_drift.height"),
+}
+"""Inputs and parameters that are zero in calm water."""
+
+
+def in_calm(model: Model) -> Model:
+    """The ship of a model without wind, waves and current, unless its inputs are set to others.
+
+    Parameters
+    ----------
+    model : Model
+    """
+    still = model.with_values({name: 0.0 for name in _WEATHER if name in model.parameter_names})
+    inputs = (same_symbol(one, replace(one, start=0.0)) if one.name in _WEATHER else one for one in still.inputs)
+    return replace(still, inputs=tuple(inputs))
 
 
 def _with_current(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
