@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import craft_log
@@ -12,8 +13,8 @@ import tank2sim as t2s
 from tank2sim.cards import CraftCard, parse_card
 from tank2sim.errors import InputError
 from tank2sim.identification.craft.card import identified_craft
-from tank2sim.identification.craft.fit import CoefficientVerdict, determination
-from tank2sim.identification.craft.study import worse_than_a_mean
+from tank2sim.identification.craft.fit import CoefficientVerdict, CraftFit, determination
+from tank2sim.identification.craft.study import _model_does_not_hold, worse_than_a_mean
 from tank2sim.notices import Level
 from tests.craft_trials import written
 
@@ -219,3 +220,11 @@ def test_trials_of_one_file_name_in_two_folders_are_two_trials(deviating) -> Non
     assert deviating.study.held_out == ("astern", "second/steps")
     assert "second/steps" in {prediction.run.name for prediction in deviating.predictions}
     assert min(deviating.determination.values()) > 0.8
+
+
+@pytest.mark.parametrize(("method", "level"), [("kalman", Level.CAUTION), ("output_error", Level.INFO)])
+def test_a_model_that_does_not_hold_is_said_as_far_as_the_estimate_suffers(method, level) -> None:
+    estimate = SimpleNamespace(method=method)
+    fit = CraftFit(None, estimate, None, np.zeros((1, 1, 1)), gust_share=0.2)  # type: ignore[arg-type]
+    assert not fit.holds and _model_does_not_hold(fit).level is level
+    assert replace(fit, gust_share=0.04).holds

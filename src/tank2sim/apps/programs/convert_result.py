@@ -144,10 +144,10 @@ class ConversionResult(Result[ConversionStudy]):
 
     def _readme(self, use: str) -> str:
         """What the files are, how they are used, and what was lost, in Markdown."""
-        study = self.study
+        study, source = self.study, one_line("/".join(Path(self.source).parts[-2:]))
         text = (
             f"# {one_line(study.ship)}: {study.to}\n\n{study.made[0].upper()}{study.made[1:]}, written by tank2sim "
-            f"{__version__} from {one_line(Path(self.source).name)}.\n\n## Use\n\n{use.strip()}\n\n## What is lost\n\n"
+            f"{__version__} from {source}.\n\n## Use\n\n{use.strip()}\n\n## What is lost\n\n"
         )
         said = [str(notice) for notice in study.notices]
         text += "".join(f"- {one_line(line)}.\n" for line in said) if said else "Nothing that tank2sim knows of.\n"

@@ -109,12 +109,20 @@ class CraftFit:
         Noise levels.
     by_run : array (runs, k, k)
         Information of each run.
+    gust_share : float
+        Random acceleration in surge that the filter needs, over that by the largest thrust.
     """
 
     problem: Problem
     estimate: KalmanEstimate
     levels: Levels
     by_run: Array
+    gust_share: float = 0.0
+
+    @property
+    def holds(self) -> bool:
+        """Whether the filter explains the trials by the model, and gusts by no more than the wind that is expected."""
+        return self.gust_share <= FORCE_SPREAD
 
     @property
     def verdicts(self) -> tuple[CoefficientVerdict, ...]:
@@ -147,9 +155,9 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
     """Estimate the free parameters of a craft with the noise levels.
 
     The compass has a deviation where the estimate by velocities shows one. The search begins at that estimate, which is
-    taken itself where the model does not hold (:func:`_holds`). With :data:`FEWEST_TRIALS` the filter searches twice:
-    the second time current, wind and bias of each trial are known beforehand as well as they agreed between trials the
-    first time (empirical Bayes), for they change slowly.
+    taken itself where the model does not hold (:attr:`CraftFit.holds`). With :data:`FEWEST_TRIALS` the filter searches
+    twice: the second time current, wind and bias of each trial are known beforehand as well as they agreed between
+    trials the first time (empirical Bayes), for they change slowly.
 
     Parameters
     ----------
@@ -166,8 +174,8 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
     settings = KalmanSettings(drifting=True, scale_prior=False, iterations=steps)
     estimate = _first_estimate(problem, settings, progress, found)
     fit = _fit_of(problem, estimate)
-    if found is not None and not _holds(problem, estimate) and (other := _at_velocities(problem, found)):
-        return other
+    if found is not None and not fit.holds and (other := _at_velocities(problem, found)):
+        return replace(other, gust_share=fit.gust_share)
     if len(problem.runs) < FEWEST_TRIALS:
         return fit
     narrower = with_disturbances(problem, *_disturbances_of(problem, estimate.smoothed))
@@ -180,14 +188,14 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
 def _fit_of(problem: Problem, estimate: KalmanEstimate) -> CraftFit:
     """The fit of an estimate by the filter."""
     levels = levels_of(problem, estimate)
-    return CraftFit(problem, estimate, levels, information(problem, estimate.values, levels))
+    return CraftFit(problem, estimate, levels, information(problem, estimate.values, levels), _gusts(problem, estimate))
 
 
-def _holds(problem: Problem, estimate: KalmanEstimate) -> bool:
-    """Whether the filter explains the trials by the model, and gusts by no more than the wind that is expected."""
+def _gusts(problem: Problem, estimate: KalmanEstimate) -> float:
+    """Random acceleration in surge, over that by the largest thrust."""
     thrust = problem.model["disturbance.north"].nominal / FORCE_SPREAD
     mass = problem.parameters(estimate.values)[problem.model.parameter_names.index("ship.mass")]
-    return bool(estimate.process_noise["motion.u"].deviation <= FORCE_SPREAD * thrust / mass)
+    return float(estimate.process_noise["motion.u"].deviation * mass / thrust)
 
 
 def _at_velocities(problem: Problem, found: Estimate) -> CraftFit | None:

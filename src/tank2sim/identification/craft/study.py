@@ -13,6 +13,7 @@ from tank2sim.arrays import Array, Number
 from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.examination import doubts
 from tank2sim.errors import InputError
+from tank2sim.identification.craft.first_values import PREDICTED_S
 from tank2sim.identification.craft.fit import (
     PREDICTION_LEAD_S,
     SHORTEST_PREDICTION_S,
@@ -179,6 +180,8 @@ def study_craft(
                 "the trials have orders and no revolutions: a full order counts as the largest revolutions of the card"
             )
         )
+    if not fit.holds:
+        notices.append(_model_does_not_hold(fit))
     notices += _dead_band_notices(card, responses, driven_by)
     compass = _compass(fit)
     if compass is not None:
@@ -207,6 +210,17 @@ def study_craft(
         next_trials=tuple(next_trials(card, fit)),
         notices=tuple(notices),
     )
+
+
+def _model_does_not_hold(fit: CraftFit) -> Notice:
+    """That the filter explains the trials by more than gusts, and which estimate is given instead."""
+    words = (
+        f"the filter needs random accelerations of {100 * fit.gust_share:.0f} % of that by full thrust, which is more "
+        "than gusts: the model does not hold closely"
+    )
+    if fit.estimate.method == "kalman":
+        return caution(f"{words}, and the coefficients may be those of its errors")
+    return Notice(f"{words}; the coefficients are those that predict {PREDICTED_S:g} s of free motion best")
 
 
 def worse_than_a_mean(r_squared: Mapping[str, float]) -> list[Notice]:
