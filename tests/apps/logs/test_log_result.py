@@ -32,3 +32,16 @@ def test_a_result_read_from_its_json_has_the_same_page(result) -> None:
     again = LogResult.read(result.to_dict(), "log.json")
     assert again.page() == result.page() and again.to_dict() == result.to_dict()
     assert again.files("voyage") == {} and Path("voyage/channels.toml") in result.files("voyage")
+
+
+def test_a_trial_of_several_stretches_of_a_craft_is_one(data, tmp_path) -> None:
+    found = t2s.log(data / "data" / "logs" / "usv_22" / "voyage.csv")
+    files = [path.name for path in found.save(tmp_path) if path.suffix == ".csv"]
+    listed = [one.file for one in found.study.stretches if one.file]
+    assert len(listed) > len(files) == len(set(listed)) and set(listed) == set(files)
+    assert found.key_figures[0].value == len(files)
+    assert found.charts()["map"].to_dict()
+    for name in files:
+        rows = [line for line in (tmp_path / name).read_text().splitlines() if not line.startswith("#")][1:]
+        lasts = sum(one.duration_s for one in found.study.stretches if one.file == name)
+        assert float(rows[-1].split(",")[0]) > lasts - 1.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -16,7 +16,7 @@ from tank2sim.apps.logs.channels import CHANNELS_FILE, channels_text
 from tank2sim.apps.logs.current import DriftCurrent
 from tank2sim.apps.logs.gear import LoggedGear
 from tank2sim.apps.logs.stretches import Stretch
-from tank2sim.apps.logs.study import LogStudy, StretchStudy
+from tank2sim.apps.logs.study import LogStudy
 from tank2sim.apps.logs.trial_files import TrialCut, remove_earlier_trials
 from tank2sim.apps.logs.voyage import Voyage
 from tank2sim.arrays import Columns
@@ -213,8 +213,14 @@ class LogResult(Result[LogStudy]):
         ]
 
     @property
-    def _cut(self) -> list[StretchStudy]:
-        return [stretch for stretch in self.study.stretches if stretch.file]
+    def _cut(self) -> dict[str, tuple[float, float]]:
+        """File of each trial to its begin and end, s: of one or several stretches."""
+        found: dict[str, tuple[float, float]] = {}
+        for stretch in self.study.stretches:
+            if stretch.file:
+                begin, _ = found.get(stretch.file, (stretch.begins_s, 0.0))
+                found[stretch.file] = begin, stretch.begins_s + stretch.duration_s
+        return found
 
     @property
     def _faults(self) -> int:
@@ -223,11 +229,11 @@ class LogResult(Result[LogStudy]):
     def _map(self, track: Columns) -> Section:
         time, x, y = track["t_s"], track["x_m"], track["y_m"]
         tracks = [TrackData(label="voyage", x_m=x, y_m=y, time_s=time)]
-        longest = sorted(self._cut, key=lambda stretch: -stretch.duration_s)[:_MOST_TRACKS]
-        for stretch in sorted(longest, key=lambda stretch: stretch.begins_s):
-            inside = (time >= stretch.begins_s) & (time <= stretch.begins_s + stretch.duration_s)
+        longest = sorted(self._cut.items(), key=lambda trial: trial[1][0] - trial[1][1])[:_MOST_TRACKS]
+        for file, (begin, end) in sorted(longest, key=lambda trial: trial[1]):
+            inside = (time >= begin) & (time <= end)
             if inside.sum() > 1:
-                label = PurePath(str(stretch.file)).stem
+                label = PurePath(file).stem
                 tracks.append(TrackData(label=label, x_m=x[inside], y_m=y[inside], time_s=time[inside]))
         origin = self.study.origin_deg
         caption = f"Origin at {origin[0]:g} deg N, {origin[1]:g} deg E (WGS 84)." if origin else ""
@@ -324,16 +330,16 @@ def _gear_section(gear: LoggedGear) -> Section:
     return Section(heading="Steering gear", text=text, tables=[table("Steering gear by this log", heads, rows)])
 
 
-def _cut_in_words(cut: Sequence[StretchStudy]) -> str:
+def _cut_in_words(files: Collection[str]) -> str:
     """The trials of the log by their kinds and orders."""
-    if not cut:
+    if not files:
         return "No manoeuvre could be cut out as a trial."
     orders: dict[str, list[str]] = {}  # kind to the orders of its trials, empty without any
-    for stretch in cut:
-        _, kind, *order = PurePath(str(stretch.file)).stem.split("_")  # such as 02_zigzag_-20
+    for file in files:
+        _, kind, *order = PurePath(file).stem.split("_")  # such as 02_zigzag_-20
         orders.setdefault(kind, []).append(" ".join(order))
     names = ", ".join(f"{kind} {_in_short(each)}".rstrip() for kind, each in orders.items())
-    count = f"{len(cut)} trials are" if len(cut) > 1 else "One trial is"
+    count = f"{len(files)} trials are" if len(files) > 1 else "One trial is"
     return f"{count} cut out: {names}."
 
 
