@@ -60,7 +60,7 @@ class Output:
     metavar : str
     required : bool
     folder_without_ending : bool
-        Whether a name without an ending is that of a folder for several files.
+        Whether a name without an ending means a folder for several files.
     """
 
     option: str

@@ -56,7 +56,7 @@ def make_autopilot_fmu(
     source : str
         How it was found, in a sentence.
     file : Path, optional
-        Where it goes: its modelName is that of the file.
+        Where it goes: its modelName is the name of the file.
     """
     tuned = (parameter.name for parameter in autopilot.parameters if parameter.name.startswith("autopilot."))
     documents = Documents(source=source, origins={name: ValueOrigin(source) for name in tuned})

@@ -74,7 +74,7 @@ class PlainShip:
 
 
 def plain_ship(card: Card) -> PlainShip:
-    """A card's equations in plain C99: those of its FMU, with the same steps, to the last bit in double precision.
+    """A card's equations in plain C99: as in its FMU, with the same steps, to the last bit in double precision.
 
     Parameters
     ----------

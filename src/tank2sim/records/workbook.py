@@ -27,7 +27,7 @@ _PLACE = re.compile(r"([A-Z]{1,3})([0-9]{1,7})")
 
 
 def is_workbook(data: bytes) -> bool:
-    """Whether the bytes of a file begin as those of a spreadsheet do (and of any other zip file)."""
+    """Whether a file begins as a spreadsheet does (and as any other zip file)."""
     return data.startswith(_BEGINS)
 
 

@@ -247,7 +247,7 @@ def _of_model(ship: ShipDimensions) -> Iterator[Notice]:
     if ship.scale == 1.0:
         return
     yield caution(
-        f"{ship.length_m:g} m is the length of a model: the formulas are those of ships, whose friction, wake and "
+        f"{ship.length_m:g} m is the length of a model: the formulas were made for ships, whose friction, wake and "
         "loading of the propeller a model does not have; the rudder turns as fast as the gear of a ship of "
         f"{SHIP_OF_MODEL_M:g} m does by Froude's law, in fresh water. State the gear on the card if it is another"
     )

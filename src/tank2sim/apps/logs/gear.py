@@ -40,7 +40,7 @@ _AGAIN = 3
 """Number of grids of the fits without a part, which begin near the fit of all (project choice)."""
 
 _RATES, _LAGS, _BANDS = (math.radians(0.5), math.radians(60.0)), (0.0, 4.0), (0.0, math.radians(4.0))
-"""Rates (rad/s), lags (s) and dead bands (rad) that are searched: wider than those of gears (project choice)."""
+"""Rates (rad/s), lags (s) and dead bands (rad) that are searched: wider than any gear needs (project choice)."""
 
 _KNOWN = 1.2
 """Mean square at the largest rate over the least one from which the rate is determined: below, the order never left the

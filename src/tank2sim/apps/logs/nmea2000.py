@@ -301,7 +301,7 @@ class _Reader:
 def _pace(stamps: Array, clock: Array) -> tuple[float, list[LogFinding]]:
     """Time of the receiver's clock for a second of the recorder's, 1 where they agree, and what to say of it.
 
-    Times of a conversion, or of a replay, run at another pace than those of the messages.
+    Times of a conversion, or of a replay, run at another pace than the times of the messages.
     """
     good = np.isfinite(stamps)
     if np.count_nonzero(good) < _PACE_FROM or np.ptp(stamps[good]) <= 0 or np.ptp(clock[good]) < _PACE_FROM_S:

@@ -258,5 +258,5 @@ def _losses_of_all(card: SteeredCard) -> list[str]:
         "levers are shares of the thrust and act at once; thrust does not change with speed",
         "wind has the force of a box with coefficient 1, times 0.265, and no yaw moment; sway has the mass of surge",
         *([f"effects of the card count only in the figures that were fitted: {', '.join(lost)}"] if lost else []),
-        *(["the figures are those of calm water: wind, waves and current are the scenario's"] * bool(names & _WEATHER)),
+        *(["the figures hold in calm water: wind, waves and current are the scenario's"] * bool(names & _WEATHER)),
     ]

@@ -153,7 +153,7 @@ def fitted_surge(wanted: Runs, speed_mps: float, mass_kg: float) -> SurgeNumbers
     wanted : mapping
         As of :func:`straight_runs_of_card`, without the change of heading.
     speed_mps, mass_kg : float
-        Speed at full ahead; mass with that of the water in surge.
+        Speed at full ahead; mass with the added mass in surge.
     """
     from scipy.optimize import least_squares  # slow to import
 

@@ -110,12 +110,12 @@ class ConversionResult(Result[ConversionStudy]):
         Parameters
         ----------
         path : path
-            A name without an ending is that of a folder.
+            A name without an ending means a folder.
 
         Raises
         ------
         InputError
-            The form has several files, and `path` is that of one.
+            The form has several files, and `path` names one.
         """
         path, made, form = Path(path), self._made, FORMS[self.study.to]
         if not names_folder(path):

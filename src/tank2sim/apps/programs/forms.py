@@ -78,7 +78,7 @@ Commands are newtons. gz-sim 7 (Garden) or later.""",
         "SDF of VRX's SimpleHydrodynamics for a small craft",
         MODEL[0],
         use=f"""{_ROBOT_LINK}
-Copy the plugin into the `<model>`. Thrusters are not in the file: take those of VRX, with the thrusts that
+Copy the plugin into the `<model>`. Thrusters are not in the file: take the thrusters of VRX, with the thrusts that
 `convert --to gazebo` writes.""",
     ),
     "mss": Form(

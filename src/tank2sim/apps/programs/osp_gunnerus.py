@@ -68,7 +68,7 @@ def gunnerus_files(card: Card) -> ProgramFiles:
         use=f"""Put both files into `gunnerus-dp/fmus` of the demo cases of the Open Simulation Platform, in place of
 `{VESSEL}.fmu` and its description. Steps are of 0.1 s; all variables start at zero.""",
         losses=(
-            "gains of the case are those of the R/V Gunnerus: set the controller's for this ship",
+            "gains of the case belong to the R/V Gunnerus: set the controller's for this ship",
             "heave, roll and pitch are zero",
             "the current is taken in the ship's axes, because the case calls its first member surge",
             f"the hull damps sway at 0.3 m/s by {sway:.2g} 1/s, and yaw by {yaw:.2g} 1/s with that at its ends",

@@ -26,7 +26,7 @@ import casadi as ca
 
 LARGEST_PRIME_RATE = 1.0
 """r' = r L/U beyond which the polynomials of wake and cross flow are not followed: a ship that turns on the spot has no
-bound of r'. Project choice: that of the tightest turns."""
+bound of r'. Project choice: as in the tightest turns."""
 
 
 def wake_ratio(p: Mapping[str, Any], beta_P: ca.SX) -> ca.SX:

@@ -19,12 +19,12 @@ from tank2sim.identification.trials.methods.coloured_noise import white
 from tank2sim.identification.trials.methods.equation_error import EquationErrorSettings, equation_error
 from tank2sim.identification.trials.methods.gauss_newton import StoppedSearchError, is_minimum, refuse_stopped
 from tank2sim.identification.trials.methods.kalman_pass import velocities_of
-from tank2sim.identification.trials.methods.shooting import Shooting, cut
+from tank2sim.identification.trials.methods.shooting import SENSED_BY, Shooting, Shot, cut
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 
 PREDICTED_S = 30.0
-"""Length of a free-running prediction, s: that of the published comparisons on small craft."""
+"""Length of a free-running prediction, s, as in the published comparisons on small craft."""
 
 _SEEN = ("motion.u", "motion.v", "motion.r", "motion.psi")
 _SHOWN = ("compass.u", "compass.v", "motion.r", "compass.heading")
@@ -48,7 +48,7 @@ _MOST_ALIKE = 0.98
 def estimate_by_velocities(problem: Problem) -> Estimate | None:
     """Estimate by output error of the velocities; None where the records are too short or the search fails.
 
-    The sum over errors e in standard deviations is that of sqrt(1 + e^2) - 1 (``soft_l1``), so that the stretches that
+    The sum is over sqrt(1 + e^2) - 1 of the errors e in standard deviations (``soft_l1``), so that the stretches that
     the model does not hold do not decide. Neighbouring errors are alike: standard errors count independent ones.
 
     Parameters
@@ -90,17 +90,24 @@ class _Search:
     def __init__(self, problem: Problem):
         self.problem, self.shooting = problem, Shooting(problem)
         self.pieces = [cut(problem, run, PREDICTED_S) for run in problem.runs]
+        self._last: tuple[Array, list[Shot]] | None = None
+
+    def _shots(self, values: Array) -> list[Shot]:
+        """Motion of all runs; the last one is kept, since slopes are asked for where errors were."""
+        if self._last is None or not np.array_equal(self._last[0], values):
+            unit = (white(1.0),) * len(_SHOWN)
+            shots = [self.shooting.shot(pieces, pieces.starts, values, unit) for pieces in self.pieces]
+            self._last = values.copy(), shots
+        return self._last[1]
 
     def errors(self, values: Array) -> list[Array]:
         """Simulated less measured of each run (pieces, n, 4)."""
-        unit = (white(1.0),) * len(_SHOWN)
-        return [self.shooting.shot(pieces, pieces.starts, values, unit).residuals for pieces in self.pieces]
+        return [shot.residuals for shot in self._shots(values)]
 
     def slopes(self, values: Array, noise: Array) -> Array:
         """Derivatives of all errors in standard deviations (errors, k)."""
         known, slopes = tuple(white(float(size)) for size in noise), []
-        for pieces in self.pieces:
-            shot = self.shooting.shot(pieces, pieces.starts, values, known)
+        for pieces, shot in zip(self.pieces, self._shots(values), strict=True):
             by = self.shooting.linearised(pieces, shot, values, known)[1][:, :, pieces.starts.shape[1] :]
             slopes.append(np.nan_to_num(by, posinf=0.0, neginf=0.0).reshape(-1, len(values)))
         return np.concatenate(slopes)
@@ -168,7 +175,7 @@ def _by_velocities(run: SampledRun) -> SampledRun:
     instants = np.arange(len(run.measured))
     columns = {}
     for name in ("motion.x", "motion.y", "motion.psi"):
-        column = run.column("compass.heading" if name == "motion.psi" else name)
+        column = run.column(SENSED_BY.get(name, name))
         known = np.isfinite(column)
         columns[name] = np.interp(instants, instants[known], column[known])
     derived = velocities_of(columns, run.step_s)

@@ -219,7 +219,7 @@ def _model_does_not_hold(fit: CraftFit) -> Notice:
         "than gusts: the model does not hold closely"
     )
     if fit.estimate.method == "kalman":
-        return caution(f"{words}, and the coefficients may be those of its errors")
+        return caution(f"{words}, and the coefficients may describe its errors")
     return Notice(f"{words}; the coefficients are those that predict {PREDICTED_S:g} s of free motion best")
 
 
