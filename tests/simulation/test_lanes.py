@@ -16,13 +16,13 @@ from tank2sim.cards.reading import revised
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.native.lanes import FLAGS_OF_LANES, VECTORS, NoLanesError, lane_function, widest_lanes
+from tank2sim.native.generate import c_loop
+from tank2sim.native.lanes import FLAGS_OF_LANES, NoLanesError, lane_function, widest_lanes
 from tank2sim.native.library import cached_library
 from tank2sim.simulation import lane_runs, lane_spirals, manoeuvres
 from tank2sim.simulation.card_range import single_figures
 from tank2sim.simulation.lane_figures import LaneManoeuvres, Pace, runs_in_lanes
 from tank2sim.simulation.manoeuvres import PullOut, SpiralManoeuvre, Stop, Turn, Zigzag
-from tank2sim.simulation.rows import EXPORT
 from tank2sim.simulation.run import simulate
 from tests.marks import first_fast
 
@@ -293,7 +293,7 @@ def evaluated(function: ca.Function, columns: list[Array], lanes: int, *, single
     """A function of scalars at each row (n,) of its arguments, in lanes; its outputs (n_out, n)."""
     numbers = 2 * lanes if single and lanes > 1 else lanes
     loop = f"""
-{EXPORT}void each(long n, const double *in, double *out) {{
+EXPORT void each(long n, const double *in, double *out) {{
   for (long k = 0; k < n; k += LANES) {{
     V x[{len(columns)}][1], y[{function.n_out()}][1];
     for (int l = 0; l < LANES; ++l)
@@ -308,7 +308,8 @@ def evaluated(function: ca.Function, columns: list[Array], lanes: int, *, single
   }}
 }}
 """
-    source = f"#define LANES {numbers}\n#define SINGLE {int(single)}\n{VECTORS}{lane_function(function, 'f')}{loop}"
+    sizes = f"#define LANES {numbers}\n#define SINGLE {int(single)}\n"
+    source = f"{sizes}{c_loop('vectors.h')}{lane_function(function, 'f')}{loop}"
     library = ctypes.CDLL(str(cached_library({"f.c": source}, flags=FLAGS_OF_LANES[lanes])))
     given = np.ascontiguousarray(columns)
     found = np.empty((function.n_out(), given.shape[1]))

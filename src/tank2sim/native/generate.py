@@ -1,11 +1,30 @@
-"""C code of CasADi functions."""
+"""C code: of CasADi functions, and of the loops about them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import casadi as ca
+
+_LOOPS = Path(__file__).with_name("c")
+
+_EXPORT = """#ifdef EXPORT
+#elif defined(_WIN32)
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+"""
+
+
+def c_loop(name: str, **values: object) -> str:
+    """The C of a file in ``native/c``, with macros of these values in it, and ``EXPORT`` for what is called."""
+    macros = {key.upper(): value for key, value in values.items()}
+    defined = "".join(f"#define {key} {value}\n" for key, value in macros.items())
+    removed = "".join(f"#undef {key}\n" for key in macros)
+    return f"{_EXPORT}{defined}{(_LOOPS / name).read_text(encoding='utf-8')}{removed}"
 
 
 @dataclass(frozen=True)

@@ -18,49 +18,10 @@ from tank2sim.dynamics.build import KEPT_MODELS
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.native.compiler import find_compiler
-from tank2sim.native.generate import generate_c
+from tank2sim.native.generate import c_loop, generate_c
 from tank2sim.native.library import cached_library
 from tank2sim.notices import Notice
-from tank2sim.simulation.rows import EXPORT
 from tank2sim.simulation.scheme import runge_kutta_step, step_and_constants
-
-# The loop around the generated step. Work arrays are on the stack, with sizes known at generation.
-_LOOP = """
-{export}void rollout(long n, long every, double h, const double* u, const double* p, double* x) {{
-  const double* arg[{sz_arg}];
-  double* res[{sz_res}];
-  casadi_int iw[{sz_iw}];
-  double w[{sz_w}];
-  double between[2][{nx}], c[{nc}];
-  long k, j;
-  arg[0] = p;
-  res[0] = c;
-  constants(arg, res, iw, w, 0);
-  for (k = 0; k < n; k += every, x += {nx}) {{
-    const long last = every < n - k ? every : n - k;
-    const double* from = x;
-    for (j = 1; j <= last; ++j) {{
-      double* to = j == last ? x + {nx} : between[j & 1];
-      arg[0] = from; arg[1] = u; arg[2] = p; arg[3] = c; arg[4] = &h;
-      res[0] = to;
-      step(arg, res, iw, w, 0);
-      from = to;
-    }}
-  }}
-}}
-{export}void outputs(long n, const double* u, const double* p, const double* x, double* y) {{
-  const double* arg[{sz_arg}];
-  double* res[{sz_res}];
-  casadi_int iw[{sz_iw}];
-  double w[{sz_w}];
-  long k;
-  for (k = 0; k < n; ++k, x += {nx}, u += {nu}, y += {ny}) {{
-    arg[0] = x; arg[1] = u; arg[2] = p;
-    res[0] = y;
-    output(arg, res, iw, w, 0);
-  }}
-}}
-"""
 
 Loop = Callable[..., None]
 
@@ -148,7 +109,7 @@ def _in_machine_code(model: Model) -> tuple[Loop, Loop]:
         "nc": max(1, constants.size1_out(0)),
         "ny": model.output.size1_out(0),
     }
-    source = generate_c(functions, "model") + _LOOP.format(export=EXPORT, **sizes, **lengths)
+    source = generate_c(functions, "model") + c_loop("rollout.c", **sizes, **lengths)
     library = ctypes.CDLL(str(cached_library({"model.c": source})))
     array = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")
     library.rollout.argtypes = [ctypes.c_long, ctypes.c_long, ctypes.c_double, array, array, array]

@@ -18,34 +18,8 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.native.compiler import find_compiler
-from tank2sim.native.generate import generate_c
+from tank2sim.native.generate import c_loop, generate_c
 from tank2sim.native.library import cached_library
-
-EXPORT = """#ifdef _WIN32
-__declspec(dllexport)
-#else
-__attribute__((visibility("default")))
-#endif
-"""
-"""Attribute of an exported function of a shared library, in C."""
-
-# Work arrays are on the stack, with sizes known at generation. A stride of 0 keeps an argument constant.
-_LOOP = """
-{export}void {name}_rows(long n, const double** arguments, const long* strides, double** results,
-                         const long* lengths) {{
-  const double* arg[{sz_arg}];
-  double* res[{sz_res}];
-  casadi_int iw[{sz_iw}];
-  double w[{sz_w}];
-  long k, i;
-  for (k = 0; k < n; ++k) {{
-    for (i = 0; i < {n_in}; ++i) arg[i] = arguments[i] + k * strides[i];
-    for (i = 0; i < {n_out}; ++i) res[i] = results[i] + k * lengths[i];
-    {name}(arg, res, iw, w, 0);
-  }}
-}}
-"""
-
 
 _NUMPY: dict[int, Callable[..., Any]] = {
     **{ca.OP_ADD: np.add, ca.OP_SUB: np.subtract, ca.OP_MUL: np.multiply, ca.OP_DIV: np.divide, ca.OP_NEG: np.negative},
@@ -197,8 +171,8 @@ def compiled_rows(
     code = generate_c(functions, "rows")
     for function in functions:
         sizes = {name: max(1, getattr(function, name)()) for name in ("sz_arg", "sz_res", "sz_iw", "sz_w")}
-        counts = {"n_in": function.n_in(), "n_out": function.n_out(), "name": function.name()}
-        code += _LOOP.format(export=EXPORT, **sizes, **counts)
+        names = {"function": function.name(), "loop": f"{function.name()}_rows"}
+        code += c_loop("rows.c", n_in=function.n_in(), n_out=function.n_out(), **sizes, **names)
     try:
         return ctypes.CDLL(str(cached_library({"model.c": code, **(sources or {})}, flags=flags)))
     except (InputError, OSError):  # a compiler that does not work, or compiles for another machine
