@@ -2,6 +2,9 @@
 
 ``python benchmarks/trial_office.py --ships 30`` prints for the Mariner and the KVLCC2 (MMG) the median error of each
 figure as run, by plain R = T F/B with current and wind in T, and of the report, and how often its 95 % intervals hold.
+``--hidden-loading`` prints the same in calm water for other hidden errors: four coefficients 4 to 10 % off, to either
+side, Yv and Nr in ballast another 6 to 8 %, and the KVLCC2 in 0.6 draughts with 3 m of trim.
+Then FS Bitumen No. 1 (trial of 2014, full load): its 20/20 zigzags as ``guess`` predicts them from its turns and 10/10.
 With the measured turns of the Esso Osaka model (``TANK2SIM_DATA``) it prints their scatter before and after correction.
 
 The truth: six coefficients 6 % off (one standard deviation) from the card that the office has, Yv and Nr in ballast
@@ -35,6 +38,7 @@ from tank2sim.simulation.run import simulate
 from tank2sim.simulation.running import Running
 
 BALLAST = {"mariner": (0.7, 1.2), "kvlcc2-mmg": (0.65, 2.0)}
+HIDDEN = {"mariner": (0.7, 1.2), "kvlcc2-mmg": (0.6, 3.0)}
 NOISE = {"x_m": 1.0, "y_m": 1.0, "psi_rad": math.radians(0.1), "u_mps": 0.05, "delta_rad": math.radians(0.2)}
 APPROACH_S = 150.5
 MANOEUVRES = {
@@ -48,10 +52,16 @@ MANOEUVRES = {
 }
 
 
-def perturbed(card: ManoeuvringCard, chance: np.random.Generator, share: float, *names: str) -> ManoeuvringCard:
-    """The card with other coefficients."""
+def perturbed(
+    card: ManoeuvringCard, chance: np.random.Generator, share: float | tuple[float, float], *names: str
+) -> ManoeuvringCard:
+    """The card with other coefficients: normal with a standard deviation of `share`, or within two shares by size."""
     known = [name for name in names if name in card.derivatives]
-    values = {name: card.derivatives[name] * (1 + share * chance.standard_normal()) for name in known}
+    if isinstance(share, tuple):
+        errors = chance.uniform(*share, len(known)) * chance.choice([-1.0, 1.0], len(known))
+    else:
+        errors = share * chance.standard_normal(len(known))
+    values = {name: card.derivatives[name] * (1 + error) for name, error in zip(known, errors, strict=True)}
     return revised(card, {name: (value, 0.02 * abs(value)) for name, value in values.items()})
 
 
@@ -92,29 +102,31 @@ def record(
     return Trial(Path(f"{name}.csv"), time, signals)
 
 
-def one_ship(name: str, number: int) -> tuple[list[tuple[str, Mapping[str, float]]], float]:
+def one_ship(name: str, number: int, *, hidden: bool) -> tuple[list[tuple[str, Mapping[str, float]]], float]:
     """Rows of a figure's true value, as run, by plain T F/B, in the report with its interval; error of the current."""
     chance = np.random.default_rng([number, len(name)])
     card = t2s.load(name).card
     assert isinstance(card, ManoeuvringCard)
-    share, trim = BALLAST[name]
+    share, trim = (HIDDEN if hidden else BALLAST)[name]
     draught = share * card.ship.draught_m
-    truth = perturbed(card, chance, 0.06, "Yv", "Yr", "Nv", "Nr", "Yd", "Nd")
+    if hidden:
+        truth = perturbed(card, chance, (0.04, 0.10), "Yv", "Yr", "Nv", "Nr")
+    else:
+        truth = perturbed(card, chance, 0.06, "Yv", "Yr", "Nv", "Nr", "Yd", "Nd")
     loaded = {"mean_draught_m": draught, "trim_m": trim}
-    ballast = perturbed(
-        add_effects_to_card(truth, [("loading", loaded, {}), ("wind", {}, {})]), chance, 0.07, "Yv", "Nr"
-    )
-    towards, wind = chance.uniform(0, math.tau), (8.0, chance.uniform(0, math.tau))
-    current = 0.5 * np.array([math.cos(towards), math.sin(towards)])
+    light = add_effects_to_card(truth, [("loading", loaded, {}), ("wind", {}, {})])
+    ballast = perturbed(light, chance, (0.06, 0.08) if hidden else 0.07, "Yv", "Nr")
+    towards, wind = chance.uniform(0, math.tau), (0.0 if hidden else 8.0, chance.uniform(0, math.tau))
+    current = (0.0 if hidden else 0.5) * np.array([math.cos(towards), math.sin(towards)])
     records = [record(ballast, manoeuvre, current, wind, chance) for manoeuvre in MANOEUVRES]
     notes = TrialNotes(draught_fore_m=draught - trim / 2, draught_aft_m=draught + trim / 2)
     found, _, _ = study_trials(card, records, notes, 40)
-    full, light = build(card), build(add_effects_to_card(card, [("loading", loaded, {})]))
+    full, empty = build(card), build(add_effects_to_card(card, [("loading", loaded, {})]))
     rows = []
     model = build(truth)
     for trial in records:
         manoeuvre = MANOEUVRES[trial.name]
-        true, after, before = (single_figures(simulate(one, manoeuvre).figures) for one in (model, full, light))
+        true, after, before = (single_figures(simulate(one, manoeuvre).figures) for one in (model, full, empty))
         for figure in found.figures:
             if figure.trial != trial.name or figure.full_load is None or figure.name.startswith("time"):
                 continue
@@ -145,15 +157,28 @@ def measured_turns(folder: Path) -> None:
         print(f"Esso Osaka model, pairs of turns, {name}: deviation as run, without current, calm {spread.round(2)} m")
 
 
+def published_ship() -> None:
+    """20/20 overshoots of FS Bitumen No. 1 by its dimensions, turns and 10/10 zigzags (means of both sides)."""
+    dimensions = {"length_m": 99.0, "beam_m": 18.0, "draught_m": 5.70, "block": 0.738, "speed_kn": 14.5}
+    turn = "advance_m=275.5 tactical_diameter_m=308.4 transfer_m=166.3"
+    found = t2s.guess(**dimensions, turn35=turn, zigzag10="overshoot_1_deg=6.95 overshoot_2_deg=10.65").figures
+    for number, measured in ((1, (20.9, 19.2)), (2, (17.8, 19.4))):
+        low, middle, high = (found.loc[f"overshoot_{number}_deg@20/20", key] for key in ("p5", "p50", "p95"))
+        shown = f"{middle:.1f} deg, 90 % from {low:.1f} to {high:.1f}"
+        print(f"FS Bitumen No. 1, 20/20 overshoot {number}: {shown}; measured {measured[0]} and {measured[1]}")
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--ships", type=int, default=30, help="made-up ships of each card")
-    count = parser.parse_args().ships
+    parser.add_argument("--hidden-loading", action="store_true", help="hidden errors alone, in calm water")
+    asked = parser.parse_args()
+    count = asked.ships
     for name in BALLAST:
         groups, currents = defaultdict(list), []
         for number in range(count):
-            rows, error = one_ship(name, number)
+            rows, error = one_ship(name, number, hidden=asked.hidden_loading)
             currents.append(error)
             for key, values in rows:
                 groups[key].append(values)
@@ -171,6 +196,7 @@ def main() -> None:
             kind = "deg" if key.endswith("deg") else "%"
             print(f"  {key:34} {errors} {kind}; in the interval {100 * np.mean(inside):.0f} %")
         print(f"  all: in the interval {100 * np.mean(every):.0f} %")
+    published_ship()
     data = Path(os.environ.get("TANK2SIM_DATA", "../shared")) / "data" / "esso_osaka" / "turning"
     if data.is_dir():
         measured_turns(data)

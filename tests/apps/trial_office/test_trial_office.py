@@ -228,6 +228,19 @@ def test_a_ship_that_is_stable_in_ballast_alone_certifies_no_overshoot(tmp_path:
     assert any("P stable = 0.00" in notice for notice in found.cautions)
 
 
+@pytest.mark.parametrize(("factor", "agrees"), [(1.0, True), (0.7, False)])
+def test_a_model_agrees_with_its_own_figures_and_not_with_others(factor: float, agrees: bool, tmp_path: Path) -> None:
+    own, notes = t2s.load("mariner").turn(35).figures, tmp_path / "notes.toml"
+    figures = "\n".join(f"{name} = {factor * own[name]}" for name in ("advance_m", "tactical_diameter_m"))
+    notes.write_text(f'draught_fore_m = 7.4\ndraught_aft_m = 7.5\n[figures."turn:35"]\n{figures}\n', encoding="utf-8")
+    study = t2s.trial_office((), ship="mariner", notes=notes, members=12).study
+    assert study.tested_at_full_load
+    for one in study.figures:
+        assert one.model_agrees is agrees
+        assert one.full_load == one.as_run == pytest.approx(factor * own[one.name])
+        assert one.model_as_tried == one.model_full_load == pytest.approx(own[one.name], rel=0.02)
+
+
 @pytest.mark.essential
 @pytest.mark.slow
 def test_the_report_is_written_as_a_whole(tmp_path: Path) -> None:
@@ -240,6 +253,8 @@ def test_the_report_is_written_as_a_whole(tmp_path: Path) -> None:
     jsonschema.validate(found.to_dict(), t2s.json_schema("trials"))
     again = type(found).read(found.to_dict(), "trials.json")
     assert again.to_json() == found.to_json()
+    assert "<td>7.468 m</td><td>5 m</td>" in files["poster.html"]
+    assert "agree with the trial" in files["poster.html"]
     as_tried = tmp_path / "as-tried.toml"
     as_tried.write_text(files["as-tried.toml"], encoding="utf-8")
     assert t2s.load(as_tried).turn(35).figures["tactical_diameter_m"] < 1029.0

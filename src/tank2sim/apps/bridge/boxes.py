@@ -80,20 +80,27 @@ def conditions(bridge: Bridge, ballast: Bridge | None) -> tuple[str, str]:
 def draughts(bridge: Bridge, ballast: Bridge | None) -> Box:
     """Draughts at which the data were obtained, and what else is of those draughts: a card has the mean one alone."""
     cards = [condition.card if condition else None for condition in (bridge, ballast)]
+    bases = [condition.basis if condition else None for condition in (bridge, ballast)]
     means = [mean_draught(card) if card else None for card in cards]
     # Displacement and block coefficient of a card are those of its own draught.
     ships = [
         card.ship if card and mean == card.ship.draught_m else None for card, mean in zip(cards, means, strict=True)
     ]
     rows = (
-        Row("Forward", (None, None)),
-        Row("Aft", (None, None)),
+        Row("Forward", tuple(_number(basis.forward_m, "m") if basis else None for basis in bases)),
+        Row("Aft", tuple(_number(basis.aft_m, "m") if basis else None for basis in bases)),
         Row("Mean", tuple(_number(mean, "m") for mean in means)),
         Row("Displacement", tuple(_tonnes(ship.displacement_kg) if ship else None for ship in ships)),
         Row("Block coefficient", tuple(_number(ship.block_coefficient, "") if ship else None for ship in ships)),
-        Row("Trial / estimated", tuple("estimated" if card else None for card in cards)),
+        Row("Trial / estimated", tuple(_basis_words(condition) for condition in (bridge, ballast))),
     )
     return Box("Draught of the manoeuvring data", rows, conditions(bridge, ballast))
+
+
+def _basis_words(condition: Bridge | None) -> str | None:
+    if condition is None:
+        return None
+    return condition.basis.words if condition.basis else "estimated"
 
 
 def _tonnes(kilograms: float | None) -> str | None:

@@ -14,7 +14,7 @@ from tank2sim.notices import Notice
 
 if TYPE_CHECKING:
     from tank2sim.apps.bridge.result import PilotCardResult, PosterResult
-    from tank2sim.apps.bridge.study import Bridge, BridgeStudy
+    from tank2sim.apps.bridge.study import Bridge, BridgeStudy, DataBasis
     from tank2sim.cards import ManoeuvringCard
     from tank2sim.dynamics.vessel import Vessel
 
@@ -56,7 +56,7 @@ def make_poster(
     """
     from tank2sim.apps.bridge.result import PosterResult
 
-    return PosterResult(*_bridges(ship, ballast, order or {}))
+    return PosterResult(*sheet_data(ship, ballast, order or {}))
 
 
 @verb(
@@ -90,24 +90,28 @@ def make_pilot_card(
     """
     from tank2sim.apps.bridge.result import PilotCardResult
 
-    return PilotCardResult(*_bridges(ship, ballast, order or {}))
+    return PilotCardResult(*sheet_data(ship, ballast, order or {}))
 
 
-def _bridges(
-    ship: Vessel, ballast: Vessel | str | Path | None, orders: Mapping[str, float]
+def sheet_data(
+    ship: Vessel,
+    ballast: Vessel | str | Path | None,
+    orders: Mapping[str, float],
+    basis: DataBasis | None = None,
+    ballast_basis: DataBasis | None = None,
 ) -> tuple[BridgeStudy, Bridge, Bridge | None]:
-    """Data of a sheet in both conditions."""
+    """Data of a sheet in both conditions, and where they are from."""
     from tank2sim.apps.bridge.study import bridge_of
     from tank2sim.dynamics.vessel import as_vessel
 
     check_orders(orders)
     loaded = ship.manoeuvring()
-    first, second = bridge_of(loaded, orders), None
+    first, second = replace(bridge_of(loaded, orders), basis=basis), None
     notices: tuple[Notice, ...] = ()
     if ballast is not None:
         light = as_vessel(ballast).manoeuvring()
         notices = _check_ballast(loaded, light)
-        second = bridge_of(light, orders)
+        second = replace(bridge_of(light, orders), basis=ballast_basis)
     text = "the card has no [propulsion]: stops and speeds by revolutions are blank"
     missing = () if loaded.propulsion else (Notice(text),)
     said = dict.fromkeys((*notices, *first.notices, *(second.notices if second else ()), *missing))

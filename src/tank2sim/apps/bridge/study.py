@@ -95,6 +95,15 @@ class Squat:
     squat_m: float
 
 
+@dataclass(frozen=True)
+class DataBasis:
+    """Where the data of a loading condition are from: draughts (m), and words for "Trial / estimated"."""
+
+    forward_m: float
+    aft_m: float
+    words: str
+
+
 @dataclass(frozen=True, eq=False)
 class Bridge:
     """Data of a ship in the loading condition of its card.
@@ -121,6 +130,8 @@ class Bridge:
     squat : tuple of Squat
         Empty without block coefficient, beam and draught.
     notices : tuple of Notice
+    basis : DataBasis, optional
+        By default the data are estimated, and the form's draughts stay blank.
     """
 
     card: ManoeuvringCard
@@ -135,6 +146,7 @@ class Bridge:
     neutral_deg: float | None
     squat: tuple[Squat, ...] = ()
     notices: tuple[Notice, ...] = ()
+    basis: DataBasis | None = None
 
     @property
     def study(self) -> BridgeStudy:

@@ -101,12 +101,18 @@ class Prediction:
         By the card itself.
     ratios : mapping
         Logarithm of F/B of each member (n,), where it has both.
+    spreads : mapping
+        Standard deviation of the logarithm of B over the members.
+    is_full_load : bool
+        Whether the trial itself shows full load in calm water: R is T, whatever the model does.
     """
 
     tried: Numbers
     calm: Numbers
     full: Numbers
     ratios: Mapping[str, Array]
+    spreads: Mapping[str, float]
+    is_full_load: bool = False
 
     def at_full_load(self, one: Tried, name: str) -> tuple[float, float] | None:
         """R = T F/B and the standard error of its logarithm; None where one is not known.
@@ -118,11 +124,33 @@ class Prediction:
         name : str
         """
         measured, before, after = one.figures.get(name), self.tried.get(name), self.full.get(name)
+        if self.is_full_load and measured is not None and measured > SMALLEST:
+            return measured, one.errors.get(name, 0.0) / measured
         if measured is None or before is None or after is None or min(before, after, measured) <= SMALLEST:
             return None
         ratios = self.ratios.get(name, np.zeros(0))
         spread = robust_deviation(ratios)
         return measured * after / before, math.hypot(spread, one.errors.get(name, 0.0) / measured)
+
+
+def model_agrees(one: Tried, found: Prediction, name: str) -> bool | None:
+    """Whether a measured figure is within the 95 % interval of the model's as tried; None where one is not known.
+
+    MSC/Circ.1053, 3.4.1, option 2: a model that agrees well in the condition of the trial may predict full load itself.
+
+    Parameters
+    ----------
+    one : Tried
+        The manoeuvre without the current.
+    found : Prediction
+        With members.
+    name : str
+    """
+    measured, simulated_figure = one.figures.get(name), found.tried.get(name)
+    if name not in found.spreads or measured is None or simulated_figure is None or measured <= SMALLEST:
+        return None
+    error = math.hypot(found.spreads[name], one.errors.get(name, 0.0) / measured)
+    return abs(math.log(measured / simulated_figure)) <= 1.96 * error
 
 
 def prediction(one: Tried, ships: TriedShips, wind: Mapping[str, float], *, at_full_load: bool) -> Prediction:
@@ -138,23 +166,28 @@ def prediction(one: Tried, ships: TriedShips, wind: Mapping[str, float], *, at_f
     at_full_load : bool
         Whether the trial itself counts as at full load: F then differs from B by the wind alone.
     """
-    if at_full_load and not wind:
-        return Prediction(one.figures, one.figures, one.figures, {})
+    calm_full_load = at_full_load and not wind
     speed = one.speed_mps if at_full_load else ships.full_load.model.speed_mps
 
     def both(values: tuple[Mapping[str, float], Mapping[str, float]]) -> tuple[Numbers, Numbers]:
         before = _run(lambda: simulated(one, ships.tried, wind, values[0]))
+        if calm_full_load:
+            return before, before
         return before, _run(lambda: single_figures(calm_run(one, ships.full, speed, values[1]).figures))
 
     before, after = both(({}, {}))
     calm = _run(lambda: simulated(one, ships.tried, {}, {})) if wind else before
     ratios: dict[str, list[float]] = {}
+    logarithms: dict[str, list[float]] = {}
     for values in ships.drawn:
         first, second = both(values)
         for name in first.keys() & second.keys():
             if min(first[name], second[name]) > SMALLEST:
                 ratios.setdefault(name, []).append(math.log(second[name] / first[name]))
-    return Prediction(before, calm, after, {name: np.array(values) for name, values in ratios.items()})
+                logarithms.setdefault(name, []).append(math.log(first[name]))
+    spreads = {name: robust_deviation(np.array(values)) for name, values in logarithms.items()}
+    drawn = {name: np.array(values) for name, values in ratios.items()}
+    return Prediction(before, calm, after, drawn, spreads, is_full_load=calm_full_load)
 
 
 def _run(simulation: Callable[[], Numbers]) -> Numbers:

@@ -15,6 +15,7 @@ from tank2sim.apps.trial_office.verdict import CriterionVerdict
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
+    from tank2sim.apps.bridge.study import DataBasis
     from tank2sim.cards.card import ManoeuvringCard
 
 _VERDICTS = {"pass": Verdict.PASSED, "fail": Verdict.FAILED}
@@ -65,6 +66,9 @@ class TrialOfficeResult(Result[TrialOffice]):
         if (current := study.current) is not None:
             how = f"separated from the wind {current.separated}" if current.separated else "together with any wind"
             lines.append(f"Current {current.speed_mps:.2f} m/s towards {current.towards_deg:.0f} deg, {how}.")
+        known = self._agreements
+        if known and not study.tested_at_full_load:
+            lines.append(f"In the condition of the trial the model agrees with {sum(known)} of {len(known)} figures.")
         if not study.applies:
             lines.append("The ship is shorter than 100 m: the standards do not bind it.")
         return tuple(lines)
@@ -160,8 +164,10 @@ class TrialOfficeResult(Result[TrialOffice]):
     def _figures(self) -> Section:
         heads = ("record", "figure", "as run", "full load", "2.5 %", "97.5 %")
         steps = ("record", "manoeuvre", "side", "figure", "without current", "standard error", "in calm water")
+        checks = ("record", "figure", "measured T", "model as tried B", "agrees", "model at full load F", "R = T F/B")
         rows: list[list[Cell]] = []
         by_step: list[list[Cell]] = []
+        checked: list[list[Cell]] = []
         for one in self.study.figures:
             words, unit = in_words(one.name)
             name = f"{words} ({unit})"
@@ -169,14 +175,24 @@ class TrialOfficeResult(Result[TrialOffice]):
             by_step.append(
                 [one.trial, one.manoeuvre, one.side, name, one.without_current, one.error, one.calm],
             )
+            if one.model_as_tried is not None:
+                agrees = None if one.model_agrees is None else "yes" if one.model_agrees else "no"
+                by_model = (one.model_as_tried, agrees, one.model_full_load, one.full_load)
+                checked.append([one.trial, name, one.without_current, *by_model])
         return Section(
             heading="Figures",
             text="The wind is taken off by the model: times its figure in calm water over that in the wind. At full "
             "load R = T F/B (MSC/Circ.1053): measured T, and simulated F at full load and B as tried, of the same "
-            "member of the ensemble, so that errors of both cancel.",
+            "member of the ensemble, so that errors of both cancel. Where the model as tried agrees with the trial, "
+            "its own figures F at full load may be used instead (option 2): those of the card full-load.toml.",
             tables=[
                 table("Figures as run and at full load", heads, rows),
                 table("Corrections, step by step", steps, by_step, on_screen=False),
+                *(
+                    [table("The model in the condition of the trial", checks, checked, on_screen=False)]
+                    if checked
+                    else []
+                ),
             ],
         )
 
@@ -205,7 +221,8 @@ class TrialOfficeResult(Result[TrialOffice]):
         ----------
         folder : Path
         """
-        from tank2sim.apps.bridge.command import make_pilot_card, make_poster
+        from tank2sim.apps.bridge.command import sheet_data
+        from tank2sim.apps.bridge.result import PilotCardResult, PosterResult
         from tank2sim.apps.trial_office.form import form_page
         from tank2sim.apps.trial_office.paper import report_pdf
         from tank2sim.dynamics.vessel import Vessel
@@ -218,14 +235,32 @@ class TrialOfficeResult(Result[TrialOffice]):
         }
         if self.as_tried is None or self.full_load is None:
             return found
-        light = self.as_tried if self.study.state.draught_m < self.study.state.full_load_draught_m else None
-        ballast = None if self.study.tested_at_full_load else light
-        loaded, other = Vessel(self.full_load), Vessel(ballast) if ballast else None
-        found[folder / "poster.html"] = make_poster(loaded, ballast=other).page()
-        found[folder / "pilotcard.html"] = make_pilot_card(loaded, ballast=other).page()
+        state = self.study.state
+        light = not self.study.tested_at_full_load and state.draught_m < state.full_load_draught_m
+        other = Vessel(self.as_tried) if light else None
+        sheet = sheet_data(Vessel(self.full_load), other, {}, *self._bases())
+        found[folder / "poster.html"] = PosterResult(*sheet).page()
+        found[folder / "pilotcard.html"] = PilotCardResult(*sheet).page()
         for name, card in (("as-tried.toml", self.as_tried), ("full-load.toml", self.full_load)):
             found |= card.files(folder / name)
         return found
+
+    def _bases(self) -> tuple[DataBasis, DataBasis]:
+        """Draughts of the sheets at full load and as tried, and how many of the estimated figures agree with the trial."""
+        from tank2sim.apps.bridge.study import DataBasis
+
+        state, known = self.study.state, self._agreements
+        checked = f"estimated; {sum(known)} of {len(known)} agree with the trial" if known else "estimated"
+        full = checked if self.study.tested_at_full_load else "estimated"
+        half_trim = state.trim_m / 2
+        return (
+            DataBasis(state.full_load_draught_m, state.full_load_draught_m, full),
+            DataBasis(state.draught_m - half_trim, state.draught_m + half_trim, checked),
+        )
+
+    @property
+    def _agreements(self) -> list[bool]:
+        return [one.model_agrees for one in self.study.figures if one.model_agrees is not None]
 
 
 def _share(probability: float | None) -> float | None:

@@ -16,7 +16,14 @@ from tank2sim.analysis.validation.standard_trials import SEED
 from tank2sim.apps.guess.study import OVERSHOOT_ERROR_DEG, TRIAL_ERROR
 from tank2sim.apps.trial_office.conditions import Met, TrialCondition, TrialState, trial_conditions
 from tank2sim.apps.trial_office.drift import CircleDrift, circle_drift
-from tank2sim.apps.trial_office.full_load import SMALLEST, Prediction, loading_validity, prediction, tried_ships
+from tank2sim.apps.trial_office.full_load import (
+    SMALLEST,
+    Prediction,
+    loading_validity,
+    model_agrees,
+    prediction,
+    tried_ships,
+)
 from tank2sim.apps.trial_office.notes import REPORTED, FormWords, TrialNotes
 from tank2sim.apps.trial_office.tried import Tried, current_removed, tried
 from tank2sim.apps.trial_office.verdict import LOADING_HOLDS, CriterionVerdict, judge_criteria
@@ -99,6 +106,10 @@ class OfficeFigure:
         At full load, on even keel, in calm water: R = T F/B.
     low, high : float or None
         95 % interval of that.
+    model_as_tried, model_full_load : float or None
+        B and F.
+    model_agrees : bool or None
+        Whether the measured figure is within the 95 % interval of B; None without members.
     """
 
     trial: str
@@ -112,6 +123,9 @@ class OfficeFigure:
     full_load: float | None = None
     low: float | None = None
     high: float | None = None
+    model_as_tried: float | None = None
+    model_full_load: float | None = None
+    model_agrees: bool | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -391,8 +405,10 @@ def _figures(raw: Tried, still: Tried, found: Prediction) -> list[OfficeFigure]:
         if name not in raw.figures or name not in still.figures:
             continue
         value = still.figures[name]
-        shown = {}
-        if name in found.tried and name in found.calm and abs(found.tried[name]) > SMALLEST:
+        shown: dict[str, float] = {}
+        if found.is_full_load:
+            shown["calm"] = value
+        elif name in found.tried and name in found.calm and abs(found.tried[name]) > SMALLEST:
             shown["calm"] = value * found.calm[name] / found.tried[name]
         if (at_load := found.at_full_load(still, name)) is not None:
             centre, error = at_load
@@ -410,6 +426,9 @@ def _figures(raw: Tried, still: Tried, found: Prediction) -> list[OfficeFigure]:
                 as_run=raw.figures[name],
                 without_current=value,
                 error=still.errors.get(name, 0.0),
+                model_as_tried=found.tried.get(name),
+                model_full_load=found.full.get(name),
+                model_agrees=model_agrees(still, found, name),
                 **shown,
             )
         )
