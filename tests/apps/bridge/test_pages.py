@@ -14,6 +14,7 @@ from tank2sim.apps.bridge.drawings import circles_drawing, clock, knots
 from tank2sim.apps.bridge.result import pilot_card_page, poster_page
 from tank2sim.apps.bridge.study import Bridge, bridge_of
 from tank2sim.cards import read_card
+from tank2sim.notices import Notice
 from tests.answer.browser import browser, measured_in_browser
 
 BLANK = 'class="blank"'
@@ -43,7 +44,7 @@ def crowded(bridge) -> Bridge:
     ship = own.card.ship.model_copy(
         update={"name": "Motor tanker " + "Verylong" * 9, "source": "S" * 60 + " words" * 99}
     )
-    notices = tuple(f"{place} {'a long notice ' * 30}" for place in range(12))
+    notices = tuple(Notice(f"{place} {'a long notice ' * 30}") for place in range(12))
     return replace(own, card=replace(own.card, ship=ship), notices=notices)
 
 

@@ -246,7 +246,7 @@ class TrialOfficeResult(Result[TrialOffice]):
         return found
 
     def _bases(self) -> tuple[DataBasis, DataBasis]:
-        """Draughts of the sheets at full load and as tried, and how many of the estimated figures agree with the trial."""
+        """Draughts of the sheets at full load and as tried, and how many figures agree with the trial."""
         from tank2sim.apps.bridge.study import DataBasis
 
         state, known = self.study.state, self._agreements
