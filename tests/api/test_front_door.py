@@ -31,6 +31,12 @@ def test_a_simulation_loads_neither_control_nor_plots_nor_tables() -> None:
     assert not loaded_by(code) & {"control", "matplotlib", "pandas", "altair", "statsmodels", "fmpy"}
 
 
+def test_the_command_simulate_loads_no_slow_library_that_it_does_not_use() -> None:
+    words = "['tank2sim', 'simulate', 'mariner', '--manoeuvre', 'turn:35', '--quiet']"
+    code = f"import sys; sys.argv = {words}\nfrom tank2sim.cli import main\ntry: main()\nexcept SystemExit: pass"
+    assert not loaded_by(code) & {"scipy", "control", "matplotlib", "pandas", "altair", "fmpy", "jinja2"}
+
+
 def test_every_name_is_there_with_a_docstring() -> None:
     assert sorted(tank2sim.__all__) == tank2sim.__all__
     for name in tank2sim.__all__:

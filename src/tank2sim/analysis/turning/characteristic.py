@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
 
 from tank2sim.analysis.turning.diagram import SteadyTurning
 from tank2sim.arrays import Array
@@ -109,6 +108,8 @@ def steering_characteristic(turning: SteadyTurning) -> SteeringCharacteristic | 
         return None
     rows = slice(first, last + 1)
     slopes = turning.slope[rows]
+    from scipy.interpolate import CubicHermiteSpline  # slow to import
+
     curve = CubicHermiteSpline(turning.yaw_rate_radps[rows], turning.rudder_rad[rows], slopes[:, 0] / slopes[:, 1])
     rate = np.linspace(curve.x[0], curve.x[-1], _RATES)
     rudder = np.asarray(curve(rate), dtype=float)

@@ -16,11 +16,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
 
 from tank2sim.analysis.linearisation import straight_course
 from tank2sim.analysis.turning import continuation
@@ -31,6 +31,9 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice, caution
 from tank2sim.simulation.card_range import exceeded_range
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicHermiteSpline
 
 _LARGEST_RUDDER = math.radians(35.0)
 """Largest rudder of the diagram: 35 deg (MSC.137(76)), or that of the gear."""
@@ -111,11 +114,16 @@ class SteadyTurning:
 
     @cached_property
     def _along(self) -> CubicHermiteSpline:
-        return CubicHermiteSpline(self.arc, np.column_stack([self.rudder_rad, self.yaw_rate_radps]), self.slope)
+        return self._spline(np.column_stack([self.rudder_rad, self.yaw_rate_radps]), self.slope)
 
     @cached_property
     def _rudder_along(self) -> CubicHermiteSpline:
-        return CubicHermiteSpline(self.arc, self.rudder_rad, self.slope[:, 0])
+        return self._spline(self.rudder_rad, self.slope[:, 0])
+
+    def _spline(self, values: Array, slopes: Array) -> CubicHermiteSpline:
+        from scipy.interpolate import CubicHermiteSpline  # slow to import
+
+        return CubicHermiteSpline(self.arc, values, slopes)
 
     def turns_at(self, rudder_rad: float) -> list[tuple[float, bool]]:
         """Yaw rate (rad/s) and stability of every steady turn of the curve at a rudder angle, along the curve."""
