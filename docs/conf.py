@@ -18,7 +18,7 @@ project_copyright = "MIT licence"
 release = __version__
 
 extensions = [
-    "myst_parser",
+    "myst_nb",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "mathml",
@@ -29,6 +29,10 @@ extensions = [
 ]
 myst_enable_extensions = ["attrs_block", "dollarmath"]
 myst_heading_anchors = 3
+nb_execution_mode = "auto"  # the notebooks have no outputs of their own; -D nb_execution_mode=off leaves them so
+nb_execution_in_temp = True
+nb_execution_timeout = 300
+nb_execution_raise_on_error = True
 html_math_renderer = "mathml"
 math_number_all = False
 

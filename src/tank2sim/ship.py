@@ -302,7 +302,7 @@ def load(card: str | Path, values: Mapping[str, object] | None = None) -> Ship:
     card : str or path
         Name of a bundled ship (:func:`ships`), or the TOML file of a card.
     values : mapping, optional
-        Values in place of the card's, by dotted key: ``{"derivatives.Yv": -0.012}``.
+        Values in place of the card's, by dotted key, in its scaling and signs: ``{"derivatives.Yv": -0.012}``.
 
     Raises
     ------
