@@ -10,6 +10,7 @@ from tank2sim.answer.charts.motion import (
     history_chart,
     spiral_chart,
     track_chart,
+    varying_histories,
 )
 from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.answer.charts.vega import PlotAxis
@@ -197,3 +198,10 @@ def test_a_spiral_is_joined_in_its_order_and_shown_in_degrees():
     drawn = sorted(rows(specification, line), key=lambda row: row[line["encoding"]["order"]["field"]])
     assert [row[line["encoding"]["x"]["field"]] for row in drawn] == pytest.approx([20, 0, -20, 0, 20])
     assert [row[line["encoding"]["y"]["field"]] for row in drawn] == pytest.approx([0.5, 0.2, -0.5, -0.2, 0.5])
+
+
+def test_revolutions_that_stay_the_same_are_said_in_rpm_on_each_side() -> None:
+    time = np.arange(3.0)
+    columns = {"t_s": time, "n_port_rpm": np.full(3, 740.0), "n_starboard_rpm": np.full(3, 640.0), "u_mps": time}
+    drawn = varying_histories(columns, {}, np.zeros(0))
+    assert drawn is not None and drawn.caption.endswith("n port 740 rpm, n starboard 640 rpm.")

@@ -423,7 +423,7 @@ def _signals(runs: Mapping[str, _Columns]) -> list[Signal]:
     found = []
     for name in names:
         unit = to_si(name, 1.0)[0].rpartition("_")[2]
-        display = {"n": "rpm"}.get(stem_of(name))
+        display = {"n": "rpm"}.get(stem_of(name).partition("_")[0])  # also n_port
         known = _UNITS.get(unit, "1")
         words, written = in_words(name)
         title = _TITLES.get(stem_of(name)) or (words if unit in _UNITS or not written else f"{words} ({written})")

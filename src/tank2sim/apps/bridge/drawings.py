@@ -253,7 +253,7 @@ def stops_drawing(stops: Sequence[ShipTrack], *, width: float, height: float) ->
         kept = thin_line([starboard, ahead], _POINTS)
         pairs = zip(starboard[kept], ahead[kept], strict=True)
         lines.append(Line(" ".join(f"{zero + scale * a:.2f},{base - scale * b:.2f}" for a, b in pairs), "track stop"))
-        last = -math.inf
+        last, right = -math.inf, zero + scale * float(starboard.max())
         # The marks crowd together where the ship is slow: the last one counts, so they are reported from the end.
         ends = [(path.range_exit, "warn")] if path.range_exit else []
         within = [(mark, "word") for mark in reversed(path.marks) if not path.outside(mark)]
@@ -262,9 +262,9 @@ def stops_drawing(stops: Sequence[ShipTrack], *, width: float, height: float) ->
             dots.append((round(x, 2), round(y, 2)))
             if y - last >= 3.2:
                 text = f"{clock(mark.time_s)}  {metres(mark.ahead_m)} m  {knots(mark.speed_mps)} kn"
-                words.append(Word(x + 2.0, y + 0.9, text, "start", style))
+                words.append(Word(right + 2.0, y + 0.9, text, "start", style))
                 last = y
                 if style == "warn":
-                    words.append(Word(x + 2.0, y - 2.2, "range of the card ends", "start", style))
+                    words.append(Word(right + 2.0, y - 2.2, "range of the card ends", "start", style))
         words.append(Word(zero - 0.2 * column, height - 2.0, path.name, "start", "title"))
     return Drawing(width, height, tuple(lines), tuple(dots), tuple(words), "Stopping tracks with time and speed.")
