@@ -192,7 +192,7 @@ class ManoeuvreResult(Result[ManoeuvreStudy]):
             if width > 0:
                 return (
                     "Within the loop the ship keeps turning to its side: it is unstable on a straight course.",
-                    "Its width is read between the rudder angles of the spiral; the command stability has the exact one.",
+                    "Its width is read between the rudder angles of the spiral; the command stability is exact.",
                 )
             return ("The curve has no loop: at each rudder angle the ship has one steady turn.",)
         shown = [
