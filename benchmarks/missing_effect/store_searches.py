@@ -2,9 +2,9 @@
 
     python benchmarks/missing_effect/store_searches.py CASES FOLDER [--workers N]
 
-CASES is a folder that ``cases.py`` wrote. Each search is written to FOLDER as ``case_0001.pickle``, as
-``tank2sim.gap.search.explanations.Search`` of the trials that name the effect; what is there already is kept.
-``decide_stored.py`` reads them.
+CASES is a folder that ``cases.py`` wrote. Of each search FOLDER gets ``case_0001.json``: all explanations with their
+scores (-2 log of the evidence), the width of the card's errors and what rules ask of them, where the innovations of the
+best are not noise, and what the scores decide today. What is there already is kept. ``decide_stored.py`` reads them.
 """
 
 from __future__ import annotations
@@ -14,22 +14,52 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # small matrices: threads would only wait for each other
 
 import argparse
+import json
+import math
 import multiprocessing
-import pickle
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict
 from pathlib import Path
-
-import casadi as ca
 
 import tank2sim as t2s
 from tank2sim.arguments import MOST_EFFECTS
 from tank2sim.gap.inference.prior import candidate_explanations, likelihood_from_card
-from tank2sim.gap.search.explanations import search
+from tank2sim.gap.search.explanations import Search, search
+from tank2sim.gap.search.model_choice import decide, find_strangeness, is_significant
 from tank2sim.gap.workflow import nonlinear_card
 from tank2sim.identification.trials.problem.prepare_trials import measured
 from tank2sim.identification.trials.problem.problem_from_card import above_low_speed, polynomial_over_trials
+
+
+def stored(found: Search) -> dict[str, object]:
+    """What a decider needs of a search."""
+    decision = decide(found)
+    ahead = {id(fit) for fit in (*found.fits[:6], found.none)}
+    fits = [
+        {
+            "effects": fit.hypothesis.effects,
+            "score": fit.score,
+            "width": fit.width,
+            "parameters": len(fit.theta),
+            "significant": is_significant(fit),
+            "strange": [asdict(one) for one in find_strangeness(found.likelihood, fit)] if id(fit) in ahead else None,
+        }
+        for fit in found.fits
+        if math.isfinite(fit.score)
+    ]
+    return {
+        "fits": fits,
+        "waves": found.likelihood.belief.waves is not None,
+        "trials": len(found.likelihood.motion.names),
+        "readings": int(found.likelihood.count),
+        "decision": {
+            "verdict": decision.verdict,
+            "best": decision.best.hypothesis.effects,
+            "alike": [fit.hypothesis.effects for fit in decision.alike],
+        },
+    }
 
 
 def store(folder: Path, target: Path) -> str:
@@ -42,8 +72,7 @@ def store(folder: Path, target: Path) -> str:
     names = candidate_explanations(card, fitted.driven_by)
     found = search(likelihood_from_card(card, fitted), names=names, most=MOST_EFFECTS)
     part = target.with_suffix(".part")
-    with ca.global_pickle_context():
-        part.write_bytes(pickle.dumps(found))
+    part.write_text(json.dumps(stored(found)), encoding="utf-8")
     part.rename(target)
     best = "+".join(found.fits[0].hypothesis.effects) or "none"
     return f"{folder.name}: {best}, {len(found.fits)} fits, {time.perf_counter() - begun:.0f} s"
@@ -58,7 +87,7 @@ def main() -> int:
     asked = parser.parse_args()
     asked.folder.mkdir(parents=True, exist_ok=True)
     places = [path.parent for path in sorted(asked.cases.glob("*/ship.toml"))]
-    todo = [(place, asked.folder / f"{place.name}.pickle") for place in places]
+    todo = [(place, asked.folder / f"{place.name}.json") for place in places]
     todo = [(place, target) for place, target in todo if not target.exists()]
     with ProcessPoolExecutor(asked.workers, multiprocessing.get_context("spawn")) as pool:
         for future in as_completed([pool.submit(store, *pair) for pair in todo]):
