@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from tank2sim.apps.logs.clock import board_start
-from tank2sim.apps.logs.lines import text_lines
-from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, not_used, optional_library
+from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, not_used, optional_library, text_lines
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.records.spelt_units import unit_of_text

@@ -22,9 +22,8 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.apps.logs.clock import continued_clock, full_year, rollover_s
-from tank2sim.apps.logs.lines import mostly, text_lines
 from tank2sim.apps.logs.quantities import QUANTITIES, quantity_of_name
-from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, not_used, optional_library
+from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, mostly, not_used, optional_library, text_lines
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.units import KNOT_MPS

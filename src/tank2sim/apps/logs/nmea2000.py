@@ -15,9 +15,8 @@ import numpy as np
 from scipy.stats import theilslopes
 
 from tank2sim.apps.logs.clock import continued_clock, rollover_s
-from tank2sim.apps.logs.lines import mostly, text_lines
 from tank2sim.apps.logs.nmea0183 import steady_times
-from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, not_used, optional_library
+from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, mostly, not_used, optional_library, text_lines
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 

@@ -181,7 +181,7 @@ def _signals(voyage: Voyage) -> _Signals | None:
     at_heading = np.full(len(time), np.nan) if heading is None else np.interp(time, heading.time_s, heading.values)
     rate = _rate(series)
     at_rate = np.full(len(time), np.nan) if rate is None else np.interp(time, rate.time_s, rate.values)
-    _, lag = steering_evidence(time, steer, *((rate.time_s, rate.values) if rate else (time, at_rate)))
+    lag = steering_evidence(time, steer, *((rate.time_s, rate.values) if rate else (time, at_rate))).lag_s
     speed = _speed(series, time)
     return _Signals(
         time, steer, threshold, propulsion, full, speed, at_heading, at_rate, float(np.clip(2 * lag, 2.0, 30.0))
