@@ -142,16 +142,15 @@ class ChannelSearch:
         by, agreement = stream.stated_by, evidence.agreement
         why = {"format": "by its format", "name": "by its name", "": "by its place"}[by]
         if agreement is None:
-            with_unit = by == "name" and stream.unit
-            confidence = BASE[by] + (0.1 if with_unit else 0.0)
-            return Judgement(
-                stream, confidence, f"{why}{' and unit' if with_unit else ''}; {evidence.text}", stream.unit
-            )
-        if agreement >= agrees:
-            return Judgement(stream, _AGREED[by], f"{why}; {evidence.text}", stream.unit)
-        if agreement < DIFFERS:
-            return Judgement(stream, CONTRADICTED, f"{why}, but {evidence.text}", stream.unit)
-        return Judgement(stream, BASE[by] - 0.1, f"{why}; {evidence.text}, which is weak", stream.unit)
+            stated, words = (0.1, " and unit") if by == "name" and stream.unit else (0.0, "")
+            confidence, why = BASE[by] + stated, f"{why}{words}; {evidence.text}"
+        elif agreement >= agrees:
+            confidence, why = _AGREED[by], f"{why}; {evidence.text}"
+        elif agreement < DIFFERS:
+            confidence, why = CONTRADICTED, f"{why}, but {evidence.text}"
+        else:
+            confidence, why = BASE[by] - 0.1, f"{why}; {evidence.text}, which is weak"
+        return Judgement(stream, confidence, why, stream.unit)
 
     def take(self, found: Judgement, quantity: str = "") -> None:
         """Add a judged stream; one that is contradicted is a fault."""

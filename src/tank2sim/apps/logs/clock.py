@@ -90,7 +90,7 @@ def continued_clock(time_s: Array, name: str) -> tuple[Array, list[LogFinding]]:
             text = f"{name}: the clock falls by {-step:.4g} s at {utc_text(time_s[place])}; it is taken to run on"
             findings.append(fault(text, name, fall_s=-step))
         else:
-            leaps.remove(ahead)
+            leaps.remove(ahead := same[-1])
             times[ahead + 1 : place + 1] -= float(steps[ahead]) - usual
             text = f"{name}: the clock is {-step + usual:.4g} s ahead from {utc_text(time_s[ahead])} on for a while"
             findings.append(fault(f"{text}; that is taken back", name, leap_s=-step + usual))

@@ -1,4 +1,4 @@
-"""Tests of what a stream holds, by its consistency with the motion: heading, rates, speeds, courses, rudders, delays."""
+"""Tests of what a stream holds, by its consistency with the motion: courses, rates, speeds, rudders, delays."""
 
 from __future__ import annotations
 

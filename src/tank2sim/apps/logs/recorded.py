@@ -64,9 +64,9 @@ def _lone_mark(values: Array, more: tuple[float, ...]) -> float | None:
     known = values[np.isfinite(values)]
     for extreme in (float(known.min()), float(known.max())) if len(known) else ():
         others = known[known != extreme]
-        if (_MARK.fullmatch(f"{extreme:.10g}") or extreme in more) and len(others) >= FEW_SAMPLES:
-            if min(abs(others.min() - extreme), abs(others.max() - extreme)) > np.ptp(others):
-                return extreme
+        is_mark = _MARK.fullmatch(f"{extreme:.10g}") or extreme in more
+        if is_mark and len(others) >= FEW_SAMPLES and np.abs(others - extreme).min() > np.ptp(others):
+            return extreme
     return None
 
 

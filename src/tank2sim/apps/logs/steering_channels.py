@@ -56,8 +56,8 @@ _ASTERN_SHARE, _ASTERN_S = 0.15, 8.0
 Project choice: beyond what a current or a coasting propeller does."""
 
 _FASTEST_SHAFT_HZ, _LARGEST_HEEL_RAD = 100.0, 0.8
-"""Revolutions beyond which a record without a unit is in rpm, 1/s: small thrusters reach 80; and heel beyond which it is
-in deg: 46 deg in rad (project choices)."""
+"""Revolutions beyond which a record without a unit is in rpm, 1/s (small thrusters reach 80), and heel beyond which it
+is in deg: 46 deg in rad (project choices)."""
 
 _LEAST_ZERO, _LEAST_ZERO_SHARE = 10.0, 0.4
 """Rudder on straight legs, deg or %, from which a zero of the record is taken out, and the same of a rudder of unknown

@@ -139,7 +139,7 @@ def named_stream(name: str, time_s: Array, values: Array, unit: str = "") -> Log
 def not_used(words: str, kinds: Mapping[str, int]) -> list[LogFinding]:
     """A note that counts what was not used, ``sentences`` or ``messages`` by their kind; none if there is nothing."""
     listed = ", ".join(f"{number} {kind}" for kind, number in sorted(kinds.items()))
-    return [note(f"{words} that are not used: {listed}", **kinds)] if kinds else []
+    return [LogFinding("note", f"{words} that are not used: {listed}", evidence=dict(kinds))] if kinds else []
 
 
 def optional_library(name: str, path: Path) -> ModuleType:
