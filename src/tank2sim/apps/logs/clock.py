@@ -82,9 +82,7 @@ def continued_clock(time_s: Array, name: str) -> tuple[Array, list[LogFinding]]:
             shift = 0.0
         elif step > 0:
             leaps.append(int(place))
-        elif (
-            ahead := next((n for n in reversed(leaps) if abs(steps[n] + step - 2 * usual) < 2 * usual), None)
-        ) is None:
+        elif not (same := [leap for leap in leaps if abs(steps[leap] + step - 2 * usual) < 2 * usual]):
             shift += usual - step
             times[place + 1 :] += usual - step
             text = f"{name}: the clock falls by {-step:.4g} s at {utc_text(time_s[place])}; it is taken to run on"
