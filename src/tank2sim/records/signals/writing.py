@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -62,8 +63,8 @@ def thinned(trial: Trial, filtered: Sequence[Filtered], notice: str) -> Trial:
     return replace(trial, time_s=time, signals=signals, noise={}, notices=(*trial.notices, Notice(notice)))
 
 
-def trial_text(trial: Trial, remarks: Sequence[str]) -> str:
-    """Text of a trial CSV, rudder positive to starboard; `remarks` are its first comment lines."""
+def trial_text(trial: Trial, remarks: Sequence[str], more: Mapping[str, Array] = MappingProxyType({})) -> str:
+    """Text of a trial CSV, rudder positive to starboard, with `remarks` as first comment lines and `more` columns."""
     text = io.StringIO()
     for remark in remarks:
         text.write(f"# {' '.join(remark.split())}\n")
@@ -71,7 +72,7 @@ def trial_text(trial: Trial, remarks: Sequence[str]) -> str:
         text.write(f"# scale: {trial.scale:.10g}\n")
     if stated := [f"{SignalName(name).file} {SignalName(name).factor * trial.noise[name]:.6g}" for name in trial.noise]:
         text.write(f"# noise: {', '.join(stated)}\n")
-    columns = file_columns(trial)
+    columns = file_columns(trial) | dict(more)
     text.write(",".join(columns) + "\n")
     for time, *values in zip(*(column.tolist() for column in columns.values()), strict=True):
         cells = (f"{value + 0.0:.10g}" if math.isfinite(value) else "" for value in values)
