@@ -56,19 +56,10 @@ def read_averages(
 
     Only the columns that ``[averages.columns]`` names are read; others may hold text.
 
-    Parameters
-    ----------
-    form : CampaignFile
-        The campaign's file.
-    spelt : mapping
-        Quantity to its key in the file and the factor that brings its column to SI.
-    path : Path
-        File of the campaign, for messages and the folder of the table.
+    `form`: The campaign's file; `spelt`: Quantity to its key in the file and the factor that brings its column to SI;
+    `path`: File of the campaign, for messages and the folder of the table.
 
-    Raises
-    ------
-    InputError
-        The table is missing, a column is, or a number in it cannot be.
+    Raises InputError: The table is missing, a column is, or a number in it cannot be.
     """
     averages = form.averages
     assert averages is not None
@@ -106,10 +97,7 @@ def read_averages(
 def read_columns(file: Path, headings: Mapping[str, str]) -> dict[str, list[float]]:
     """Columns of a table by their headings: `headings` has key to heading, the result key to values.
 
-    Raises
-    ------
-    InputError
-        The table cannot be read, lacks a column, or has text where a number is expected.
+    Raises InputError: The table cannot be read, lacks a column, or has text where a number is expected.
     """
     lines, rows, _ = _cells(file)
     heads = rows.pop(0)

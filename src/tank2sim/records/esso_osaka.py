@@ -46,10 +46,7 @@ def read_esso_osaka(path: Path | str) -> Trial:
 
     Revolutions are in 1/s, negative astern; the rest is in SI.
 
-    Raises
-    ------
-    InputError
-        A column is missing or unknown, or a row is faulty.
+    Raises InputError: A column is missing or unknown, or a row is faulty.
     """
     path = Path(path)
     lines = read_bytes_as_text(path).split("\n")

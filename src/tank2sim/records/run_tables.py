@@ -65,20 +65,11 @@ def read_run_table(path: Path, columns: Mapping[str, ColumnEntry | str], files: 
     if that is one of :data:`RUN_QUANTITIES` with a unit: in the name (``Y_kN``, ``Y [kN]``), in a row of units, or in
     the property of a channel.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    columns : mapping
-        Name of a column in the file to its quantity, as ``[columns]`` of the campaign has it.
-    files : FilesSection
-        What the campaign says of the layout.
+    `path`: The file; `columns`: Name of a column in the file to its quantity, as ``[columns]`` of the campaign has it;
+    `files`: What the campaign says of the layout.
 
-    Raises
-    ------
-    InputError
-        The file cannot be read; a column of the map is not in it, has no unit, or a unit of another kind; or two
-        columns are one quantity.
+    Raises InputError: The file cannot be read; a column of the map is not in it, has no unit, or a unit of another
+    kind; or two columns are one quantity.
     """
     raw = binary_columns(path)
     if raw is not None:
@@ -300,13 +291,9 @@ _FIRST_BYTES = 1024
 class RawColumn:
     """A column as a file has it.
 
-    Parameters
-    ----------
-    name : str
-        Path in the file: ``group/channel``, ``structure.field``, ``matrix 2`` for its second column.
-    values : array, (rows,)
-    unit : str
-        As the file spells it; empty if it does not.
+    - `name`: Path in the file: ``group/channel``, ``structure.field``, ``matrix 2`` for its second column.
+    - `values` (rows,).
+    - `unit`: As the file spells it; empty if it does not.
     """
 
     name: str
@@ -319,10 +306,7 @@ def binary_columns(path: Path) -> list[RawColumn] | None:
 
     Variables of other lengths than the longest common one (parameters, texts) are left out.
 
-    Raises
-    ------
-    InputError
-        The file is missing or broken, it has no columns, or the library for its format is not installed.
+    Raises InputError: The file is missing or broken, it has no columns, or the library for its format is not installed.
     """
     refuse_folder(path)
     try:

@@ -58,10 +58,7 @@ def read_simman(path: Path | str) -> Trial:
     Times of MARIN have three digits and repeat beyond 100 s: they are replaced by a uniform time base that agrees with
     every time printed, and a notice says so.
 
-    Raises
-    ------
-    InputError
-        The file is none of these, a row is faulty, or no uniform step explains its times.
+    Raises InputError: The file is none of these, a row is faulty, or no uniform step explains its times.
     """
     path = Path(path)
     text = read_bytes_as_text(path)

@@ -84,10 +84,7 @@ def read_ardupilot_bin(path: Path) -> VesselLog:
     _REVERSED. Times are those of the board, set to UTC by the GPS with the least delay; a GPS fix has the time of the
     receiver.
 
-    Raises
-    ------
-    InputError
-        The file is not such a log, or no message of it is understood.
+    Raises InputError: The file is not such a log, or no message of it is understood.
     """
     library = optional_library("pymavlink.DFReader", path)
     try:

@@ -27,11 +27,11 @@ a compass that was swung)."""
 _TWINS = ("rudder_angle", "rudder_order", "rpm", "rpm_order")
 """Quantities of which a vessel may have two, each of its own."""
 
-BASE = {"format": 0.95, "name": 0.75, "": 0.6}
+STATED = {"format": 0.95, "name": 0.75, "": 0.6}
 """Confidence by what states a quantity, before its content is tested."""
 
 _AGREED = {"format": 0.99, "name": 0.96, "": 0.9}
-CONTRADICTED = 0.2
+REFUTED = 0.2
 """Confidence of a stream whose content contradicts its name."""
 
 
@@ -48,7 +48,7 @@ class Judgement:
 
     def refuse(self, why: str) -> None:
         """Take it for contradicted."""
-        self.confidence, self.why = CONTRADICTED, why
+        self.confidence, self.why = REFUTED, why
 
     def doubt(self, most: float, text: str) -> None:
         """Bound the confidence, and say why."""
@@ -143,13 +143,13 @@ class ChannelSearch:
         why = {"format": "by its format", "name": "by its name", "": "by its place"}[by]
         if agreement is None:
             stated, words = (0.1, " and unit") if by == "name" and stream.unit else (0.0, "")
-            confidence, why = BASE[by] + stated, f"{why}{words}; {evidence.text}"
+            confidence, why = STATED[by] + stated, f"{why}{words}; {evidence.text}"
         elif agreement >= agrees:
             confidence, why = _AGREED[by], f"{why}; {evidence.text}"
         elif agreement < DIFFERS:
-            confidence, why = CONTRADICTED, f"{why}, but {evidence.text}"
+            confidence, why = REFUTED, f"{why}, but {evidence.text}"
         else:
-            confidence, why = BASE[by] - 0.1, f"{why}; {evidence.text}, which is weak"
+            confidence, why = STATED[by] - 0.1, f"{why}; {evidence.text}, which is weak"
         return Judgement(stream, confidence, why, stream.unit)
 
     def take(self, found: Judgement, quantity: str = "") -> None:
@@ -181,7 +181,7 @@ class ChannelSearch:
         """Let no channel of these streams be used."""
         for place, channel in enumerate(self.found):
             if channel.stream in streams:
-                self.found[place] = replace(channel, confidence=CONTRADICTED, why=f"{channel.why}, but {why}")
+                self.found[place] = replace(channel, confidence=REFUTED, why=f"{channel.why}, but {why}")
 
     # The result -------------------------------------------------------------------------------------------------
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tank2sim.apps.logs.candidates import BASE, CONTRADICTED, ChannelSearch, Judgement
+from tank2sim.apps.logs.candidates import REFUTED, STATED, ChannelSearch, Judgement
 from tank2sim.apps.logs.channels import ChannelSet
 from tank2sim.apps.logs.clock import usual_step
 from tank2sim.apps.logs.content import (
@@ -99,7 +99,7 @@ def _find_positions(search: ChannelSearch) -> None:
             tracks.append((pair, track))
             continue
         for stream in pair:
-            search.add(Judgement(stream, CONTRADICTED, "its values are no position, or leap", stream.unit or "deg"))
+            search.add(Judgement(stream, REFUTED, "its values are no position, or leap", stream.unit or "deg"))
         search.fault(pair[0].name, "holds no position, or leaps")
     if not tracks:
         return
@@ -108,7 +108,7 @@ def _find_positions(search: ChannelSearch) -> None:
     wrong = _wrong_axes(search)
     for pair, _ in tracks:
         for stream in pair:
-            confidence = {"format": BASE["format"], "name": 0.9, "": BASE["name"]}[stream.stated_by]
+            confidence = {"format": STATED["format"], "name": 0.9, "": STATED["name"]}[stream.stated_by]
             confidence -= 0.0 if pair is main else 0.02
             unit = stream.unit or ("deg" if stream.quantity in ("latitude", "longitude") else "m")
             found = Judgement(stream, confidence, "a track of a plausible speed", unit)

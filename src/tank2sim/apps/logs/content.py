@@ -64,20 +64,13 @@ _NOMOTO_T_S = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0, 60.0)
 class ContentEvidence:
     """What the content of a stream says of what it is.
 
-    Parameters
-    ----------
-    agreement : float or None
-        0 to 1; None where the log cannot show it.
-    sign : int
-        Sign of the values against the convention of trials; 0 where the log cannot show it.
-    unit : str
-        Unit by the size of the values; empty where the log cannot show it.
-    offset_rad, spread_rad : float
-        Mean difference of an angle from what it should be, and the median difference without this mean.
-    lag_s : float
-        Time constant with which the turn follows a rudder.
-    text : str
-        The finding in a few words.
+    - `agreement`: 0 to 1; None where the log cannot show it.
+    - `sign`: Sign of the values against the convention of trials; 0 where the log cannot show it.
+    - `unit`: Unit by the size of the values; empty where the log cannot show it.
+    - `offset_rad`, `spread_rad`: Mean difference of an angle from what it should be, and the median difference without
+      this mean.
+    - `lag_s`: Time constant with which the turn follows a rudder.
+    - `text`: The finding in a few words.
     """
 
     agreement: float | None = None

@@ -24,13 +24,8 @@ current: headings spread over about 90 deg. Project choice."""
 class DriftCurrent:
     """A current: speed (m/s), direction towards which it sets (deg from north), and how much it varies.
 
-    Parameters
-    ----------
-    speed_mps, direction_deg : float
-    spread_mps : float
-        Standard deviation of its averages over :data:`AVERAGED_S`, m/s.
-    by : str
-        What it follows from.
+    - `spread_mps`: Standard deviation of its averages over :data:`AVERAGED_S`, m/s.
+    - `by`: What it follows from.
     """
 
     speed_mps: float

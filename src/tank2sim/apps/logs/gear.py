@@ -71,28 +71,17 @@ class GearLimit:
 class LoggedGear:
     """Steering gear by a log.
 
-    Parameters
-    ----------
-    angle, order : str
-        Streams of the rudder's angle and of its order.
-    duration_s : float
-        Time for which both were recorded.
-    moves : int
-        Movements of the order of a degree or more, counted from one change of side to the next.
-    rate_degps, rate_error_degps : float or None
-        Rate with its standard error; None where the order never left the rudder behind.
-    lag_s, lag_error_s : float
-        From the order to the first movement.
-    dead_band_deg, dead_band_error_deg : float
-        Difference from which the rudder moves.
-    offset_deg : float
-        Recorded angle less order at rest.
-    fastest_degps : float
-        Fastest movement over :data:`_FASTEST_S` in the whole record, also by hand: the gear's rate at least.
-    residual_deg : float
-        Root mean square of simulated less recorded angle.
-    port, starboard : GearLimit or None
-        Largest angles that were held, in the whole record; the gear may go further.
+    - `angle`, `order`: Streams of the rudder's angle and of its order.
+    - `duration_s`: Time for which both were recorded.
+    - `moves`: Movements of the order of a degree or more, counted from one change of side to the next.
+    - `rate_degps`, `rate_error_degps`: Rate with its standard error; None where the order never left the rudder behind.
+    - `lag_s`, `lag_error_s`: From the order to the first movement.
+    - `dead_band_deg`, `dead_band_error_deg`: Difference from which the rudder moves.
+    - `offset_deg`: Recorded angle less order at rest.
+    - `fastest_degps`: Fastest movement over :data:`_FASTEST_S` in the whole record, also by hand: the gear's rate at
+      least.
+    - `residual_deg`: Root mean square of simulated less recorded angle.
+    - `port`, `starboard`: Largest angles that were held, in the whole record; the gear may go further.
     """
 
     angle: str
@@ -133,10 +122,6 @@ def logged_gear(voyage: Voyage) -> LoggedGear | None:
     """The steering gear by the rudder's angle and order of a voyage; None without both, or with too few movements.
 
     A rudder that the turn of the vessel does not confirm is taken, too: at the dock nothing follows it.
-
-    Parameters
-    ----------
-    voyage : Voyage
     """
     of_angle, of_order = (_rudder(voyage, quantity) for quantity in ("rudder_angle", "rudder_order"))
     if of_angle is None or of_order is None:

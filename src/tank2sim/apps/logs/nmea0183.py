@@ -110,10 +110,8 @@ def read_nmea0183(path: Path) -> VesselLog:
     from another (GP, then GN) is the same instrument; talkers that send at the same time are two, and have streams of
     their own. Times of day alone give a log without a date.
 
-    Raises
-    ------
-    InputError
-        There is no clock (RMC, ZDA, times of day, stamps of the recorder), or no sentence that is understood.
+    Raises InputError: There is no clock (RMC, ZDA, times of day, stamps of the recorder), or no sentence that is
+    understood.
     """
     reader = _Reader(path)
     reader.summed = {label for line in text_lines(path) for label in _SUMMED.findall(line)}

@@ -97,10 +97,7 @@ def read_nmea2000(path: Path) -> VesselLog:
     stamp of the recorder they are those of the system times before and after. Time stamps without a date and without a
     system time give a log without a date.
 
-    Raises
-    ------
-    InputError
-        The file cannot be read, no message is understood, or there is no time.
+    Raises InputError: The file cannot be read, no message is understood, or there is no time.
     """
     reader = _Reader(path)
     for number, line in enumerate(text_lines(path)):

@@ -37,10 +37,7 @@ def read_px4_ulog(path: Path) -> VesselLog:
     motor the propeller, two motors the right and the left one where CA_AIRFRAME says that the difference of two motors
     steers, as PX4 numbers them. Which is which is confirmed by what the vessel does.
 
-    Raises
-    ------
-    InputError
-        The file is not a ULog, or no topic of it is understood.
+    Raises InputError: The file is not a ULog, or no topic of it is understood.
     """
     library = optional_library("pyulog", path)
     try:

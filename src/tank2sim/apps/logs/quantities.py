@@ -33,14 +33,9 @@ _WORDS = {group: rf"\b({'|'.join(words)})\b" for group, words in _DECLARED["word
 class LogQuantity:
     """A quantity that a channel of a log may hold.
 
-    Parameters
-    ----------
-    words : str
-        For people.
-    units : dict
-        Unit to the factor that gives SI (rad, m/s, rad/s; degrees for latitude and longitude); the first is SI.
-    column : str
-        Signal of the trial format that it becomes; empty if it becomes none.
+    - `words`: For people.
+    - `units`: Unit to the factor that gives SI (rad, m/s, rad/s; degrees for latitude and longitude); the first is SI.
+    - `column`: Signal of the trial format that it becomes; empty if it becomes none.
     """
 
     words: str

@@ -64,10 +64,7 @@ def read_ros_bag(path: Path) -> VesselLog:
     another pace, as those of a simulation do, theirs are taken for all, and the log has no date. Fixes without a status
     of a fix hold no value.
 
-    Raises
-    ------
-    InputError
-        The file is cut off or is not a bag, or no message of it has a number.
+    Raises InputError: The file is cut off or is not a bag, or no message of it has a number.
     """
     highlevel = optional_library("rosbags.highlevel", path)
     stores = optional_library("rosbags.typesys", path)

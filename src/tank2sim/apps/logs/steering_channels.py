@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tank2sim.apps.logs.candidates import BASE, CONTRADICTED, ChannelSearch, Judgement
+from tank2sim.apps.logs.candidates import REFUTED, STATED, ChannelSearch, Judgement
 from tank2sim.apps.logs.channels import SURE_FROM, USED_FROM, LogChannel
 from tank2sim.apps.logs.clock import usual_step, utc_text
 from tank2sim.apps.logs.content import (
@@ -183,7 +183,7 @@ def _judge_rudder(search: ChannelSearch, stream: LogStream) -> None:
     if zero and not stream.unit and abs(zero / _SERVO_DEG - round(zero / _SERVO_DEG)) > 0.01:
         found.doubt(0.6, "; its unit is known by its size alone")
     if zero:
-        found.doubt(BASE["name"], f"; {zero:.4g} on straight legs is taken as its zero")
+        found.doubt(STATED["name"], f"; {zero:.4g} on straight legs is taken as its zero")
     search.add(found)
 
 
@@ -307,10 +307,10 @@ def _judge_pair(search: ChannelSearch, names: tuple[str, str], pair: tuple[LogSt
             found.refuse(f"{found.why}: the turn contradicts its side")
             search.fault(stream.name, found.why)
         if reversal and signs == (1, 1):
-            found.confidence = CONTRADICTED
+            found.confidence = REFUTED
             search.fault(stream.name, reversal)
         elif reversal:
-            found.confidence = _DOUBTED if swap or (evidence.agreement or 1.0) >= _SHOWN else BASE["name"]
+            found.confidence = _DOUBTED if swap or (evidence.agreement or 1.0) >= _SHOWN else STATED["name"]
             found.why += f"; {reversal}"
         found.unit = _share_unit(stream, quantity)
         shown = "rpm" in plain_words(stream.name).split() or np.abs(stream.values).max() > _FASTEST_SHAFT_HZ

@@ -108,12 +108,12 @@ class VesselLog:
 
 
 def note(text: str, stream: str = "", **evidence: float) -> LogFinding:
-    """A finding that leaves the result as it is."""
+    """A finding on a `stream`, or on the log as a whole, with `evidence`; the result stays as it is."""
     return LogFinding("note", text, stream, evidence)
 
 
 def fault(text: str, stream: str = "", **evidence: float) -> LogFinding:
-    """A finding that marks the result."""
+    """A finding on a `stream`, or on the log as a whole, with `evidence`, that marks the result."""
     return LogFinding("fault", text, stream, evidence)
 
 
@@ -137,7 +137,7 @@ def named_stream(name: str, time_s: Array, values: Array, unit: str = "") -> Log
 
 
 def not_used(words: str, kinds: Mapping[str, int]) -> list[LogFinding]:
-    """A note that counts what was not used, ``sentences`` or ``messages`` by their kind; none if there is nothing."""
+    """A note that counts what was not used, `words` are ``sentences`` or such, by `kinds`; none without any."""
     listed = ", ".join(f"{number} {kind}" for kind, number in sorted(kinds.items()))
     return [LogFinding("note", f"{words} that are not used: {listed}", evidence=dict(kinds))] if kinds else []
 
@@ -153,7 +153,7 @@ def optional_library(name: str, path: Path) -> ModuleType:
 
 
 def unreadable(path: Path, error: Exception, remedy: str, problem: str = "cannot be read") -> InputError:
-    """The fault of a file at which a library failed; libraries let errors of struct, lz4 and others through."""
+    """The `problem` of a file at which a library failed, with its `error` (of struct, lz4, ...), and the `remedy`."""
     reason = f"{type(error).__name__}: {' '.join(str(error).split())[:100]}"
     return InputError(path, "", f"{problem} ({reason})", remedy)
 
@@ -182,7 +182,7 @@ def text_lines(path: Path) -> Iterator[bytes]:
 
 
 def mostly(head: bytes, fits: Callable[[bytes], object]) -> bool:
-    """Whether at least half the lines of the beginning of a file fit, comments and a cut last line left out."""
+    """Whether at least half the lines of `head`, the beginning of a file, are what `fits`: comments and a cut last line left out."""
     lines = re.split(rb"[\r\n]+", head)
     lines = [line for line in lines[:-1] or lines if line.strip() and not line.startswith(b"#")]
     return bool(lines) and 2 * sum(bool(fits(line)) for line in lines) > len(lines)

@@ -98,10 +98,7 @@ def read_table_log(path: Path) -> VesselLog:
     too; the log then has no date. Columns without names are ``column 1`` and so on. Rows that cannot be read are
     counted and left out.
 
-    Raises
-    ------
-    InputError
-        The file cannot be read, or has no rows or no time.
+    Raises InputError: The file cannot be read, or has no rows or no time.
     """
     text, encoding = decoded_text(head := head_of(path, _HEAD_BYTES), complete=False)
     lines = text.splitlines()
@@ -296,7 +293,7 @@ class _TableClock:
         for least, largest, factor in _EPOCHS:
             counts = least <= size <= largest and np.percentile(known, _BEGINNING) >= least
             if counts and (len(known) < 2 or np.median(np.diff(known)) * factor < _SLOWEST_STEP_S):
-                return values * factor
+                return np.asarray(values * factor)
         moments = _moments_of_numbers(values)
         for least, largest, day in _DAYS:
             if moments is None and least <= size <= largest and np.ptp(known) < _LONGEST_IN_DAYS:

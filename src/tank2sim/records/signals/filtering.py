@@ -38,23 +38,11 @@ def butterworth(
 ) -> Filtered:
     """Butterworth filter, forwards and backwards without shift of phase, or forwards alone as a measuring chain does.
 
-    Parameters
-    ----------
-    series : Series
-        What to filter.
-    kind : FilterType
-        Low, high or band pass.
-    cutoff_hz : sequence of 1 or (band) 2 floats
-        Where one pass has -3 dB; forwards and backwards together have -6 dB there.
-    order : int
-        Order of one pass; in a band pass, of each of its sides.
-    causal : bool
-        Forwards alone; it begins as if the signal had always had its first value.
+    `series`: What to filter; `kind`: Low, high or band pass; `cutoff_hz`: Where one pass has -3 dB; forwards and
+    backwards together have -6 dB there; `order`: Order of one pass; in a band pass, of each of its sides; `causal`:
+    Forwards alone; it begins as if the signal had always had its first value.
 
-    Raises
-    ------
-    InputError
-        A frequency is not between one period a record and the Nyquist frequency, or they do not rise.
+    Raises InputError: A frequency is not between one period a record and the Nyquist frequency, or they do not rise.
     """
     edges = [_within(series, kind.value, edge) for edge in cutoff_hz]
     if len(edges) != (2 if kind is FilterType.BAND else 1) or sorted(set(edges)) != edges:
@@ -85,21 +73,11 @@ def butterworth(
 def savitzky_golay(series: Series, samples: int, degree: int, *, derivative: int = 0) -> Filtered:
     """Savitzky-Golay: a polynomial fitted to `samples` about each, and its value or derivative there.
 
-    Parameters
-    ----------
-    series : Series
-        What to smooth.
-    samples : int
-        Length of the window, odd; at most the record.
-    degree : int
-        Degree of the polynomial, below `samples`.
-    derivative : int
-        0 for the value, 1 or more for the derivative by time, in unit/s and so on.
+    `series`: What to smooth; `samples`: Length of the window, odd; at most the record; `degree`: Degree of the
+    polynomial, below `samples`; `derivative`: 0 for the value, 1 or more for the derivative by time, in unit/s and so
+    on.
 
-    Raises
-    ------
-    InputError
-        These do not fit each other.
+    Raises InputError: These do not fit each other.
     """
     if samples % 2 == 0 or not degree < samples <= len(series.values) or not 0 <= derivative <= degree:
         problem = f"{samples} samples of degree {degree} do not fit a record of {len(series.values)}"
@@ -127,10 +105,7 @@ def smoothing_spline(series: Series, cutoff_hz: float) -> Filtered:
     Of densely sampled values it is a filter of gain 1/(1 + (f/cutoff)^4) and no phase (Silverman 1984), which makes
     the weight in samples 1/(2 pi cutoff step)^4. Its response is measured here, from what it makes of an impulse.
 
-    Raises
-    ------
-    InputError
-        The frequency is not between one period a record and the Nyquist frequency.
+    Raises InputError: The frequency is not between one period a record and the Nyquist frequency.
     """
     _within(series, "spline", cutoff_hz)
     count = len(series.values)
@@ -154,10 +129,7 @@ def decimate(series: Series, factor: int) -> Filtered:
     The filter is that of scipy.signal.decimate, Chebyshev with 0.05 dB ripple to 0.8 of the new Nyquist frequency, but
     of order 7: one of even order has its ripple at zero frequency too, and would take 1 % off a steady heading.
 
-    Raises
-    ------
-    InputError
-        The factor is below 2 or leaves fewer than 50 samples.
+    Raises InputError: The factor is below 2 or leaves fewer than 50 samples.
     """
     if factor < 2 or len(series.values) // factor < FEWEST_SAMPLES:
         problem = f"every {factor}th of {len(series.values)} samples"
@@ -257,10 +229,7 @@ def detrend(series: Series, degree: int) -> Filtered:
     What it does to a wave depends on where in the record its crests are; the stated effect is the mean over all such
     places, the part of the wave that stays a wave of this frequency. It has no phase.
 
-    Raises
-    ------
-    InputError
-        The degree is not from 0 to 10.
+    Raises InputError: The degree is not from 0 to 10.
     """
     if not 0 <= degree <= HIGHEST_DEGREE:
         problem = f"{degree} is not a degree of a trend"
@@ -293,18 +262,12 @@ _FREQUENCIES = 400
 class FilterEffect:
     """Frequency response of a filter, and where its ends are not to be believed.
 
-    Parameters
-    ----------
-    frequency_hz : array (m,)
-        Rising, from one period a record to below the Nyquist frequency.
-    response : complex array (m,)
-        Output over input; a negative angle: the output comes later. Its unit is 1, or 1/s of a derivative.
-    group_delay_s : array (m,)
-        Delay of a packet of waves about a frequency.
-    distorted_ends_s : (float, float)
-        Distorted time at the begin and at the end of the record.
-    explanation : str
-        The same in words.
+    - `frequency_hz` (m,): Rising, from one period a record to below the Nyquist frequency.
+    - `response` (m,): Output over input; a negative angle: the output comes later. Its unit is 1, or 1/s of a
+      derivative.
+    - `group_delay_s` (m,): Delay of a packet of waves about a frequency.
+    - `distorted_ends_s`: Distorted time at the begin and at the end of the record.
+    - `explanation`: The same in words.
     """
 
     frequency_hz: Array
