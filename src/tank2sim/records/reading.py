@@ -10,8 +10,7 @@ import numpy as np
 from tank2sim.errors import InputError
 from tank2sim.plugins import PluginWarning, Registry
 from tank2sim.records.csv_table import SHORTEST_STEP, CsvTable, read_bytes_as_text
-from tank2sim.records.esso_osaka import ESSO_OSAKA
-from tank2sim.records.simman import SIMMAN
+from tank2sim.records.published import ESSO_OSAKA, SIMMAN
 from tank2sim.records.trial_csv import TRIAL_CSV, read_trial_csv
 from tank2sim.records.trials import Trial, TrialReader, fault_of
 from tank2sim.records.workbook import is_workbook, workbook_text

@@ -15,6 +15,9 @@ from tank2sim.arrays import Array
 AVERAGED_S = 60.0
 """Time over which the current is averaged for its spread, s. Project choice: receivers wander over minutes."""
 
+_FEWEST = 10
+"""Samples below which no current is determined (project choice)."""
+
 _LEAST_TURN = 0.15
 """Least eigenvalue, of at most 0.5, of the mean square of heading vectors for which the speed ahead alone determines a
 current: headings spread over about 90 deg. Project choice."""
@@ -42,38 +45,42 @@ def drift_current(voyage: Voyage, begin_s: float, end_s: float) -> DriftCurrent 
     heading, for which the heading must have changed. A scale error of the log through the water is part of it.
     """
     series = voyage.series
-    if "heading" not in series or "u_water" not in series:
-        return None
     ground = _ground(voyage)
-    if ground is None:
+    if "heading" not in series or "u_water" not in series or ground is None:
         return None
-    time, north, east = ground
-    inside = (time >= begin_s) & (time <= end_s)
-    time, north, east = time[inside], north[inside], east[inside]
-    if len(time) < 10:
+    inside = (ground[0] >= begin_s) & (ground[0] <= end_s)
+    time, north, east = (part[inside] for part in ground)
+    if len(time) < _FEWEST:
         return None
-    heading = interpolated(time, series["heading"].time_s, series["heading"].values, 5.0)
-    ahead = interpolated(time, series["u_water"].time_s, series["u_water"].values, 5.0)
+    heading, ahead, side = (
+        interpolated(time, series[name].time_s, series[name].values, 5.0) if name in series else np.zeros(0)
+        for name in ("heading", "u_water", "v_water")
+    )
     cosine, sine = np.cos(heading), np.sin(heading)
     if "v_water" in series:
-        side = interpolated(time, series["v_water"].time_s, series["v_water"].values, 5.0)
         x, y = north - (ahead * cosine - side * sine), east - (ahead * sine + side * cosine)
-        return _mean(time, x, y, "velocities over the ground and through the water")
+        good = np.isfinite(x) & np.isfinite(y)
+        if good.sum() < _FEWEST:
+            return None
+        time, x, y = time[good], x[good], y[good]
+        bins = np.floor((time - time[0]) / AVERAGED_S).astype(int)
+        counts = np.bincount(bins)
+        full = counts > 0
+        means = [np.bincount(bins, weights=part)[full] / counts[full] for part in (x, y)]
+        spread = math.hypot(float(np.std(means[0])), float(np.std(means[1])))
+        return _current(float(x.mean()), float(y.mean()), spread, "velocities over the ground and through the water")
     difference = north * cosine + east * sine - ahead
     good = np.isfinite(difference)
-    if good.sum() < 10:
-        return None
     matrix = np.column_stack([cosine[good], sine[good]])
-    if np.linalg.eigvalsh(matrix.T @ matrix / good.sum())[0] < _LEAST_TURN:
+    if good.sum() < _FEWEST or np.linalg.eigvalsh(matrix.T @ matrix / good.sum())[0] < _LEAST_TURN:
         return None
-    (x_mean, y_mean), *_ = np.linalg.lstsq(matrix, difference[good], rcond=None)
-    left = difference[good] - matrix @ np.array([x_mean, y_mean])
-    return DriftCurrent(
-        float(math.hypot(x_mean, y_mean)),
-        math.degrees(math.atan2(y_mean, x_mean)) % 360,
-        float(np.std(left)),
-        "speeds ahead over the ground and through the water",
-    )
+    mean, *_ = np.linalg.lstsq(matrix, difference[good], rcond=None)
+    spread = float(np.std(difference[good] - matrix @ mean))
+    return _current(float(mean[0]), float(mean[1]), spread, "speeds ahead over the ground and through the water")
+
+
+def _current(north: float, east: float, spread: float, by: str) -> DriftCurrent:
+    return DriftCurrent(math.hypot(north, east), math.degrees(math.atan2(east, north)) % 360, spread, by)
 
 
 def _ground(voyage: Voyage) -> tuple[Array, Array, Array] | None:
@@ -92,20 +99,5 @@ def _ground(voyage: Voyage) -> tuple[Array, Array, Array] | None:
         return sog.time_s, sog.values * np.cos(course), sog.values * np.sin(course)
     if "x" in series and "y" in series:
         time, v_north = differenced(series["x"].time_s, series["x"].values, POSITION_WINDOW_S)
-        _, v_east = differenced(series["y"].time_s, series["y"].values, POSITION_WINDOW_S)
-        return time, v_north, v_east
+        return time, v_north, differenced(series["y"].time_s, series["y"].values, POSITION_WINDOW_S)[1]
     return None
-
-
-def _mean(time: Array, x: Array, y: Array, by: str) -> DriftCurrent | None:
-    good = np.isfinite(x) & np.isfinite(y)
-    if good.sum() < 10:
-        return None
-    time, x, y = time[good], x[good], y[good]
-    bins = np.floor((time - time[0]) / AVERAGED_S).astype(int)
-    counts = np.bincount(bins)
-    full = counts > 0
-    means = [np.bincount(bins, weights=part)[full] / counts[full] for part in (x, y)]
-    spread = math.hypot(float(np.std(means[0])), float(np.std(means[1])))
-    middle = float(x.mean()), float(y.mean())
-    return DriftCurrent(math.hypot(*middle), math.degrees(math.atan2(middle[1], middle[0])) % 360, spread, by)

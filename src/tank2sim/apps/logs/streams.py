@@ -182,7 +182,7 @@ def text_lines(path: Path) -> Iterator[bytes]:
 
 
 def mostly(head: bytes, fits: Callable[[bytes], object]) -> bool:
-    """Whether at least half the lines of `head`, the beginning of a file, are what `fits`: comments and a cut last line left out."""
+    """Whether half the lines of `head`, the beginning of a file, are what `fits`, but comments and a cut last one."""
     lines = re.split(rb"[\r\n]+", head)
     lines = [line for line in lines[:-1] or lines if line.strip() and not line.startswith(b"#")]
     return bool(lines) and 2 * sum(bool(fits(line)) for line in lines) > len(lines)
