@@ -12,11 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.apps.logs.clock import usual_step, utc_text
-from tank2sim.apps.logs.current import drift_current
 from tank2sim.apps.logs.quantities import QUANTITIES
 from tank2sim.apps.logs.reference import held, interpolated, thinned_series
 from tank2sim.apps.logs.stretches import LEAST_TRIAL_ROWS, Stretch, StretchKind
-from tank2sim.apps.logs.voyage import QuantitySeries, Voyage
+from tank2sim.apps.logs.voyage import QuantitySeries, Voyage, drift_current
 from tank2sim.arrays import Array
 from tank2sim.records.signals.sampling import GAP_STEPS
 from tank2sim.records.signals.writing import trial_text
