@@ -11,6 +11,7 @@ import tomllib
 import unicodedata
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from tank2sim.units import KNOT_MPS
 
@@ -26,6 +27,9 @@ _UNITS = {
     "none": {"": 1.0},
 }
 _DECLARED = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+CLOCK_WORDS: dict[str, Any] = _DECLARED["clock"]
+"""Words for times and dates, seconds of units by their words, and hours of zones."""
+
 _WORDS = {group: rf"\b({'|'.join(words)})\b" for group, words in _DECLARED["words"].items()}
 
 

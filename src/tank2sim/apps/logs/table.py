@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tank2sim.apps.logs.clock import DOUBLED_STEPS, TWO_DIGITS_FROM
-from tank2sim.apps.logs.quantities import plain_words, quantity_of_name, unit_of_signal_k
+from tank2sim.apps.logs.quantities import CLOCK_WORDS, plain_words, quantity_of_name, unit_of_signal_k
 from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, fault, head_of, named_stream, note
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
@@ -22,16 +22,8 @@ from tank2sim.records.text_layout import WHITESPACE, TextLayout, decoded_text, t
 if TYPE_CHECKING:
     import pandas as pd
 
-_ZONES_H = {"utc": 0, "gmt": 0, "z": 0, "mez": 1, "cet": 1, "mesz": 2, "cest": 2, "wet": 0, "west": 1, "bst": 1}
-_ZONES_H |= {"eet": 2, "eest": 3, "msk": 3, "sgt": 8, "hkt": 8, "jst": 9, "kst": 9, "aest": 10, "nzst": 12}
-_ZONES_H |= {"est": -5, "edt": -4, "cst": -6, "cdt": -5, "mst": -7, "mdt": -6, "pst": -8, "pdt": -7}
-"""Hours of time zones before UTC, by the abbreviations that names of columns use (IANA time zone database)."""
-
-_TIME_WORDS = re.compile(
-    r"\b(time|times|timestamp|zeit|uhrzeit|zeitstempel|utc|datetime|epoch|stamp|heure|horodatage|hora|ora|tijd|tijdstip"
-    r"|tid|tidspunkt|czas|tempo|aika|zaman|saat|t|secs|seconds)\b"
-)
-_DATE_WORDS = re.compile(r"\b(date|datum|day|tag|fecha|data|dato|paivamaara|tarih)\b")
+_ZONES_H, _COUNTS = CLOCK_WORDS["zones_h"], CLOCK_WORDS["seconds"]
+_TIME_WORDS, _DATE_WORDS = (re.compile(rf"\b({'|'.join(CLOCK_WORDS[kind])})\b") for kind in ("time", "date"))
 _DATE = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}")
 _LIKE_TIME = re.compile(rf"({_DATE.pattern}[T ,]+)?\d{{1,2}}:\d\d")
 _EPOCHS = ((1e8, 1e10, 1.0), (1e11, 1e13, 1e-3), (1e14, 1e16, 1e-6), (1e17, 1e19, 1e-9))
@@ -49,16 +41,6 @@ _FIRST_DAY, _LAST_DAY = 19800101, 21001231
 
 _CLOCK_DIGITS = 3
 """Least number of different seconds of a minute of a clock in digits. Project choice: counts by 50 have two."""
-
-_COUNTS = (
-    (r"ms|msec|milli\w*", 1e-3),
-    (r"us|usec|micro\w*", 1e-6),
-    (r"ns|nano\w*", 1e-9),
-    (r"min|mins|minutes?", 60.0),
-    (r"h|hr|hrs|hours?", 3600.0),
-    (r"s|sec|secs|seconds?", 1.0),
-)
-"""Words for the unit in which a column counts time, and its seconds."""
 
 _BEGINNING = 10
 """Percentile of times that are since 1970 already; counts since a start are less. Project choice: some cells are 0."""
@@ -303,7 +285,7 @@ class _TableClock:
     def _stated_count(self, name: str) -> float | None:
         """Seconds of the unit in which a column counts by its name or its unit; None where neither says."""
         words = plain_words(f"{name} {self.layout.units[self.layout.names.index(name)]}")
-        return next((factor for pattern, factor in _COUNTS if re.search(rf"\b({pattern})\b", words)), None)
+        return next((factor for pattern, factor in _COUNTS.items() if re.search(rf"\b({pattern})\b", words)), None)
 
     def _count_by_motion(self, name: str) -> float:
         """Seconds of the unit in which a column counts, by the speed of the track, or else by the step."""

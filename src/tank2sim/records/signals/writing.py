@@ -13,12 +13,10 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice
-from tank2sim.records.signals.columns import HELD_COLUMNS, SignalName, file_columns
+from tank2sim.records.signals.columns import DIRECTION_COLUMNS, HELD_COLUMNS, SignalName, file_columns
 from tank2sim.records.signals.filtering import Filtered
 from tank2sim.records.signals.sampling import Series, even_series
 from tank2sim.records.trials import Trial, with_signals
-
-_CIRCLE = frozenset({"cog_rad", "wind_direction_rad", "wind_rel_direction_rad", "current_direction_rad"})
 
 
 def with_filtered(trial: Trial, filtered: Filtered, notice: str) -> Trial:
@@ -81,7 +79,7 @@ def trial_text(trial: Trial, remarks: Sequence[str], more: Mapping[str, Array] =
 
 
 def _on_circle(name: str, values: Array) -> Array:
-    return np.mod(values, 2.0 * np.pi) if name in _CIRCLE else values
+    return np.mod(values, 2.0 * np.pi) if name in DIRECTION_COLUMNS - {"psi_rad"} else values
 
 
 def _held(order: Series, time: Array) -> Array:
