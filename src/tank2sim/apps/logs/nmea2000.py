@@ -257,12 +257,14 @@ class _Reader:
         """A column under a name of its own; engines by their instance, of which a single one has no side."""
         pgn, source, name, quantity, instance = key
         alike = [other for other in self.columns if (other[0], *other[2:]) == (pgn, *key[2:])]
-        instances = sorted({other[4] for other in self.columns if (other[0], other[2]) == (pgn, name)}, key=_engine)
+        instances = {other[4] for other in self.columns if (other[0], other[2]) == (pgn, name)}
+        # Of engines the port one is the first (canboat, ENGINE_INSTANCE).
+        places = sorted(instances, key=lambda other: ("Starboard" in other and "Port" not in other, other))
         label = f"{pgn}.{name}"
         unit, usual = _FIELDS.get(pgn, {}).get(name, ["rad" if name == _TRUE else "", quantity])
         label += f" ({quantity})" if quantity != usual else ""
         if len(instances) > 1:
-            place = instances.index(instance)
+            place = places.index(instance)
             label += f" of {('port', 'starboard')[place]}" if pgn == _ENGINE and place < 2 else f" of {place}"
             if pgn == _ENGINE:
                 quantity = ("rpm_port", "rpm_starboard")[place] if place < 2 else ""
@@ -299,11 +301,6 @@ def _ahead_s(column: Samples, every: dict[int, Samples]) -> float:
         return float(np.median(clock - stamps))
     means = [np.interp(column.lines, other.lines, other.values) for other in every.values()]
     return float(np.median(clock - np.mean(means, axis=0)))
-
-
-def _engine(instance: str) -> tuple[int, str]:
-    """Order of engines: the port one is the first (canboat, ENGINE_INSTANCE)."""
-    return "Starboard" in instance and "Port" not in instance, instance
 
 
 def _seconds(text: str) -> float:

@@ -148,7 +148,7 @@ class _Topic:
         self.received, self.stamps = array("d"), array("d")
         self.columns: dict[str, array[float]] = defaultdict(lambda: array("d"))
         self.valid = array("b")
-        self.lists = list(_lists_of(message))
+        self.lists = [path for path, value in _fields_of(message) if _is_list(value)]  # whatever their length
         self.longest = self._length(message)
         self.scans = {path: size for path, size in self._sizes(message) if size > LONGEST_VECTOR}
 
@@ -287,11 +287,6 @@ def _is_list(value: Any) -> bool:
     return isinstance(value, np.ndarray) or (
         isinstance(value, list) and all(isinstance(item, int | float | np.number) for item in value)
     )
-
-
-def _lists_of(message: Any) -> Iterator[str]:
-    """Paths of the lists of numbers of a message, whatever their length."""
-    return (path for path, value in _fields_of(message) if _is_list(value))
 
 
 def _numbers_of(message: Any) -> Iterator[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -161,17 +160,16 @@ def time_unit_findings(trial: Trial) -> list[Finding]:
     evidence = {"factor_heading": abs(turned), "factor_track": gone}
     for factor, name in _UNITS.items():
         if abs(gone / factor - 1) < AGREEMENT:
-            repair = partial(_in_seconds, factor=factor, name=name)
+            notice = Notice(f"time was in {name} and is in seconds now")
+
+            def repair(other: Trial, factor: float = factor, notice: Notice = notice) -> Trial:
+                return replace(other, time_s=factor * other.time_s, notices=(*other.notices, notice))
+
             return [found_in(trial, ["t_s"], what, f"time is in {name}", evidence, repair)]
     if max(gone, 1 / gone) < 1 + MISCALIBRATED:
         return []
     truth = f"a second of the file is {gone:.3g} s: its clock or its sampling rate is another"
     return [found_in(trial, ["t_s"], what, truth, evidence)]
-
-
-def _in_seconds(trial: Trial, factor: float, name: str) -> Trial:
-    text = f"time was in {name} and is in seconds now"
-    return replace(trial, time_s=factor * trial.time_s, notices=(*trial.notices, Notice(text)))
 
 
 def _turned(trial: Trial) -> float | None:

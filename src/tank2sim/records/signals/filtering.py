@@ -66,7 +66,9 @@ def butterworth(
         response = np.abs(response) ** 2 + 0j
     delay = _sections_delay(sections, grid, series) if causal else np.zeros(len(grid))
     effect = FilterEffect(grid, response, delay, (settling, 0.0 if causal else settling), "")
-    sentence = _causal_sentence(effect, kind, edges) if causal else _zero_phase_sentence(effect, edges)
+    where = " and ".join(f"{edge:.3g}" for edge in edges)
+    sentence = f"no phase shift, {decibel(0.5)} at {where} Hz, ends distorted over {settling:.3g} s"
+    sentence = _causal_sentence(effect, kind, edges) if causal else sentence
     return Filtered(series.with_values(values), replace(effect, explanation=sentence))
 
 
@@ -92,7 +94,7 @@ def savitzky_golay(series: Series, samples: int, degree: int, *, derivative: int
     grid = effect_frequencies(series)
     response = _centred_response(taps, grid, series)
     half = samples // 2 * series.step_s
-    found = _falls_to_half(grid, np.abs(response) / (2.0 * np.pi * grid) ** derivative)
+    found = next(iter(grid[np.abs(response) / (2.0 * np.pi * grid) ** derivative < 0.5].tolist()), None)
     limit = f"{decibel(0.5)} at {found:.3g} Hz" if found else "more than half the amplitude at all frequencies"
     what = f"derivative of order {derivative} without delay" if derivative else "no phase shift"
     text = f"{what}, {limit}, side lobes above, some upside down; fit one-sided over {half:.3g} s at both ends"
@@ -187,16 +189,6 @@ def _settling(sections: Array, series: Series) -> float:
     impulse[0] = 1.0
     size = np.cumsum(np.abs(signal.sosfilt(sections, impulse)))
     return float(np.searchsorted(size, (1.0 - _SETTLED) * size[-1])) * series.step_s
-
-
-def _falls_to_half(grid: Array, gain: Array) -> float | None:
-    below = np.flatnonzero(gain < 0.5)
-    return float(grid[below[0]]) if below.size else None
-
-
-def _zero_phase_sentence(effect: FilterEffect, edges: Sequence[float]) -> str:
-    where = " and ".join(f"{edge:.3g}" for edge in edges)
-    return f"no phase shift, {decibel(0.5)} at {where} Hz, ends distorted over {effect.distorted_ends_s[0]:.3g} s"
 
 
 def _causal_sentence(effect: FilterEffect, kind: FilterType, edges: Sequence[float]) -> str:

@@ -179,7 +179,8 @@ def transfer_function(source: Series, result: Series, segment_s: float | None = 
     inner = _inner(averaging)
     frequency, power = signal.welch(source.values, **options)
     _, cross = signal.csd(source.values, result.values, **options)
-    _, coherence = signal.coherence(source.values, result.values, **_without_scaling(options))
+    unscaled = {key: value for key, value in options.items() if key != "scaling"}
+    _, coherence = signal.coherence(source.values, result.values, **unscaled)
     names = " and ".join(SignalName(item.name).file for item in (source, result))
     if not np.all(power[inner] > 0):
         raise InputError(source.source, f"columns {names}", "have no power at some frequency", "leave them out")
@@ -233,10 +234,6 @@ def _options(series: Series, averaging: Averaging) -> dict[str, object]:
         "fs": series.rate_hz, "window": "hann", "nperseg": samples, "noverlap": samples // 2,
         "detrend": "constant", "scaling": "density",
     }  # fmt: skip
-
-
-def _without_scaling(options: dict[str, object]) -> dict[str, object]:
-    return {key: value for key, value in options.items() if key != "scaling"}
 
 
 def _inner(averaging: Averaging) -> slice:

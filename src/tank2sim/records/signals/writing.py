@@ -15,7 +15,7 @@ from tank2sim.errors import InputError
 from tank2sim.notices import Notice
 from tank2sim.records.signals.columns import DIRECTION_COLUMNS, HELD_COLUMNS, SignalName, file_columns
 from tank2sim.records.signals.filtering import Filtered
-from tank2sim.records.signals.sampling import Series, even_series
+from tank2sim.records.signals.sampling import even_series
 from tank2sim.records.trials import Trial, with_signals
 
 
@@ -57,7 +57,9 @@ def thinned(trial: Trial, filtered: Sequence[Filtered], notice: str) -> Trial:
         signals[series.name] = _on_circle(series.name, series.values)
     for name in trial.signals:
         if name in HELD_COLUMNS:
-            signals[name] = _held(even_series(trial, name), time)
+            order = even_series(trial, name)
+            places = np.searchsorted(order.time_s, time + 1e-6 * order.step_s, side="right") - 1
+            signals[name] = order.values[np.clip(places, 0, None)]
     return replace(trial, time_s=time, signals=signals, noise={}, notices=(*trial.notices, Notice(notice)))
 
 
@@ -80,8 +82,3 @@ def trial_text(trial: Trial, remarks: Sequence[str], more: Mapping[str, Array] =
 
 def _on_circle(name: str, values: Array) -> Array:
     return np.mod(values, 2.0 * np.pi) if name in DIRECTION_COLUMNS - {"psi_rad"} else values
-
-
-def _held(order: Series, time: Array) -> Array:
-    places = np.searchsorted(order.time_s, time + 1e-6 * order.step_s, side="right") - 1
-    return order.values[np.clip(places, 0, None)]
