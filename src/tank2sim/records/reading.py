@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.errors import InputError
+from tank2sim.files import first_bytes
 from tank2sim.plugins import PluginWarning, Registry
 from tank2sim.records.csv_table import SHORTEST_STEP, CsvTable, read_bytes_as_text
 from tank2sim.records.published import ESSO_OSAKA, SIMMAN
@@ -95,8 +96,7 @@ def looks_like_a_trial(path: Path) -> bool:
     """True if name and beginning of a file are those of a known format of trials: for folders with other files."""
     if not called_like_a_trial(path):
         return False
-    with path.open("rb") as file:
-        text = file.read(HEAD_BYTES).decode("latin-1")
+    text = first_bytes(path, HEAD_BYTES).decode("latin-1")
     if is_workbook(text[:4].encode("latin-1")):
         try:
             text = workbook_text(path)

@@ -5,20 +5,18 @@ MATLAB files, HDF5 and TDMS need the extra ``tank2sim[tank]``.
 
 from __future__ import annotations
 
-import importlib
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.errors import InputError, close_name
-from tank2sim.files import read_bytes, refuse_folder
+from tank2sim.errors import InputError, close_name, optional_library
+from tank2sim.files import first_bytes, read_bytes, refuse_folder
 from tank2sim.records.campaign_form import ColumnEntry, FilesSection
 from tank2sim.records.csv_table import LARGEST, CsvTable, read_table, table_of_rows
 from tank2sim.records.spelt_units import unit_factor
@@ -82,9 +80,8 @@ def read_run_table(path: Path, columns: Mapping[str, ColumnEntry | str], files: 
 
 def _is_plain(path: Path) -> bool:
     """True for the CSV that needs no map; also for a file that :func:`read_table` explains best."""
-    with path.open("rb") as beginning:
-        if is_workbook(beginning.read(4)):
-            return False
+    if is_workbook(first_bytes(path, 4)):
+        return False
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         head = next((line for line in file if line.strip() and not line.lstrip().startswith("#")), "")
     names = [name.strip() for name in head.split(",")]
@@ -309,19 +306,13 @@ def binary_columns(path: Path) -> list[RawColumn] | None:
     Raises InputError: The file is missing or broken, it has no columns, or the library for its format is not installed.
     """
     refuse_folder(path)
-    try:
-        with path.open("rb") as file:
-            head = file.read(_FIRST_BYTES)
-    except FileNotFoundError:
-        raise InputError(path, "", "the file does not exist", "check the name") from None
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read ({error.strerror})", "check the name and its permissions") from None
+    head = first_bytes(path, _FIRST_BYTES)
     if head.startswith(_TDMS):
-        library, read = _library("nptdms", path), _tdms
+        library, read = optional_library("nptdms", "tank", path), _tdms
     elif head.startswith(_HDF5) or head[512:].startswith(_HDF5):
-        library, read = _library("h5py", path), _hdf5
+        library, read = optional_library("h5py", "tank", path), _hdf5
     elif head.startswith(_MATLAB) or (path.suffix.lower() == ".mat" and b"\0" in head):
-        library, read = importlib.import_module("scipy.io"), _matlab
+        library, read = optional_library("scipy.io", "tank", path), _matlab
     else:
         return None
     try:
@@ -331,14 +322,6 @@ def binary_columns(path: Path) -> list[RawColumn] | None:
     except Exception as error:  # each library has errors of its own for a broken file
         raise InputError(path, "", f"cannot be read ({' '.join(str(error).split())})", "export it again") from None
     return _of_equal_length(columns, path)
-
-
-def _library(name: str, path: Path) -> ModuleType:
-    try:
-        return importlib.import_module(name)
-    except ImportError:
-        remedy = "install it with: pip install 'tank2sim[tank]'"
-        raise InputError(path, "", f"needs the library {name}, which is not installed", remedy) from None
 
 
 def _of_equal_length(columns: list[RawColumn], path: Path) -> list[RawColumn]:

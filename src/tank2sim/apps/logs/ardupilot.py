@@ -19,15 +19,14 @@ from tank2sim.apps.logs.streams import (
     LogStream,
     VesselLog,
     fault,
-    head_of,
     not_used,
     note,
-    optional_library,
     text_lines,
     unreadable,
 )
 from tank2sim.arrays import Array
-from tank2sim.errors import InputError
+from tank2sim.errors import InputError, optional_library
+from tank2sim.files import first_bytes
 from tank2sim.records.spelt_units import unit_of_text
 
 GPS_EPOCH_S = 315964800.0
@@ -86,9 +85,9 @@ def read_ardupilot_bin(path: Path) -> VesselLog:
 
     Raises InputError: The file is not such a log, or no message of it is understood.
     """
-    library = optional_library("pymavlink.DFReader", path)
+    library = optional_library("pymavlink.DFReader", "logs", path)
     try:
-        if head_of(path, 2) == _MAGIC:
+        if first_bytes(path, 2) == _MAGIC:
             tables, units, params, unread = _dataflash_tables(library.DFReader_binary(str(path)))
         else:
             with tempfile.TemporaryDirectory() as folder:
@@ -227,7 +226,7 @@ def read_ardupilot_tlog(path: Path) -> VesselLog:
 
     Orders to servos become shares of their range where the log holds the parameters SERVOn_FUNCTION.
     """
-    mavutil = optional_library("pymavlink.mavutil", path)
+    mavutil = optional_library("pymavlink.mavutil", "logs", path)
     rows: dict[_Sender, _Rows] = defaultdict(_rows)
     params: dict[int, dict[str, float]] = defaultdict(dict)
     unread: Counter[str] = Counter()

@@ -31,11 +31,10 @@ from tank2sim.apps.logs.streams import (
     mostly,
     not_used,
     note,
-    optional_library,
     text_lines,
 )
 from tank2sim.arrays import Array
-from tank2sim.errors import InputError
+from tank2sim.errors import InputError, optional_library
 from tank2sim.units import KNOT_MPS
 
 _SENTENCE = re.compile(rb"(?P<body>[$!][^*$!\r\n]*)(?:\*(?P<sum>[0-9A-Fa-f]{2}))?")
@@ -125,7 +124,7 @@ class _Reader:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.known = set(optional_library("pynmea2", path).TalkerSentence.sentence_types)
+        self.known = set(optional_library("pynmea2", "logs", path).TalkerSentence.sentence_types)
         self.summed: set[bytes] = set()
         self.number = self.added = self.line = 0
         self.talker = ""

@@ -24,11 +24,10 @@ from tank2sim.apps.logs.streams import (
     mostly,
     not_used,
     note,
-    optional_library,
     text_lines,
 )
 from tank2sim.arrays import Array
-from tank2sim.errors import InputError
+from tank2sim.errors import InputError, optional_library
 
 _FIELDS: dict[int, dict[str, list[str]]] = {int(pgn): fields for pgn, fields in FIELDS["nmea2000"].items()}
 _SYSTEM_TIME, _VARIATION, _RUDDER, _ENGINE = 126992, 127258, 127245, 127488
@@ -116,7 +115,7 @@ class _Reader:
     def __init__(self, path: Path) -> None:
         self.path = path
         logging.getLogger("nmea2000").setLevel(logging.ERROR)
-        self.decoder = optional_library("nmea2000", path).NMEA2000Decoder()
+        self.decoder = optional_library("nmea2000", "logs", path).NMEA2000Decoder()
         self.counts: Counter[str] = Counter()
         self.unused: Counter[int] = Counter()
         self.columns: dict[_Key, Samples] = defaultdict(Samples)

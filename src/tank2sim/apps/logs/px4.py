@@ -17,11 +17,10 @@ from tank2sim.apps.logs.streams import (
     heading_of_quaternion,
     not_used,
     note,
-    optional_library,
     unreadable,
 )
 from tank2sim.arrays import Array
-from tank2sim.errors import InputError
+from tank2sim.errors import InputError, optional_library
 
 _FIELDS = FIELDS["px4"]
 _RECEIVERS = ("sensor_gps", "vehicle_gps_position")
@@ -39,7 +38,7 @@ def read_px4_ulog(path: Path) -> VesselLog:
 
     Raises InputError: The file is not a ULog, or no topic of it is understood.
     """
-    library = optional_library("pyulog", path)
+    library = optional_library("pyulog", "logs", path)
     try:
         log = library.ULog(str(path))
     except Exception as error:

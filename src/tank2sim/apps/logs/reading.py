@@ -12,9 +12,10 @@ from tank2sim.apps.logs.nmea0183 import looks_like_nmea0183, read_nmea0183
 from tank2sim.apps.logs.nmea2000 import looks_like_nmea2000, read_nmea2000
 from tank2sim.apps.logs.px4 import read_px4_ulog
 from tank2sim.apps.logs.ros import read_ros_bag
-from tank2sim.apps.logs.streams import VesselLog, head_of
+from tank2sim.apps.logs.streams import VesselLog
 from tank2sim.apps.logs.table import read_table_log
 from tank2sim.errors import InputError
+from tank2sim.files import first_bytes
 from tank2sim.plugins import Registry
 from tank2sim.records.text_layout import decoded_text
 
@@ -103,7 +104,7 @@ def read_log(path: Path | str) -> VesselLog:
             problem = "is a folder, and neither a log nor a bag of ROS 2 (no metadata.yaml)"
             raise InputError(path, "", problem, "give the log in it")
         return read_ros_bag(path)
-    head = head_of(path, _HEAD_BYTES)
+    head = first_bytes(path, _HEAD_BYTES)
     if not head.strip():
         raise InputError(path, "", "is empty", "give a log with values")
     text, encoding = decoded_text(head, complete=False)

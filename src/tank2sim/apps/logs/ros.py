@@ -27,11 +27,11 @@ from tank2sim.apps.logs.streams import (
     heading_of_quaternion,
     named_stream,
     note,
-    optional_library,
     unreadable,
 )
 from tank2sim.arrays import Array
-from tank2sim.errors import InputError
+from tank2sim.errors import InputError, optional_library
+from tank2sim.files import first_bytes
 from tank2sim.records.spelt_units import split_unit
 
 LONGEST_VECTOR = 32
@@ -66,8 +66,8 @@ def read_ros_bag(path: Path) -> VesselLog:
 
     Raises InputError: The file is cut off or is not a bag, or no message of it has a number.
     """
-    highlevel = optional_library("rosbags.highlevel", path)
-    stores = optional_library("rosbags.typesys", path)
+    highlevel = optional_library("rosbags.highlevel", "logs", path)
+    stores = optional_library("rosbags.typesys", "logs", path)
     store = stores.get_typestore(stores.Stores.LATEST)
     topics: dict[str, _Topic] = {}
     failed: dict[str, str] = {}
@@ -111,10 +111,7 @@ def _named(path: Path, folder: Path) -> Path:
 
 def _suffix(path: Path) -> str:
     """The ending that a bag should have, by its first bytes."""
-    if path.is_dir():
-        return ""
-    with path.open("rb") as file:
-        return _SUFFIXES.get(file.read(4), path.suffix)
+    return "" if path.is_dir() else _SUFFIXES.get(first_bytes(path, 4), path.suffix)
 
 
 def _simulated_times(topics: Iterable[_Topic], findings: list[LogFinding]) -> tuple[Array, Array] | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 import re
 import tomllib
@@ -10,7 +9,6 @@ from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -18,6 +16,7 @@ import numpy as np
 from tank2sim.apps.logs.quantities import quantity_of_name
 from tank2sim.arrays import Array, Number
 from tank2sim.errors import InputError
+from tank2sim.files import first_bytes
 from tank2sim.records.text_layout import decoded_text
 
 OVERLAP_S = 2.0
@@ -142,36 +141,15 @@ def not_used(words: str, kinds: Mapping[str, int]) -> list[LogFinding]:
     return [LogFinding("note", f"{words} that are not used: {listed}", evidence=dict(kinds))] if kinds else []
 
 
-def optional_library(name: str, path: Path) -> ModuleType:
-    """Import a library of the extra ``tank2sim[logs]``; InputError where it is not installed."""
-    try:
-        return importlib.import_module(name)
-    except ImportError:
-        package = name.partition(".")[0]
-        remedy = "install it with: pip install 'tank2sim[logs]'"
-        raise InputError(path, "", f"needs the library {package}, which is not installed", remedy) from None
-
-
 def unreadable(path: Path, error: Exception, remedy: str, problem: str = "cannot be read") -> InputError:
     """The `problem` of a file at which a library failed, with its `error` (of struct, lz4, ...), and the `remedy`."""
     reason = f"{type(error).__name__}: {' '.join(str(error).split())[:100]}"
     return InputError(path, "", f"{problem} ({reason})", remedy)
 
 
-def head_of(path: Path, size: int) -> bytes:
-    """The first bytes of a file; InputError where it is missing or cannot be read."""
-    try:
-        with path.open("rb") as file:
-            return file.read(size)
-    except FileNotFoundError:
-        raise InputError(path, "", "the file does not exist", "check the name") from None
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read ({error.strerror})", "check the name and its permissions") from None
-
-
 def text_lines(path: Path) -> Iterator[bytes]:
     """Lines of a text file in one byte a letter: UTF-16 is decoded, the mark of UTF-8 left out."""
-    encoding = decoded_text(head_of(path, _HEAD_BYTES), complete=False)[1]
+    encoding = decoded_text(first_bytes(path, _HEAD_BYTES), complete=False)[1]
     if encoding.startswith("utf-16"):
         with path.open(encoding=encoding, errors="replace") as text:
             yield from (line.encode("latin-1", errors="replace") for line in text)

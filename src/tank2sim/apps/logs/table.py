@@ -13,9 +13,10 @@ import numpy as np
 
 from tank2sim.apps.logs.clock import DOUBLED_STEPS, TWO_DIGITS_FROM
 from tank2sim.apps.logs.quantities import CLOCK_WORDS, plain_words, quantity_of_name, unit_of_signal_k
-from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, fault, head_of, named_stream, note
+from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, fault, named_stream, note
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
+from tank2sim.files import first_bytes
 from tank2sim.records.spelt_units import split_unit
 from tank2sim.records.text_layout import WHITESPACE, TextLayout, decoded_text, text_layout
 
@@ -82,7 +83,7 @@ def read_table_log(path: Path) -> VesselLog:
 
     Raises InputError: The file cannot be read, or has no rows or no time.
     """
-    text, encoding = decoded_text(head := head_of(path, _HEAD_BYTES), complete=False)
+    text, encoding = decoded_text(head := first_bytes(path, _HEAD_BYTES), complete=False)
     lines = text.splitlines()
     layout = text_layout(path, lines[:-1] if len(head) == _HEAD_BYTES and len(lines) > 1 else lines)  # a cut line
     frame, findings, skipped = _frame(path, layout, encoding)

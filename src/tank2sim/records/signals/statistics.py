@@ -6,14 +6,13 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 from scipy import signal, stats
 
 from tank2sim.arrays import Array, Number
-from tank2sim.errors import InputError
+from tank2sim.errors import optional_library
 from tank2sim.records.signals.columns import DIRECTION_COLUMNS
 from tank2sim.records.signals.sampling import Series, at_common_times
 
@@ -211,12 +210,7 @@ def probability_density(series: Series) -> Density:
 
 def _of_statsmodels(module: str, name: str) -> Callable[..., Any]:
     """A test of the extra ``tank2sim[signals]``, loaded where it is used: it takes more than a second."""
-    try:
-        found: Callable[..., Any] = getattr(import_module(f"statsmodels.{module}"), name)
-    except ImportError:
-        remedy = "install it with: pip install 'tank2sim[signals]'"
-        raise InputError("signals", "", "needs statsmodels, which is not installed", remedy) from None
-    return found
+    return getattr(optional_library(f"statsmodels.{module}", "signals", "signals"), name)  # type: ignore[no-any-return]
 
 
 def _unit_root_tests(values: Array, about: str) -> UnitRootTests:
