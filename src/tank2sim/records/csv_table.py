@@ -136,13 +136,12 @@ class CsvTable:
             return None
         text = self.comments[key].strip()
         number = _number(text)
-        if number is not None and abs(number) > LARGEST:
-            raise InputError(
-                self.path, f"comment {key}", f"{_quoted(text)} is too large", f"at most {LARGEST:g} can be"
-            )
         if number is None:
             problem = f"{_quoted(text)} is not a number" if "\n" not in text else "is given more than once"
             raise InputError(self.path, f"comment {key}", problem, f"write one line such as '# {key}: 11.63'")
+        if abs(number) > LARGEST:
+            problem = f"{_quoted(text)} is too large"
+            raise InputError(self.path, f"comment {key}", problem, f"at most {LARGEST:g} can be")
         return number
 
     def refuse_misspelt_keys(self, known: Sequence[str]) -> None:
@@ -257,8 +256,6 @@ def read_table(path: Path | str | CsvTable) -> CsvTable:
     if not numbers:
         raise InputError(path, "", "there is no header", "begin with a line of column names, such as t_s,u_mps")
     names = _header(path, numbers[0], stripped[numbers[0] - 1])
-    if len(numbers) == 1:
-        raise InputError(path, "", "there are no rows under the header", "add the measured values")
     lines = np.array(numbers[1:], dtype=np.int64)
     rows = [stripped[number - 1] for number in numbers[1:]]
     comments, remarks = _comments([line for line in stripped if line.startswith("#")])
@@ -418,13 +415,12 @@ def _cells(path: Path, place: str, line: str) -> list[str]:
 
 
 def _refuse(path: Path, place: str, cell: str) -> NoReturn:
+    problem, remedy = "is not a number", "write digits with a decimal point, or nothing"
     if cell.lstrip("+-").lower() in ("nan", "inf", "infinity", "na", "null", "none", "-", ""):
-        raise InputError(
-            path, place, f"{_quoted(cell)} is not a number", "leave the cell empty if nothing was recorded"
-        )
-    if _NUMBER.fullmatch(cell):
-        raise InputError(path, place, f"{_quoted(cell)} is too large", f"at most {LARGEST:g} was expected")
-    raise InputError(path, place, f"{_quoted(cell)} is not a number", "write digits with a decimal point, or nothing")
+        remedy = "leave the cell empty if nothing was recorded"
+    elif _NUMBER.fullmatch(cell):
+        problem, remedy = "is too large", f"at most {LARGEST:g} was expected"
+    raise InputError(path, place, f"{_quoted(cell)} {problem}", remedy)
 
 
 def _comments(lines: Sequence[str]) -> tuple[dict[str, str], tuple[str, ...]]:
