@@ -66,7 +66,7 @@ ROOMS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     ),
     "guess": (("apps/guess/*.py",), ("tests/apps/guess",)),
     "logs": (
-        ("apps/logs/clock.py", "apps/logs/current.py", "apps/logs/delays.py", "apps/logs/quantities.py"),
+        ("apps/logs/clock.py", "apps/logs/voyage.py", "apps/logs/content.py", "apps/logs/quantities.py"),
         (
             "tests/apps/logs/test_clock.py",
             "tests/apps/logs/test_current.py",

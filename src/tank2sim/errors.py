@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import importlib
 from collections.abc import Iterable
 from pathlib import Path
+from types import ModuleType
 
 
 class InputError(Exception):
@@ -45,3 +47,18 @@ def close_name(name: str, known: Iterable[str]) -> str:
     names = list(known)
     close = difflib.get_close_matches(name, names, n=1)
     return f"did you mean {close[0]}?" if close else f"known are: {', '.join(names)}"
+
+
+def optional_library(name: str, extra: str, source: Path | str) -> ModuleType:
+    """Import a library of the optional `extra` of tank2sim.
+
+    Raises
+    ------
+    InputError
+        It is not installed; the message names the `source` that needs it.
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        problem = f"needs the library {name.partition('.')[0]}, which is not installed"
+        raise InputError(source, "", problem, f"install it with: pip install 'tank2sim[{extra}]'") from None

@@ -193,6 +193,23 @@ def read_bytes(path: str | Path) -> bytes:
     return Path(path).read_bytes()
 
 
+def first_bytes(path: Path, size: int) -> bytes:
+    """The first bytes of a file, `size` at most.
+
+    Raises
+    ------
+    InputError
+        The file is missing or cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            return file.read(size)
+    except FileNotFoundError:
+        raise InputError(path, "", "the file does not exist", "check the name") from None
+    except OSError as error:
+        raise InputError(path, "", f"cannot be read ({error.strerror})", "check the name and its permissions") from None
+
+
 def refuse_device(path: Path) -> None:
     """Raise InputError if a path is a device, which may have no end."""
     if path.is_char_device() or path.is_block_device():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -56,33 +56,20 @@ def read_averages(
 
     Only the columns that ``[averages.columns]`` names are read; others may hold text.
 
-    Parameters
-    ----------
-    form : CampaignFile
-        The campaign's file.
-    spelt : mapping
-        Quantity to its key in the file and the factor that brings its column to SI.
-    path : Path
-        File of the campaign, for messages and the folder of the table.
+    `form`: The campaign's file; `spelt`: Quantity to its key in the file and the factor that brings its column to SI;
+    `path`: File of the campaign, for messages and the folder of the table.
 
-    Raises
-    ------
-    InputError
-        The table is missing, a column is, or a number in it cannot be.
+    Raises InputError: The table is missing, a column is, or a number in it cannot be.
     """
     averages = form.averages
     assert averages is not None
     file = path.parent / averages.file
-    lines, rows, units = _cells(file)
-    heads = rows.pop(0)
+    lines, columns, units = _columns(file)
     values: dict[str, list[float]] = {}
     for key, heading in averages.columns.model_dump(exclude_none=True).items():
-        if heading not in heads:
-            problem = f"the table has no column {heading!r}"
-            raise InputError(path, f"averages.columns.{spelt[key].key}", problem, f"its columns are {', '.join(heads)}")
-        place = heads.index(heading)
-        _refuse_other_unit(file, heading, key, units[place] if place < len(units) else "", spelt[key].factor)
-        cells = _column(file, heading, place, zip(lines[1:], rows, strict=True))
+        _refuse_missing(columns, heading, path, f"averages.columns.{spelt[key].key}")
+        _refuse_other_unit(file, heading, key, units.get(heading, ""), spelt[key].factor)
+        cells = _numbers(file, heading, lines, columns[heading])
         values[key] = [cell * spelt[key].factor for cell in cells]
         if key in ("X", "Y", "N") and max(map(abs, cells)) < LEAST_FORCE:
             remedy = "give the readings of the gauge"
@@ -93,12 +80,12 @@ def read_averages(
     _, first = np.unique(table, axis=0, return_index=True)
     distinct = sorted(int(row) for row in first)
     conditions = [
-        _condition(dict(zip(values, table[row].tolist(), strict=True)), (file, lines[row + 1]), form, spelt)
+        _condition(dict(zip(values, table[row].tolist(), strict=True)), (file, lines[row]), form, spelt)
         for row in distinct
     ]
-    repeated = len(rows) - len(distinct)
+    repeated = len(lines) - len(distinct)
     text = Notice(
-        f"{file.name}: {repeated} of {len(rows)} rows repeat another to the last digit; each is counted once."
+        f"{file.name}: {repeated} of {len(lines)} rows repeat another to the last digit; each is counted once."
     )
     return conditions, [text] if repeated else []
 
@@ -106,46 +93,47 @@ def read_averages(
 def read_columns(file: Path, headings: Mapping[str, str]) -> dict[str, list[float]]:
     """Columns of a table by their headings: `headings` has key to heading, the result key to values.
 
-    Raises
-    ------
-    InputError
-        The table cannot be read, lacks a column, or has text where a number is expected.
+    Raises InputError: The table cannot be read, lacks a column, or has text where a number is expected.
     """
-    lines, rows, _ = _cells(file)
-    heads = rows.pop(0)
-    found = {}
-    for key, heading in headings.items():
-        if heading not in heads:
-            problem = f"the table has no column {heading!r}"
-            raise InputError(file, "header", problem, f"its columns are {', '.join(heads)}")
-        found[key] = _column(file, heading, heads.index(heading), zip(lines[1:], rows, strict=True))
-    return found
+    lines, columns, _ = _columns(file)
+    for heading in headings.values():
+        _refuse_missing(columns, heading, file, "header")
+    return {key: _numbers(file, heading, lines, columns[heading]) for key, heading in headings.items()}
 
 
-def _column(file: Path, heading: str, place: int, rows: Iterable[tuple[int, list[str]]]) -> list[float]:
-    """Numbers of one column of rows with their line numbers."""
-    return [_number(file, (line, heading), row[place] if place < len(row) else "") for line, row in rows]
+def _refuse_missing(columns: Mapping[str, Sequence[str]], heading: str, source: Path, place: str) -> None:
+    if heading not in columns:
+        problem = f"the table has no column {heading!r}"
+        raise InputError(source, place, problem, f"its columns are {', '.join(columns)}")
 
 
-def _cells(file: Path) -> tuple[list[int], list[list[str]], list[str]]:
-    """Line numbers and cells of the lines that are neither empty nor comments, the first the header; units if any."""
+def _columns(file: Path) -> tuple[list[int], dict[str, list[str]], dict[str, str]]:
+    """Line numbers of the rows, cells by the headings of their columns, and units by these, if there are any."""
     try:
         text, _ = decoded_text(read_bytes(file))
     except OSError:
         text = read_text(file)  # which says what is wrong with it
-    all_lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    numbered = [(n, line) for n, line in enumerate(all_lines, start=1) if line.strip() and line.lstrip()[0] != "#"]
+    every = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    numbered = [(n, line) for n, line in enumerate(every, start=1) if line.strip() and line.lstrip()[0] != "#"]
     if len(numbered) < 2:
         raise InputError(file, "", "has no rows under a header", "give a header and a row for each condition")
+    units: dict[str, str] = {}
     if "," in numbered[0][1] and not re.search("[;\t]", numbered[0][1]):
         rows = [[cell.strip() for cell in next(csv.reader([line], skipinitialspace=True))] for _, line in numbered]
-        return [number for number, _ in numbered], rows, []
-    layout = text_layout(file, all_lines)
-    numbered = [(number, line) for number, line in numbered if number > layout.skip]
-    rows = [[cell.strip() for cell in cells_of(line, layout.separator)] for _, line in numbered]
-    if layout.comma:
-        rows = [[cell.replace(",", ".") if "." not in cell else cell + " (point)" for cell in row] for row in rows]
-    return [layout.skip, *(number for number, _ in numbered)], [list(layout.names), *rows], list(layout.units)
+        heads, rows = rows[0], rows[1:]
+        numbered = numbered[1:]
+    else:
+        layout = text_layout(file, every)
+        numbered = [(number, line) for number, line in numbered if number > layout.skip]
+        heads, units = list(layout.names), dict(zip(layout.names, layout.units, strict=True))
+        rows = [[cell.strip() for cell in cells_of(line, layout.separator)] for _, line in numbered]
+        if layout.comma:
+            rows = [[cell.replace(",", ".") if "." not in cell else f"{cell} (point)" for cell in row] for row in rows]
+    cells = {
+        head: [row[place] if place < len(row) else "" for row in rows]
+        for place, head in reversed(list(enumerate(heads)))
+    }
+    return [number for number, _ in numbered], {head: cells[head] for head in heads}, units
 
 
 def _refuse_other_unit(file: Path, heading: str, key: str, unit: str, factor: float) -> None:
@@ -161,15 +149,19 @@ def _refuse_other_unit(file: Path, heading: str, key: str, unit: str, factor: fl
         raise InputError(file, f"column {heading}", problem, "name the key with its unit (drift_deg), forces in N")
 
 
-def _number(file: Path, place: tuple[int, str], text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not abs(value) <= LARGEST:
-        problem = f"{text[:30]!r} is not a number" + (f" up to {LARGEST:g}" if math.isfinite(value) else "")
-        raise InputError(file, f"line {place[0]}, column {place[1]}", problem, "give each condition its value")
-    return value
+def _numbers(file: Path, heading: str, lines: Sequence[int], cells: Sequence[str]) -> list[float]:
+    """Numbers of one column."""
+    values = []
+    for line, text in zip(lines, cells, strict=True):
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not abs(value) <= LARGEST:
+            problem = f"{text[:30]!r} is not a number" + (f" up to {LARGEST:g}" if math.isfinite(value) else "")
+            raise InputError(file, f"line {line}, column {heading}", problem, "give each condition its value")
+        values.append(value)
+    return values
 
 
 def _condition(

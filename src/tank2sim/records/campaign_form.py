@@ -7,7 +7,7 @@ then renamed (``drift_deg`` to ``drift_rad``, ``propeller_rps`` to ``propeller_r
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 from pydantic import Field, ValidationError
 
@@ -19,15 +19,7 @@ from tank2sim.units import to_si
 RunType = Literal[
     "static_drift", "static_rudder", "drift_and_rudder", "steady_turn", "pure_sway", "pure_yaw", "yaw_with_drift"
 ]
-RUN_TYPES: tuple[RunType, ...] = (
-    "static_drift",
-    "static_rudder",
-    "drift_and_rudder",
-    "steady_turn",
-    "pure_sway",
-    "pure_yaw",
-    "yaw_with_drift",
-)
+RUN_TYPES: tuple[RunType, ...] = get_args(RunType)
 OSCILLATING: tuple[RunType, ...] = ("pure_sway", "pure_yaw", "yaw_with_drift")
 """Types of run in which the model oscillates; in the others it is towed steadily."""
 
@@ -376,8 +368,7 @@ def campaign_file(content: dict[str, Any], source: Path) -> tuple[CampaignFile, 
     InputError
         A key is missing, unknown, given twice in two units, or holds what it cannot.
     """
-    content = dict(content)
-    spelt: dict[str, str] = {}
+    content, spelt = dict(content), dict[str, str]()
     for section in ("model", "test", "tank", "uncertainty", "full_scale"):
         if isinstance(content.get(section), dict):
             content[section] = section_in_si(content[section], section, source, spelt)

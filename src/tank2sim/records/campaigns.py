@@ -337,20 +337,16 @@ def read_captive_run(
     to_port = test.rudder_sign == "port"
     if to_port and sheet.rudder_rad is not None:
         sheet = sheet.model_copy(update={"rudder_rad": -sheet.rudder_rad})
-    sense = -1.0 if test.force_convention == "on_model" else 1.0
-    rudder = _optional(table, "delta_rad")
+    rudder, speed, y, psi, recorded = (
+        _optional(table, name) for name in ("delta_rad", "speed_mps", "y_m", "psi_rad", "propeller_radps")
+    )
     if rudder is None:
-        rudder = np.full(len(time), 0.0 if sheet.rudder_rad is None else sheet.rudder_rad)
+        rudder = np.full(len(time), sheet.rudder_rad or 0.0)
     elif to_port:
         rudder = -rudder
-    speed = _optional(table, "speed_mps")
-    if speed is None:
-        speed = np.full(len(time), test.speed_mps)
-    y, psi = _optional(table, "y_m"), _optional(table, "psi_rad")
+    speed = np.full(len(time), test.speed_mps) if speed is None else speed
     revolutions = sheet.propeller_radps if sheet.propeller_radps is not None else test.propeller_radps
-    recorded = _optional(table, "propeller_radps")
-    if recorded is not None:
-        revolutions = float(np.mean(recorded))
+    revolutions = revolutions if recorded is None else float(np.mean(recorded))
     return CaptiveRun(
         name=sheet.file,
         type=sheet.type,
@@ -360,7 +356,7 @@ def read_captive_run(
         r_radps=_yaw_rate(table, sheet, psi, time),
         speed_mps=speed,
         delta_rad=rudder,
-        **{column: sense * _filled(table, column) for column in _FORCE_COLUMNS.values()},
+        **{column: test.sense * _filled(table, column) for column in _FORCE_COLUMNS.values()},
         y_m=y,
         psi_rad=psi,
         propeller_radps=revolutions,
@@ -379,8 +375,11 @@ def _yaw_rate(table: CsvTable, sheet: RunSheet, psi: Array | None, time: Array) 
         return recorded
     if sheet.type == "steady_turn" and sheet.yaw_rate_radps is not None:
         return np.full(len(time), sheet.yaw_rate_radps)
-    turns = sheet.type in ("pure_yaw", "yaw_with_drift", "steady_turn")
-    return _rate_of(table, psi, time) if turns else np.zeros(len(time))
+    if sheet.type not in ("pure_yaw", "yaw_with_drift", "steady_turn"):
+        return np.zeros(len(time))
+    if psi is None:
+        raise InputError(table.path, "header", "there is neither r_radps nor psi_rad", "add one of them")
+    return np.asarray(np.gradient(np.unwrap(psi), time))
 
 
 def _filled(table: CsvTable, name: str) -> Array:
@@ -404,20 +403,11 @@ def _sway_velocity(table: CsvTable, sheet: RunSheet, motion: tuple[Array, Array 
     if sheet.type == "pure_sway":
         if y is None:
             raise InputError(table.path, "header", "there is neither v_mps nor y_m", "add one of them")
-        velocity: Array = np.gradient(y, time)
-        return velocity
+        return np.asarray(np.gradient(y, time))
     drifts = ("static_drift", "drift_and_rudder", "steady_turn", "yaw_with_drift")
     if sheet.drift_rad is None and sheet.type in drifts:
         raise InputError(table.path, "header", "there is no v_mps, and the campaign gives no drift", "give one of them")
-    steady: Array = -speed * np.sin(sheet.drift_rad or 0.0)
-    return steady
-
-
-def _rate_of(table: CsvTable, psi: Array | None, time: Array) -> Array:
-    if psi is None:
-        raise InputError(table.path, "header", "there is neither r_radps nor psi_rad", "add one of them")
-    rate: Array = np.gradient(np.unwrap(psi), time)
-    return rate
+    return np.asarray(-speed * np.sin(sheet.drift_rad or 0.0))
 
 
 def _averaged_run(condition: Condition, form: CampaignFile) -> CaptiveRun:

@@ -9,6 +9,7 @@ from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import label
 
 from tank2sim.arrays import Array
 from tank2sim.cards.form import ThrusterSection
@@ -83,13 +84,8 @@ def read_craft_trial(path: Path | CsvTable, thrusters: Sequence[ThrusterSection]
 def _held(x: Array, y: Array) -> NDArray[np.bool_]:
     """Rows (n,) in which a recorder faster than its receiver repeats a position: a few in a row, exactly the same."""
     same = np.concatenate([[False], (np.diff(x) == 0) & (np.diff(y) == 0)])
-    run = np.arange(len(same)) - np.maximum.accumulate(np.where(same, 0, np.arange(len(same))))
-    ends = np.append(~same[1:], True)
-    lengths = np.zeros(len(same), dtype=int)
-    lengths[ends] = run[ends]
-    # Every row has the length of the repetition that it belongs to.
-    following = np.flip(np.minimum.accumulate(np.flip(np.where(ends, np.arange(len(same)), len(same)))))
-    return same & (lengths[following] <= MOST_REPEATED)
+    runs, _ = label(same)
+    return np.asarray(same & (np.bincount(runs)[runs] <= MOST_REPEATED))
 
 
 def _azimuths(path: Path, thrusters: Sequence[ThrusterSection], columns: Mapping[str, Array]) -> dict[str, Array]:

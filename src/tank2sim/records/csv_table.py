@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import csv
 import difflib
-import math
 import re
 import sys
 from collections.abc import Sequence
@@ -137,13 +136,12 @@ class CsvTable:
             return None
         text = self.comments[key].strip()
         number = _number(text)
-        if number is not None and abs(number) > LARGEST:
-            raise InputError(
-                self.path, f"comment {key}", f"{_quoted(text)} is too large", f"at most {LARGEST:g} can be"
-            )
         if number is None:
             problem = f"{_quoted(text)} is not a number" if "\n" not in text else "is given more than once"
             raise InputError(self.path, f"comment {key}", problem, f"write one line such as '# {key}: 11.63'")
+        if abs(number) > LARGEST:
+            problem = f"{_quoted(text)} is too large"
+            raise InputError(self.path, f"comment {key}", problem, f"at most {LARGEST:g} can be")
         return number
 
     def refuse_misspelt_keys(self, known: Sequence[str]) -> None:
@@ -258,8 +256,6 @@ def read_table(path: Path | str | CsvTable) -> CsvTable:
     if not numbers:
         raise InputError(path, "", "there is no header", "begin with a line of column names, such as t_s,u_mps")
     names = _header(path, numbers[0], stripped[numbers[0] - 1])
-    if len(numbers) == 1:
-        raise InputError(path, "", "there are no rows under the header", "add the measured values")
     lines = np.array(numbers[1:], dtype=np.int64)
     rows = [stripped[number - 1] for number in numbers[1:]]
     comments, remarks = _comments([line for line in stripped if line.startswith("#")])
@@ -419,13 +415,12 @@ def _cells(path: Path, place: str, line: str) -> list[str]:
 
 
 def _refuse(path: Path, place: str, cell: str) -> NoReturn:
+    problem, remedy = "is not a number", "write digits with a decimal point, or nothing"
     if cell.lstrip("+-").lower() in ("nan", "inf", "infinity", "na", "null", "none", "-", ""):
-        raise InputError(
-            path, place, f"{_quoted(cell)} is not a number", "leave the cell empty if nothing was recorded"
-        )
-    if _NUMBER.fullmatch(cell):
-        raise InputError(path, place, f"{_quoted(cell)} is too large", f"at most {LARGEST:g} was expected")
-    raise InputError(path, place, f"{_quoted(cell)} is not a number", "write digits with a decimal point, or nothing")
+        remedy = "leave the cell empty if nothing was recorded"
+    elif _NUMBER.fullmatch(cell):
+        problem, remedy = "is too large", f"at most {LARGEST:g} was expected"
+    raise InputError(path, place, f"{_quoted(cell)} {problem}", remedy)
 
 
 def _comments(lines: Sequence[str]) -> tuple[dict[str, str], tuple[str, ...]]:
@@ -454,10 +449,6 @@ def _quoted(text: str) -> str:
     return repr(text if len(text) <= _QUOTED_LENGTH else text[:_QUOTED_LENGTH] + "...")
 
 
-NumberRows = Sequence[tuple[int, Sequence[str]]]
-"""Line of the file (from 1) and cells of each row."""
-
-
 def read_bytes_as_text(path: Path | str) -> str:
     """Text of a file whose letters beyond ASCII do not matter (read as ISO 8859-1); every line ends in a line feed.
 
@@ -473,40 +464,3 @@ def read_bytes_as_text(path: Path | str) -> str:
     except OSError as error:
         raise InputError(path, "", f"cannot be read ({error.strerror})", "check the name and its permissions") from None
     return text.replace("\r\n", "\n").replace("\r", "\n")
-
-
-def number_rows(path: Path, rows: NumberRows, names: Sequence[str]) -> NDArray[np.float64]:
-    """Values (rows, columns), nan where a cell is empty or says so.
-
-    Raises
-    ------
-    InputError
-        A row has too many or too few cells, or one that is not a finite number; or there are fewer than two rows.
-    """
-    if len(rows) < 2:
-        raise InputError(path, "", "has no rows of measured values", "give the file as it was published")
-    for line, cells in rows:
-        if len(cells) != len(names):
-            problem = f"the number of cells is {len(cells)}, and that of columns {len(names)}"
-            raise InputError(path, f"line {line}", problem, "correct or delete the line")
-    values = np.array([[_cell_value(cell) for cell in cells] for _, cells in rows])
-    faulty = np.argwhere(np.abs(values) > LARGEST)
-    if faulty.size:
-        row, column = (int(place) for place in faulty[0])
-        line, cells = rows[row]
-        problem = f"{cells[column][:30]!r} is not a number" + (
-            f" up to {LARGEST:g}" if np.isfinite(values[row, column]) else ""
-        )
-        raise InputError(path, f"line {line}, column {names[column]}", problem, "write a number, or nan for none")
-    return values
-
-
-def _cell_value(cell: str) -> float:
-    """The value of a cell; inf if it is none."""
-    text = cell.strip()
-    if not text:
-        return math.nan
-    try:
-        return float(text)
-    except ValueError:
-        return math.inf

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.errors import InputError
+from tank2sim.files import first_bytes
 from tank2sim.plugins import PluginWarning, Registry
 from tank2sim.records.csv_table import SHORTEST_STEP, CsvTable, read_bytes_as_text
-from tank2sim.records.esso_osaka import ESSO_OSAKA
-from tank2sim.records.simman import SIMMAN
+from tank2sim.records.published import ESSO_OSAKA, SIMMAN
 from tank2sim.records.trial_csv import TRIAL_CSV, read_trial_csv
 from tank2sim.records.trials import Trial, TrialReader, fault_of
 from tank2sim.records.workbook import is_workbook, workbook_text
@@ -96,8 +96,7 @@ def looks_like_a_trial(path: Path) -> bool:
     """True if name and beginning of a file are those of a known format of trials: for folders with other files."""
     if not called_like_a_trial(path):
         return False
-    with path.open("rb") as file:
-        text = file.read(HEAD_BYTES).decode("latin-1")
+    text = first_bytes(path, HEAD_BYTES).decode("latin-1")
     if is_workbook(text[:4].encode("latin-1")):
         try:
             text = workbook_text(path)

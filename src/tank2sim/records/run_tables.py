@@ -5,20 +5,18 @@ MATLAB files, HDF5 and TDMS need the extra ``tank2sim[tank]``.
 
 from __future__ import annotations
 
-import importlib
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.errors import InputError, close_name
-from tank2sim.files import read_bytes, refuse_folder
+from tank2sim.errors import InputError, close_name, optional_library
+from tank2sim.files import first_bytes, read_bytes, refuse_folder
 from tank2sim.records.campaign_form import ColumnEntry, FilesSection
 from tank2sim.records.csv_table import LARGEST, CsvTable, read_table, table_of_rows
 from tank2sim.records.spelt_units import unit_factor
@@ -65,20 +63,11 @@ def read_run_table(path: Path, columns: Mapping[str, ColumnEntry | str], files: 
     if that is one of :data:`RUN_QUANTITIES` with a unit: in the name (``Y_kN``, ``Y [kN]``), in a row of units, or in
     the property of a channel.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    columns : mapping
-        Name of a column in the file to its quantity, as ``[columns]`` of the campaign has it.
-    files : FilesSection
-        What the campaign says of the layout.
+    `path`: The file; `columns`: Name of a column in the file to its quantity, as ``[columns]`` of the campaign has it;
+    `files`: What the campaign says of the layout.
 
-    Raises
-    ------
-    InputError
-        The file cannot be read; a column of the map is not in it, has no unit, or a unit of another kind; or two
-        columns are one quantity.
+    Raises InputError: The file cannot be read; a column of the map is not in it, has no unit, or a unit of another
+    kind; or two columns are one quantity.
     """
     raw = binary_columns(path)
     if raw is not None:
@@ -91,9 +80,8 @@ def read_run_table(path: Path, columns: Mapping[str, ColumnEntry | str], files: 
 
 def _is_plain(path: Path) -> bool:
     """True for the CSV that needs no map; also for a file that :func:`read_table` explains best."""
-    with path.open("rb") as beginning:
-        if is_workbook(beginning.read(4)):
-            return False
+    if is_workbook(first_bytes(path, 4)):
+        return False
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         head = next((line for line in file if line.strip() and not line.lstrip().startswith("#")), "")
     names = [name.strip() for name in head.split(",")]
@@ -300,13 +288,9 @@ _FIRST_BYTES = 1024
 class RawColumn:
     """A column as a file has it.
 
-    Parameters
-    ----------
-    name : str
-        Path in the file: ``group/channel``, ``structure.field``, ``matrix 2`` for its second column.
-    values : array, (rows,)
-    unit : str
-        As the file spells it; empty if it does not.
+    - `name`: Path in the file: ``group/channel``, ``structure.field``, ``matrix 2`` for its second column.
+    - `values` (rows,).
+    - `unit`: As the file spells it; empty if it does not.
     """
 
     name: str
@@ -319,25 +303,16 @@ def binary_columns(path: Path) -> list[RawColumn] | None:
 
     Variables of other lengths than the longest common one (parameters, texts) are left out.
 
-    Raises
-    ------
-    InputError
-        The file is missing or broken, it has no columns, or the library for its format is not installed.
+    Raises InputError: The file is missing or broken, it has no columns, or the library for its format is not installed.
     """
     refuse_folder(path)
-    try:
-        with path.open("rb") as file:
-            head = file.read(_FIRST_BYTES)
-    except FileNotFoundError:
-        raise InputError(path, "", "the file does not exist", "check the name") from None
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read ({error.strerror})", "check the name and its permissions") from None
+    head = first_bytes(path, _FIRST_BYTES)
     if head.startswith(_TDMS):
-        library, read = _library("nptdms", path), _tdms
+        library, read = optional_library("nptdms", "tank", path), _tdms
     elif head.startswith(_HDF5) or head[512:].startswith(_HDF5):
-        library, read = _library("h5py", path), _hdf5
+        library, read = optional_library("h5py", "tank", path), _hdf5
     elif head.startswith(_MATLAB) or (path.suffix.lower() == ".mat" and b"\0" in head):
-        library, read = importlib.import_module("scipy.io"), _matlab
+        library, read = optional_library("scipy.io", "tank", path), _matlab
     else:
         return None
     try:
@@ -347,14 +322,6 @@ def binary_columns(path: Path) -> list[RawColumn] | None:
     except Exception as error:  # each library has errors of its own for a broken file
         raise InputError(path, "", f"cannot be read ({' '.join(str(error).split())})", "export it again") from None
     return _of_equal_length(columns, path)
-
-
-def _library(name: str, path: Path) -> ModuleType:
-    try:
-        return importlib.import_module(name)
-    except ImportError:
-        remedy = "install it with: pip install 'tank2sim[tank]'"
-        raise InputError(path, "", f"needs the library {name}, which is not installed", remedy) from None
 
 
 def _of_equal_length(columns: list[RawColumn], path: Path) -> list[RawColumn]:

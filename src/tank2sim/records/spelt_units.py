@@ -2,44 +2,15 @@
 
 from __future__ import annotations
 
-import math
 import re
+import tomllib
+from pathlib import Path
 
-from tank2sim.units import KNOT_MPS
-
-_UNIT_SPELLINGS = {
-    "deg": ("deg", "degree", "degrees", "°", "grad"),
-    "rad": ("rad", "radian", "radians"),
-    "deg/s": ("deg/s", "degps", "deg_s", "dps", "°/s", "deg_per_s", "degs"),
-    "deg/min": ("deg/min", "degpmin", "deg_min", "°/min", "dpm", "deg_per_min"),
-    "rad/s": ("rad/s", "radps", "rad_s", "rad_per_s"),
-    "kn": ("kn", "kt", "kts", "knot", "knots", "kns"),
-    "km/h": ("km/h", "kmh", "km_h", "kph", "kmph"),
-    "m/s": ("m/s", "mps", "m_s", "ms-1", "m_per_s"),
-    "rpm": (
-        "rpm",
-        "1/min",
-        "u/min",
-        "min-1",
-        "r/min",
-        "rev/min",
-        "obr/min",
-        "tr/min",
-        "giri/min",
-        "varv/min",
-        "omdr/min",
-    ),
-    "1/s": ("rps", "1/s", "hz", "rev/s"),
-    "%": ("%", "percent", "pct", "prozent"),
-    "m": ("m", "metre", "meter", "metres", "meters"),
-    "m/s2": ("m/s2", "m/s^2", "m/s/s", "mps2", "m_s2", "m/s²"),
-    "g": ("g",),
-    "s": ("s", "sec", "seconds"),
-    "V": ("v", "volt"),
-    "degC": ("degc", "°c"),
+_DECLARED = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
+_UNIT_OF: dict[str, str] = {
+    spelling: unit for unit, spellings in _DECLARED["spellings"].items() for spelling in spellings
 }
-_UNIT_OF = {spelling: unit for unit, spellings in _UNIT_SPELLINGS.items() for spelling in spellings}
-_UNIT_OF |= {"degheading": "deg", "deglatitude": "deg", "deglongitude": "deg"}
+_SIZES: dict[str, dict[str, float]] = _DECLARED["sizes"]
 _BRACKET = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]")
 
 
@@ -65,22 +36,6 @@ def split_unit(name: str) -> tuple[str, str]:
     if len(parts) > 1 and parts[-1] == "m":
         return "_".join(parts[:-1]), "m"
     return name, ""
-
-
-_FORCE = {"n": 1.0, "kn": 1e3, "kgf": 9.80665, "kp": 9.80665, "lbf": 4.4482216152605}
-_SIZES = {
-    "N": _FORCE,
-    "Nm": {
-        "nm": 1.0, "knm": 1e3, "nmm": 1e-3, "ncm": 1e-2, "kgfm": 9.80665, "kpm": 9.80665, "lbfft": 1.3558179483314,
-    },
-    "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "ft": 0.3048, "in": 0.0254},
-    "s": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "min": 60.0},
-    "mps": {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "kn": KNOT_MPS, "km/h": 1 / 3.6, "ft/s": 0.3048},
-    "rad": {"rad": 1.0, "deg": math.pi / 180, "mrad": 1e-3},
-    "radps": {"rad/s": 1.0, "deg/s": math.pi / 180, "deg/min": math.pi / 180 / 60, "mrad/s": 1e-3},
-}  # fmt: skip
-"""SI unit, as names of columns end with it, to the spelling of units of that kind (small letters, no blanks, points or
-stars) and their factor to it: BIPM SI brochure (9th ed.), NIST SP 811 for lbf, ft and in; kp and kgf 9.80665 N."""
 
 
 def unit_factor(text: str, suffix: str) -> float | None:

@@ -37,16 +37,10 @@ _UNIT_NUMBERS = ("1/min", "1/s")
 class TextLayout:
     """How a table is written.
 
-    Parameters
-    ----------
-    separator : str
-        One character; :data:`WHITESPACE` is any number of blanks.
-    comma : bool
-        Decimal commas.
-    names, units : tuple of str
-        Names and units of the columns; ``column 3`` without a name, an empty unit without a unit.
-    skip : int
-        Lines above the first row of values.
+    - `separator`: One character; :data:`WHITESPACE` is any number of blanks.
+    - `comma`: Decimal commas.
+    - `names`, `units`: Names and units of the columns; ``column 3`` without a name, an empty unit without a unit.
+    - `skip`: Lines above the first row of values.
     """
 
     separator: str
@@ -60,11 +54,7 @@ def decoded_text(data: bytes, *, complete: bool = True) -> tuple[str, str]:
     """Text of the bytes of a file, and its encoding: UTF-16 and UTF-8 by their marks, UTF-8 if it can be, else
     Windows-1252, of which ISO 8859-1 is a part.
 
-    Parameters
-    ----------
-    data : bytes
-    complete : bool
-        False if the bytes may end within a letter.
+    `complete`: False if the bytes may end within a letter.
     """
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return data.decode("utf-16", errors="replace"), "utf-16"
@@ -83,21 +73,10 @@ def decoded_text(data: bytes, *, complete: bool = True) -> tuple[str, str]:
 def text_layout(path: object, lines: Sequence[str], separator: str = "", comma: bool | None = None) -> TextLayout:
     """How the lines of a table are written.
 
-    Parameters
-    ----------
-    path : path
-        For messages.
-    lines : sequence of str
-        The beginning of the file, or all of it.
-    separator : str
-        If it is known.
-    comma : bool, optional
-        Decimal commas, if it is known.
+    `path`: For messages; `lines`: The beginning of the file, or all of it; `separator`: If it is known; `comma`:
+    Decimal commas, if it is known.
 
-    Raises
-    ------
-    InputError
-        There are no rows.
+    Raises InputError: There are no rows.
     """
     numbered = [(number, line) for number, line in enumerate(lines) if line.strip() and not line.startswith("#")]
     if len(numbered) < 2:

@@ -28,11 +28,9 @@ def read_trial_csv(path: Path | str | CsvTable) -> Trial:
     ``# origin: 54.4 10.3`` latitude and longitude of x = y = 0 (any other text behind ``# origin:`` is free).
     Columns that are not part of the format are left out, and a notice names them.
 
-    Raises
-    ------
-    InputError
-        The table is at fault (:func:`tank2sim.records.csv_table.read_table`); there is no ``t_s`` in each row, no
-        rudder or nothing measured; a column has the name of a signal and another unit; a comment is not understood.
+    Raises InputError: The table is at fault (:func:`tank2sim.records.csv_table.read_table`); there is no ``t_s`` in
+    each row, no rudder or nothing measured; a column has the name of a signal and another unit; a comment is not
+    understood.
     """
     raw = read_table(path)
     raw.refuse_misspelt_keys(COMMENT_KEYS)

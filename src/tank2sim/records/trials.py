@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,16 +15,17 @@ from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice
 
-RUDDERS = ("delta_rad", "delta_order_rad")
-"""Angle and order of the rudder: a trial has one of them or both."""
-MEASURED_COLUMNS = (
-    *("u_mps", "v_mps", "u_ground_mps", "v_ground_mps", "sog_mps", "cog_rad", "r_radps", "psi_rad", "x_m", "y_m"),
-    *("phi_rad", "wind_speed_mps", "wind_direction_rad", "wind_rel_speed_mps", "wind_rel_direction_rad"),
-    *("current_speed_mps", "current_direction_rad"),
+SIGNALS: dict[str, dict[str, Any]] = tomllib.loads(
+    Path(__file__).with_name("trial_signals.toml").read_text(encoding="utf-8")
 )
+"""Every signal of the trial format, in SI, and what is declared of it: words, whether it is a rudder, held, ..."""
+
+TRIAL_SIGNALS = tuple(SIGNALS)
+RUDDERS = tuple(name for name in SIGNALS if "rudder" in SIGNALS[name])
+"""Angle and order of the rudder: a trial has one of them or both."""
+
+MEASURED_COLUMNS = tuple(name for name in SIGNALS if "measured" in SIGNALS[name])
 """Quantities of the motion, the wind and the current that sensors measure."""
-TRIAL_SIGNALS = (*RUDDERS, "n_radps", *MEASURED_COLUMNS)
-"""Every signal of the trial format, in SI."""
 
 
 @dataclass(frozen=True, eq=False)

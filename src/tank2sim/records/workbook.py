@@ -37,11 +37,8 @@ def workbook_text(path: Path) -> str:
     Numbers are as the file holds them, formulas as their last results. A row whose first cell begins with ``#`` is a
     comment and keeps its text. Each other row has as many cells as the first of them.
 
-    Raises
-    ------
-    InputError
-        The file is not a spreadsheet, is broken, or a cell holds an error such as ``#DIV/0!`` or a formula without its
-        result.
+    Raises InputError: The file is not a spreadsheet, is broken, or a cell holds an error such as ``#DIV/0!`` or a
+    formula without its result.
     """
     from xml.etree.ElementTree import ParseError
 

@@ -247,3 +247,19 @@ def motion(made: dict[str, np.ndarray]) -> pd.DataFrame:
             "heading_deg": np.degrees(made["psi"]) % 360,
         }
     )
+
+
+def stream_of(found, name: str):
+    """The only stream of a name."""
+    (stream,) = (stream for stream in found.streams if stream.name == name)
+    return stream
+
+
+def texts(found, kind: str = "") -> str:
+    """Texts of the findings of a kind, or of all."""
+    return "\n".join(finding.text for finding in found.findings if kind in ("", finding.kind))
+
+
+def used(result) -> dict[str, str]:
+    """Quantity to stream of the channels in use."""
+    return {channel.quantity: channel.stream for channel in result.voyage.channels.channels if channel.use}

@@ -14,7 +14,7 @@ from tank2sim.apps.logs.reading import read_log
 from tank2sim.apps.logs.result import LogResult
 from tank2sim.errors import InputError
 from tank2sim.records.reading import read_trial_file
-from tests.apps.logs.made_logs import frame, nmea_lines, rmc, sentence, voyage
+from tests.apps.logs.made_logs import frame, nmea_lines, rmc, sentence, used, voyage
 from tests.marks import first_fast
 
 
@@ -37,10 +37,6 @@ def nmea(tmp_path: Path):
         return path
 
     return write
-
-
-def used(result: LogResult) -> dict[str, str]:
-    return {channel.quantity: channel.stream for channel in result.voyage.channels.channels if channel.use}
 
 
 def signals_of(result: LogResult) -> set[str]:

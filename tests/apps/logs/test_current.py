@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tank2sim.apps.logs.current import AVERAGED_S, drift_current
+from tank2sim.apps.logs.voyage import AVERAGED_S, drift_current
 
 SET_DEG, SPEED = 300.0, 0.6
 NORTH, EAST = SPEED * math.cos(math.radians(SET_DEG)), SPEED * math.sin(math.radians(SET_DEG))

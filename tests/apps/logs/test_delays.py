@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.apps.logs.delays import RateDelay, rate_delay
+from tank2sim.apps.logs.content import RateDelay, rate_delay
 from tests.apps.logs.made_logs import frame, voyage
 
 STEP = 0.1

@@ -76,15 +76,6 @@ def test_units_in_names(name, unit) -> None:
         ("Dümen komutu", "rudder_order"),
         ("Yere göre hız", "sog"),
         ("Recorder rudder", "rudder_angle"),
-    ],
-)
-def test_quantities_of_names(name, quantity) -> None:
-    assert quantity_of_name(name) == quantity
-
-
-@pytest.mark.parametrize(
-    ("name", "quantity"),
-    [
         ("GPS1_LAT", "latitude"),
         ("SPD_WATER_LONG", "u_water"),
         ("ROT1", "yaw_rate"),
@@ -102,7 +93,7 @@ def test_quantities_of_names(name, quantity) -> None:
         ("wind temp", ""),
     ],
 )
-def test_languages_and_recorders(name, quantity) -> None:
+def test_quantities_of_names(name, quantity) -> None:
     assert quantity_of_name(name) == quantity
 
 

@@ -14,20 +14,11 @@ import pytest
 from tank2sim.apps.logs.command import log
 from tank2sim.apps.logs.reading import read_log
 from tank2sim.errors import InputError
-from tests.apps.logs.made_logs import T0, can_frame, candump_lines, frame, voyage
+from tests.apps.logs.made_logs import T0, can_frame, candump_lines, frame, stream_of, texts, voyage
 from tests.apps.logs.recorders import dataflash
 from tests.marks import first_fast
 
 ROWS = 400
-
-
-def stream_of(found, name):
-    (stream,) = (stream for stream in found.streams if stream.name == name)
-    return stream
-
-
-def texts(found, kind: str = "") -> str:
-    return "\n".join(finding.text for finding in found.findings if kind in ("", finding.kind))
 
 
 @functools.cache

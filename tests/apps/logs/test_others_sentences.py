@@ -11,7 +11,7 @@ import pytest
 from tank2sim.apps.logs.command import log
 from tank2sim.apps.logs.reading import read_log
 from tank2sim.errors import InputError
-from tests.apps.logs.made_logs import T0, frame, nmea_lines, sentence
+from tests.apps.logs.made_logs import T0, frame, nmea_lines, sentence, stream_of, texts
 
 pytest.importorskip("pynmea2")
 
@@ -61,15 +61,6 @@ def read(tmp_path):
         return read_log(path)
 
     return read
-
-
-def stream_of(found, name):
-    (stream,) = (stream for stream in found.streams if stream.name == name)
-    return stream
-
-
-def texts(found, kind: str = "") -> str:
-    return "\n".join(finding.text for finding in found.findings if kind in ("", finding.kind))
 
 
 def test_a_cell_that_cannot_be_read_costs_its_sentence_alone(read) -> None:

@@ -10,8 +10,8 @@ import pytest
 
 from tank2sim.apps.logs.channel_search import find_channels
 from tank2sim.apps.logs.command import log
-from tank2sim.apps.logs.missing import without_missing
 from tank2sim.apps.logs.reading import read_log
+from tank2sim.apps.logs.recorded import without_missing
 from tank2sim.apps.logs.streams import LogStream
 from tank2sim.errors import InputError
 from tests.apps.logs.made_logs import T0, frame, voyage

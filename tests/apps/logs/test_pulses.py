@@ -10,8 +10,8 @@ import pytest
 
 from tank2sim.apps.logs import px4
 from tank2sim.apps.logs.command import log
-from tank2sim.apps.logs.pulses import pulses_of
 from tank2sim.apps.logs.reading import read_log
+from tank2sim.apps.logs.recorded import pulses_of
 from tank2sim.apps.logs.streams import LogStream
 from tests.apps.logs.made_logs import T0, craft, frame, motion, voyage
 from tests.marks import first_fast

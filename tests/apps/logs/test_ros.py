@@ -9,7 +9,7 @@ import pytest
 
 from tank2sim.apps.logs.command import log
 from tank2sim.apps.logs.reading import read_log
-from tests.apps.logs.made_logs import T0, degrees, voyage
+from tests.apps.logs.made_logs import T0, degrees, stream_of, voyage
 from tests.marks import first_fast
 
 pytest.importorskip("rosbags")
@@ -77,10 +77,6 @@ def write_bag(
                 twist = types["geometry_msgs/msg/Twist"](velocity, vector(0.0, 0.0, 0.0))
                 put("/motion", t, types["geometry_msgs/msg/TwistStamped"](header, twist))
     return path
-
-
-def stream_of(found, name):
-    return next(stream for stream in found.streams if stream.name == name)
 
 
 def test_frames_of_rep_103_become_those_of_trials(tmp_path) -> None:

@@ -15,7 +15,7 @@ from tank2sim.apps.logs.content import AGREES, direction_evidence
 from tank2sim.apps.logs.quantities import quantity_of_name
 from tank2sim.apps.logs.reading import read_log
 from tank2sim.apps.logs.reference import ReferenceMotion
-from tests.apps.logs.made_logs import T0, craft, frame, motion, nmea_lines, sentence, voyage
+from tests.apps.logs.made_logs import T0, craft, frame, motion, nmea_lines, sentence, used, voyage
 
 DAY = 86400.0
 
@@ -23,10 +23,6 @@ DAY = 86400.0
 @functools.cache
 def table() -> pd.DataFrame:
     return frame()
-
-
-def used(result) -> dict[str, str]:
-    return {channel.quantity: channel.stream for channel in result.voyage.channels.channels if channel.use}
 
 
 def written(path, columns: dict[str, object], **changes: object):

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import datetime as dt
+from dataclasses import replace
 
 import numpy as np
 
-from tank2sim.apps.logs.streams import LogFinding, LogStream
+from tank2sim.apps.logs.streams import LogFinding, LogStream, fault, note
 from tank2sim.arrays import Array
 from tank2sim.records.csv_table import LARGEST
 from tank2sim.records.signals.sampling import GAP_STEPS
@@ -43,21 +44,19 @@ def rollover_s(ahead_s: float) -> tuple[float, list[LogFinding]]:
     the receiver is right.
     """
     turns = round(-ahead_s / _ROLLOVER_S)
-    rest = ahead_s + turns * _ROLLOVER_S
-    if turns and abs(rest) < _DAY_S:
+    if turns and abs(ahead_s + turns * _ROLLOVER_S) < _DAY_S:
         text = f"the receiver's date is {1024 * abs(turns)} weeks off the date of the recorder, which is taken"
-        return turns * _ROLLOVER_S, [LogFinding("note", text, evidence={"weeks": 1024 * turns})]
-    if abs(ahead_s) > _DAY_S:
-        text = f"the recorder's clock is {abs(ahead_s) / _DAY_S:.4g} days off the receiver's clock, which is used"
-        return 0.0, [LogFinding("note", text, evidence={"days": ahead_s / _DAY_S})]
-    return 0.0, []
+        return turns * _ROLLOVER_S, [note(text, weeks=1024 * turns)]
+    days = ahead_s / _DAY_S
+    text = f"the recorder's clock is {abs(days):.4g} days off the receiver's clock, which is used"
+    return 0.0, [note(text, days=days)] if abs(days) > 1 else []
 
 
 def board_start(lag_s: Array, receiver: str, findings: list[LogFinding]) -> float:
     """Time of a board at UTC 0, s, by its clock less UTC at each fix (n,); leaps of the receiver are a fault."""
     if (spread := float(np.ptp(lag_s))) > 1.0:
         text = f"the receiver's clock leaps by {spread:.3g} s against the board's clock, which is used"
-        findings.append(LogFinding("fault", text, receiver))
+        findings.append(fault(text, receiver))
         return float(np.median(lag_s))
     # The message is written after the fix was measured: the least difference has the least delay.
     return float(lag_s.min())
@@ -78,25 +77,21 @@ def continued_clock(time_s: Array, name: str) -> tuple[Array, list[LogFinding]]:
     leaps: list[int] = []
     for place in np.flatnonzero((steps < -FALL_STEPS * usual) | (steps > GAP_STEPS * usual)):
         step = float(steps[place])
-        if step > 0:
-            if shift > 0 and abs(step - usual - shift) < 2 * usual:
-                times[place + 1 :] -= shift
-                shift = 0.0
-            else:
-                leaps.append(int(place))
-            continue
-        ahead = next((leap for leap in reversed(leaps) if abs(steps[leap] + step - 2 * usual) < 2 * usual), None)
-        if ahead is not None:
-            leaps.remove(ahead)
+        if step > 0 and shift > 0 and abs(step - usual - shift) < 2 * usual:
+            times[place + 1 :] -= shift
+            shift = 0.0
+        elif step > 0:
+            leaps.append(int(place))
+        elif not (same := [leap for leap in leaps if abs(steps[leap] + step - 2 * usual) < 2 * usual]):
+            shift += usual - step
+            times[place + 1 :] += usual - step
+            text = f"{name}: the clock falls by {-step:.4g} s at {utc_text(time_s[place])}; it is taken to run on"
+            findings.append(fault(text, name, fall_s=-step))
+        else:
+            leaps.remove(ahead := same[-1])
             times[ahead + 1 : place + 1] -= float(steps[ahead]) - usual
             text = f"{name}: the clock is {-step + usual:.4g} s ahead from {utc_text(time_s[ahead])} on for a while"
-            findings.append(LogFinding("fault", f"{text}; that is taken back", name, {"leap_s": -step + usual}))
-            continue
-        change = usual - step
-        shift += change
-        times[place + 1 :] += change
-        text = f"{name}: the clock falls by {-step:.4g} s at {utc_text(time_s[place])}; it is taken to run on"
-        findings.append(LogFinding("fault", text, name, {"fall_s": -step}))
+            findings.append(fault(f"{text}; that is taken back", name, leap_s=-step + usual))
     return times, findings
 
 
@@ -108,26 +103,21 @@ def tidied(stream: LogStream) -> tuple[LogStream, int, list[LogFinding]]:
     """
     good = np.isfinite(stream.time_s) & (np.abs(stream.values) < LARGEST)  # nan is not
     time, findings = continued_clock(stream.time_s[good], stream.name)
-    values = stream.values[good]
     order = np.argsort(time, kind="stable")
-    time, values = time[order], values[order]
-    new = np.concatenate([[True], np.diff(time) > 0]) if len(time) else np.zeros(0, dtype=bool)
+    time, values = time[order], stream.values[good][order]
+    new = np.diff(time, prepend=-np.inf) > 0
     repeated = int(len(time) - new.sum())
     if repeated > _DOUBLED * len(time):
         apart = np.abs(np.diff(values))[~new[1:]]
         steps = np.abs(np.diff(values[new]))
         usual = float(np.median(steps)) if len(steps) else 0.0
         if np.median(apart) > DOUBLED_STEPS * max(usual, 1e-12):
-            text = (
-                f"{stream.name}: two values at one time, {np.median(apart):.3g} apart (median): two instruments in one"
-            )
-            findings.append(LogFinding("fault", text, stream.name))
+            text = f"two values at one time, {np.median(apart):.3g} apart (median): two instruments in one"
+            findings.append(fault(f"{stream.name}: {text}", stream.name))
         elif apart.any():
-            share = 100 * repeated / len(time)
-            text = f"{stream.name}: {share:.0f} % of its samples have the time of another, and are left out"
-            findings.append(LogFinding("note", text, stream.name))
-    tidy = LogStream(stream.name, time[new], values[new], stream.unit, stream.quantity, stream.stated_by)
-    return tidy, repeated, findings
+            text = f"{100 * repeated / len(time):.0f} % of its samples have the time of another, and are left out"
+            findings.append(note(f"{stream.name}: {text}", stream.name))
+    return replace(stream, time_s=time[new], values=values[new]), repeated, findings
 
 
 def usual_step(time_s: Array) -> float:

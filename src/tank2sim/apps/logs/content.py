@@ -1,4 +1,4 @@
-"""Tests of what a stream holds, by its consistency with the motion: heading, rates, speeds, courses, rudders."""
+"""Tests of what a stream holds, by its consistency with the motion: courses, rates, speeds, rudders, delays."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 from scipy.signal import lfilter
 
 from tank2sim.apps.logs.clock import usual_step
@@ -16,6 +17,7 @@ from tank2sim.apps.logs.reference import (
     ReferenceMotion,
     differenced,
     interpolated,
+    thinned_series,
 )
 from tank2sim.apps.logs.streams import wrapped_angle
 from tank2sim.arrays import Array
@@ -62,20 +64,13 @@ _NOMOTO_T_S = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0, 60.0)
 class ContentEvidence:
     """What the content of a stream says of what it is.
 
-    Parameters
-    ----------
-    agreement : float or None
-        0 to 1; None where the log cannot show it.
-    sign : int
-        Sign of the values against the convention of trials; 0 where the log cannot show it.
-    unit : str
-        Unit by the size of the values; empty where the log cannot show it.
-    offset_rad : float
-        Mean difference of an angle from what it should be, rad.
-    spread_rad : float
-        Median difference of an angle from what it should be, without its mean, rad.
-    text : str
-        The finding in a few words.
+    - `agreement`: 0 to 1; None where the log cannot show it.
+    - `sign`: Sign of the values against the convention of trials; 0 where the log cannot show it.
+    - `unit`: Unit by the size of the values; empty where the log cannot show it.
+    - `offset_rad`, `spread_rad`: Mean difference of an angle from what it should be, and the median difference without
+      this mean.
+    - `lag_s`: Time constant with which the turn follows a rudder.
+    - `text`: The finding in a few words.
     """
 
     agreement: float | None = None
@@ -83,7 +78,13 @@ class ContentEvidence:
     unit: str = ""
     offset_rad: float = 0.0
     spread_rad: float = 0.0
+    lag_s: float = 0.0
     text: str = ""
+
+    @property
+    def known(self) -> float:
+        """The agreement, 0 where the log cannot show it."""
+        return self.agreement or 0.0
 
 
 UNTESTED = ContentEvidence(text="not to be tested in this log")
@@ -102,40 +103,36 @@ def direction_evidence(time_s: Array, angle_rad: Array, motion: ReferenceMotion)
     All four right angles between them and both senses of rotation are tried; the agreement is the share of samples
     that differ by less than :data:`NEAR_RAD`.
     """
-    if not len(motion.time_s) or not motion.moving.any():
-        return UNTESTED
-    at = motion.time_s[motion.moving]
-    course = np.arctan2(motion.v_east_mps, motion.v_north_mps)[motion.moving]
-    step = max(usual_step(time_s), 1.0)
-    cosine, sine = (interpolated(at, time_s, part, 5 * step) for part in (np.cos(angle_rad), np.sin(angle_rad)))
+    moving, longest = motion.moving, 5 * max(usual_step(time_s), 1.0)
+    at, north, east = (part[moving] for part in (motion.time_s, motion.v_north_mps, motion.v_east_mps))
+    cosine, sine = (interpolated(at, time_s, part, longest) for part in (np.cos(angle_rad), np.sin(angle_rad)))
     good = np.isfinite(cosine)
     if good.sum() < FEW_SAMPLES:
         return UNTESTED
-    angle, course = np.arctan2(sine, cosine)[good], course[good]
-    shares = {
-        (sign, quarter): float((np.abs(wrapped_angle(sign * angle + quarter * math.pi / 2 - course)) < NEAR_RAD).mean())
+    angle, north, east = np.arctan2(sine, cosine)[good], north[good], east[good]
+    course = np.arctan2(east, north)
+    differences = {
+        (sign, quarter): wrapped_angle(sign * angle + quarter * math.pi / 2 - course)
         for sign in (1, -1)
         for quarter in range(4)
     }
-    as_it_is = shares[1, 0]
+    shares = {key: float((np.abs(each) < NEAR_RAD).mean()) for key, each in differences.items()}
+    agreement = shares[1, 0]
     best = max(shares, key=lambda key: shares[key] + (0.02 if key == (1, 0) else 0.0))
     turned = np.ptp(np.unwrap(course)) > LEAST_TURNED_RAD
-    sign, quarter = best
-    difference = wrapped_angle(sign * angle + quarter * math.pi / 2 - course)
-    middle = float(np.median(difference)) - quarter * math.pi / 2
-    offset = float(wrapped_angle(np.array([middle]))[0])
-    if best == (1, 0) or not turned:
-        text = f"follows the course of the positions in {100 * as_it_is:.0f} % of the time"
-        if turned and DIFFERS <= as_it_is < AGREES:
-            north, east = (part[motion.moving][good] for part in (motion.v_north_mps, motion.v_east_mps))
-            if (share := _sideways_share(angle, north, east)) < _SIDEWAYS:
-                as_it_is = AGREES
-                text += f", and moves sideways by {100 * share:.0f} % of its speed in a steady current"
-        spread = float(np.median(np.abs(difference - np.median(difference))))
-        return ContentEvidence(as_it_is, 1 if turned else 0, offset_rad=offset, spread_rad=spread, text=text)
-    mirrored = "mirrored and " if sign < 0 else ""
-    words = f"is {mirrored}off by {math.degrees(offset):.0f} deg against the course of the positions"
-    return ContentEvidence(as_it_is, sign, offset_rad=offset, text=words)
+    difference, (sign, quarter) = differences[best], best
+    middle = float(np.median(difference))
+    offset = float(wrapped_angle(np.array([middle - quarter * math.pi / 2]))[0])
+    if best != (1, 0) and turned:
+        mirrored = "mirrored and " if sign < 0 else ""
+        words = f"is {mirrored}off by {math.degrees(offset):.0f} deg against the course of the positions"
+        return ContentEvidence(agreement, sign, offset_rad=offset, text=words)
+    text = f"follows the course of the positions in {100 * agreement:.0f} % of the time"
+    if turned and DIFFERS <= agreement < AGREES and (share := _sideways_share(angle, north, east)) < _SIDEWAYS:
+        agreement = AGREES
+        text += f", and moves sideways by {100 * share:.0f} % of its speed in a steady current"
+    spread = float(np.median(np.abs(difference - middle)))
+    return ContentEvidence(agreement, 1 if turned else 0, offset_rad=offset, spread_rad=spread, text=text)
 
 
 def _sideways_share(heading: Array, north: Array, east: Array) -> float:
@@ -151,6 +148,11 @@ def _sideways_share(heading: Array, north: Array, east: Array) -> float:
     return float(np.sqrt(np.mean((across - sideways @ current) ** 2) / np.mean(speed**2)))
 
 
+def _integral(time_s: Array, values: Array) -> Array:
+    """Integral (n,) of a signal from its first sample."""
+    return np.asarray(cumulative_trapezoid(values, time_s, initial=0.0))
+
+
 def rate_evidence(
     time_s: Array, values: Array, motion: ReferenceMotion, windows_s: Sequence[float] = RATE_WINDOWS_S
 ) -> ContentEvidence:
@@ -160,7 +162,7 @@ def rate_evidence(
     """
     if len(motion.heading_time_s) < FEW_SAMPLES or len(time_s) < FEW_SAMPLES or np.ptp(values) == 0:
         return UNTESTED
-    area = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(time_s))])
+    area = _integral(time_s, values)
     best, slope, other = 0.0, np.zeros(0), np.zeros(0)
     for window in windows_s:
         at, slopes = differenced(motion.heading_time_s, motion.heading_rad, window)
@@ -175,8 +177,7 @@ def rate_evidence(
             break
     if len(other) < FEW_SAMPLES:
         return UNTESTED
-    scale = float(np.std(slope) / np.std(other))  # either may have the noise
-    unit = _nearest_unit(scale, "yaw_rate")
+    unit = _nearest_unit(float(np.std(slope) / np.std(other)), "yaw_rate")  # either may have the noise
     text = f"correlates with the derivative of the heading by {best:.3f}"
     return ContentEvidence(abs(best), 1 if best > 0 else -1, unit, text=text)
 
@@ -184,8 +185,6 @@ def rate_evidence(
 def speed_evidence(time_s: Array, values: Array, motion: ReferenceMotion, quantity: str) -> ContentEvidence:
     """Compare a speed (n,), in an unknown unit, with that of the positions: unit, and whether it follows it."""
     speed = motion.speed_mps
-    if len(speed) < FEW_SAMPLES or not motion.moving.any():
-        return UNTESTED
     other = interpolated(motion.time_s, time_s, values, 5 * max(usual_step(time_s), 1.0))
     good = np.isfinite(other) & motion.moving
     if good.sum() < FEW_SAMPLES:
@@ -208,29 +207,24 @@ def speed_evidence(time_s: Array, values: Array, motion: ReferenceMotion, quanti
 def component_evidence(time_s: Array, values: Array, reference: Array, motion: ReferenceMotion) -> ContentEvidence:
     """Compare a velocity (n,), m/s, with one of the positions at the times of the motion, without their means."""
     other = interpolated(motion.time_s, time_s, values, 5 * max(usual_step(time_s), 1.0))
-    good = np.isfinite(other) & np.isfinite(reference)
-    if good.sum() < FEW_SAMPLES:
+    if np.count_nonzero(np.isfinite(other) & np.isfinite(reference)) < FEW_SAMPLES:
         return UNTESTED
-    found = _correlation(other[good], reference[good])
-    text = f"correlates with the positions by {found:.2f}"
-    return ContentEvidence(abs(found), 1 if found > 0 else -1, text=text)
+    found = _correlation(other, reference)
+    return ContentEvidence(abs(found), 1 if found > 0 else -1, text=f"correlates with the positions by {found:.2f}")
 
 
-def steering_evidence(
-    time_s: Array, values: Array, rate_time_s: Array, rate: Array, hold: bool = False
-) -> tuple[ContentEvidence, float]:
-    """Compare a rudder (n,) with the rate of turn (m,) that follows it: agreement, sign, and the best time constant, s.
+def steering_evidence(time_s: Array, values: Array, rate_time_s: Array, rate: Array) -> ContentEvidence:
+    """Compare a rudder (n,) with the rate of turn (m,) that follows it: agreement, sign, and the best time constant.
 
     The rate is compared with the rudder behind a first-order lag (Nomoto 1957), over a range of time constants; a
     rudder leads the turn, and what has no lag (an acceleration, another rate) is none.
     """
-    step = float(np.clip(max(usual_step(rate_time_s), 0.1), 0.1, 1.0))
     if len(time_s) < FEW_SAMPLES or len(rate_time_s) < FEW_SAMPLES or np.ptp(values) == 0:
-        return UNTESTED, 0.0
-    begin, end = max(time_s[0], rate_time_s[0]), min(time_s[-1], rate_time_s[-1])
-    if end - begin < FEW_SAMPLES * step:
-        return UNTESTED, 0.0
-    grid = np.arange(begin, end, step)
+        return UNTESTED
+    step = float(np.clip(usual_step(rate_time_s), 0.1, 1.0))
+    grid = np.arange(max(time_s[0], rate_time_s[0]), min(time_s[-1], rate_time_s[-1]), step)
+    if len(grid) <= FEW_SAMPLES:
+        return UNTESTED
     rudder, turn = np.interp(grid, time_s, values), np.interp(grid, rate_time_s, rate)
     found: dict[float, float] = {}
     for constant in _NOMOTO_T_S:
@@ -239,7 +233,7 @@ def steering_evidence(
         found[constant] = _correlation(lagged, turn)
     best = max(found, key=lambda constant: abs(found[constant]))
     text = f"the rate of turn follows it by {found[best]:.2f} with a lag of {best:g} s"
-    return ContentEvidence(abs(found[best]), 1 if found[best] > 0 else -1, text=text), best
+    return ContentEvidence(abs(found[best]), 1 if found[best] > 0 else -1, lag_s=best, text=text)
 
 
 def rudder_unit(values: Array) -> str:
@@ -249,10 +243,8 @@ def rudder_unit(values: Array) -> str:
     70 to 105, nothing is certain, and the confidence says so.
     """
     most = float(np.nanpercentile(np.abs(values), 99.9))
-    for limit, unit in ((0.75, "rad"), (1.05, "1"), (1.6, ""), (75.0, "deg"), (105.0, "%")):
-        if most <= limit:
-            return unit
-    return ""
+    limits = ((0.75, "rad"), (1.05, "1"), (1.6, ""), (75.0, "deg"), (105.0, "%"))
+    return next((unit for limit, unit in limits if most <= limit), "")
 
 
 def _nearest_unit(scale: float, quantity: str) -> str:
@@ -270,3 +262,80 @@ def _correlation(first: Array, second: Array) -> float:
     a, b = first[good] - first[good].mean(), second[good] - second[good].mean()
     size = math.sqrt(float(np.sum(a * a) * np.sum(b * b)))
     return float(np.sum(a * b)) / size if size > 0 else 0.0
+
+
+SEGMENT_S = 60.0
+"""Length of the segments, each with an offset and a drift of its own, s: gyros drift over minutes (project choice)."""
+
+LEAST_SEGMENTS = 6
+"""Segments from which a scatter between them means something (project choice)."""
+
+LEAST_DELAY_S, SURE_ERRORS = 0.1, 5.0
+"""Delay below which a channel is left as it is, s, and standard errors by which it differs from 0 (project choices: a
+ship turns by 0.2 deg at most in it)."""
+
+_LARGEST_DELAY_S, _STEPS = 3.0, 6
+
+
+@dataclass(frozen=True)
+class RateDelay:
+    """By how much a rate of turn is late against the heading, s (negative: the heading is late), and its error."""
+
+    delay_s: float
+    standard_error_s: float
+
+    @property
+    def certain(self) -> bool:
+        """Whether it is large and sure enough to be applied."""
+        return abs(self.delay_s) > max(LEAST_DELAY_S, SURE_ERRORS * self.standard_error_s)
+
+
+def rate_delay(heading_time_s: Array, heading_rad: Array, rate_time_s: Array, rate_radps: Array) -> RateDelay | None:
+    """Delay of a rate of turn (m,), rad/s, against a continuous heading (n,), rad; None where too little overlaps.
+
+    The heading is the integral of the rate a delay d later, which to first order in each segment is
+
+        psi(t) = s A(t) + d r(t) + a + b t,  A the integral of r,
+
+    solved by least squares, with the rate moved by d until it no longer changes. The standard error is that of the
+    scatter between segments (Liang and Zeger 1986, Biometrika 73), so that drift of the sensors is in it.
+    """
+    rate_at, rate = thinned_series(rate_time_s, rate_radps, 0.2)
+    if len(rate_at) < 3 or len(heading_time_s) < 3:
+        return None
+    area = _integral(rate_at, rate)
+    at, heading = thinned_series(heading_time_s, heading_rad, 0.2)
+    longest = 5 * max(usual_step(rate_at), usual_step(at))
+    segment = np.floor((at - at[0]) / SEGMENT_S).astype(np.int64)
+    delay, error = 0.0, np.inf
+    for _ in range(_STEPS):
+        columns = [interpolated(at + delay, rate_at, values, longest) for values in (area, rate)]
+        parts = [
+            _without_line(at[rows], np.column_stack([heading[rows], *(column[rows] for column in columns)]))
+            for number in np.unique(segment)
+            if (rows := np.flatnonzero((segment == number) & np.isfinite(columns[0]))).size > 10
+        ]
+        if len(parts) < LEAST_SEGMENTS:
+            return None
+        table = np.concatenate(parts)
+        X, y = table[:, 1:], table[:, 0]
+        normal = X.T @ X
+        if np.linalg.cond(normal / np.sqrt(np.outer(np.diag(normal), np.diag(normal)))) > 1e8:
+            return None
+        (scale, step), *_ = np.linalg.lstsq(X, y, rcond=None)
+        scores = np.array([part[:, 1:].T @ (part[:, 0] - part[:, 1:] @ [scale, step]) for part in parts])
+        inverse = np.linalg.inv(normal)
+        spread = np.sqrt((inverse @ (scores.T @ scores) @ inverse)[1, 1] * len(parts) / (len(parts) - 1))
+        change, error = step / scale, float(spread / abs(scale))
+        delay += float(change)
+        if abs(delay) > _LARGEST_DELAY_S:
+            return None
+        if abs(change) < 0.01:
+            break
+    return RateDelay(delay, error)
+
+
+def _without_line(time_s: Array, columns: Array) -> Array:
+    """Columns (n, k) less their straight lines in time."""
+    line = np.column_stack([np.ones(len(time_s)), time_s - time_s.mean()])
+    return np.asarray(columns - line @ np.linalg.lstsq(line, columns, rcond=None)[0])

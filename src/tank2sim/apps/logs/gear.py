@@ -71,28 +71,17 @@ class GearLimit:
 class LoggedGear:
     """Steering gear by a log.
 
-    Parameters
-    ----------
-    angle, order : str
-        Streams of the rudder's angle and of its order.
-    duration_s : float
-        Time for which both were recorded.
-    moves : int
-        Movements of the order of a degree or more, counted from one change of side to the next.
-    rate_degps, rate_error_degps : float or None
-        Rate with its standard error; None where the order never left the rudder behind.
-    lag_s, lag_error_s : float
-        From the order to the first movement.
-    dead_band_deg, dead_band_error_deg : float
-        Difference from which the rudder moves.
-    offset_deg : float
-        Recorded angle less order at rest.
-    fastest_degps : float
-        Fastest movement over :data:`_FASTEST_S` in the whole record, also by hand: the gear's rate at least.
-    residual_deg : float
-        Root mean square of simulated less recorded angle.
-    port, starboard : GearLimit or None
-        Largest angles that were held, in the whole record; the gear may go further.
+    - `angle`, `order`: Streams of the rudder's angle and of its order.
+    - `duration_s`: Time for which both were recorded.
+    - `moves`: Movements of the order of a degree or more, counted from one change of side to the next.
+    - `rate_degps`, `rate_error_degps`: Rate with its standard error; None where the order never left the rudder behind.
+    - `lag_s`, `lag_error_s`: From the order to the first movement.
+    - `dead_band_deg`, `dead_band_error_deg`: Difference from which the rudder moves.
+    - `offset_deg`: Recorded angle less order at rest.
+    - `fastest_degps`: Fastest movement over :data:`_FASTEST_S` in the whole record, also by hand: the gear's rate at
+      least.
+    - `residual_deg`: Root mean square of simulated less recorded angle.
+    - `port`, `starboard`: Largest angles that were held, in the whole record; the gear may go further.
     """
 
     angle: str
@@ -133,10 +122,6 @@ def logged_gear(voyage: Voyage) -> LoggedGear | None:
     """The steering gear by the rudder's angle and order of a voyage; None without both, or with too few movements.
 
     A rudder that the turn of the vessel does not confirm is taken, too: at the dock nothing follows it.
-
-    Parameters
-    ----------
-    voyage : Voyage
     """
     of_angle, of_order = (_rudder(voyage, quantity) for quantity in ("rudder_angle", "rudder_order"))
     if of_angle is None or of_order is None:
@@ -145,42 +130,37 @@ def logged_gear(voyage: Voyage) -> LoggedGear | None:
     begin, end = _busiest(max(time_s[0], order_s[0]), min(time_s[-1], order_s[-1]), order_s, order)
     inside = (time_s >= begin) & (time_s <= end)
     asked = order[(order_s >= begin) & (order_s <= end)]
-    if np.count_nonzero(inside) < 10 * _BLOCKS or len(asked) < _FEWEST_MOVES:
-        return None
-    moves = _moves(asked)
-    if moves < _FEWEST_MOVES:
+    moves = _moves(asked) if len(asked) >= _FEWEST_MOVES else 0
+    if np.count_nonzero(inside) < 10 * _BLOCKS or moves < _FEWEST_MOVES:
         return None
     record = _Record(time_s[inside], angle[inside], order_s, order)
-    blocks = np.array_split(np.arange(np.count_nonzero(inside)), _BLOCKS)
-    best, squares = record.fit(np.ones(len(record.time_s)))
+    whole = np.ones(len(record.time_s))
+    best, squares = record.fit(whole)
     if math.sqrt(squares) > _FOLLOWS * float(np.std(record.angle)):
         return None
     parts = []
-    for block in blocks:
-        weights = np.ones(len(record.time_s))
+    for block in np.array_split(np.arange(len(whole)), _BLOCKS):
+        weights = whole.copy()
         weights[block] = 0.0
         parts.append(record.fit(weights, near=best)[0])
-    spread = np.array(parts) - np.mean(parts, axis=0)
-    errors = np.sqrt((_BLOCKS - 1) / _BLOCKS * np.sum(spread**2, axis=0))
+    errors = np.sqrt((_BLOCKS - 1) * np.var(parts, axis=0))
     clocks = math.hypot(*(float(np.median(np.diff(times))) for times in (record.time_s, order_s)))
     errors = np.maximum(errors, [0.0, clocks / math.sqrt(12), math.radians(_resolution_deg(angle)), 0.0])
     at_once = record.simulate(np.array([_RATES[1]]), best[1:2], best[2:3])[:, 0] + best[3]
     known = float(np.mean((at_once - record.angle) ** 2)) > _KNOWN * squares
-    rate, rate_error, band, band_error, offset = (
-        math.degrees(value) for value in (best[0], errors[0], best[2], errors[2], best[3])
-    )
+    degrees, errors_deg = np.degrees(best).tolist(), np.degrees(errors).tolist()
     return LoggedGear(
         angle=angle_name,
         order=order_name,
         duration_s=float(end - begin),
         moves=moves,
-        rate_degps=rate if known else None,
-        rate_error_degps=rate_error if known else None,
+        rate_degps=degrees[0] if known else None,
+        rate_error_degps=errors_deg[0] if known else None,
         lag_s=float(best[1]),
         lag_error_s=float(errors[1]),
-        dead_band_deg=band,
-        dead_band_error_deg=band_error,
-        offset_deg=offset,
+        dead_band_deg=degrees[2],
+        dead_band_error_deg=errors_deg[2],
+        offset_deg=degrees[3],
         fastest_degps=_fastest_degps(time_s, angle),
         residual_deg=math.degrees(math.sqrt(squares)),
         port=_limit(time_s, angle, -1.0),
@@ -280,17 +260,17 @@ class _Record:
 
     def fit(self, weights: Array, near: Array | None = None) -> tuple[Array, float]:
         """Rate, lag, dead band and offset (4,) of the least weighted mean square, and this; sought `near` a fit."""
-        low = np.array([math.log(_RATES[0]), _LAGS[0], _BANDS[0]])
-        high = np.array([math.log(_RATES[1]), _LAGS[1], _BANDS[1]])
-        bounds = low, high
-        best, least, rounds = np.zeros(4), math.inf, _ROUNDS
+        bounds = np.array([np.log(_RATES), _LAGS, _BANDS]).T
+        low, high, rounds = *bounds, _ROUNDS
+        best, least = np.zeros(4), math.inf
+
+        def about(found: Array, width: Array) -> Array:
+            """Ends of the axes about a fit, within their bounds (2, 3)."""
+            centre = np.array([math.log(found[0]), found[1], found[2]])
+            return np.asarray(np.clip([centre - width / 2, centre + width / 2], *bounds))
+
         if near is not None:
-            centre, width = (
-                np.array([math.log(near[0]), near[1], near[2]]),
-                _NARROWER ** (_ROUNDS - _AGAIN) * (high - low),
-            )
-            low, high = np.maximum(low, centre - width / 2), np.minimum(high, centre + width / 2)
-            rounds = _AGAIN
+            (low, high), rounds = about(near, _NARROWER ** (_ROUNDS - _AGAIN) * (high - low)), _AGAIN
         for _ in range(rounds):
             axes = [np.linspace(*ends, _POINTS) for ends in zip(low, high, strict=True)]
             points = np.array(np.meshgrid(*axes, indexing="ij")).reshape(3, -1)
@@ -301,8 +281,7 @@ class _Record:
             if squares[place] < least:
                 least = float(squares[place])
                 best = np.array([math.exp(points[0, place]), *points[1:, place], offset[place]])
-            centre, width = np.array([math.log(best[0]), best[1], best[2]]), _NARROWER * (high - low)
-            low, high = np.maximum(bounds[0], centre - width / 2), np.minimum(bounds[1], centre + width / 2)
+            low, high = about(best, _NARROWER * (high - low))
         return best, least
 
     def simulate(self, rate: Array, lag: Array, band: Array) -> Array:

@@ -6,42 +6,32 @@ import datetime as dt
 import logging
 import math
 import re
-from array import array
 from collections import Counter, defaultdict
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from scipy.stats import theilslopes
 
 from tank2sim.apps.logs.clock import continued_clock, rollover_s
-from tank2sim.apps.logs.lines import mostly, text_lines
 from tank2sim.apps.logs.nmea0183 import steady_times
-from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, not_used, optional_library
+from tank2sim.apps.logs.streams import (
+    FIELDS,
+    LogFinding,
+    LogStream,
+    Samples,
+    VesselLog,
+    fault,
+    mostly,
+    not_used,
+    note,
+    text_lines,
+)
 from tank2sim.arrays import Array
-from tank2sim.errors import InputError
+from tank2sim.errors import InputError, optional_library
 
-_FIELDS: dict[int, dict[str, tuple[str, str]]] = {
-    127250: {"heading": ("rad", "heading")},
-    127251: {"rate": ("rad/s", "yaw_rate")},
-    127245: {"position": ("rad", "rudder_angle"), "angleOrder": ("rad", "rudder_order")},
-    127257: {"roll": ("rad", "heel")},
-    127488: {"speed": ("rpm", "rpm")},
-    128259: {"speedWaterReferenced": ("m/s", "u_water")},
-    129025: {"latitude": ("deg", "latitude"), "longitude": ("deg", "longitude")},
-    129026: {"cog": ("rad", "cog"), "sog": ("m/s", "sog")},
-    129029: {"latitude": ("deg", "latitude"), "longitude": ("deg", "longitude")},
-    130306: {"windSpeed": ("m/s", "wind_rel_speed"), "windAngle": ("rad", "wind_rel_direction")},
-    130578: {
-        "longitudinalSpeedWaterReferenced": ("m/s", "u_water"),
-        "transverseSpeedWaterReferenced": ("m/s", "v_water"),
-        "longitudinalSpeedGroundReferenced": ("m/s", "u_ground"),
-        "transverseSpeedGroundReferenced": ("m/s", "v_ground"),
-    },
-}
-"""Fields of the messages (PGN) by the names of canboat, with the unit of the library and the quantity."""
-
+_FIELDS: dict[int, dict[str, list[str]]] = {int(pgn): fields for pgn, fields in FIELDS["nmea2000"].items()}
 _SYSTEM_TIME, _VARIATION, _RUDDER, _ENGINE = 126992, 127258, 127245, 127488
+_TRUE = "true heading"
 _EPOCHS = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
 _OFTEN = 0.1
 """Share of time stamps that fall from which they are differences. Project choice: messages rarely change places."""
@@ -106,10 +96,7 @@ def read_nmea2000(path: Path) -> VesselLog:
     stamp of the recorder they are those of the system times before and after. Time stamps without a date and without a
     system time give a log without a date.
 
-    Raises
-    ------
-    InputError
-        The file cannot be read, no message is understood, or there is no time.
+    Raises InputError: The file cannot be read, no message is understood, or there is no time.
     """
     reader = _Reader(path)
     for number, line in enumerate(text_lines(path)):
@@ -118,13 +105,8 @@ def read_nmea2000(path: Path) -> VesselLog:
     return reader.log()
 
 
-@dataclass
-class _Column:
-    """Values of a field of one source, with time stamps and numbers of lines."""
-
-    stamps: array[float] = field(default_factory=lambda: array("d"))
-    values: array[float] = field(default_factory=lambda: array("d"))
-    lines: array[int] = field(default_factory=lambda: array("q"))
+_Key = tuple[int, int, str, str, str]
+"""Message (PGN), source, field, quantity, instance."""
 
 
 class _Reader:
@@ -133,14 +115,12 @@ class _Reader:
     def __init__(self, path: Path) -> None:
         self.path = path
         logging.getLogger("nmea2000").setLevel(logging.ERROR)
-        self.decoder = optional_library("nmea2000", path).NMEA2000Decoder()
+        self.decoder = optional_library("nmea2000", "logs", path).NMEA2000Decoder()
         self.counts: Counter[str] = Counter()
         self.unused: Counter[int] = Counter()
-        self.columns: dict[tuple[int, int, str, str, str], _Column] = defaultdict(_Column)
-        self.units: dict[tuple[int, str], str] = {}
-        self.ticks = _Column()
-        self.clocks: dict[int, _Column] = defaultdict(_Column)
-        self.sums = _Column()
+        self.columns: dict[_Key, Samples] = defaultdict(Samples)
+        self.clocks: dict[int, Samples] = defaultdict(Samples)
+        self.sums = Samples()
         self.variation = math.nan
         self.days, self.last_s = 0, 0.0
 
@@ -163,45 +143,37 @@ class _Reader:
             stamp = self._of_day(clock)
         elif not frame and _TIMED.match(line):
             stamp = message.timestamp.replace(tzinfo=dt.UTC).timestamp()
-        self.counts["timed"] += math.isfinite(stamp)
-        self.counts["untimed"] += math.isnan(stamp)
+        self.counts["timed" if math.isfinite(stamp) else "untimed"] += 1
         values = {entry.id: entry.value for entry in message.fields}
         if message.PGN == _SYSTEM_TIME and isinstance(values.get("date"), dt.date):
             moment = dt.datetime.combine(values["date"], values["time"], tzinfo=dt.UTC)
-            _append(self.clocks[message.source], stamp, moment.timestamp(), number)
+            self.clocks[message.source].add(moment.timestamp(), number, stamp)
         if message.PGN == _VARIATION and isinstance(values.get("variation"), float):
             self.variation = values["variation"]
         self._keep(message.PGN, message.source, values, stamp, number)
 
     def _keep(self, pgn: int, source: int, values: dict[str, object], stamp: float, number: int) -> None:
         """Keep the fields that are quantities; of a message that is not used, all numbers."""
-        fields = _FIELDS.get(pgn)
-        if fields is None:
-            if pgn != _SYSTEM_TIME:
-                self.unused[pgn] += 1
-            names = [name for name in values if pgn in _VESSELS and not _NOT_VALUES.match(name)]
-            fields = dict.fromkeys(names, ("", ""))
+        self.unused[pgn] += pgn not in _FIELDS and pgn != _SYSTEM_TIME
+        names = [name for name in values if pgn in _VESSELS and not _NOT_VALUES.match(name)]
         instance = str(values["instance"]) if pgn in (_RUDDER, _ENGINE) and "instance" in values else ""
-        for name, (unit, quantity) in fields.items():
-            if isinstance(value := values.get(name), int | float):
-                self.units[pgn, name] = unit
-                where = _quantity(pgn, quantity, values)
-                _append(self.columns[pgn, source, name, where, instance], stamp, float(value), number)
-                if where == "magnetic_heading":
-                    stated = [values.get(key) for key in ("deviation", "variation")]
-                    deviation, variation = (part if isinstance(part, float) else 0.0 for part in stated)
-                    true = value + deviation + (variation or self.variation)
-                    if math.isfinite(true):
-                        self.units[pgn, "true heading"] = "rad"
-                        column = self.columns[pgn, source, "true heading", "heading", ""]
-                        _append(column, stamp, true % (2 * math.pi), number)
+        for name in _FIELDS.get(pgn, names):
+            if not isinstance(value := values.get(name), int | float):
+                continue
+            quantity = _quantity(pgn, name, values)
+            self.columns[pgn, source, name, quantity, instance].add(float(value), number, stamp)
+            if quantity == "magnetic_heading":
+                stated = [values.get(key) for key in ("deviation", "variation")]
+                deviation, variation = (part if isinstance(part, float) else 0.0 for part in stated)
+                true = value + deviation + (variation or self.variation)
+                if math.isfinite(true):
+                    self.columns[pgn, source, _TRUE, "heading", ""].add(true % (2 * math.pi), number, stamp)
 
     def _sum(self, stamp: float, number: int) -> None:
         """Count where time stamps fall, and add them up, for they may be differences (candump -t d)."""
-        before = self.sums.stamps[-1] if len(self.sums.stamps) else 0.0
-        total = self.sums.values[-1] if len(self.sums.values) else 0.0
+        before, total = (self.sums.stamps[-1], self.sums.values[-1]) if self.sums.lines else (0.0, 0.0)
         self.counts["falls"] += stamp < before
-        _append(self.sums, stamp, total + stamp, number)
+        self.sums.add(total + stamp, number, stamp)
 
     def _of_day(self, clock: re.Match[str]) -> float:
         """Time of day, s, which goes on over midnight."""
@@ -214,57 +186,59 @@ class _Reader:
     def log(self) -> VesselLog:
         """The log after the last line."""
         ticks, findings = self._one_clock()
-        self.ticks = ticks
         if not any(quantity for _, _, _, quantity, _ in self.columns):
             raise InputError(self.path, "", "no message of it is understood", "give a log of candump or of Actisense")
         timed = self.counts["timed"] > _SAME * (self.counts["timed"] + self.counts["untimed"])
         if not timed and len(ticks.values) < 2:
             remedy = "log with time stamps: candump -L"
             raise InputError(self.path, "", "has neither time stamps nor system times", remedy)
-        stamps = [np.array(column.stamps) for column in (*self.columns.values(), ticks)]
+        times, dated, found = self._times(ticks, timed)
+        findings += found
+        streams = [self._stream(key, time) for key, time in zip(self.columns, times, strict=True)]
+        streams.sort(key=lambda stream: _TRUE in stream.name)
+        counts = {"lines": self.counts["lines"]}
+        if spoilt := self.counts["corrupted"]:
+            findings.append(note(f"{spoilt} of {self.counts['lines']} lines are corrupted and left out"))
+            counts["corrupted"] = spoilt
+        if unused := self.unused.total():
+            counts["unused"] = unused
+            kinds = {f"PGN {pgn}": number for pgn, number in self.unused.items() if pgn in _VESSELS and number}
+            others = unused - sum(kinds.values())
+            findings += not_used("messages", kinds | ({"of makers, satellites, other ships": others} if others else {}))
+        return VesselLog(self.path, "NMEA 2000", tuple(streams), counts, tuple(findings), dated)
+
+    def _times(self, ticks: Samples, timed: bool) -> tuple[list[Array], bool, list[LogFinding]]:
+        """Times of all columns by their stamps, else by the system times around them; if they are UTC; findings."""
+        columns = [*self.columns.values(), ticks]
+        stamps = [np.array(column.stamps) for column in columns]
         dated = not timed or float(np.nanmedian(stamps[0])) > _FIRST_EPOCH_S
+        findings: list[LogFinding] = []
         if timed and not dated and self.counts["falls"] > _OFTEN * self.counts["lines"]:
-            columns = (*self.columns.values(), ticks)
             stamps = [np.interp(column.lines, self.sums.lines, self.sums.values) for column in columns]
-            findings.append(LogFinding("note", "the time stamps count from line to line and are added up"))
-        clock = np.array(ticks.values)
-        if len(clock) > 1:
-            clock, found = continued_clock(clock, "system time")
-            findings += found
-        shift, pace = 0.0, 1.0
-        if timed and len(clock):
+            findings.append(note("the time stamps count from line to line and are added up"))
+        clock, found = continued_clock(np.array(ticks.values), "system time")
+        findings += found
+        if not timed:
+            between = [np.interp(column.lines, ticks.lines, clock) for column in columns[:-1]]
+            return [steady_times(time) for time in between], True, findings
+        shift = 0.0
+        if len(clock):
             pace, found = _pace(stamps[-1], clock)
-            findings += found
             stamps = [pace * stamp for stamp in stamps]
             shift = float(np.nanmedian(clock - stamps[-1]))
             if dated and pace == 1.0:
-                turned, found = rollover_s(shift)
-                shift, findings = shift + turned, [*findings, *(found or _recorder_off(shift))]
-        streams = []
-        for (key, column), stamp in zip(self.columns.items(), stamps, strict=False):
-            time = stamp + shift if timed else steady_times(np.interp(column.lines, ticks.lines, clock))
-            streams.append(self._stream(key, column, time, findings))
-        streams.sort(key=lambda stream: "true heading" in stream.name)
-        if spoilt := self.counts["corrupted"]:
-            text = f"{spoilt} of {self.counts['lines']} lines are corrupted and left out"
-            findings.append(LogFinding("note", text))
-        counts = {"lines": self.counts["lines"]} | ({"corrupted": spoilt} if spoilt else {})
-        if self.unused.total():
-            counts["unused"] = self.unused.total()
-            kinds = {f"PGN {pgn}": number for pgn, number in self.unused.items() if pgn in _VESSELS}
-            others = self.unused.total() - sum(kinds.values())
-            findings += not_used("messages", kinds | ({"of makers, satellites, other ships": others} if others else {}))
-        return VesselLog(
-            self.path, "NMEA 2000", tuple(streams), counts, tuple(findings), dated or len(ticks.values) > 0
-        )
+                turned, rolled = rollover_s(shift)
+                shift, found = shift + turned, [*found, *(rolled or _recorder_off(shift))]
+            findings += found
+        return [stamp + shift for stamp in stamps[:-1]], dated or len(clock) > 0, findings
 
-    def _one_clock(self) -> tuple[_Column, list[LogFinding]]:
+    def _one_clock(self) -> tuple[Samples, list[LogFinding]]:
         """The system times of the source with most of them, and findings on other sources whose clocks differ.
 
         Of sources that send equally often (within a fifth) it is the one whose clock is in the middle.
         """
         if not self.clocks:
-            return self.ticks, []
+            return Samples(), []
         most = max(len(column.values) for column in self.clocks.values())
         often = {source: column for source, column in self.clocks.items() if len(column.values) > 0.8 * most}
         ahead = {source: _ahead_s(column, often) for source, column in self.clocks.items()}
@@ -275,27 +249,26 @@ class _Reader:
             if abs(late) > _CLOCKS_APART_S:
                 word = "behind" if late > 0 else "ahead of"
                 text = f"the clock of source {source} is {abs(late):.2g} s {word} that of {chosen}, which is used"
-                findings.append(LogFinding("note", text, evidence={"behind_s": late}))
+                findings.append(note(text, behind_s=late))
         return self.clocks[chosen], findings
 
-    def _stream(
-        self, key: tuple[int, int, str, str, str], column: _Column, time: Array, findings: list[LogFinding]
-    ) -> LogStream:
+    def _stream(self, key: _Key, time: Array) -> LogStream:
         """A column under a name of its own; engines by their instance, of which a single one has no side."""
         pgn, source, name, quantity, instance = key
         alike = [other for other in self.columns if (other[0], *other[2:]) == (pgn, *key[2:])]
-        instances = sorted({other[4] for other in self.columns if (other[0], other[2]) == (pgn, name)}, key=_engine)
+        instances = {other[4] for other in self.columns if (other[0], other[2]) == (pgn, name)}
+        # Of engines the port one is the first (canboat, ENGINE_INSTANCE).
+        places = sorted(instances, key=lambda other: ("Starboard" in other and "Port" not in other, other))
         label = f"{pgn}.{name}"
-        if pgn in _FIELDS and name in _FIELDS[pgn] and quantity != _FIELDS[pgn][name][1]:
-            label += f" ({quantity})"
+        unit, usual = _FIELDS.get(pgn, {}).get(name, ["rad" if name == _TRUE else "", quantity])
+        label += f" ({quantity})" if quantity != usual else ""
         if len(instances) > 1:
-            place = instances.index(instance)
+            place = places.index(instance)
             label += f" of {('port', 'starboard')[place]}" if pgn == _ENGINE and place < 2 else f" of {place}"
             if pgn == _ENGINE:
                 quantity = ("rpm_port", "rpm_starboard")[place] if place < 2 else ""
         label += f" from {source}" if len(alike) > 1 else ""
-        unit = self.units[pgn, name]
-        return LogStream(label, time, np.array(column.values), unit, quantity, "format" if quantity else "")
+        return LogStream(label, time, np.array(self.columns[key].values), unit, quantity, "format" if quantity else "")
 
 
 def _pace(stamps: Array, clock: Array) -> tuple[float, list[LogFinding]]:
@@ -310,30 +283,23 @@ def _pace(stamps: Array, clock: Array) -> tuple[float, list[LogFinding]]:
     if abs(pace - 1) < _PACE_OFF or pace <= 0:
         return 1.0, []
     text = f"the clock of the satellites runs {pace:.3g} times as fast as that of the recorder, and is used"
-    return pace, [LogFinding("fault", text, evidence={"pace": pace})]
+    return pace, [fault(text, pace=pace)]
 
 
 def _recorder_off(ahead_s: float) -> list[LogFinding]:
     """A note on a recorder's clock that differs by more than the steps of the system time."""
-    if abs(ahead_s) <= _CLOCKS_APART_S:
-        return []
     word = "behind" if ahead_s > 0 else "ahead of"
     text = f"the clock of the recorder is {abs(ahead_s):.3g} s {word} that of the satellites, which is used"
-    return [LogFinding("note", text, evidence={"behind_s": ahead_s})]
+    return [note(text, behind_s=ahead_s)] if abs(ahead_s) > _CLOCKS_APART_S else []
 
 
-def _ahead_s(column: _Column, every: dict[int, _Column]) -> float:
+def _ahead_s(column: Samples, every: dict[int, Samples]) -> float:
     """Median of a clock less the time stamps; of lines without, less the mean clock of all sources at these lines."""
     clock, stamps = np.array(column.values), np.array(column.stamps)
     if np.isfinite(stamps).all():
         return float(np.median(clock - stamps))
     means = [np.interp(column.lines, other.lines, other.values) for other in every.values()]
     return float(np.median(clock - np.mean(means, axis=0)))
-
-
-def _engine(instance: str) -> tuple[int, str]:
-    """Order of engines: the port one is the first (canboat, ENGINE_INSTANCE)."""
-    return "Starboard" in instance and "Port" not in instance, instance
 
 
 def _seconds(text: str) -> float:
@@ -345,14 +311,9 @@ def _seconds(text: str) -> float:
     return value * next((factor for least, factor in _EPOCHS if value > least), 1.0)
 
 
-def _append(column: _Column, stamp: float, value: float, number: int) -> None:
-    column.stamps.append(stamp)
-    column.values.append(value)
-    column.lines.append(number)
-
-
-def _quantity(pgn: int, quantity: str, values: dict[str, object]) -> str:
-    """Quantity of a field whose meaning depends on other fields of its message."""
+def _quantity(pgn: int, name: str, values: dict[str, object]) -> str:
+    """Quantity of a field, whose meaning may depend on other fields of its message."""
+    _, quantity = _FIELDS.get(pgn, {}).get(name, ("", ""))
     reference = str(values.get("reference", values.get("cogReference", "")))
     if pgn == 127250 and reference.startswith("Magnetic"):
         return "magnetic_heading"

@@ -15,6 +15,7 @@ from tank2sim.apps.logs.ros import read_ros_bag
 from tank2sim.apps.logs.streams import VesselLog
 from tank2sim.apps.logs.table import read_table_log
 from tank2sim.errors import InputError
+from tank2sim.files import first_bytes
 from tank2sim.plugins import Registry
 from tank2sim.records.text_layout import decoded_text
 
@@ -103,13 +104,7 @@ def read_log(path: Path | str) -> VesselLog:
             problem = "is a folder, and neither a log nor a bag of ROS 2 (no metadata.yaml)"
             raise InputError(path, "", problem, "give the log in it")
         return read_ros_bag(path)
-    try:
-        with path.open("rb") as file:
-            head = file.read(_HEAD_BYTES)
-    except FileNotFoundError:
-        raise InputError(path, "", "the file does not exist", "check the name") from None
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read ({error.strerror})", "check the name and its permissions") from None
+    head = first_bytes(path, _HEAD_BYTES)
     if not head.strip():
         raise InputError(path, "", "is empty", "give a log with values")
     text, encoding = decoded_text(head, complete=False)

@@ -34,14 +34,9 @@ _LONGEST_BRIDGE = 3.0
 class ReferenceMotion:
     """Motion by positions and headings alone.
 
-    Parameters
-    ----------
-    time_s : array (n,)
-        Times of the velocities, UTC s.
-    v_north_mps, v_east_mps : array (n,)
-        Over the ground, m/s.
-    heading_time_s, heading_rad : array (m,)
-        Continuous heading, rad; empty where there is none.
+    - `time_s` (n,): Times of the velocities, UTC s.
+    - `v_north_mps`, `v_east_mps` (n,): Over the ground, m/s.
+    - `heading_time_s`, `heading_rad` (m,): Continuous heading, rad; empty where there is none.
     """
 
     time_s: Array

@@ -13,12 +13,11 @@ from tank2sim.answer.charts.motion import History, Signal, TimeMark, TrackData, 
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, records_table, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.logs.channels import CHANNELS_FILE, channels_text
-from tank2sim.apps.logs.current import DriftCurrent
 from tank2sim.apps.logs.gear import LoggedGear
 from tank2sim.apps.logs.stretches import Stretch
 from tank2sim.apps.logs.study import LogStudy
 from tank2sim.apps.logs.trial_files import TrialCut, remove_earlier_trials
-from tank2sim.apps.logs.voyage import Voyage
+from tank2sim.apps.logs.voyage import DriftCurrent, Voyage
 from tank2sim.arrays import Columns
 from tank2sim.files import folder_made, write_together
 from tank2sim.notices import Notice

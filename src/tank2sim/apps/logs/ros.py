@@ -10,17 +10,28 @@ import math
 import tempfile
 from array import array
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from functools import cache
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tank2sim.apps.logs.quantities import QUANTITIES, plain_words, quantity_of_name
-from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, heading_of_quaternion, optional_library
+from tank2sim.apps.logs.quantities import plain_words
+from tank2sim.apps.logs.streams import (
+    LogFinding,
+    LogStream,
+    VesselLog,
+    heading_of_quaternion,
+    named_stream,
+    note,
+    unreadable,
+)
 from tank2sim.arrays import Array
-from tank2sim.errors import InputError
+from tank2sim.errors import InputError, optional_library
+from tank2sim.files import first_bytes
 from tank2sim.records.spelt_units import split_unit
 
 LONGEST_VECTOR = 32
@@ -53,16 +64,12 @@ def read_ros_bag(path: Path) -> VesselLog:
     another pace, as those of a simulation do, theirs are taken for all, and the log has no date. Fixes without a status
     of a fix hold no value.
 
-    Raises
-    ------
-    InputError
-        The file is cut off or is not a bag, or no message of it has a number.
+    Raises InputError: The file is cut off or is not a bag, or no message of it has a number.
     """
-    highlevel = optional_library("rosbags.highlevel", path)
-    stores = optional_library("rosbags.typesys", path)
+    highlevel = optional_library("rosbags.highlevel", "logs", path)
+    stores = optional_library("rosbags.typesys", "logs", path)
     store = stores.get_typestore(stores.Stores.LATEST)
     topics: dict[str, _Topic] = {}
-    findings: list[LogFinding] = []
     failed: dict[str, str] = {}
     try:
         with (
@@ -80,11 +87,10 @@ def read_ros_bag(path: Path) -> VesselLog:
                 topics[connection.topic].take(message, received_ns)
     except InputError:
         raise
-    except Exception as error:  # the library lets errors of struct, lz4 and zstd through
-        problem = f"cannot be read to its end ({type(error).__name__}: {' '.join(str(error).split())[:100]})"
+    except Exception as error:
         remedy = "it may be cut off: repair it with 'rosbag reindex' or 'mcap recover'"
-        raise InputError(path, "", problem, remedy) from None
-    findings += [LogFinding("note", f"{topic} cannot be decoded ({why})", topic) for topic, why in failed.items()]
+        raise unreadable(path, error, remedy, "cannot be read to its end") from None
+    findings = [note(f"{topic} cannot be decoded ({why})", topic) for topic, why in failed.items()]
     simulated = _simulated_times(topics.values(), findings)
     streams = [stream for topic in topics.values() for stream in topic.streams(simulated, findings)]
     if not streams:
@@ -105,16 +111,13 @@ def _named(path: Path, folder: Path) -> Path:
 
 def _suffix(path: Path) -> str:
     """The ending that a bag should have, by its first bytes."""
-    if path.is_dir():
-        return ""
-    with path.open("rb") as file:
-        return _SUFFIXES.get(file.read(4), path.suffix)
+    return "" if path.is_dir() else _SUFFIXES.get(first_bytes(path, 4), path.suffix)
 
 
 def _simulated_times(topics: Iterable[_Topic], findings: list[LogFinding]) -> tuple[Array, Array] | None:
     """Times of recording and of the headers (n,), s, where these run at another pace; None where they do not."""
     pairs = [np.column_stack(topic.clock) for topic in topics if topic.stamped and len(topic.received) > 1]
-    both = np.concatenate(pairs) if pairs else np.zeros((0, 2))
+    both = np.concatenate([np.zeros((0, 2)), *pairs])
     both = both[both[:, 1] > 0]
     if len(both) < 2 or abs(float(np.median(both[:, 1] - both[:, 0]))) < _OFF_BY_S:
         return None
@@ -122,10 +125,8 @@ def _simulated_times(topics: Iterable[_Topic], findings: list[LogFinding]) -> tu
     spans = np.ptp(both, axis=0)
     if not spans.all() or abs(spans[1] / spans[0] - 1) < _PACE:
         return None
-    text = (
-        f"the times of the headers run {spans[1] / spans[0]:.3g} times as fast as the recording, as of a simulation: "
-    )
-    findings.append(LogFinding("note", f"{text}they are taken, and the trials have no date"))
+    text = f"the times of the headers run {spans[1] / spans[0]:.3g} times as fast as the recording, as of a simulation"
+    findings.append(note(f"{text}: they are taken, and the trials have no date"))
     return both[:, 0], both[:, 1]
 
 
@@ -133,16 +134,18 @@ class _Topic:
     """Numbers of the messages of one topic."""
 
     def __init__(self, name: str, kind: str, message: Any) -> None:
-        self.name, self.kind = name, kind.replace("/msg/", "/")
+        header = getattr(message, "header", None)
+        self.name, self.kind = name, kind.rpartition("/")[2]
         self.paths = list(_numbers_of(message))
-        self.get = [_getter(path) for path in self.paths]
-        self.stamped = hasattr(getattr(message, "header", message), "stamp")
-        self.frame = str(getattr(getattr(message, "header", None), "frame_id", "")).strip("/").lower()
-        self.child = str(getattr(message, "child_frame_id", "")).strip("/").lower()
+        self.stamped = hasattr(header or message, "stamp")
+        self.frame, self.child = (
+            str(frame).strip("/").lower()
+            for frame in (getattr(header, "frame_id", ""), getattr(message, "child_frame_id", ""))
+        )
         self.received, self.stamps = array("d"), array("d")
         self.columns: dict[str, array[float]] = defaultdict(lambda: array("d"))
         self.valid = array("b")
-        self.lists = list(_lists_of(message))
+        self.lists = [path for path, value in _fields_of(message) if _is_list(value)]  # whatever their length
         self.longest = self._length(message)
         self.scans = {path: size for path, size in self._sizes(message) if size > LONGEST_VECTOR}
 
@@ -156,18 +159,16 @@ class _Topic:
     def take(self, message: Any, received_ns: int) -> None:
         if self.lists and self._length(message) > self.longest:  # lists are often empty at first
             self.longest = self._length(message)
-            for path in _numbers_of(message):
-                if path not in self.paths:
-                    self.paths.append(path)
-                    self.get.append(_getter(path))
-                    self.columns[path].extend([math.nan] * len(self.received))
+            for path in set(_numbers_of(message)) - set(self.paths):
+                self.columns[path].extend([math.nan] * len(self.received))
+            self.paths += [path for path in _numbers_of(message) if path not in self.paths]
         self.received.append(received_ns * 1e-9)
         if self.stamped:
             stamp = getattr(message, "header", message).stamp
             self.stamps.append(stamp.sec + stamp.nanosec * 1e-9)
-        for path, get in zip(self.paths, self.get, strict=True):
+        for path in self.paths:
             try:
-                self.columns[path].append(float(get(message)))
+                self.columns[path].append(float(_getter(path)(message)))
             except (IndexError, TypeError, ValueError):
                 self.columns[path].append(math.nan)
         self.valid.append(getattr(getattr(message, "status", None), "status", 0) >= 0)
@@ -181,138 +182,124 @@ class _Topic:
         received, stamps = self.clock
         if simulated is not None:
             return np.where(stamps > 0, stamps, np.nan) if self.stamped else np.interp(received, *simulated)
-        if not self.stamped:
-            return received
-        if abs(float(np.median(stamps - received))) < _OFF_BY_S:
+        if self.stamped and abs(float(np.median(stamps - received))) < _OFF_BY_S:
             return stamps
         if (stamps != 0).any():
             text = f"{self.name}: header times differ from recording times, which are used"
-            findings.append(LogFinding("note", text, self.name))
+            findings.append(note(text, self.name))
         return received
 
     def streams(self, simulated: tuple[Array, Array] | None, findings: list[LogFinding]) -> Iterator[LogStream]:
         time = self._time(simulated, findings)
         for path, size in self.scans.items():
             text = f"{self.name}.{path} has {size} entries, more than {LONGEST_VECTOR}, and is not read"
-            findings.append(LogFinding("note", text, self.name))
+            findings.append(note(text, self.name))
         valid = np.frombuffer(self.valid, dtype=np.int8) > 0
         columns = {
             path: np.where(valid, np.frombuffer(values, dtype=float), np.nan) for path, values in self.columns.items()
         }
-        kind = self.kind.rpartition("/")[2]
-        converted = self._standard(kind, columns)
-        for path, values, unit, quantity in converted:
-            yield LogStream(f"{self.name}.{path}", time, values, unit, quantity, "format")
-        if converted:
-            return
-        for path, values in columns.items():
+        converted = self._standard(columns)
+        for quantity, values, unit in converted:
+            yield LogStream(f"{self.name}.{quantity}", time, values, unit, quantity, "format")
+        for path, values in columns.items() if not converted else ():
             name = self.name if path == "data" else f"{self.name}.{path}"
-            unit = split_unit(name.replace("/", " ").replace(".", " "))[1]
-            quantity = quantity_of_name(name)
-            if quantity and unit and unit not in QUANTITIES[quantity].units:
-                quantity = ""
-            if quantity.startswith("wind") and quantity.endswith("speed"):
-                unit = unit or "m/s"  # REP 103: SI; what can be tested by content is not taken for granted
-            yield LogStream(name, time, values, unit, quantity, "name" if quantity else "")
+            stream = named_stream(name, time, values, split_unit(name.replace("/", " ").replace(".", " "))[1])
+            if stream.quantity.startswith("wind") and stream.quantity.endswith("speed") and not stream.unit:
+                # REP 103: SI; what can be tested by content is not taken for granted
+                stream = replace(stream, unit="m/s")
+            yield stream
 
-    def _standard(self, kind: str, columns: dict[str, Array]) -> list[tuple[str, Array, str, str]]:
-        """Streams of a standard message in the frames of trials; empty for any other message."""
-        pick = columns.get
-        if kind == "NavSatFix":
-            return [
-                ("latitude", columns["latitude"], "deg", "latitude"),
-                ("longitude", columns["longitude"], "deg", "longitude"),
-            ]
-        if kind == "Imu":
+    def _standard(self, columns: dict[str, Array]) -> list[tuple[str, Array, str]]:
+        """Quantities, values and units of a standard message in the frames of trials; empty for any other message."""
+        words, prefix = set(plain_words(self.name).split()), _PREFIXES.get(self.kind, "")
+        if self.kind == "NavSatFix":
+            return [(name, columns[name], "deg") for name in ("latitude", "longitude")]
+        if self.kind == "Imu":
             return [
                 *_attitude(columns, "orientation"),
-                ("yaw_rate", -columns["angular_velocity.z"], "rad/s", "yaw_rate"),
-                ("a_x", columns["linear_acceleration.x"], "m/s2", "a_x"),
-                ("a_y", -columns["linear_acceleration.y"], "m/s2", "a_y"),
+                ("yaw_rate", -columns["angular_velocity.z"], "rad/s"),
+                ("a_x", columns["linear_acceleration.x"], "m/s2"),
+                ("a_y", -columns["linear_acceleration.y"], "m/s2"),
             ]
-        if kind == "Odometry":
-            return [
-                ("x", columns["pose.pose.position.y"], "m", "x"),
-                ("y", columns["pose.pose.position.x"], "m", "y"),
-                *_attitude(columns, "pose.pose.orientation"),
-                *_velocity(columns, "twist.twist.", self.child in _WORLD_FRAMES),
-            ]
-        if kind in ("Twist", "TwistStamped", "TwistWithCovarianceStamped"):
-            prefix = {"Twist": "", "TwistStamped": "twist.", "TwistWithCovarianceStamped": "twist.twist."}[kind]
-            ahead, left = pick(f"{prefix}linear.x"), pick(f"{prefix}linear.y")
-            words = plain_words(self.name).split()
-            if ahead is None or left is None or {"cmd", "command", "setpoint"} & set(words):
-                return []
-            of_world = bool(set(words) & set(_GROUND_WORDS)) or self.frame in _WORLD_FRAMES
-            return _velocity(columns, prefix, of_world)
-        if kind in ("Pose", "PoseStamped", "PoseWithCovarianceStamped"):
-            prefix = {"Pose": "", "PoseStamped": "pose.", "PoseWithCovarianceStamped": "pose.pose."}[kind]
-            return [
-                ("x", columns[f"{prefix}position.y"], "m", "x"),
-                ("y", columns[f"{prefix}position.x"], "m", "y"),
-                *_attitude(columns, f"{prefix}orientation"),
-            ]
+        if self.kind == "Odometry":
+            return [*_pose(columns, "pose.pose."), *_velocity(columns, "twist.twist.", self.child in _WORLD_FRAMES)]
+        if self.kind.startswith("Pose") and self.kind in _PREFIXES:
+            return _pose(columns, prefix)
+        vector = {f"{prefix}linear.x", f"{prefix}linear.y"} <= columns.keys()
+        if self.kind in _PREFIXES and vector and not {"cmd", "command", "setpoint"} & words:
+            return _velocity(columns, prefix, bool(words & set(_GROUND_WORDS)) or self.frame in _WORLD_FRAMES)
         return []
 
 
-def _velocity(columns: dict[str, Array], prefix: str, of_world: bool) -> list[tuple[str, Array, str, str]]:
+_PREFIXES = {
+    "Twist": "",
+    "TwistStamped": "twist.",
+    "TwistWithCovarianceStamped": "twist.twist.",
+    "Pose": "",
+    "PoseStamped": "pose.",
+    "PoseWithCovarianceStamped": "pose.pose.",
+}
+"""Beginnings of the paths of standard messages."""
+
+
+def _velocity(columns: dict[str, Array], prefix: str, of_world: bool) -> list[tuple[str, Array, str]]:
     """Velocity and rate of turn of a twist, of the body or of the world (without a rate where that is 0)."""
     x, y, rate = columns[f"{prefix}linear.x"], columns[f"{prefix}linear.y"], -columns[f"{prefix}angular.z"]
-    turn = [("yaw_rate", rate, "rad/s", "yaw_rate")]
+    turn = [("yaw_rate", rate, "rad/s")]
     if of_world:
-        named = [("v_north", y, "m/s", "v_north"), ("v_east", x, "m/s", "v_east")]
-        return [*named, *(turn if np.nanmax(np.abs(rate), initial=0.0) > 0 else [])]
-    return [("u_ground", x, "m/s", "u_ground"), ("v_ground", -y, "m/s", "v_ground"), *turn]
+        turn = turn if np.nanmax(np.abs(rate), initial=0.0) > 0 else []
+        return [("v_north", y, "m/s"), ("v_east", x, "m/s"), *turn]
+    return [("u_ground", x, "m/s"), ("v_ground", -y, "m/s"), *turn]
 
 
-def _attitude(columns: dict[str, Array], prefix: str) -> list[tuple[str, Array, str, str]]:
+def _pose(columns: dict[str, Array], prefix: str) -> list[tuple[str, Array, str]]:
+    """Position, heading and heel of a pose of REP 103."""
+    x, y = columns[f"{prefix}position.y"], columns[f"{prefix}position.x"]
+    return [("x", x, "m"), ("y", y, "m"), *_attitude(columns, f"{prefix}orientation")]
+
+
+def _attitude(columns: dict[str, Array], prefix: str) -> list[tuple[str, Array, str]]:
     """Heading and heel of a quaternion of REP 103; empty where it is not filled in."""
     w, x, y, z = (columns[f"{prefix}.{axis}"] for axis in "wxyz")
     if not np.nanmax(np.abs(w**2 + x**2 + y**2 + z**2), initial=0.0) > 0.5:
         return []
     roll, _, yaw = heading_of_quaternion(w, x, y, z)
-    heading = np.asarray((math.pi / 2 - yaw) % (2 * math.pi))
-    return [("heading", heading, "rad", "heading"), ("heel", roll, "rad", "heel")]
+    return [("heading", np.asarray((math.pi / 2 - yaw) % (2 * math.pi)), "rad"), ("heel", roll, "rad")]
 
 
-def _numbers_of(message: Any, prefix: str = "") -> Iterator[str]:
-    """Paths of the numbers of a message: ``twist.linear.x``, ``control[0]``."""
+def _fields_of(message: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Paths and values of a message and those within it: ``twist.linear.x``."""
     for name in getattr(message, "__dataclass_fields__", {}):
-        if (
-            name.startswith("__")
-            or any(name == word or name.endswith("_covariance") for word in _OMITTED)
-            or name.isupper()
-        ):
-            continue
-        value = getattr(message, name)
-        path = f"{prefix}{name}"
-        if isinstance(value, bool | int | float | np.number):
-            yield path
-        elif isinstance(value, np.ndarray | list) and 0 < len(value) <= LONGEST_VECTOR:
-            if all(isinstance(item, int | float | np.number) for item in value):
-                yield from (f"{path}[{place}]" for place in range(len(value)))
-        elif hasattr(value, "__dataclass_fields__"):
-            yield from _numbers_of(value, f"{path}.")
-
-
-def _lists_of(message: Any, prefix: str = "") -> Iterator[str]:
-    """Paths of the lists of numbers of a message, whatever their length."""
-    for name in getattr(message, "__dataclass_fields__", {}):
-        value = getattr(message, name)
         if name.startswith("__") or name in _OMITTED or name.endswith("_covariance"):
             continue
+        value = getattr(message, name)
         if hasattr(value, "__dataclass_fields__"):
-            yield from _lists_of(value, f"{prefix}{name}.")
-        elif isinstance(value, np.ndarray) or (
-            isinstance(value, list) and all(isinstance(item, int | float | np.number) for item in value)
-        ):
-            yield f"{prefix}{name}"
+            yield from _fields_of(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
 
 
-def _getter(path: str) -> Any:
+def _is_list(value: Any) -> bool:
+    """Whether a value is a list of numbers."""
+    return isinstance(value, np.ndarray) or (
+        isinstance(value, list) and all(isinstance(item, int | float | np.number) for item in value)
+    )
+
+
+def _numbers_of(message: Any) -> Iterator[str]:
+    """Paths of the numbers of a message: ``twist.linear.x``, ``control[0]``."""
+    for path, value in _fields_of(message):
+        if path.rpartition(".")[2].isupper():
+            continue
+        if isinstance(value, bool | int | float | np.number):
+            yield path
+        elif _is_list(value) and len(value) <= LONGEST_VECTOR:
+            yield from (f"{path}[{place}]" for place in range(len(value)))
+
+
+@cache
+def _getter(path: str) -> Callable[[Any], Any]:
+    """What gets the number at a path out of a message."""
     name, _, place = path.partition("[")
-    get = attrgetter(name)
-    if not place:
-        return get
-    index = int(place.rstrip("]"))
-    return lambda message: get(message)[index]
+    get, index = attrgetter(name), int(place.rstrip("]") or 0)
+    return (lambda message: get(message)[index]) if place else get

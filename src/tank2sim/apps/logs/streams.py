@@ -1,21 +1,33 @@
-"""The common form of all logs: named series of numbers, each with its time in UTC."""
+"""The common form of all logs, named series of numbers with their times in UTC, and what the readers share."""
 
 from __future__ import annotations
 
-import importlib
 import math
-from collections.abc import Mapping, Sequence
+import re
+import tomllib
+from array import array
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import ModuleType
+from typing import Any
 
 import numpy as np
 
+from tank2sim.apps.logs.quantities import quantity_of_name
 from tank2sim.arrays import Array, Number
 from tank2sim.errors import InputError
+from tank2sim.files import first_bytes
+from tank2sim.records.text_layout import decoded_text
 
 OVERLAP_S = 2.0
 """Most that a file may reach into the next one, s. Project choice: what a message is late by, recorded."""
+
+FIELDS: dict[str, dict[str, dict[str, Any]]] = tomllib.loads(
+    Path(__file__).with_name("fields.toml").read_text(encoding="utf-8")
+)
+"""Format to its messages, their fields, and what is known of each."""
+
+_HEAD_BYTES = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,36 +106,64 @@ class VesselLog:
     dated: bool = True
 
 
+def note(text: str, stream: str = "", **evidence: float) -> LogFinding:
+    """A finding on a `stream`, or on the log as a whole, with `evidence`; the result stays as it is."""
+    return LogFinding("note", text, stream, evidence)
+
+
+def fault(text: str, stream: str = "", **evidence: float) -> LogFinding:
+    """A finding on a `stream`, or on the log as a whole, with `evidence`, that marks the result."""
+    return LogFinding("fault", text, stream, evidence)
+
+
+class Samples:
+    """Values of a field while a file is read, with the line of the file and the time stamp (s) of each."""
+
+    def __init__(self) -> None:
+        self.lines, self.stamps, self.values = array("q"), array("d"), array("d")
+
+    def add(self, value: float, line: int = 0, stamp: float = math.nan) -> None:
+        """Append a value."""
+        self.lines.append(line)
+        self.stamps.append(stamp)
+        self.values.append(value)
+
+
+def named_stream(name: str, time_s: Array, values: Array, unit: str = "") -> LogStream:
+    """A stream of the quantity that its name suggests, unless its unit is of another kind."""
+    quantity = quantity_of_name(name, unit)
+    return LogStream(name, time_s, values, unit, quantity, "name" if quantity else "")
+
+
 def not_used(words: str, kinds: Mapping[str, int]) -> list[LogFinding]:
-    """A note that counts what was not used; none if there is nothing.
-
-    Parameters
-    ----------
-    words : str
-        What is counted, ``sentences`` or ``messages``.
-    kinds : mapping
-        Kind to its number.
-    """
-    if not kinds:
-        return []
+    """A note that counts what was not used, `words` are ``sentences`` or such, by `kinds`; none without any."""
     listed = ", ".join(f"{number} {kind}" for kind, number in sorted(kinds.items()))
-    return [LogFinding("note", f"{words} that are not used: {listed}", evidence=dict(kinds))]
+    return [LogFinding("note", f"{words} that are not used: {listed}", evidence=dict(kinds))] if kinds else []
 
 
-def optional_library(name: str, path: Path) -> ModuleType:
-    """Import a library of the extra ``tank2sim[logs]``.
+def unreadable(path: Path, error: Exception, remedy: str, problem: str = "cannot be read") -> InputError:
+    """The `problem` of a file at which a library failed, with its `error` (of struct, lz4, ...), and the `remedy`."""
+    reason = f"{type(error).__name__}: {' '.join(str(error).split())[:100]}"
+    return InputError(path, "", f"{problem} ({reason})", remedy)
 
-    Raises
-    ------
-    InputError
-        It is not installed.
-    """
-    try:
-        return importlib.import_module(name)
-    except ImportError:
-        package = name.partition(".")[0]
-        remedy = "install it with: pip install 'tank2sim[logs]'"
-        raise InputError(path, "", f"needs the library {package}, which is not installed", remedy) from None
+
+def text_lines(path: Path) -> Iterator[bytes]:
+    """Lines of a text file in one byte a letter: UTF-16 is decoded, the mark of UTF-8 left out."""
+    encoding = decoded_text(first_bytes(path, _HEAD_BYTES), complete=False)[1]
+    if encoding.startswith("utf-16"):
+        with path.open(encoding=encoding, errors="replace") as text:
+            yield from (line.encode("latin-1", errors="replace") for line in text)
+        return
+    with path.open("rb") as file:
+        yield next(file, b"").removeprefix(b"\xef\xbb\xbf")
+        yield from file
+
+
+def mostly(head: bytes, fits: Callable[[bytes], object]) -> bool:
+    """Whether half the lines of `head`, the beginning of a file, are what `fits`, but comments and a cut last one."""
+    lines = re.split(rb"[\r\n]+", head)
+    lines = [line for line in lines[:-1] or lines if line.strip() and not line.startswith(b"#")]
+    return bool(lines) and 2 * sum(bool(fits(line)) for line in lines) > len(lines)
 
 
 def wrapped_angle(angle_rad: Array) -> Array:
@@ -140,18 +180,13 @@ def heading_of_quaternion(w: Array, x: Array, y: Array, z: Array) -> tuple[Array
 
 
 def joined_parts(logs: Sequence[VesselLog]) -> list[VesselLog]:
-    """The logs, with dated files of one format that follow each other as one.
+    """The logs, with dated files of one format that follow each other as one, each at the place of its first file.
 
     Streams of one name become one stream. A file that holds only streams that the others lack, or that lies in their
     time, is another instrument's and stays a log of its own.
-
-    Parameters
-    ----------
-    logs : sequence of VesselLog
-        In any order, in which they stay: that of the first that was given of each.
     """
     found: list[tuple[int, VesselLog]] = []
-    for given in sorted(range(len(logs)), key=lambda one: _span(logs[one])[0]):
+    for given in sorted(range(len(logs)), key=lambda number: _span(logs[number])[0]):
         log = logs[given]
         place = next((place for place, (_, before) in enumerate(found) if _follows(before, log)), None)
         if place is None:
@@ -159,33 +194,25 @@ def joined_parts(logs: Sequence[VesselLog]) -> list[VesselLog]:
         else:
             first, before = found[place]
             found[place] = min(first, given), _joined(before, log)
-    return [log for _, log in sorted(found, key=lambda one: one[0])]
+    return [log for _, log in sorted(found, key=lambda entry: entry[0])]
 
 
 def _span(log: VesselLog) -> tuple[float, float]:
     times = [stream.time_s[np.isfinite(stream.time_s)] for stream in log.streams]
-    times = [time for time in times if len(time)]
-    if not times:
-        return np.inf, np.inf
-    return min(float(time.min()) for time in times), max(float(time.max()) for time in times)
+    begins, ends = ([float(bound(time)) for time in times if len(time)] for bound in (np.min, np.max))
+    return min(begins, default=np.inf), max(ends, default=np.inf)
 
 
 def _follows(before: VesselLog, log: VesselLog) -> bool:
-    names = {stream.name for stream in before.streams}
-    return (
-        before.dated
-        and log.dated
-        and before.format == log.format
-        and any(stream.name in names for stream in log.streams)
-        and _span(before)[1] <= _span(log)[0] + OVERLAP_S
-    )
+    shared = {stream.name for stream in before.streams} & {stream.name for stream in log.streams}
+    alike = before.dated and log.dated and before.format == log.format
+    return alike and bool(shared) and _span(before)[1] <= _span(log)[0] + OVERLAP_S
 
 
 def _joined(before: VesselLog, log: VesselLog) -> VesselLog:
     later = {stream.name: stream for stream in log.streams}
     streams = [_continued(stream, later.pop(stream.name, None)) for stream in before.streams]
-    text = f"{log.path.name} continues {before.path.name}"
-    findings = (*before.findings, *log.findings, LogFinding("note", text))
+    findings = (*before.findings, *log.findings, note(f"{log.path.name} continues {before.path.name}"))
     return replace(before, path=log.path, streams=(*streams, *later.values()), findings=findings)
 
 
@@ -195,8 +222,5 @@ def _continued(stream: LogStream, later: LogStream | None) -> LogStream:
     if not len(stream.time_s):
         return later
     new = ~(later.time_s <= np.nanmax(stream.time_s))
-    return replace(
-        stream,
-        time_s=np.concatenate([stream.time_s, later.time_s[new]]),
-        values=np.concatenate([stream.values, later.values[new]]),
-    )
+    time_s, values = np.append(stream.time_s, later.time_s[new]), np.append(stream.values, later.values[new])
+    return replace(stream, time_s=time_s, values=values)

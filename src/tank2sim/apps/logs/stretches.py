@@ -6,6 +6,7 @@ its propulsion and the speed; pieces that belong together are one stretch: a zig
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -137,6 +138,11 @@ class _Signals:
         """s."""
         return float(self.time[1] - self.time[0])
 
+    @property
+    def ship(self) -> bool:
+        """Whether it has a rudder."""
+        return self.threshold == HELD_RUDDER_RAD
+
     def held(self, begin: int, end: int) -> Array:
         """Steering where it does not move to another order."""
         values = self.steering[begin:end]
@@ -144,14 +150,31 @@ class _Signals:
         still = np.abs(values[reach:] - values[:-reach]) < 0.5 * self.threshold
         return values[reach:][still] if len(values) > reach else values[:0]
 
+    def lasted(self, piece: _Piece) -> float:
+        """Duration of a piece, s."""
+        return (piece.end - piece.begin) * self.step
+
+    def turned(self, piece: _Piece) -> float:
+        """Change of heading in a piece, rad."""
+        heading = self.heading[piece.begin : piece.end]
+        return float(heading[-1] - heading[0]) if len(heading) else 0.0
+
+    def steered(self, piece: _Piece) -> bool:
+        """Whether a piece has a rudder order."""
+        return abs(piece.level) > self.threshold
+
+    def same_power(self, first: _Piece, second: _Piece, steps: float = 1.0) -> bool:
+        """Whether the propulsion of the second of two pieces is that of the first; also if it is not known."""
+        return not abs(second.propulsion - first.propulsion) > steps * PROPULSION_STEP * self.full
+
 
 @dataclass(frozen=True)
 class _Piece:
     begin: int
     end: int  # one past the last sample
-    kind: StretchKind
-    level: float
-    propulsion: float
+    kind: StretchKind = StretchKind.STEADY
+    level: float = 0.0
+    propulsion: float = math.nan
 
 
 def find_stretches(voyage: Voyage) -> tuple[Stretch, ...]:
@@ -160,7 +183,7 @@ def find_stretches(voyage: Voyage) -> tuple[Stretch, ...]:
     if signals is None:
         return ()
     pieces = _merged(signals, [_piece(signals, begin, end) for begin, end in _cuts(signals)])
-    if signals.threshold != HELD_RUDDER_RAD:
+    if not signals.ship:
         pieces = _without_splinters(signals, pieces)
     return tuple(_stretch(signals, piece) for piece in pieces)
 
@@ -176,47 +199,52 @@ def _signals(voyage: Voyage) -> _Signals | None:
     if len(time) < LEAST_TRIAL_ROWS:  # many samples of a few instants
         return None
     steer = median_filter(_on_grid(time, entry), size=3, mode="nearest")
-    propulsion, full = _propulsion(series, time)
+    propulsion = _propulsion(series, time)
+    full = max(float(np.nanpercentile(np.abs(propulsion), 99)), 1e-9) if np.isfinite(propulsion).any() else 1.0
     heading = series.get("heading", series.get("magnetic_heading"))
-    at_heading = np.full(len(time), np.nan) if heading is None else np.interp(time, heading.time_s, heading.values)
-    rate = _rate(series)
-    at_rate = np.full(len(time), np.nan) if rate is None else np.interp(time, rate.time_s, rate.values)
-    _, lag = steering_evidence(time, steer, *((rate.time_s, rate.values) if rate else (time, at_rate)))
-    speed = _speed(series, time)
-    return _Signals(
-        time, steer, threshold, propulsion, full, speed, at_heading, at_rate, float(np.clip(2 * lag, 2.0, 30.0))
+    rate = series.get("yaw_rate")
+    if rate is None and heading is not None:
+        slopes = QuantitySeries(*differenced(heading.time_s, heading.values, 2.0))
+        rate = slopes if len(slopes.time_s) else None
+    at_heading, at_rate = (
+        np.full(len(time), np.nan) if entry is None else np.interp(time, entry.time_s, entry.values)
+        for entry in (heading, rate)
     )
+    lag = steering_evidence(time, steer, *((rate.time_s, rate.values) if rate else (time, at_rate))).lag_s
+    rest = float(np.clip(2 * lag, 2.0, 30.0))
+    return _Signals(time, steer, threshold, propulsion, full, _speed(series, time), at_heading, at_rate, rest)
+
+
+def _thrusters(series: Mapping[str, QuantitySeries]) -> tuple[str, QuantitySeries, QuantitySeries] | None:
+    """Orders of two thrusters, else their revolutions, and which of these they are."""
+    for stem in ("thrust_order", "rpm"):
+        port, starboard = series.get(f"{stem}_port"), series.get(f"{stem}_starboard")
+        if port and starboard:
+            return stem, port, starboard
+    return None
 
 
 def _steering(series: Mapping[str, QuantitySeries]) -> tuple[QuantitySeries, float] | None:
     """The order of the rudder, or its angle, or the difference of two thrusters; and the threshold of steering."""
-    for name in ("rudder_order", "rudder_angle"):
-        if name in series:
-            return series[name], HELD_RUDDER_RAD
-    for stem in ("thrust_order", "rpm"):
-        port, starboard = series.get(f"{stem}_port"), series.get(f"{stem}_starboard")
-        if port and starboard:
-            other = np.interp(port.time_s, starboard.time_s, starboard.values)
-            full = 1.0 if stem == "thrust_order" else max(float(np.percentile(np.abs(port.values), 99)), 1e-9)
-            return QuantitySeries(port.time_s, (port.values - other) / full / 2), HELD_SHARE / 2
-    return None
+    rudder = series.get("rudder_order", series.get("rudder_angle"))
+    if rudder is not None:
+        return rudder, HELD_RUDDER_RAD
+    if (pair := _thrusters(series)) is None:
+        return None
+    stem, port, starboard = pair
+    full = 1.0 if stem == "thrust_order" else max(float(np.percentile(np.abs(port.values), 99)), 1e-9)
+    other = np.interp(port.time_s, starboard.time_s, starboard.values)
+    return QuantitySeries(port.time_s, (port.values - other) / full / 2), HELD_SHARE / 2
 
 
-def _propulsion(series: Mapping[str, QuantitySeries], time: Array) -> tuple[Array, float]:
-    """Order of the propulsion (n,), or revolutions, and its largest; nan without."""
-    if (entry := series.get("rpm_order", series.get("rpm"))) is not None:
-        values = median_filter(_on_grid(time, entry), size=5, mode="nearest")
-    else:
-        parts = []
-        for stem in ("thrust_order", "rpm"):
-            pair = [series.get(f"{stem}_{side}") for side in ("port", "starboard")]
-            if all(part is not None for part in pair):
-                parts = [_on_grid(time, part) for part in pair if part is not None]
-                break
-        if not parts:
-            return np.full(len(time), np.nan), 1.0
-        values = median_filter(0.5 * (parts[0] + parts[1]), size=3, mode="nearest")
-    return values, max(float(np.nanpercentile(np.abs(values), 99)), 1e-9)
+def _propulsion(series: Mapping[str, QuantitySeries], time: Array) -> Array:
+    """Order of the propulsion (n,), or revolutions; nan without."""
+    entry = series.get("rpm_order", series.get("rpm"))
+    if entry is not None:
+        return np.asarray(median_filter(_on_grid(time, entry), size=5, mode="nearest"))
+    if (pair := _thrusters(series)) is None:
+        return np.full(len(time), np.nan)
+    return np.asarray(median_filter(0.5 * (_on_grid(time, pair[1]) + _on_grid(time, pair[2])), size=3, mode="nearest"))
 
 
 def _on_grid(time: Array, entry: QuantitySeries) -> Array:
@@ -226,10 +254,9 @@ def _on_grid(time: Array, entry: QuantitySeries) -> Array:
 
 
 def _speed(series: Mapping[str, QuantitySeries], time: Array) -> Array:
-    for name in ("u_water", "sog", "u_ground"):
-        if name in series:
-            values = interpolated(time, series[name].time_s, series[name].values, 30.0)
-            return np.abs(values)
+    entry = next((series[name] for name in ("u_water", "sog", "u_ground") if name in series), None)
+    if entry is not None:
+        return np.abs(interpolated(time, entry.time_s, entry.values, 30.0))
     if "x" in series:
         at, north = differenced(series["x"].time_s, series["x"].values, 4.0)
         _, east = differenced(series["y"].time_s, series["y"].values, 4.0)
@@ -237,21 +264,11 @@ def _speed(series: Mapping[str, QuantitySeries], time: Array) -> Array:
     return np.full(len(time), np.nan)
 
 
-def _rate(series: Mapping[str, QuantitySeries]) -> QuantitySeries | None:
-    if "yaw_rate" in series:
-        return series["yaw_rate"]
-    heading = series.get("heading", series.get("magnetic_heading"))
-    if heading is None:
-        return None
-    time, rate = differenced(heading.time_s, heading.values, 2.0)
-    return QuantitySeries(time, rate) if len(time) else None
-
-
 def _cuts(signals: _Signals) -> list[tuple[int, int]]:
     """Begin and end of pieces between jumps of the orders; a piece begins where its jump does."""
-    step = signals.time[1] - signals.time[0]
-    reach = max(1, round(JUMP_S / step))
-    jumping = np.zeros(len(signals.time), dtype=bool)
+    step, count = signals.step, len(signals.time)
+    reach, settling = max(1, round(JUMP_S / step)), round(signals.rest_s / step)
+    jumping = np.zeros(count, dtype=bool)
     for values, least in (
         (signals.steering, 0.75 * signals.threshold),
         (signals.propulsion, PROPULSION_STEP * signals.full),
@@ -262,66 +279,49 @@ def _cuts(signals: _Signals) -> list[tuple[int, int]]:
             jumping[place + int(np.argmax(window > 0.2 * least)) + 1] = True
         # Within a long movement there may be another order: a reversal of the movement itself.
         slope = np.sign(values[reach:] - values[:-reach]) * moved
-        for place in np.flatnonzero(slope[1:] * slope[:-1] < 0):
-            jumping[place + reach // 2 + 1] = True
+        jumping[np.flatnonzero(slope[1:] * slope[:-1] < 0) + reach // 2 + 1] = True
     inactive = np.abs(signals.steering) < signals.threshold
-    turns = np.flatnonzero(np.diff(inactive.astype(int))) + 1
-    for begin, end in zip([0, *turns], [*turns, len(inactive)], strict=True):
-        settling = round(signals.rest_s / step)
-        if (
-            begin > settling
-            and inactive[begin]
-            and end - begin >= settling
-            and not jumping[begin - settling : begin].any()
-        ):
+    turns = [0, *(np.flatnonzero(np.diff(inactive.astype(int))) + 1), count]
+    for begin, end in pairwise(turns):
+        rests = inactive[begin] and begin > settling and end - begin >= settling
+        if rests and not jumping[begin - settling : begin].any():
             jumping[begin] = True  # a rudder that was brought back slowly
-    starts = np.flatnonzero(jumping)
-    edges = np.unique(np.concatenate([[0], starts, [len(signals.time)]]))
     least = max(2, round(1.5 / step))
-    kept = [int(edges[0])]
-    kept += [int(edge) for edge in edges[1:-1] if edge - kept[-1] >= least and len(signals.time) - edge >= least]
-    return list(zip(kept, [*kept[1:], len(signals.time)], strict=True))
+    kept = [0]
+    kept += [int(edge) for edge in np.flatnonzero(jumping) if edge - kept[-1] >= least and count - edge >= least]
+    return list(pairwise([*kept, count]))
 
 
 def _piece(signals: _Signals, begin: int, end: int) -> _Piece:
-    # The second half is free of the movement to the new order.
-    late = slice(begin + (end - begin) // 3, end)
+    third = (end - begin) // 3
+    late = slice(begin + third, end)  # free of the movement to the new order
     level = float(np.median(signals.steering[late]))
-    early = signals.steering[begin : begin + max(2, (end - begin) // 3)]
-    if abs(level) < signals.threshold and abs(np.median(early)) > signals.threshold and end - begin > 4:
-        level = float(np.median(early)) if abs(_turned(signals, begin, end)) > LEAST_TURN_RAD else level
-    propulsion = float(np.median(signals.propulsion[late]))
-    share = propulsion / signals.full
-    speed = signals.speed[begin:end]
+    early = float(np.median(signals.steering[begin : begin + max(2, third)]))
+    back = abs(level) < signals.threshold < abs(early) and end - begin > 4
+    if back and abs(signals.turned(_Piece(begin, end))) > LEAST_TURN_RAD:
+        level = early
+    piece = _Piece(begin, end, level=level, propulsion=float(np.median(signals.propulsion[late])))
+    return replace(piece, kind=_kind(signals, piece))
+
+
+def _kind(signals: _Signals, piece: _Piece) -> StretchKind:
+    """What a piece is by its orders and the speed."""
+    speed = signals.speed[piece.begin : piece.end]
     known = speed[np.isfinite(speed)]
-    first, last = (
-        float(np.median(part)) if len(part) else math.nan
-        for part in (known[: max(1, len(known) // 10)], known[-max(1, len(known) // 10) :])
-    )
-    change = abs(last - first) / max(first, last, 1e-9)
-    turning = abs(level) > signals.threshold
+    tenth = max(1, len(known) // 10)
+    first, last = (float(np.median(part)) if len(part) else math.nan for part in (known[:tenth], known[-tenth:]))
+    turning, share = signals.steered(piece), piece.propulsion / signals.full
     moved = len(known) > 0 and float(np.max(known)) > RESTING_MPS
-    if not math.isnan(share) and share < -STOPPED_SHARE:
-        kind = StretchKind.STOP if first > 2 * RESTING_MPS and last < first else StretchKind.ASTERN
-    elif not math.isnan(share) and abs(share) <= STOPPED_SHARE:
-        if turning:
-            kind = StretchKind.PIVOT if signals.threshold != HELD_RUDDER_RAD else StretchKind.TURN
-        else:
-            sailing = len(known) > 0 and float(np.median(known)) > UNDER_WAY_MPS
-            slow = StretchKind.STEADY if sailing else StretchKind.REST
-            kind = StretchKind.COAST if moved and change > SPEED_CHANGE else slow
-    elif turning:
-        kind = StretchKind.TURN
-    elif moved and change > SPEED_CHANGE:
-        kind = StretchKind.ACCELERATE
-    else:
-        kind = StretchKind.STEADY if moved or not len(known) else StretchKind.REST
-    return _Piece(begin, end, kind, level, propulsion)
-
-
-def _turned(signals: _Signals, begin: int, end: int) -> float:
-    heading = signals.heading[begin:end]
-    return float(heading[-1] - heading[0]) if len(heading) else 0.0
+    changes = moved and abs(last - first) / max(first, last, 1e-9) > SPEED_CHANGE
+    if share < -STOPPED_SHARE:
+        return StretchKind.STOP if first > 2 * RESTING_MPS and last < first else StretchKind.ASTERN
+    stopped = abs(share) <= STOPPED_SHARE
+    if turning:
+        return StretchKind.PIVOT if stopped and not signals.ship else StretchKind.TURN
+    if changes:
+        return StretchKind.COAST if stopped else StretchKind.ACCELERATE
+    steady = float(np.median(known)) > UNDER_WAY_MPS if stopped and len(known) else moved or not (stopped or len(known))
+    return StretchKind.STEADY if steady else StretchKind.REST
 
 
 _UNSTEERED = (StretchKind.STEADY, StretchKind.ACCELERATE, StretchKind.COAST, StretchKind.REST, StretchKind.ASTERN)
@@ -358,21 +358,16 @@ _STEPS_LONGEST = 2.5
 
 def _merged(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
     """Pieces that belong together as one: zigzags, steps, slow changes of propulsion, short corrections between."""
-    step = signals.step
     joined: list[_Piece] = []
     for piece in pieces:
         last = joined[-1] if joined else None
-        lasted = (last.end - last.begin) * step if last else math.inf
-        moving = last is not None and lasted < signals.rest_s and _changes_power(signals, last)
-        movement = lasted < JUMP_S or (moving and _straight(signals, piece))
-        if last is not None and last.kind in _UNSTEERED and movement:
+        if last is not None and last.kind in _UNSTEERED and _is_movement(signals, last, piece):
             joined[-1] = _piece(signals, last.begin, piece.end)
         else:
             joined.append(piece)
     groups: list[list[_Piece]] = []
     for piece in joined:
-        brief = (piece.end - piece.begin) * step < signals.rest_s
-        if groups and _belongs(signals, groups[-1], piece, brief):
+        if groups and _belongs(signals, groups[-1][-1], piece):
             groups[-1].append(piece)
         else:
             groups.append([piece])
@@ -380,11 +375,19 @@ def _merged(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
     for piece in _steps(signals, [piece for group in groups for piece in _manoeuvres(signals, group)]):
         same = out and out[-1].kind == piece.kind and piece.kind in _JOINABLE
         settled = out and out[-1].kind is StretchKind.ACCELERATE and piece.kind is StretchKind.STEADY
-        if same or (settled and (piece.end - piece.begin) * step < 2 * signals.rest_s):
+        if same or (settled and signals.lasted(piece) < 2 * signals.rest_s):
             out[-1] = replace(out[-1], end=piece.end)
         else:
             out.append(piece)
     return out
+
+
+def _is_movement(signals: _Signals, last: _Piece, piece: _Piece) -> bool:
+    """Whether a piece is the way to the order of the next: it is short, or the propulsion changes throughout."""
+    lasted, power = signals.lasted(last), signals.propulsion[last.begin : last.end]
+    changes = lasted < signals.rest_s and bool(np.ptp(power) > PROPULSION_STEP * signals.full)
+    straight = piece.kind in (*_UNSTEERED, StretchKind.STOP) and abs(piece.level) < signals.threshold
+    return lasted < JUMP_S or (changes and straight)
 
 
 def _without_splinters(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
@@ -392,62 +395,41 @@ def _without_splinters(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
     out: list[_Piece] = []
     for piece in pieces:
         last = out[-1] if out else None
-        if last is not None and last.kind.excites and piece.kind.excites:
-            shortest = min(each.end - each.begin for each in (last, piece)) * signals.step
-            if shortest < SPLINTER_S:
-                out[-1] = replace(last, end=piece.end, kind=StretchKind.STEPS)
-                continue
-        out.append(piece)
+        both = last is not None and last.kind.excites and piece.kind.excites
+        if last is not None and both and min(map(signals.lasted, (last, piece))) < SPLINTER_S:
+            out[-1] = replace(last, end=piece.end, kind=StretchKind.STEPS)
+        else:
+            out.append(piece)
     return out
-
-
-def _changes_power(signals: _Signals, piece: _Piece) -> bool:
-    """Whether the propulsion moves to another order throughout a piece."""
-    values = signals.propulsion[piece.begin : piece.end]
-    return bool(np.ptp(values) > PROPULSION_STEP * signals.full)
-
-
-def _straight(signals: _Signals, piece: _Piece) -> bool:
-    """Whether a piece is not steered."""
-    return piece.kind in (*_UNSTEERED, StretchKind.STOP) and abs(piece.level) < signals.threshold
 
 
 def _steps(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
     """Rows of at least :data:`_STEPS_LEAST` short stretches as one of steps each."""
-    step = signals.step
-    longest = _STEPS_LONGEST * signals.rest_s
-    ship = signals.threshold == HELD_RUDDER_RAD
-    short = [
-        (piece.end - piece.begin) * step < longest
-        and piece.kind not in (StretchKind.ZIGZAG, StretchKind.REST)
-        and not (ship and abs(_turned(signals, piece.begin, piece.end)) > CHANGED_COURSE_RAD)
-        for piece in pieces
-    ]
+
+    def short(piece: _Piece) -> bool:
+        far = signals.ship and abs(signals.turned(piece)) > CHANGED_COURSE_RAD
+        brief = signals.lasted(piece) < _STEPS_LONGEST * signals.rest_s
+        return brief and piece.kind not in (StretchKind.ZIGZAG, StretchKind.REST) and not far
+
     out: list[_Piece] = []
-    place = 0
-    while place < len(pieces):
-        length = next((n for n, is_short in enumerate(short[place:]) if not is_short), len(pieces) - place)
-        steered = sum(abs(piece.level) > signals.threshold for piece in pieces[place : place + length])
-        if length >= _STEPS_LEAST and steered > 1:
-            out.append(replace(pieces[place], end=pieces[place + length - 1].end, kind=StretchKind.STEPS))
-            place += length
-        else:
-            out.append(pieces[place])
-            place += 1
+    for is_short, members in itertools.groupby(pieces, short):
+        row = list(members)
+        if is_short and len(row) >= _STEPS_LEAST and sum(map(signals.steered, row)) > 1:
+            row = [_whole(row, StretchKind.STEPS)]
+        out += row
     return out
 
 
-def _belongs(signals: _Signals, group: Sequence[_Piece], piece: _Piece, brief: bool) -> bool:
-    last = group[-1]
-    same_power = _same_power(signals, last, piece)
-    steered = (StretchKind.TURN, StretchKind.PIVOT)
-    if last.kind in steered and piece.kind in steered:
-        if _amidships(signals, last):
-            return False
-        if last.kind == piece.kind is StretchKind.PIVOT and not brief:
-            return False
-        return same_power
-    return brief and same_power and last.kind in steered and piece.kind in (StretchKind.STEADY, StretchKind.ACCELERATE)
+def _belongs(signals: _Signals, last: _Piece, piece: _Piece) -> bool:
+    """Whether a piece belongs to the manoeuvre of the one before."""
+    turning = (StretchKind.TURN, StretchKind.PIVOT)
+    brief = signals.lasted(piece) < signals.rest_s
+    if last.kind not in turning or not signals.same_power(last, piece):
+        return False
+    if piece.kind in turning:
+        pivots = last.kind == piece.kind is StretchKind.PIVOT
+        return not _amidships(signals, last) and (brief or not pivots)
+    return brief and piece.kind in (StretchKind.STEADY, StretchKind.ACCELERATE)
 
 
 def _manoeuvres(signals: _Signals, group: Sequence[_Piece]) -> list[_Piece]:
@@ -476,22 +458,16 @@ def _manoeuvres(signals: _Signals, group: Sequence[_Piece]) -> list[_Piece]:
 
 def _single(signals: _Signals, piece: _Piece) -> _Piece:
     """A piece alone: without a change of heading it is not a turn."""
-    lasted = (piece.end - piece.begin) * signals.step
-    turned = abs(_turned(signals, piece.begin, piece.end))
-    if piece.kind is StretchKind.TURN and (turned < LEAST_TURN_RAD or lasted < LEAST_TURN_S):
-        return replace(piece, kind=StretchKind.STEADY)
-    return piece
+    little = abs(signals.turned(piece)) < LEAST_TURN_RAD or signals.lasted(piece) < LEAST_TURN_S
+    return replace(piece, kind=StretchKind.STEADY) if piece.kind is StretchKind.TURN and little else piece
 
 
 def _legs(signals: _Signals, group: Sequence[_Piece]) -> list[_Piece]:
     """Pieces of a group to one side as one each: a helmsman's corrections of an order belong to it."""
     sides: list[list[_Piece]] = []
     for piece in group:
-        if (
-            sides
-            and (_amidships(signals, piece) or sides[-1][0].level * piece.level > 0)
-            and _same_power(signals, sides[-1][0], piece)
-        ):
+        same = sides and signals.same_power(sides[-1][0], piece)
+        if same and (_amidships(signals, piece) or sides[-1][0].level * piece.level > 0):
             sides[-1].append(piece)
         else:
             sides.append([piece])
@@ -536,12 +512,6 @@ def _movement_begin(signals: _Signals, leg: _Piece, least: int) -> int:
     return begin
 
 
-def _same_power(signals: _Signals, first: _Piece, second: _Piece) -> bool:
-    return math.isnan(second.propulsion) or (
-        abs(second.propulsion - first.propulsion) <= PROPULSION_STEP * signals.full
-    )
-
-
 def _zigzag_length(signals: _Signals, legs: Sequence[_Piece]) -> int:
     """How many of the first legs are a zigzag: opposite orders of one size that each turn the vessel; 0 for none."""
     count = 0
@@ -549,33 +519,33 @@ def _zigzag_length(signals: _Signals, legs: Sequence[_Piece]) -> int:
         sizes = [abs(each.level) for each in legs[: place + 1]]
         alike = max(sizes) - min(sizes) < _ALIKE * max(sizes)
         other = place == 0 or leg.level * legs[place - 1].level < 0
-        same_power = abs(leg.propulsion - legs[0].propulsion) < 2 * PROPULSION_STEP * signals.full
-        if not (alike and other and (same_power or math.isnan(leg.propulsion))) or _turns_far(signals, leg):
+        if not (alike and other and signals.same_power(legs[0], leg, 2.0)) or _turns_far(signals, leg):
             break
         count = place + 1
-    following = sum(_turned(signals, leg.begin, leg.end) * leg.level >= 0 for leg in legs[:count])
+    following = sum(signals.turned(leg) * leg.level >= 0 for leg in legs[:count])
     return count if count > 2 and following > _FOLLOWING * count else 0
 
 
 def _turns_far(signals: _Signals, leg: _Piece) -> bool:
     """Whether a leg turns farther than one of a zigzag does."""
-    turn = leg.kind is StretchKind.TURN and abs(leg.level) > signals.threshold
-    return turn and abs(_turned(signals, leg.begin, leg.end)) > FAR_TURN_RAD
+    return leg.kind is StretchKind.TURN and signals.steered(leg) and abs(signals.turned(leg)) > FAR_TURN_RAD
 
 
 def _checks_swing(signals: _Signals, turn: _Piece, check: _Piece) -> bool:
     """Whether the second of two legs checks the swing of the first: short and small, or the heading does not follow."""
-    short = (check.end - check.begin) * signals.step < signals.rest_s
-    follows = _turned(signals, check.begin, check.end) * check.level > 0
-    return turn.level * check.level < 0 and (not follows or (short and abs(check.level) < 0.5 * abs(turn.level)))
+    small = signals.lasted(check) < signals.rest_s and abs(check.level) < 0.5 * abs(turn.level)
+    follows = signals.turned(check) * check.level > 0
+    return turn.level * check.level < 0 and (not follows or small)
 
 
 def _remaining(signals: _Signals, legs: Sequence[_Piece]) -> list[_Piece]:
     """Legs that are neither a zigzag nor far turns."""
     if len(legs) < 2:
         return [_single(signals, leg) for leg in legs]
-    levels = [leg.level for leg in legs if abs(leg.level) > signals.threshold]
-    if len(levels) <= 2 and _main_share(legs) > 0.8:
+    # What its first piece and others of the same side do not last checks the swing.
+    main = sum(leg.end - leg.begin for leg in legs if leg.level * legs[0].level > 0)
+    share = main / (legs[-1].end - legs[0].begin)
+    if sum(map(signals.steered, legs)) <= 2 and share > 0.8:
         return [_whole(legs, StretchKind.PIVOT if legs[0].kind is StretchKind.PIVOT else StretchKind.TURN)]
     return [_whole(legs, StretchKind.STEPS)]
 
@@ -584,18 +554,10 @@ def _whole(legs: Sequence[_Piece], kind: StretchKind) -> _Piece:
     return replace(legs[0], end=legs[-1].end, kind=kind)
 
 
-def _main_share(group: Sequence[_Piece]) -> float:
-    """Share of a group that its first piece and others of the same side last: what remains checks the swing."""
-    same = sum(piece.end - piece.begin for piece in group if piece.level * group[0].level > 0)
-    return same / (group[-1].end - group[0].begin)
-
-
 def _stretch(signals: _Signals, piece: _Piece) -> Stretch:
     part = slice(piece.begin, piece.end)
-    rate, speed = signals.rate[part], signals.speed[part]
-    steering = signals.steering[part]
+    rate, speed, steering = signals.rate[part], signals.speed[part], signals.steering[part]
     sides = np.sign(steering[np.abs(steering) > signals.threshold])
-    reversals = int((sides[1:] != sides[:-1]).sum())
     known = speed[np.isfinite(speed)]
     speeds = (float(known[0]), float(known.min()), float(known.max())) if len(known) else (math.nan,) * 3
     return Stretch(
@@ -603,8 +565,8 @@ def _stretch(signals: _Signals, piece: _Piece) -> Stretch:
         begin_s=float(signals.time[piece.begin]),
         end_s=float(signals.time[min(piece.end, len(signals.time) - 1)]),
         rudder_rad=piece.level if piece.kind not in (StretchKind.STEADY, StretchKind.REST) else math.nan,
-        heading_change_rad=_turned(signals, piece.begin, piece.end),
-        reversals=reversals,
+        heading_change_rad=signals.turned(piece),
+        reversals=int((sides[1:] != sides[:-1]).sum()),
         speed_mps=(speeds[0], speeds[1], speeds[2]),
         yaw_rate_radps=float(np.sqrt(np.nanmean(rate**2))) if np.isfinite(rate).any() else math.nan,
     )

@@ -10,13 +10,12 @@ import numpy as np
 
 from tank2sim.apps.logs.channels import CHANNELS_FILE, LogChannel
 from tank2sim.apps.logs.clock import utc_text
-from tank2sim.apps.logs.current import DriftCurrent, drift_current
 from tank2sim.apps.logs.gear import LoggedGear, logged_gear
 from tank2sim.apps.logs.quantities import QUANTITIES
 from tank2sim.apps.logs.streams import LogFinding
 from tank2sim.apps.logs.stretches import Stretch, StretchKind
 from tank2sim.apps.logs.trial_files import TrialCut
-from tank2sim.apps.logs.voyage import Voyage
+from tank2sim.apps.logs.voyage import DriftCurrent, Voyage, drift_current
 from tank2sim.arrays import Columns, Number
 from tank2sim.identification.craft.study import CraftIdentificationStudy
 from tank2sim.notices import Notice, caution

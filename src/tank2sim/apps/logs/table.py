@@ -12,27 +12,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tank2sim.apps.logs.clock import DOUBLED_STEPS, TWO_DIGITS_FROM
-from tank2sim.apps.logs.quantities import QUANTITIES, quantity_of_name, unit_of_signal_k
-from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog
+from tank2sim.apps.logs.quantities import CLOCK_WORDS, plain_words, quantity_of_name, unit_of_signal_k
+from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, fault, named_stream, note
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
+from tank2sim.files import first_bytes
 from tank2sim.records.spelt_units import split_unit
 from tank2sim.records.text_layout import WHITESPACE, TextLayout, decoded_text, text_layout
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_ZONES_H = {"utc": 0, "gmt": 0, "z": 0, "mez": 1, "cet": 1, "mesz": 2, "cest": 2, "wet": 0, "west": 1, "bst": 1}
-_ZONES_H |= {"eet": 2, "eest": 3, "msk": 3, "sgt": 8, "hkt": 8, "jst": 9, "kst": 9, "aest": 10, "nzst": 12}
-_ZONES_H |= {"est": -5, "edt": -4, "cst": -6, "cdt": -5, "mst": -7, "mdt": -6, "pst": -8, "pdt": -7}
-"""Hours of time zones before UTC, by the abbreviations that names of columns use (IANA time zone database)."""
-
-_TIME_WORDS = re.compile(
-    r"\b(time|times|timestamp|zeit|uhrzeit|zeitstempel|utc|datetime|epoch|stamp|heure|horodatage|hora|ora|tijd|tijdstip"
-    r"|tid|tidspunkt|czas|tempo|aika|zaman|saat|t|secs|seconds)\b"
-)
-_DATE_WORDS = re.compile(r"\b(date|datum|day|tag|fecha|data|dato|paivamaara|tarih)\b")
+_ZONES_H, _COUNTS = CLOCK_WORDS["zones_h"], CLOCK_WORDS["seconds"]
+_TIME_WORDS, _DATE_WORDS = (re.compile(rf"\b({'|'.join(CLOCK_WORDS[kind])})\b") for kind in ("time", "date"))
 _DATE = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}")
+_LIKE_TIME = re.compile(rf"({_DATE.pattern}[T ,]+)?\d{{1,2}}:\d\d")
 _EPOCHS = ((1e8, 1e10, 1.0), (1e11, 1e13, 1e-3), (1e14, 1e16, 1e-6), (1e17, 1e19, 1e-9))
 """Least and largest size of an epoch in s, ms, us and ns since 1970 (years 1973 to 2286), and its factor to seconds."""
 
@@ -48,16 +42,6 @@ _FIRST_DAY, _LAST_DAY = 19800101, 21001231
 
 _CLOCK_DIGITS = 3
 """Least number of different seconds of a minute of a clock in digits. Project choice: counts by 50 have two."""
-
-_COUNTS = (
-    (r"ms|msec|milli\w*", 1e-3),
-    (r"us|usec|micro\w*", 1e-6),
-    (r"ns|nano\w*", 1e-9),
-    (r"min|mins|minutes?", 60.0),
-    (r"h|hr|hrs|hours?", 3600.0),
-    (r"s|sec|secs|seconds?", 1.0),
-)
-"""Words for the unit in which a column counts time, and its seconds."""
 
 _BEGINNING = 10
 """Percentile of times that are since 1970 already; counts since a start are less. Project choice: some cells are 0."""
@@ -97,14 +81,47 @@ def read_table_log(path: Path) -> VesselLog:
     too; the log then has no date. Columns without names are ``column 1`` and so on. Rows that cannot be read are
     counted and left out.
 
-    Raises
-    ------
-    InputError
-        The file cannot be read, or has no rows or no time.
+    Raises InputError: The file cannot be read, or has no rows or no time.
     """
+    text, encoding = decoded_text(head := first_bytes(path, _HEAD_BYTES), complete=False)
+    lines = text.splitlines()
+    layout = text_layout(path, lines[:-1] if len(head) == _HEAD_BYTES and len(lines) > 1 else lines)  # a cut line
+    frame, findings, skipped = _frame(path, layout, encoding)
+    rows = len(frame)
+    clock = _TableClock(path, frame, layout, findings)
+    time, dated, used = clock.times()
+    last = max(used, key=list(frame.columns).index)
+    if not np.isfinite(time).any():
+        remedy = "write ISO 8601 times, as 2024-05-04T09:30:00.2Z, or seconds since 1970"
+        problem = f"holds no time that can be read, as {_first_cell(frame[last])[:40]!r}"
+        raise InputError(path, f"column {last}", problem, remedy)
+    values = frame.drop(columns=list(used))
+    by_signal = _by_signal(values, time)
+    spread = None if by_signal else _spread(time, values)
+    if spread is not None:
+        time, each = spread
+        text = f"{last} has {each} rows at each time (median): they are spread evenly between them"
+        findings.append(note(text, last, rows=each))
+    else:
+        new = ~frame.duplicated().to_numpy()
+        frame, time = frame[new], time[new]
+        by_signal = _by_signal(values[new], time)
+    streams = by_signal or [
+        _stream(name, unit, time, numbers)
+        for name, unit in zip(layout.names, layout.units, strict=True)
+        if name not in used and (numbers := _numbers(frame[name], layout.comma)) is not None
+    ]
+    if not streams:
+        raise InputError(path, "", "has no column of numbers next to its time", "give a table of measured values")
+    counts = {"rows": rows, "repeated_rows": rows - len(frame), "skipped": skipped}
+    counts["without_time"] = int(np.isnan(time).sum())
+    return VesselLog(path, "CSV", tuple(streams), counts, tuple(findings), dated)
+
+
+def _frame(path: Path, layout: TextLayout, encoding: str) -> tuple[pd.DataFrame, list[LogFinding], int]:
+    """Cells of the table, and notes of rows with too many, whose number is the last."""
     import pandas as pd
 
-    layout, encoding = _layout(path)
     try:
         with warnings.catch_warnings(record=True) as warned:
             warnings.simplefilter("always", pd.errors.ParserWarning)
@@ -123,50 +140,18 @@ def read_table_log(path: Path) -> VesselLog:
             )
     except (ValueError, csv.Error) as error:
         raise InputError(path, "", f"is not a table ({' '.join(str(error).split())})", "give a CSV") from None
-    rows = len(frame)
     with path.open("rb") as file:
         body = itertools.islice(file, layout.skip, None)
-        skipped = max(0, sum(1 for line in body if line.strip() and not line.startswith(b"#")) - rows)
-    findings = [LogFinding("note", f"{skipped} rows have too many cells and are left out")] if skipped else []
+        skipped = max(0, sum(1 for line in body if line.strip() and not line.startswith(b"#")) - len(frame))
+    findings = [note(f"{skipped} rows have too many cells and are left out")] if skipped else []
     if any(issubclass(each.category, pd.errors.ParserWarning) for each in warned):
-        findings.append(
-            LogFinding("note", f"rows have cells beyond the {len(layout.names)} columns; they are not read")
-        )
-    time, dated, used = _time(path, frame, layout, findings)
-    if not np.isfinite(time).any():
-        name = sorted(used, key=list(frame.columns).index)[-1]
-        first = _first_cell(frame[name])
-        remedy = "write ISO 8601 times, as 2024-05-04T09:30:00.2Z, or seconds since 1970"
-        raise InputError(path, f"column {name}", f"holds no time that can be read, as {first[:40]!r}", remedy)
-    values = frame.drop(columns=list(used))
-    by_signal = _by_signal(values, time)
-    spread = None if by_signal else _spread(time, values)
-    if spread is not None:
-        time, each = spread
-        name = sorted(used, key=list(frame.columns).index)[-1]
-        text = f"{name} has {each} rows at each time (median): they are spread evenly between them"
-        findings.append(LogFinding("note", text, name, {"rows": each}))
-    else:
-        new = ~frame.duplicated().to_numpy()
-        frame, time, values = frame[new], time[new], values[new]
-        by_signal = _by_signal(values, time)
-    streams = by_signal or [
-        _stream(name, unit, time, numbers)
-        for name, unit in zip(layout.names, layout.units, strict=True)
-        if name not in used and (numbers := _numbers(frame[name], layout.comma)) is not None
-    ]
-    if not streams:
-        raise InputError(path, "", "has no column of numbers next to its time", "give a table of measured values")
-    counts = {"rows": rows, "repeated_rows": rows - len(frame), "skipped": skipped}
-    counts["without_time"] = int(np.isnan(time).sum())
-    return VesselLog(path, "CSV", tuple(streams), counts, tuple(findings), dated)
+        findings.append(note(f"rows have cells beyond the {len(layout.names)} columns; they are not read"))
+    return frame, findings, skipped
 
 
 def _by_signal(frame: pd.DataFrame, time: Array) -> list[LogStream]:
     """Streams of a table with a column of signal names, :data:`_ROWS_OF_A_SIGNAL` rows of each or more; else none."""
-    import pandas as pd
-
-    numeric = [name for name in frame.columns if pd.api.types.is_numeric_dtype(frame[name])]
+    numeric = list(frame.select_dtypes("number").columns)
     texts = [name for name in frame.columns if name not in numeric]
     if len(numeric) != 1 or len(texts) != 1 or frame[texts[0]].isna().any():
         return []
@@ -206,192 +191,201 @@ def _spread(time: Array, values: pd.DataFrame) -> tuple[Array, int] | None:
 
 def _stream(name: str, unit: str, time: Array, values: Array) -> LogStream:
     """A column with the quantity that its name suggests, unless its unit is of another kind."""
-    quantity = quantity_of_name(name)
-    unit = unit or split_unit(name)[1] or unit_of_signal_k(name, quantity)
-    if quantity and unit and unit not in QUANTITIES[quantity].units:
-        quantity = ""
-    return LogStream(name, time, values, unit, quantity, "name" if quantity else "")
+    return named_stream(
+        name, time, values, unit or split_unit(name)[1] or unit_of_signal_k(name, quantity_of_name(name))
+    )
 
 
-def _layout(path: Path) -> tuple[TextLayout, str]:
-    """Layout by the beginning of the file, and its encoding."""
-    try:
-        with path.open("rb") as file:
-            head = file.read(_HEAD_BYTES)
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read ({error.strerror})", "check the name and its permissions") from None
-    text, encoding = decoded_text(head, complete=False)
-    lines = text.splitlines()
-    if len(head) == _HEAD_BYTES and len(lines) > 1:
-        lines.pop()  # a part of a line
-    return text_layout(path, lines), encoding
+class _TableClock:
+    """The times of a table, by the names of its columns and by their cells."""
 
+    def __init__(self, path: Path, frame: pd.DataFrame, layout: TextLayout, findings: list[LogFinding]) -> None:
+        self.path, self.layout, self.findings = path, layout, findings
+        self.columns = {name: _as_numbers(frame[name]) for name in frame.columns}
+        first = {name: _first_cell(column) for name, column in self.columns.items()}
+        self.numbers = {
+            name: column.to_numpy(dtype=float) for name, column in self.columns.items() if column.dtype.kind in "iufb"
+        }
+        self.named = [name for name in first if _TIME_WORDS.search(plain_words(name))]
+        self.dates = [
+            name
+            for name in first
+            if _DATE_WORDS.search(plain_words(name))
+            and name not in self.named
+            and (_DATE.match(first[name]) or self._days_of_numbers(name) is not None)
+        ]
+        known = (*self.named, *self.dates)
+        self.clocks = [name for name in first if name not in known and _LIKE_TIME.match(first[name])]
+        self.first = first
 
-def _time(
-    path: Path, frame: pd.DataFrame, layout: TextLayout, findings: list[LogFinding]
-) -> tuple[Array, bool, set[str]]:
-    """Times (rows,), whether they are UTC, and the columns that they are made of."""
-    import pandas as pd
-
-    named = [name for name in frame.columns if _TIME_WORDS.search(_plain(name))]
-    dates = [
-        name
-        for name in frame.columns
-        if _DATE_WORDS.search(_plain(name))
-        and name not in named
-        and (_DATE.match(_first_cell(frame[name])) or _days_of_numbers(frame[name]) is not None)
-    ]
-    clocks = [name for name in frame.columns if name not in (*named, *dates) and _looks_like_time(frame[name])]
-    for name in [*named, *dates, *clocks, *frame.columns[:1]]:
-        column = _as_numbers(frame[name])
-        if pd.api.types.is_numeric_dtype(column):
-            values = column.to_numpy(dtype=float)
-            counted = _stated_count(name, layout) is not None
-            if not counted and name not in dates and (clock := _clock_of_numbers(values)) is not None:
-                if not dates:
-                    continue
-                day = _days(path, dates[0], frame[dates[0]], _zone_s(name, findings))
-                return day + clock, True, {name, dates[0]}
-            seconds = _epoch_seconds(name, values, findings)
-            if seconds is not None:
-                return seconds, True, {name, *dates}
-            continue
-        first = _first_cell(column)
-        offset = _zone_s(name, findings)
-        if re.match(r"\d{4}-\d\d-\d\d[T ]\d", first):
-            return (
-                _seconds(pd.to_datetime(column, format="ISO8601", utc=True, errors="coerce"), offset),
-                True,
-                {name, *dates},
-            )
-        if re.match(r"\d{1,4}[./-]\d{1,2}[./-]\d{2,4}[T ,]+\d", first):
-            return _seconds(_dates(path, name, column), offset), True, {name}
-        if dates and re.match(r"\d{1,2}:\d\d", first):
-            return _days(path, dates[0], frame[dates[0]], offset) + _clock(column), True, {name, dates[0]}
-    return _undated_time(path, frame, layout, [named, clocks], findings)
-
-
-def _undated_time(
-    path: Path, frame: pd.DataFrame, layout: TextLayout, columns: list[list[str]], findings: list[LogFinding]
-) -> tuple[Array, bool, set[str]]:
-    """Times (rows,) without a date: of the day, or a count; else as :func:`_time`. `columns`: by names and by cells."""
-    import pandas as pd
-
-    named, clocks = columns
-    for name in [*named, *clocks, *frame.columns[:1]]:
-        column = _as_numbers(frame[name])
-        of_day = _clock(column) if re.match(r"\d{1,2}:\d\d", _first_cell(column)) else None
-        if pd.api.types.is_numeric_dtype(column) and _stated_count(name, layout) is None:
-            of_day = _clock_of_numbers(column.to_numpy(dtype=float))
-        if of_day is not None:
-            text = f"{name} has times of day without a date: the trials have no date"
-            findings.append(LogFinding("note", text, name))
-            return _over_midnight(of_day), False, {name}
-    for name in named or list(frame.columns[:1]):
-        column = _as_numbers(frame[name])
-        if pd.api.types.is_numeric_dtype(column):
-            values = column.to_numpy(dtype=float)
+    def times(self) -> tuple[Array, bool, set[str]]:
+        """Times (rows,), whether they are UTC, and the columns that they are made of."""
+        leftmost = list(self.columns)[:1]
+        for name in [*self.named, *self.dates, *self.clocks, *leftmost]:
+            found = self._counted(name) if name in self.numbers else self._written(name)
+            if found is not None:
+                return found[0], True, {name, *found[1]}
+        for name in [*self.named, *self.clocks, *leftmost]:
+            of_day = _clock(self.columns[name]) if re.match(r"\d{1,2}:\d\d", self.first[name]) else None
+            if name in self.numbers and self._stated_count(name) is None:
+                of_day = _clock_of_numbers(self.numbers[name])
+            if of_day is not None:
+                self._note(name, "has times of day without a date: the trials have no date")
+                return _over_midnight(of_day), False, {name}
+        for name in self.named or leftmost:
+            values = self.numbers.get(name, np.zeros(0))
             steps = np.diff(values[np.isfinite(values)])
             if len(steps) and (steps >= 0).mean() > 0.9:
-                text = f"{name} counts from the beginning of the log: the trials have no date"
-                findings.append(LogFinding("note", text, name))
-                scale = _stated_count(name, layout) or _count_by_motion(name, values, frame, findings)
-                return values * scale, False, {name}
-    problem = "it is not a log of a known format, and as a table there is no column of time"
-    remedy = "give a column of ISO 8601 times, of date and time, or of seconds"
-    raise InputError(path, "header", problem, remedy)
+                self._note(name, "counts from the beginning of the log: the trials have no date")
+                return values * (self._stated_count(name) or self._count_by_motion(name)), False, {name}
+        problem = "it is not a log of a known format, and as a table there is no column of time"
+        remedy = "give a column of ISO 8601 times, of date and time, or of seconds"
+        raise InputError(self.path, "header", problem, remedy)
 
+    def _note(self, name: str, text: str) -> None:
+        self.findings.append(note(f"{name} {text}", name))
 
-def _epoch_seconds(name: str, values: Array, findings: list[LogFinding]) -> Array | None:
-    """Seconds (rows,) since 1970 of numbers that count s, ms, us or ns since then, or days; None if they do not."""
-    known = values[np.isfinite(values)]
-    size = float(np.median(np.abs(known))) if len(known) else 0.0
-    for least, largest, factor in _EPOCHS:
-        counts = least <= size <= largest and np.percentile(known, _BEGINNING) >= least
-        if counts and (len(known) < 2 or np.median(np.diff(known)) * factor < _SLOWEST_STEP_S):
-            return values * factor
-    moments = _moments_of_numbers(values)
-    if moments is not None:
-        return moments - _zone_s(name, findings)
-    for least, largest, day in _DAYS:
-        if least <= size <= largest and np.nanmax(values) - np.nanmin(values) < _LONGEST_IN_DAYS:
-            return (values - day) * 86400 - _zone_s(name, findings)
-    return None
+    def _counted(self, name: str) -> tuple[Array, list[str]] | None:
+        """UTC (rows,) of a column of numbers, and the columns of dates used; None if it does not show it."""
+        values = self.numbers[name]
+        clock = None if self._stated_count(name) or name in self.dates else _clock_of_numbers(values)
+        if clock is None:
+            seconds = self._epoch_seconds(name)
+            return None if seconds is None else (seconds, self.dates)
+        return (self._days(self.dates[0], self._zone_s(name)) + clock, self.dates[:1]) if self.dates else None
+
+    def _written(self, name: str) -> tuple[Array, list[str]] | None:
+        """UTC (rows,) of a column of text, and the columns of dates used; None if it does not show it."""
+        import pandas as pd
+
+        column, first, offset = self.columns[name], self.first[name], self._zone_s(name)
+        if re.match(r"\d{4}-\d\d-\d\d[T ]\d", first):
+            moments = pd.to_datetime(column, format="ISO8601", utc=True, errors="coerce")
+            return _seconds(moments, offset), self.dates
+        if re.match(r"\d{1,4}[./-]\d{1,2}[./-]\d{2,4}[T ,]+\d", first):
+            return _seconds(_dates(self.path, name, column), offset), []
+        if self.dates and re.match(r"\d{1,2}:\d\d", first):
+            return self._days(self.dates[0], offset) + _clock(column), self.dates[:1]
+        return None
+
+    def _epoch_seconds(self, name: str) -> Array | None:
+        """Seconds (rows,) since 1970 of numbers that count s, ms, us or ns since then, or days; None if they do not."""
+        values = self.numbers[name]
+        known = values[np.isfinite(values)]
+        size = float(np.median(np.abs(known))) if len(known) else 0.0
+        for least, largest, factor in _EPOCHS:
+            counts = least <= size <= largest and np.percentile(known, _BEGINNING) >= least
+            if counts and (len(known) < 2 or np.median(np.diff(known)) * factor < _SLOWEST_STEP_S):
+                return np.asarray(values * factor)
+        moments = _moments_of_numbers(values)
+        for least, largest, day in _DAYS:
+            if moments is None and least <= size <= largest and np.ptp(known) < _LONGEST_IN_DAYS:
+                moments = (values - day) * 86400
+        return None if moments is None else moments - self._zone_s(name)
+
+    def _stated_count(self, name: str) -> float | None:
+        """Seconds of the unit in which a column counts by its name or its unit; None where neither says."""
+        words = plain_words(f"{name} {self.layout.units[self.layout.names.index(name)]}")
+        return next((factor for pattern, factor in _COUNTS.items() if re.search(rf"\b({pattern})\b", words)), None)
+
+    def _count_by_motion(self, name: str) -> float:
+        """Seconds of the unit in which a column counts, by the speed of the track, or else by the step."""
+        values = self.numbers[name]
+        step = float(np.median(np.diff(values[np.isfinite(values)])))
+        if step < _DOUBTFUL_STEP:
+            return 1.0
+        speed = self._track_speed(values)
+        if not speed:  # no positions, or the receiver was at rest
+            slow = self._turns_too_slowly(values)
+            if not slow and step < _SLOWEST_STEP_S - 1e-3:
+                return 1.0
+            rows = f"a row in {step:.4g} s shows no manoeuvre"
+            why = "the heading would turn by less than any vessel" if slow else rows
+            self.findings.append(fault(f"{name} states no unit, and {why}: it is taken to count ms", name))
+            return 1e-3
+        factor = next((factor for factor in (1.0, 1e-3, 1e-6, 1e-9) if speed > _SLOWEST_MPS * factor), 1.0)
+        if factor < 1:
+            text = f"{name} states no unit; in s the vessel would make {speed:.2g} m/s, so it counts in {factor:g} s"
+            self.findings.append(note(text, name, unit_s=factor))
+        return factor
+
+    def _of_quantity(self, *quantities: str) -> list[Array]:
+        """Values (rows,) of columns by their names; empty unless all are there."""
+        columns = {quantity_of_name(name): column for name, column in self.columns.items()}
+        found = [_numbers(columns[name], False) for name in quantities if name in columns]
+        known = [values for values in found if values is not None]
+        return known if len(known) == len(quantities) else []
+
+    def _turns_too_slowly(self, values: Array) -> bool:
+        """Whether a heading (deg) turns so slowly, with the time in s, that the time is in a smaller unit."""
+        for heading in self._of_quantity("heading"):
+            known = np.isfinite(heading) & np.isfinite(values)
+            turned, steps = np.unwrap(heading[known], period=360), np.diff(values[known])
+            if len(steps) >= _ROWS_OF_A_SIGNAL and np.ptp(turned) >= _LEAST_TURNED_DEG and (steps > 0).any():
+                rates = np.abs(np.diff(turned))[steps > 0] / steps[steps > 0]
+                return float(np.percentile(rates, 99)) < _SLOWEST_TURN_DEGPS
+        return False
+
+    def _track_speed(self, values: Array) -> float | None:
+        """Speed of the positions of a table, 95th percentile, m in the unit of its time; None without positions."""
+        for pair, metres in ((("latitude", "longitude"), 111_000.0), (("x", "y"), 1.0)):
+            if track := self._of_quantity(*pair):
+                shrink = float(np.cos(np.radians(np.nanmedian(track[0])))) if metres > 1 else 1.0
+                way = metres * np.hypot(np.diff(track[0]), shrink * np.diff(track[1]))
+                step = np.diff(values)
+                good = np.isfinite(way) & (step > 0)
+                return float(np.percentile(way[good] / step[good], 95)) if good.any() else None
+        return None
+
+    def _days_of_numbers(self, name: str) -> Array | None:
+        """Seconds (rows,) since 1970 of dates yyyymmdd, ddmmyy (as in NMEA 0183) or yymmdd, or of spreadsheets."""
+        values = self.numbers.get(name)
+        if values is None:
+            return None
+        size = float(np.nanmedian(values)) if np.isfinite(values).any() else 0.0
+        least, largest, day = _DAYS[0]
+        if _FIRST_DAY <= size <= _LAST_DAY:
+            return _calendar_days(values)
+        if size > 991299 or size < 10100:
+            return None
+        first, middle, last = values // 10000, values // 100 % 100, values % 100
+        forwards = [first, middle, last] if "yymmdd" in name.lower() else [last, middle, first]
+        for year, month, date in (forwards, forwards[::-1]):
+            full = year + np.where(year >= TWO_DIGITS_FROM, 1900, 2000)
+            if (days := _calendar_days(full * 10000 + month * 100 + date)) is not None:
+                return days
+        return (values - day) * 86400 if least <= size <= largest else None
+
+    def _days(self, name: str, offset_s: float) -> Array:
+        """Seconds (rows,) since 1970 of a column of dates in text or numbers."""
+        numbers = self._days_of_numbers(name)
+        return (
+            _seconds(_dates(self.path, name, self.columns[name]), offset_s) if numbers is None else numbers - offset_s
+        )
+
+    def _zone_s(self, name: str) -> float:
+        """Seconds that the clock of a column is before UTC, by its name."""
+        if match := re.search(r"(?:utc|gmt)\s*([+-]\d{1,2})(?::?(\d\d))?", name, re.IGNORECASE):
+            return 3600.0 * (int(match[1]) + (int(match[2] or 0) / 60) * (-1 if match[1][0] == "-" else 1))
+        words = plain_words(name)
+        zone = next((_ZONES_H[word] for word in words.split() if word in _ZONES_H), None)
+        if zone is None and re.search(r"\b(local|lt|ortszeit|bordzeit)\b", words):
+            text = f"{name} is a local time of unknown zone, and is taken as UTC"
+            self.findings.append(fault(text, name))
+        return 3600.0 * (zone or 0)
 
 
 def _as_numbers(column: pd.Series[Any]) -> pd.Series[Any]:
     """A column of numbers with another decimal sign than the rest of the table as numbers; any other as it is."""
     import pandas as pd
 
-    if pd.api.types.is_numeric_dtype(column) or not re.fullmatch(r"\s*-?\d+[.,]\d+\s*", _first_cell(column)):
+    if column.dtype.kind in "iufb" or not re.fullmatch(r"\s*-?\d+[.,]\d+\s*", _first_cell(column)):
         return column
     return pd.to_numeric(column.astype(str).str.replace(",", ".", regex=False), errors="coerce")
 
 
-def _looks_like_time(column: pd.Series[Any]) -> bool:
-    """Whether the first cell of a column is a date with a time, or a time of day."""
-    return bool(re.match(rf"({_DATE.pattern}[T ,]+)?\d{{1,2}}:\d\d", _first_cell(column)))
-
-
 def _first_cell(column: pd.Series[Any]) -> str:
     return next((str(value) for value in column.dropna()[:1]), "")
-
-
-def _stated_count(name: str, layout: TextLayout) -> float | None:
-    """Seconds of the unit in which a column counts by its name or its unit; None where neither says."""
-    words = _plain(f"{name} {layout.units[layout.names.index(name)]}")
-    return next((factor for pattern, factor in _COUNTS if re.search(rf"\b({pattern})\b", words)), None)
-
-
-def _count_by_motion(name: str, values: Array, frame: pd.DataFrame, findings: list[LogFinding]) -> float:
-    """Seconds of the unit in which a column counts, by the speed of the track, or else by the step."""
-    step = float(np.median(np.diff(values[np.isfinite(values)])))
-    if step < _DOUBTFUL_STEP:
-        return 1.0
-    speed = _track_speed(values, frame)
-    if not speed:  # no positions, or the receiver was at rest
-        slow = _turns_too_slowly(values, frame)
-        if not slow and step < _SLOWEST_STEP_S - 1e-3:
-            return 1.0
-        rows = f"a row in {step:.4g} s shows no manoeuvre"
-        why = "the heading would turn by less than any vessel" if slow else rows
-        text = f"{name} states no unit, and {why}: it is taken to count ms"
-        findings.append(LogFinding("fault", text, name))
-        return 1e-3
-    factor = next((factor for factor in (1.0, 1e-3, 1e-6, 1e-9) if speed > _SLOWEST_MPS * factor), 1.0)
-    if factor < 1:
-        text = f"{name} states no unit; in s the vessel would make {speed:.2g} m/s, so it counts in {factor:g} s"
-        findings.append(LogFinding("note", text, name, {"unit_s": factor}))
-    return factor
-
-
-def _turns_too_slowly(values: Array, frame: pd.DataFrame) -> bool:
-    """Whether a heading (deg) turns so slowly, with the time in s, that the time is in a smaller unit."""
-    columns = {quantity_of_name(name): name for name in frame.columns}
-    if "heading" not in columns or (heading := _numbers(frame[columns["heading"]], False)) is None:
-        return False
-    known = np.isfinite(heading) & np.isfinite(values)
-    turned, steps = np.unwrap(heading[known], period=360), np.diff(values[known])
-    if len(steps) < _ROWS_OF_A_SIGNAL or np.ptp(turned) < _LEAST_TURNED_DEG or not (steps > 0).any():
-        return False
-    rates = np.abs(np.diff(turned))[steps > 0] / steps[steps > 0]
-    return float(np.percentile(rates, 99)) < _SLOWEST_TURN_DEGPS
-
-
-def _track_speed(values: Array, frame: pd.DataFrame) -> float | None:
-    """Speed of the positions of a table, 95th percentile, m in the unit of its time; None without positions."""
-    columns = {quantity_of_name(name): name for name in frame.columns}
-    for north, east, metres in (("latitude", "longitude", 111_000.0), ("x", "y", 1.0)):
-        if north in columns and east in columns:
-            a, b = (_numbers(frame[columns[name]], False) for name in (north, east))
-            if a is None or b is None:
-                continue
-            shrink = float(np.cos(np.radians(np.nanmedian(a)))) if metres > 1 else 1.0
-            way = metres * np.hypot(np.diff(a), shrink * np.diff(b))
-            step = np.diff(values)
-            good = np.isfinite(way) & (step > 0)
-            return float(np.percentile(way[good] / step[good], 95)) if good.any() else None
-    return None
 
 
 def _clock_of_numbers(values: Array) -> Array | None:
@@ -421,28 +415,6 @@ def _moments_of_numbers(values: Array) -> Array | None:
     return None
 
 
-def _days_of_numbers(column: pd.Series[Any]) -> Array | None:
-    """Seconds (rows,) since 1970 of dates yyyymmdd, ddmmyy (as in NMEA 0183) or yymmdd, or of spreadsheets."""
-    import pandas as pd
-
-    if not pd.api.types.is_numeric_dtype(column):
-        return None
-    values = column.to_numpy(dtype=float)
-    size = float(np.nanmedian(values)) if np.isfinite(values).any() else 0.0
-    least, largest, day = _DAYS[0]
-    if _FIRST_DAY <= size <= _LAST_DAY:
-        return _calendar_days(values)
-    if size > 991299 or size < 10100:
-        return None
-    first, middle, last = values // 10000, values // 100 % 100, values % 100
-    forwards = [first, middle, last] if "yymmdd" in str(column.name).lower() else [last, middle, first]
-    for year, month, date in (forwards, forwards[::-1]):
-        full = year + np.where(year >= TWO_DIGITS_FROM, 1900, 2000)
-        if (days := _calendar_days(full * 10000 + month * 100 + date)) is not None:
-            return days
-    return (values - day) * 86400 if least <= size <= largest else None
-
-
 def _calendar_days(values: Array) -> Array | None:
     """Seconds (rows,) since 1970 of dates yyyymmdd; None unless all are."""
     import pandas as pd
@@ -455,32 +427,19 @@ def _calendar_days(values: Array) -> Array | None:
     return out if known.any() and not moments.isna().any() else None
 
 
-def _days(path: Path, name: str, column: pd.Series[Any], offset_s: float) -> Array:
-    """Seconds (rows,) since 1970 of a column of dates in text or numbers."""
-    numbers = _days_of_numbers(column)
-    return _seconds(_dates(path, name, column), offset_s) if numbers is None else numbers - offset_s
-
-
-def _plain(name: str) -> str:
-    return re.sub(r"[^a-z0-9]+", " ", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower()).strip()
-
-
 def _clock(column: pd.Series[Any]) -> Array:
     """Seconds (rows,) of times of day, of which some may end with AM or PM."""
     import pandas as pd
 
     text = _of_24_hours(column.astype(str).str.strip().str.replace(",", ".", regex=False))
     text = text.where(text.str.count(":") > 1, text + ":00")
-    seconds: Array = pd.to_timedelta(text, errors="coerce").dt.total_seconds().to_numpy(dtype=float)
-    return seconds
+    return np.asarray(pd.to_timedelta(text, errors="coerce").dt.total_seconds(), dtype=float)
 
 
 def _over_midnight(clock: Array) -> Array:
     """Times of day, s, that go on over midnight."""
-    known = np.isfinite(clock)
-    days = np.cumsum(np.diff(clock[known], prepend=clock[known][:1]) < -43200)
-    out = np.array(clock)
-    out[known] += 86400 * days
+    known, out = np.isfinite(clock), np.array(clock)
+    out[known] += 86400 * np.cumsum(np.diff(clock[known], prepend=clock[known][:1]) < -43200)
     return out
 
 
@@ -527,20 +486,6 @@ def _seconds(moments: pd.Series[Any], offset_s: float) -> Array:
 
     values = (moments - pd.Timestamp(0, tz="UTC")) / pd.Timedelta(seconds=1)
     return np.asarray(values.to_numpy(dtype=float) - offset_s)
-
-
-def _zone_s(name: str, findings: list[LogFinding]) -> float:
-    """Seconds that the clock of a column is before UTC, by its name."""
-    if match := re.search(r"(?:utc|gmt)\s*([+-]\d{1,2})(?::?(\d\d))?", name, re.IGNORECASE):
-        hours = int(match[1]) + (int(match[2] or 0) / 60) * (-1 if match[1][0] == "-" else 1)
-        return 3600.0 * hours
-    for word in _plain(name).split():
-        if word in _ZONES_H:
-            return 3600.0 * _ZONES_H[word]
-    if re.search(r"\b(local|lt|ortszeit|bordzeit)\b", _plain(name)):
-        text = f"{name} is a local time of unknown zone, and is taken as UTC"
-        findings.append(LogFinding("fault", text, name))
-    return 0.0
 
 
 def _numbers(column: pd.Series[Any], comma: bool) -> Array | None:

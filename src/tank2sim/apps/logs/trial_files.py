@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-import io
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from tank2sim.apps.logs.clock import usual_step, utc_text
-from tank2sim.apps.logs.current import drift_current
 from tank2sim.apps.logs.quantities import QUANTITIES
 from tank2sim.apps.logs.reference import held, interpolated, thinned_series
 from tank2sim.apps.logs.stretches import LEAST_TRIAL_ROWS, Stretch, StretchKind
-from tank2sim.apps.logs.voyage import QuantitySeries, Voyage
+from tank2sim.apps.logs.voyage import QuantitySeries, Voyage, drift_current
 from tank2sim.arrays import Array
-from tank2sim.records.signals.columns import file_columns
 from tank2sim.records.signals.sampling import GAP_STEPS
 from tank2sim.records.signals.writing import trial_text
 from tank2sim.records.trials import MEASURED_COLUMNS, RUDDERS, TRIAL_SIGNALS, Trial
@@ -103,24 +101,23 @@ def _places(stretches: Sequence[Stretch], whole: bool) -> Iterator[tuple[int, in
     """First stretch of each trial and how many it has: one that excites the vessel, or several."""
     place = 0
     while place < len(stretches):
-        end = place + 1
-        if whole and stretches[place].kind.excites:
-            while (
-                end < len(stretches)
-                and stretches[end].kind is not StretchKind.REST
-                and stretches[end].begin_s == stretches[end - 1].end_s
-                and stretches[end - 1].end_s - stretches[place].begin_s < PREDICTABLE_S
-            ):
+        first, end = stretches[place], place + 1
+        if whole and first.kind.excites:
+            for last, following in pairwise(stretches[place:]):
+                apart = following.kind is StretchKind.REST or following.begin_s != last.end_s
+                if apart or last.end_s - first.begin_s >= PREDICTABLE_S:
+                    break
                 end += 1
-            while end > place + 1 and not stretches[end - 1].kind.excites:
+            while not stretches[end - 1].kind.excites:
                 end -= 1
-        if stretches[place].kind.excites:
+        if first.kind.excites:
             yield place, end - place
         place = end
 
 
 def _cut(voyage: Voyage, stretches: tuple[Stretch, ...], begin: float, number: int) -> TrialCut | None:
-    clock = next((voyage.series[name] for name in ("heading", "yaw_rate", "x", "sog") if name in voyage.series), None)
+    series = dict(voyage.series)
+    clock = next((series[name] for name in ("heading", "yaw_rate", "x", "sog") if name in series), None)
     if clock is None:
         return None
     step = float(np.clip(usual_step(clock.time_s), SHORTEST_STEP_S, LONGEST_STEP_S))
@@ -130,18 +127,12 @@ def _cut(voyage: Voyage, stretches: tuple[Stretch, ...], begin: float, number: i
     if rows < LEAST_TRIAL_ROWS:
         return None
     at = first + step * np.arange(rows)
-    series = dict(voyage.series)
-    if "rpm_order" not in series and "rpm" in series:
-        series["rpm_order"] = series["rpm"]
-    series.pop("rpm", None)
-    for name in _redundant(series):
-        series.pop(name, None)
-    signals = {
-        signal: values
-        for name, signal in _columns().items()
-        if name in series and np.isfinite(values := _sampled(series[name], at, step, name)).any()
-    }
-    signals = {name: signals[name] for name in TRIAL_SIGNALS if name in signals}
+    if "rpm" in series:  # revolutions that are ordered are those of the format
+        series.setdefault("rpm_order", series["rpm"])
+    columns = {name: quantity.column for name, quantity in QUANTITIES.items() if quantity.column} | {"rpm": ""}
+    columns |= {"rpm_order": QUANTITIES["rpm"].column} | dict.fromkeys(_redundant(series), "")
+    sampled = {columns.get(name): _sampled(entry, at, step, name) for name, entry in series.items()}
+    signals = {name: sampled[name] for name in TRIAL_SIGNALS if name in sampled and np.isfinite(sampled[name]).any()}
     thrusters = {
         column: factor * _sampled(series[name], at, step, name)
         for name, (column, factor) in _THRUSTER_COLUMNS.items()
@@ -152,9 +143,7 @@ def _cut(voyage: Voyage, stretches: tuple[Stretch, ...], begin: float, number: i
         return None
     name = f"{number:02d}_run" if len(stretches) > 1 else _name(number, stretches[0], steered)
     trial = Trial(Path(f"{name}.csv"), np.round(at - first, 6), signals)
-    text = trial_text(trial, _remarks(voyage, stretches, first)) if steered else ""
-    if thrusters:
-        text = _with_thrusters(text, trial, thrusters, _remarks(voyage, stretches, first))
+    text = trial_text(trial, _remarks(voyage, stretches, first), thrusters)
     return TrialCut(stretches, trial, first, text, steered)
 
 
@@ -166,13 +155,6 @@ def _redundant(series: Mapping[str, QuantitySeries]) -> tuple[str, ...]:
     if "u_water" in series:
         return (*ground, "sog", "cog")
     return ground if "sog" in series and "cog" in series else ()
-
-
-def _columns() -> dict[str, str]:
-    """Quantity to signal of the trial format; revolutions that are ordered become those of the format."""
-    columns = {name: quantity.column for name, quantity in QUANTITIES.items() if quantity.column}
-    columns["rpm_order"] = columns.pop("rpm")
-    return columns
 
 
 def _name(number: int, stretch: Stretch, steered: bool) -> str:
@@ -207,16 +189,15 @@ def _sampled(entry: QuantitySeries, at: Array, step: float, name: str) -> Array:
         return np.full(len(at), np.nan)
     if name in _HELD:
         return held(at, time, values)
-    circular = QUANTITIES[name].column in ("cog_rad", "wind_rel_direction_rad", "wind_direction_rad")
+    circular = name in ("cog", "wind_rel_direction", "wind_direction")
     if circular:
         values = np.unwrap(values)
     if usual_step(time) < 0.75 * step:
         time, values = thinned_series(time, values, step)
     own_step = usual_step(time)
     found = interpolated(at, time, values, max(GAP_STEPS * step, 1.5 * own_step))
-    if (
-        own_step > 1.5 * step and name != "rudder_angle"
-    ):  # which drives the vessel, and moves evenly between its samples
+    # A rudder angle drives the vessel, and moves evenly between its samples.
+    if own_step > 1.5 * step and name != "rudder_angle":
         rows = np.clip(np.round((time - at[0]) / step).astype(int), 0, len(at) - 1)
         sampled = np.zeros(len(at), dtype=bool)
         sampled[rows[(time >= at[0] - step / 2) & (time <= at[-1] + step / 2)]] = True
@@ -224,43 +205,17 @@ def _sampled(entry: QuantitySeries, at: Array, step: float, name: str) -> Array:
     return np.mod(found, 2 * math.pi) if circular else found
 
 
-def _with_thrusters(text: str, trial: Trial, thrusters: Mapping[str, Array], remarks: list[str]) -> str:
-    """The text of a trial with columns of thrusters behind its own."""
-    out = io.StringIO()
-    if text:
-        lines = text.splitlines()
-        head = next(place for place, line in enumerate(lines) if not line.startswith("#"))
-    else:
-        lines, head = [f"# {remark}" for remark in remarks], len(remarks)
-        columns = file_columns(trial)
-        lines.append(",".join(columns))
-        rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-        lines += [",".join(f"{value + 0.0:.10g}" if math.isfinite(value) else "" for value in row) for row in rows]
-    for line in lines[:head]:
-        out.write(f"{line}\n")
-    out.write(f"{lines[head]},{','.join(thrusters)}\n")
-    for line, *values in zip(lines[head + 1 :], *(column.tolist() for column in thrusters.values()), strict=True):
-        cells = (f"{value + 0.0:.10g}" if math.isfinite(value) else "" for value in values)
-        out.write(f"{line},{','.join(cells)}\n")
-    return out.getvalue()
-
-
 def remove_earlier_trials(folder: Path, written: Iterable[Path]) -> list[str]:
     """Remove the trials that an earlier run cut into a folder and this one did not write; return their names.
 
-    Only files that say in their comments that they were cut by tank2sim are removed.
-
-    Parameters
-    ----------
-    folder : Path
-    written : iterable of Path
-        Files of this run, which stay.
+    Only files that say in their comments that they were cut by tank2sim are removed; those of this run, `written`,
+    stay.
     """
     removed = []
     for path in sorted(set(folder.glob("[0-9][0-9]*_*.csv")) - set(written)):
         with path.open(encoding="utf-8", errors="replace") as file:
-            head = [line for line in itertools.islice(file, _HEAD_LINES) if line.startswith("#")]
-        if any(CUT_BY in line for line in head):
+            cut = any(CUT_BY in line for line in itertools.islice(file, _HEAD_LINES) if line.startswith("#"))
+        if cut:
             path.unlink()
             removed.append(path.name)
     return removed

@@ -1,10 +1,11 @@
-"""A voyage: the channels of its logs in SI on one clock."""
+"""A voyage: the channels of its logs in SI on one clock, and its current."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -12,11 +13,17 @@ from tank2sim.apps.logs.channel_search import find_channels
 from tank2sim.apps.logs.channels import SURE_FROM, ChannelSet
 from tank2sim.apps.logs.clock import gaps_of, tidied, usual_step, utc_text
 from tank2sim.apps.logs.content import AGREES
-from tank2sim.apps.logs.missing import without_missing
-from tank2sim.apps.logs.pulses import pulses_of
 from tank2sim.apps.logs.quantities import QUANTITIES
-from tank2sim.apps.logs.reference import HEADING_WINDOW_S, differenced, local_metres, rounded_origin
-from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, joined_parts
+from tank2sim.apps.logs.recorded import pulses_of, without_missing
+from tank2sim.apps.logs.reference import (
+    HEADING_WINDOW_S,
+    POSITION_WINDOW_S,
+    differenced,
+    interpolated,
+    local_metres,
+    rounded_origin,
+)
+from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, fault, joined_parts, note
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice, caution
@@ -96,40 +103,14 @@ def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -
         A channel names a stream that no log has, or nothing in the logs is understood.
     """
     parts = joined_parts(logs)
-    findings = [finding for log in parts for finding in log.findings]
     counts: dict[str, dict[str, int]] = {log.path.name: dict(log.counts) for log in logs}
-    streams = _tidied_streams(parts, counts, findings)
-    findings = _gathered(findings)
-    span = max((float(s.time_s[-1]) for s in streams), default=0) - min(
-        (float(s.time_s[0]) for s in streams), default=0
-    )
-    if span > LONGEST_VOYAGE_S:
-        problem = f"its times span {span:.3g} s: they are in another unit, or some are wrong"
-        raise InputError(logs[0].path, "", problem, "name the unit in the column of time, or remove the wrong rows")
-    if len({log.dated for log in logs}) > 1:
-        odd = next(log for log in logs if not log.dated)
-        raise InputError(odd.path, "", "has no date, and other logs have", "give logs that all have UTC, or one alone")
+    streams, findings = _tidied_streams(parts, counts)
+    _refuse_odd_times(logs, streams)
     found = channels or find_channels(streams)
     findings += found.findings
     if len(parts) > 1 and channels is None:
         findings += _clock_findings([log.path.stem for log in parts], found, streams)
-    named = {stream.name: stream for stream in streams}
-    series: dict[str, QuantitySeries] = {}
-    for channel in found.channels:
-        if channel.use and channel.quantity != "ignore":
-            if channel.stream not in named:
-                raise InputError(
-                    logs[0].path, f"channel {channel.quantity}", f"no stream is called {channel.stream}", _remedy(named)
-                )
-            stream = named[channel.stream]
-            series[channel.quantity] = QuantitySeries(stream.time_s - channel.delay_s, channel.si(stream.values))
-    if not any(len(stream.values) > 1 for stream in streams):
-        remedy = "give a log with values at several times, that rise"
-        raise InputError(logs[0].path, "", "has values at one time alone, or none", remedy)
-    if not series:
-        problem = "no channel of it is understood"
-        remedy = f"say which is what in a channels file (--channels), as docs/logs.md shows: {_listed(named)}"
-        raise InputError(logs[0].path, "", problem, remedy)
+    series = _series(logs[0].path, found, streams)
     findings += _to_confirm(found)
     if channels is None:
         findings += _not_understood(found, streams)
@@ -140,11 +121,27 @@ def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -
     return Voyage(tuple(logs), found, series, origin, begin, end, tuple(findings), counts)
 
 
+def _refuse_odd_times(logs: Sequence[VesselLog], streams: Sequence[LogStream]) -> None:
+    """Refuse times in another unit, and logs with and without a date."""
+    begins, ends = ([float(stream.time_s[place]) for stream in streams] for place in (0, -1))
+    span = max(ends, default=0.0) - min(begins, default=0.0)
+    if span > LONGEST_VOYAGE_S:
+        problem = f"its times span {span:.3g} s: they are in another unit, or some are wrong"
+        raise InputError(logs[0].path, "", problem, "name the unit in the column of time, or remove the wrong rows")
+    if len({log.dated for log in logs}) > 1:
+        odd = next(log for log in logs if not log.dated)
+        raise InputError(odd.path, "", "has no date, and other logs have", "give logs that all have UTC, or one alone")
+
+
 def _tidied_streams(
-    parts: Sequence[VesselLog], counts: dict[str, dict[str, int]], findings: list[LogFinding]
-) -> list[LogStream]:
-    """Streams of all logs with rising times and values alone; what was left out is counted and found."""
+    parts: Sequence[VesselLog], counts: dict[str, dict[str, int]]
+) -> tuple[list[LogStream], list[LogFinding]]:
+    """Streams of all logs with rising times and values alone; what was left out is counted and found.
+
+    Findings that differ by the name of their stream alone are one.
+    """
     streams: list[LogStream] = []
+    findings = [finding for log in parts for finding in log.findings]
     for log in parts:
         repeated = 0
         for stream in log.streams:
@@ -153,25 +150,43 @@ def _tidied_streams(
             repeated += doubled
             findings += [*missing, *found_in_time]
             tidy, _ = pulses_of(tidy)
-            if stream.quantity and len(stream.values) and not len(tidy.values):
-                findings.append(LogFinding("note", f"{stream.name}: holds no valid value", stream.name))
             if len(tidy.values):
                 name = stream.name if len(parts) == 1 else f"{log.path.stem}: {stream.name}"
                 streams.append(replace(tidy, name=name))
+            elif stream.quantity and len(stream.values):
+                findings.append(note(f"{stream.name}: holds no valid value", stream.name))
         counts[log.path.name]["repeated_samples"] = repeated
-    return streams
-
-
-def _gathered(findings: list[LogFinding]) -> list[LogFinding]:
-    """Findings that differ by the name of their stream alone as one."""
     groups: dict[str, list[LogFinding]] = {}
     for finding in findings:
         key = finding.text.removeprefix(f"{finding.stream}: ") if finding.stream else finding.text
         groups.setdefault(key, []).append(finding)
-    return [
+    return streams, [
         group[0] if len(group) == 1 else replace(group[0], text=f"{len(group)} streams: {key}", stream="")
         for key, group in groups.items()
     ]
+
+
+def _series(path: Path, found: ChannelSet, streams: Sequence[LogStream]) -> dict[str, QuantitySeries]:
+    """The channels in use in SI, at their times less their delays."""
+    named = {stream.name: stream for stream in streams}
+    listed = f"streams are {', '.join(list(named)[:12])}{', ...' if len(named) > 12 else ''}"
+    series: dict[str, QuantitySeries] = {}
+    for channel in found.channels:
+        if not channel.use or channel.quantity == "ignore":
+            continue
+        if channel.stream not in named:
+            problem = f"no stream is called {channel.stream}"
+            remedy = f"{listed}; correct the channels file, or delete it"
+            raise InputError(path, f"channel {channel.quantity}", problem, remedy)
+        stream = named[channel.stream]
+        series[channel.quantity] = QuantitySeries(stream.time_s - channel.delay_s, channel.si(stream.values))
+    if not any(len(stream.values) > 1 for stream in streams):
+        remedy = "give a log with values at several times, that rise"
+        raise InputError(path, "", "has values at one time alone, or none", remedy)
+    if not series:
+        remedy = f"say which is what in a channels file (--channels), as docs/logs.md shows: {listed}"
+        raise InputError(path, "", "no channel of it is understood", remedy)
+    return series
 
 
 MOST_NAMED = 20
@@ -193,19 +208,16 @@ def _clock_findings(names: list[str], found: ChannelSet, streams: list[LogStream
         for channel in found.channels:
             name = next((name for name in names if channel.stream.startswith(f"{name}: ")), "")
             if channel.quantity == quantity and channel.confidence >= SURE_FROM and name not in rates:
-                stream = named[channel.stream]
-                values = channel.si(stream.values)
-                rate = (stream.time_s, values) if quantity == "yaw_rate" else None
-                rates[name] = rate or differenced(stream.time_s, np.unwrap(values), HEADING_WINDOW_S)
+                time, values = named[channel.stream].time_s, channel.si(named[channel.stream].values)
+                turned = quantity == "heading"
+                rates[name] = differenced(time, np.unwrap(values), HEADING_WINDOW_S) if turned else (time, values)
     findings = []
     for name in names[1:]:
-        if names[0] in rates and name in rates:
-            shift = _shift(rates[names[0]], rates[name])
-            if shift is not None and abs(shift) > _CLOCKS_AGREE_S:
-                side = "ahead of" if shift > 0 else "behind"
-                text = f"the clock of {name} is {abs(shift):.3g} s {side} that of {names[0]} by the rate of turn: give "
-                text += f"its channels delay_s = {shift:.3g}"
-                findings.append(LogFinding("fault", text, evidence={"shift_s": shift}))
+        shift = _shift(rates[names[0]], rates[name]) if names[0] in rates and name in rates else None
+        if shift is not None and abs(shift) > _CLOCKS_AGREE_S:
+            side = "ahead of" if shift > 0 else "behind"
+            text = f"the clock of {name} is {abs(shift):.3g} s {side} that of {names[0]} by the rate of turn: give "
+            findings.append(fault(f"{text}its channels delay_s = {shift:.3g}", shift_s=shift))
     return findings
 
 
@@ -229,74 +241,66 @@ def _not_understood(found: ChannelSet, streams: list[LogStream]) -> list[LogFind
     """The streams that vary and are no channel, neither by name nor by content, as one note."""
     known = {channel.stream for channel in found.channels}
     names = [stream.name for stream in streams if stream.name not in known and np.ptp(stream.values) > 0]
-    if not names:
-        return []
     more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-    text = (
-        f"columns that were not understood: {', '.join(names[:MOST_NAMED])}{more}; add them to channels.toml if they "
-    )
-    return [LogFinding("note", f"{text}are quantities of it", evidence={"streams": len(names)})]
-
-
-def _listed(named: Mapping[str, LogStream]) -> str:
-    return f"streams are {', '.join(list(named)[:12])}{', ...' if len(named) > 12 else ''}"
-
-
-def _remedy(named: Mapping[str, LogStream]) -> str:
-    return f"{_listed(named)}; correct the channels file, or delete it"
-
-
-def _to_confirm(found: ChannelSet) -> list[LogFinding]:
-    """Findings of channels in use that are not sure, and of quantities whose only streams are not used."""
-    findings, others = [], []
-    for channel in found.channels:
-        if channel.use and channel.confidence < SURE_FROM:
-            words = QUANTITIES[channel.quantity].words
-            if channel.confidence < 0.8 and channel.quantity in _ESSENTIAL:
-                text = f"{words} is taken from {channel.stream} ({channel.why}): to be confirmed"
-                findings.append(LogFinding("fault", text, channel.stream))
-            else:
-                others.append(f"{words} ({channel.stream})")
-    if others:
-        findings.append(LogFinding("note", f"to be confirmed in channels.toml: {', '.join(others)}"))
-    for quantity in _ESSENTIAL:
-        candidates = [channel for channel in found.channels if channel.quantity == quantity]
-        if candidates and not any(channel.use for channel in candidates) and candidates[0].confidence >= 0.5:
-            text = f"{QUANTITIES[quantity].words} may be {candidates[0].stream} ({candidates[0].why}), and is not used"
-            findings.append(LogFinding("fault", text, candidates[0].stream))
-    used = {channel.quantity: channel.stream for channel in found.channels if channel.use}
-    if "magnetic_heading" in used and "heading" not in used:
-        name = used["magnetic_heading"]
-        text = f"{name} is a magnetic heading, and there is no true one: the trials have no heading; make it one in "
-        text += 'channels.toml (quantity = "heading", offset = less the variation in deg, + east, and the deviation)'
-        findings.append(LogFinding("fault", text, name))
-    return findings
+    listed = f"columns that were not understood: {', '.join(names[:MOST_NAMED])}{more}"
+    text = f"{listed}; add them to channels.toml if they are quantities of it"
+    return [note(text, streams=len(names))] if names else []
 
 
 _ESSENTIAL = ("rudder_angle", "rudder_order", "heading", "yaw_rate")
 """Quantities without which no manoeuvre is understood."""
 
 
+def _to_confirm(found: ChannelSet) -> list[LogFinding]:
+    """Findings of channels in use that are not sure, and of quantities whose only streams are not used."""
+    findings, others = [], []
+    for channel in found.channels:
+        if not channel.use or channel.confidence >= SURE_FROM:
+            continue
+        words = QUANTITIES[channel.quantity].words
+        if channel.confidence < 0.8 and channel.quantity in _ESSENTIAL:
+            text = f"{words} is taken from {channel.stream} ({channel.why}): to be confirmed"
+            findings.append(fault(text, channel.stream))
+        else:
+            others.append(f"{words} ({channel.stream})")
+    if others:
+        findings.append(note(f"to be confirmed in channels.toml: {', '.join(others)}"))
+    used = {channel.quantity: channel.stream for channel in found.channels if channel.use}
+    for quantity in _ESSENTIAL:
+        best = next((channel for channel in found.channels if channel.quantity == quantity), None)
+        if best and quantity not in used and best.confidence >= 0.5:
+            text = f"{QUANTITIES[quantity].words} may be {best.stream} ({best.why}), and is not used"
+            findings.append(fault(text, best.stream))
+    if "magnetic_heading" in used and "heading" not in used:
+        name = used["magnetic_heading"]
+        text = f"{name} is a magnetic heading, and there is no true one: the trials have no heading; make it one in "
+        text += 'channels.toml (quantity = "heading", offset = less the variation in deg, + east, and the deviation)'
+        findings.append(fault(text, name))
+    return findings
+
+
 def _derived(series: dict[str, QuantitySeries]) -> tuple[dict[str, QuantitySeries], tuple[float, float] | None]:
     """Local metres, continuous headings, and speed and course of velocities to north and east."""
-    origin = None
-    out = dict(series)
-    if "latitude" in out and "longitude" in out:
-        latitude, longitude = out.pop("latitude"), out.pop("longitude")
-        at = latitude.time_s
-        origin = rounded_origin(latitude.values, longitude.values)
-        x, y = local_metres(latitude.values, np.interp(at, longitude.time_s, longitude.values), origin)
+    origin, out = None, dict(series)
+
+    def on(first: str, second: str) -> tuple[Array, Array, Array]:
+        """Times and values of a series, and of another at these times."""
+        time = out[first].time_s
+        return time, out[first].values, np.interp(time, out[second].time_s, out[second].values)
+
+    if {"latitude", "longitude"} <= out.keys():
+        at, latitude, longitude = on("latitude", "longitude")
+        origin = rounded_origin(latitude, out.pop("longitude").values)
+        x, y = local_metres(latitude, longitude, origin)
         out["x"], out["y"] = QuantitySeries(at, x), QuantitySeries(at, y)
+        del out["latitude"]
     if ("x" in out) != ("y" in out):
         out.pop("x", None)
         out.pop("y", None)
-    if "v_north" in out and "v_east" in out:
-        north, east = out["v_north"], out["v_east"]
-        at_east = np.interp(north.time_s, east.time_s, east.values)
-        if "sog" not in out:
-            out["sog"] = QuantitySeries(north.time_s, np.hypot(north.values, at_east))
-        if "cog" not in out:
-            out["cog"] = QuantitySeries(north.time_s, np.arctan2(at_east, north.values) % (2 * math.pi))
+    if {"v_north", "v_east"} <= out.keys():
+        at, north, east = on("v_north", "v_east")
+        out.setdefault("sog", QuantitySeries(at, np.hypot(north, east)))
+        out.setdefault("cog", QuantitySeries(at, np.arctan2(east, north) % (2 * math.pi)))
     for name in ("heading", "magnetic_heading"):
         if name in out:
             out[name] = QuantitySeries(out[name].time_s, np.unwrap(out[name].values))
@@ -305,19 +309,108 @@ def _derived(series: dict[str, QuantitySeries]) -> tuple[dict[str, QuantitySerie
 
 def _gap_findings(series: Mapping[str, QuantitySeries]) -> list[LogFinding]:
     """A note of the gaps of each set of channels that share them."""
-    groups: dict[tuple[str, ...], list[tuple[str, list[tuple[float, float]]]]] = {}
+    groups: dict[tuple[str, ...], tuple[list[tuple[float, float]], list[str]]] = {}
     for name, entry in series.items():
-        if name == "y" or len(entry.time_s) < 3:
-            continue
         gaps = gaps_of(entry.time_s, max(_GAP_LEAST_S, GAP_STEPS * usual_step(entry.time_s)))
-        if gaps:
+        if name != "y" and len(entry.time_s) > 2 and gaps:
             words = "position" if name == "x" else QUANTITIES[name].words
-            groups.setdefault(tuple(utc_text(begin)[:19] for begin, _ in gaps), []).append((words, gaps))
+            key = tuple(utc_text(begin)[:19] for begin, _ in gaps)
+            groups.setdefault(key, (gaps, []))[1].append(words)
     findings = []
-    for members in groups.values():
-        gaps = members[0][1]
+    for gaps, names in groups.values():
         shown = ", ".join(f"{end - begin:.3g} s from {utc_text(begin)[11:19]}" for begin, end in gaps[:_GAPS_LISTED])
         more = f" and {len(gaps) - _GAPS_LISTED} more" if len(gaps) > _GAPS_LISTED else ""
-        text = f"nothing for {shown}{more}: {'; '.join(words for words, _ in members)}"
-        findings.append(LogFinding("note", text, evidence={"total_s": sum(end - begin for begin, end in gaps)}))
+        text = f"nothing for {shown}{more}: {'; '.join(names)}"
+        findings.append(note(text, total_s=sum(end - begin for begin, end in gaps)))
     return findings
+
+
+AVERAGED_S = 60.0
+"""Time over which the current is averaged for its spread, s. Project choice: receivers wander over minutes."""
+
+_FEWEST = 10
+"""Samples below which no current is determined (project choice)."""
+
+_LEAST_TURN = 0.15
+"""Least eigenvalue, of at most 0.5, of the mean square of heading vectors for which the speed ahead alone determines a
+current: headings spread over about 90 deg. Project choice."""
+
+
+@dataclass(frozen=True)
+class DriftCurrent:
+    """A current: speed (m/s), direction towards which it sets (deg from north), and how much it varies.
+
+    - `spread_mps`: Standard deviation of its averages over :data:`AVERAGED_S`, m/s.
+    - `by`: What it follows from.
+    """
+
+    speed_mps: float
+    direction_deg: float
+    spread_mps: float
+    by: str
+
+
+def drift_current(voyage: Voyage, begin_s: float, end_s: float) -> DriftCurrent | None:
+    """Current between two times of a voyage; None where its log does not determine it.
+
+    With both components of the velocity through the water it is the mean difference of the velocities over ground and
+    water. With the speed ahead alone the difference of the speeds ahead is fitted by the current's component on the
+    heading, for which the heading must have changed. A scale error of the log through the water is part of it.
+    """
+    series = voyage.series
+    ground = _ground(voyage)
+    if "heading" not in series or "u_water" not in series or ground is None:
+        return None
+    inside = (ground[0] >= begin_s) & (ground[0] <= end_s)
+    time, north, east = (part[inside] for part in ground)
+    if len(time) < _FEWEST:
+        return None
+    heading, ahead, side = (
+        interpolated(time, series[name].time_s, series[name].values, 5.0) if name in series else np.zeros(0)
+        for name in ("heading", "u_water", "v_water")
+    )
+    cosine, sine = np.cos(heading), np.sin(heading)
+    if "v_water" in series:
+        x, y = north - (ahead * cosine - side * sine), east - (ahead * sine + side * cosine)
+        good = np.isfinite(x) & np.isfinite(y)
+        if good.sum() < _FEWEST:
+            return None
+        time, x, y = time[good], x[good], y[good]
+        bins = np.floor((time - time[0]) / AVERAGED_S).astype(int)
+        counts = np.bincount(bins)
+        full = counts > 0
+        means = [np.bincount(bins, weights=part)[full] / counts[full] for part in (x, y)]
+        spread = math.hypot(float(np.std(means[0])), float(np.std(means[1])))
+        return _current(float(x.mean()), float(y.mean()), spread, "velocities over the ground and through the water")
+    difference = north * cosine + east * sine - ahead
+    good = np.isfinite(difference)
+    matrix = np.column_stack([cosine[good], sine[good]])
+    if good.sum() < _FEWEST or np.linalg.eigvalsh(matrix.T @ matrix / good.sum())[0] < _LEAST_TURN:
+        return None
+    mean, *_ = np.linalg.lstsq(matrix, difference[good], rcond=None)
+    spread = float(np.std(difference[good] - matrix @ mean))
+    return _current(float(mean[0]), float(mean[1]), spread, "speeds ahead over the ground and through the water")
+
+
+def _current(north: float, east: float, spread: float, by: str) -> DriftCurrent:
+    return DriftCurrent(math.hypot(north, east), math.degrees(math.atan2(east, north)) % 360, spread, by)
+
+
+def _ground(voyage: Voyage) -> tuple[Array, Array, Array] | None:
+    """Times and velocity to north and east over the ground."""
+    series = voyage.series
+    if "v_north" in series and "v_east" in series:
+        north, east = series["v_north"], series["v_east"]
+        return north.time_s, north.values, np.interp(north.time_s, east.time_s, east.values)
+    if "sog" in series and "cog" in series:
+        sog, cog = series["sog"], series["cog"]
+        longest = 3 * max(usual_step(cog.time_s), 1.0)
+        cosine, sine = (
+            interpolated(sog.time_s, cog.time_s, part, longest) for part in (np.cos(cog.values), np.sin(cog.values))
+        )
+        course = np.arctan2(sine, cosine)
+        return sog.time_s, sog.values * np.cos(course), sog.values * np.sin(course)
+    if "x" in series and "y" in series:
+        time, v_north = differenced(series["x"].time_s, series["x"].values, POSITION_WINDOW_S)
+        return time, v_north, differenced(series["y"].time_s, series["y"].values, POSITION_WINDOW_S)[1]
+    return None

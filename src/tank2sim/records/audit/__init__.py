@@ -95,14 +95,9 @@ def _without_empty(trial: Trial) -> Trial:
 class ColumnNoise:
     """White noise of a signal.
 
-    Parameters
-    ----------
-    column : str
-        Head of the column in the file.
-    sigma : float
-        Standard deviation, SI.
-    stated : bool
-        Whether the file states it; elsewhere it is estimated from the record.
+    - `column`: Head of the column in the file.
+    - `sigma`: Standard deviation, SI.
+    - `stated`: Whether the file states it; elsewhere it is estimated from the record.
     """
 
     column: str
@@ -114,18 +109,9 @@ class ColumnNoise:
 class AuditedTrial:
     """An audited trial.
 
-    Parameters
-    ----------
-    file : str
-    duration_s, step_s : float
-    rows : int
-    columns : tuple of str
-        Heads in the file.
-    noise : dict
-        Noise by the name of the signal in SI.
-    notices : tuple of Notice
-    histories : dict
-        The record thinned to draw.
+    - `columns`: Heads in the file.
+    - `noise`: Noise by the name of the signal in SI.
+    - `histories`: The record thinned to draw.
     """
 
     file: str

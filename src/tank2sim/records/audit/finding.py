@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
-from tank2sim.arrays import Number
-from tank2sim.records.trials import Trial
+from tank2sim.arrays import Array, Number
+from tank2sim.records.trials import Trial, with_signals
 
 Repair = Callable[[Trial], Trial]
+SeenPlaces = tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ColumnFinding:
     """A finding about one column of a file.
 
-    Parameters
-    ----------
-    file, column : str
-    what, likely_truth, kind, evidence, places_s
-        As of :class:`Finding`.
-    repaired : bool
-        Whether the trial is corrected when it is read.
+    - `what`, `likely_truth`, `kind`, `evidence`, `places_s`: As of :class:`Finding`.
+    - `repaired`: Whether the trial is corrected when it is read.
     """
 
     file: str
@@ -40,29 +36,14 @@ class ColumnFinding:
 class Finding:
     """One finding about a trial.
 
-    Parameters
-    ----------
-    source : Path
-        The file.
-    columns : tuple of str
-        The columns it is about, as the file calls them.
-    what : str
-        What does not agree with what.
-    likely_truth : str
-        What the columns hold instead.
-    kind : str
-        "fault" if a column is not what its name says or a sensor failed; "note" for what a right record may show too
-        (a current, a small bias, a gap).
-    evidence : mapping
-        Figures, the unit in the name.
-    correct : callable or None
-        Trial to repaired trial.
-    safe : bool
-        Whether the correct only restates what was measured (a frame, a sign, a unit, a time base, a failed sensor left
-        out), so that :func:`tank2sim.records.audit.repair_trial` applies it. The others (a bias, a scale, a clock)
-        change measured values by an estimate and are for the user, or for the gap workflow, to decide.
-    places_s : tuple of (float, float)
-        From when to when it is seen, in the time of the file; empty where it is of the whole record.
+    `columns` are what it is about, as the file calls them; `what` does not agree with what; `likely_truth` is what they
+    hold instead. A "fault" is a column that is not what its name says, or a sensor that failed; a "note" what a right
+    record may show too (a current, a small bias, a gap). `evidence` are figures, the unit in the name.
+
+    A `safe` repair only restates what was measured (a frame, a sign, a unit, a time base, a failed sensor left out),
+    and :func:`tank2sim.records.audit.repair_trial` applies it. The others (a bias, a scale, a clock) change measured
+    values by an estimate and are for the user, or for the gap workflow, to decide. `places_s` are the times from when
+    to when it is seen, in the time of the file; empty where it is of the whole record.
     """
 
     source: Path
@@ -102,3 +83,43 @@ class Finding:
             )
             for column in self.columns
         )
+
+
+def found_in(
+    trial: Trial,
+    names: Iterable[str],
+    what: str,
+    truth: str,
+    evidence: Mapping[str, float] | None = None,
+    repair: Repair | None = None,
+) -> Finding:
+    """A fault of the columns of these signals, with a safe repair."""
+    columns = tuple(trial.heading(name) for name in names)
+    return Finding(trial.path, columns, what, truth, "fault", evidence or {}, repair, safe=repair is not None)
+
+
+def noted_in(
+    trial: Trial,
+    names: Iterable[str],
+    what: str,
+    truth: str,
+    evidence: Mapping[str, float] | None = None,
+    repair: Repair | None = None,
+) -> Finding:
+    """A note on the columns of these signals; its repair is an estimate."""
+    return replace(found_in(trial, names, what, truth, evidence, repair), kind="note", safe=False)
+
+
+def changed(names: Iterable[str], change: Callable[[Array], Array], notice: str) -> Repair:
+    """The repair that changes the values (n,) of signals."""
+    names = tuple(names)
+
+    def repaired(trial: Trial) -> Trial:
+        return with_signals(trial, {name: change(trial.signals[name]) for name in names}, notice)
+
+    return repaired
+
+
+def negated(values: Array) -> Array:
+    """Values of the opposite sign, without -0."""
+    return 0.0 - values

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from tank2sim.arrays import Array
-from tank2sim.records.audit.finding import Finding
+from tank2sim.records.audit.finding import Finding, changed, found_in, negated, noted_in
 from tank2sim.records.audit.noise import record_noise
 from tank2sim.records.audit.weak import FEWEST_WINDOWS, fit, on_uniform_time, windows_for, windows_of
-from tank2sim.records.trials import RUDDERS, Trial, with_signals
+from tank2sim.records.trials import RUDDERS, Trial
 
 SIDEWAYS = np.pi / 2
 """No rudder turns as far; beyond it an angle is not in its unit."""
@@ -31,18 +31,37 @@ MOVES = 0.3
 def rudder_unit_findings(trial: Trial) -> list[Finding]:
     """Unit of the rudder angle and of the order."""
     findings = []
-    for name in RUDDERS:
-        if name not in trial.signals:
-            continue
+    for name in (name for name in RUDDERS if name in trial.signals):
         largest = float(np.nanmax(np.abs(trial.signals[name])))
+        degrees, in_degrees = float(np.rad2deg(largest)), "deg" in trial.heading(name)
         if largest > SIDEWAYS:
-            findings.append(_too_large(trial, name, largest))
-        elif _too_small(trial, name, largest):
-            found = _in_radians(trial, name, largest)
-            assert found.repair is not None
-            if rudder_response(found.repair(trial), name):
-                findings.append(found)
+            known = largest < np.rad2deg(SIDEWAYS)
+            truth = "it is in degrees under the name of radians" if known else "it is not a rudder angle"
+            repair = changed([name], np.deg2rad, f"{name}: {truth}") if known and not in_degrees else None
+            what = f"the rudder angle reaches {degrees:.4g} deg"
+            findings.append(found_in(trial, [name], what, truth, {"largest_deg": degrees}, repair))
+        elif in_degrees and _turns_too_far(trial, largest):
+            what = f"a rudder of {degrees:.3g} deg at most turns the ship far"
+            truth = "it is in radians under the name of degrees"
+            repair = changed([name], np.rad2deg, f"{name}: {truth}")
+            if rudder_response(repair(trial), name):
+                evidence = {"largest_deg": degrees}
+                findings.append(found_in(trial, [name], what, truth, evidence, repair))
     return findings
+
+
+def _turns_too_far(trial: Trial, largest: float) -> bool:
+    """Whether the heading changes 57 times as far as a rudder that stays below 45 deg in radians."""
+    if "psi_rad" in trial.signals:
+        heading = trial.signals["psi_rad"]
+    elif "r_radps" in trial.signals:
+        rate = trial.signals["r_radps"]
+        known = np.isfinite(rate)
+        heading = cumulative_trapezoid(rate[known], trial.time_s[known], initial=0.0)
+    else:
+        return False
+    turned = np.nanmax(heading) - np.nanmin(heading)
+    return bool(largest <= np.deg2rad(np.pi / 4) and turned > largest * 180 / np.pi)
 
 
 def rudder_findings(trial: Trial) -> list[Finding]:
@@ -105,57 +124,11 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(np.square(known)))) if known.size else 0.0
 
 
-def _too_large(trial: Trial, name: str, largest: float) -> Finding:
-    what = f"the rudder angle reaches {np.rad2deg(largest):.4g} deg"
-    truth = (
-        "it is in degrees under the name of radians" if largest < np.rad2deg(SIDEWAYS) else "it is not a rudder angle"
-    )
-
-    def in_degrees(other: Trial) -> Trial:
-        return with_signals(other, {name: np.deg2rad(other.signals[name])}, f"{name}: {truth}")
-
-    repair = in_degrees if "deg" not in trial.heading(name) and largest < np.rad2deg(SIDEWAYS) else None
-    evidence = {"largest_deg": float(np.rad2deg(largest))}
-    return Finding(trial.path, (trial.heading(name),), what, truth, "fault", evidence, repair, safe=repair is not None)
-
-
-def _too_small(trial: Trial, name: str, largest: float) -> bool:
-    """Whether a rudder in degrees stays below 45 deg in radians while the heading changes 57 times as far."""
-    if "deg" not in trial.heading(name) or largest > np.deg2rad(np.pi / 4):
-        return False
-    if "psi_rad" in trial.signals:
-        heading = trial.signals["psi_rad"]
-    elif "r_radps" in trial.signals:
-        rate = trial.signals["r_radps"]
-        known = np.isfinite(rate)
-        heading = cumulative_trapezoid(rate[known], trial.time_s[known], initial=0.0)
-    else:
-        return False
-    return bool(np.nanmax(heading) - np.nanmin(heading) > largest * 180 / np.pi)
-
-
-def _in_radians(trial: Trial, name: str, largest: float) -> Finding:
-    degrees = float(np.rad2deg(largest))
-    what = f"a rudder of {degrees:.3g} deg at most turns the ship far"
-    truth = "it is in radians under the name of degrees"
-
-    def in_radians(other: Trial) -> Trial:
-        return with_signals(other, {name: np.rad2deg(other.signals[name])}, f"{name}: {truth}")
-
-    columns = (trial.heading(name),)
-    return Finding(trial.path, columns, what, truth, "fault", {"largest_deg": degrees}, in_radians, safe=True)
-
-
 def _wrong_sign(trial: Trial, name: str, response: float) -> Finding:
     what = "a positive rudder turns the ship to port"
     truth = "the rudder is positive to port (rudder_sign: port); or heading, rate of turn, v and y all are"
-
-    def turned(other: Trial) -> Trial:
-        text = f"{name}: positive to port in the file, by the turn that it causes"
-        return with_signals(other, {name: 0.0 - other.signals[name]}, text)
-
-    evidence = {"standard_errors_from_zero": response}
-    return Finding(trial.path, (trial.heading(name),), what, truth, "fault", evidence, turned, safe=True)
+    repair = changed([name], negated, f"{name}: positive to port in the file, by the turn that it causes")
+    return found_in(trial, [name], what, truth, {"standard_errors_from_zero": response}, repair)
 
 
 def _saturation(trial: Trial) -> list[Finding]:
@@ -173,7 +146,7 @@ def _saturation(trial: Trial) -> list[Finding]:
     what = f"the rudder stays at {np.rad2deg(stop):.3g} deg while more is ordered, {100 * share:.2g} % of the time"
     truth = "the steering gear or the sensor saturates there"
     evidence = {"stop_deg": float(np.rad2deg(stop)), "share": share}
-    return [Finding(trial.path, (trial.heading("delta_rad"),), what, truth, "note", evidence)]
+    return [noted_in(trial, ["delta_rad"], what, truth, evidence)]
 
 
 _DEGREE = np.pi / 180
@@ -239,7 +212,7 @@ def rudder_clock_findings(trial: Trial) -> list[Finding]:
         "movements": float(len(moves)),
         "squares_ratio": unshifted / max(squares[best], 1e-300),
     }
-    return [Finding(trial.path, (trial.heading("delta_rad"),), what, truth, "note", evidence)]
+    return [noted_in(trial, ["delta_rad"], what, truth, evidence)]
 
 
 def _moves(rudder: Array, rate: Array) -> list[_Move]:
@@ -292,10 +265,11 @@ def _squares(move: _Move, rudder: Array, rate: Array, step: float, shifts: NDArr
     rows = np.arange(move.begin, move.end)
     taken = np.clip(rows + shifts[:, None], 0, len(rudder) - 1)
     change = np.where(taken <= move.row, 0.0, rudder[taken] - rudder[move.row])
-    once = _integral(change, step)
+    once = cumulative_trapezoid(change, dx=step, initial=0.0)
     straight = np.broadcast_to(np.column_stack([np.ones(len(rows)), rows - rows[0]]), (*taken.shape, 2))
     known = np.isfinite(rate[rows])
-    table = np.concatenate([straight, once[..., None], _integral(once, step)[..., None]], axis=2)[:, known]
+    twice = cumulative_trapezoid(once, dx=step, initial=0.0)
+    table = np.concatenate([straight, once[..., None], twice[..., None]], axis=2)[:, known]
     wanted = rate[rows][known]
     size = np.sqrt(np.mean(table**2, axis=1, keepdims=True))
     directions, weights, _ = np.linalg.svd(table / np.where(size > 0, size, 1.0), full_matrices=False)
@@ -304,8 +278,3 @@ def _squares(move: _Move, rudder: Array, rate: Array, step: float, shifts: NDArr
     explained = directions @ (np.where(independent, wanted @ directions, 0.0)[..., None])
     squares: Array = np.sum((wanted - explained[..., 0]) ** 2, axis=1)
     return squares
-
-
-def _integral(values: Array, step: float) -> Array:
-    integral: Array = cumulative_trapezoid(values, dx=step, initial=0.0)
-    return integral

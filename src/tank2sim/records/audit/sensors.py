@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from scipy.signal import savgol_coeffs
 from scipy.stats import norm
 
 from tank2sim.arrays import Array
-from tank2sim.records.audit.finding import Finding, Repair
+from tank2sim.records.audit.finding import Finding, Repair, SeenPlaces, found_in, noted_in
 from tank2sim.records.audit.noise import DEGREE, WINDOW, record_noise, white_noise
 from tank2sim.records.audit.weak import FALSE_ALARM
 from tank2sim.records.trials import MEASURED_COLUMNS, Trial, sampling_step, with_signals
@@ -57,16 +57,14 @@ def _missing(trial: Trial, name: str, values: Array) -> list[Finding]:
         return []
     runs = _runs(missing)
     longest = max(runs, key=lambda run: run.stop - run.start)
-    seconds = (longest.stop - longest.start) * sampling_step(trial)
-    what = (
-        f"{missing.sum()} values are missing, the longest time {seconds:.3g} s from {trial.time_s[longest.start]:.6g} s"
-    )
+    seconds, begin = (longest.stop - longest.start) * sampling_step(trial), trial.time_s[longest.start]
+    what = f"{missing.sum()} values are missing, the longest time {seconds:.3g} s from {begin:.6g} s"
     evidence = {"values": float(missing.sum()), "runs": float(len(runs)), "longest_s": seconds}
-    places = _places(trial, runs)
-    return [Finding(trial.path, (trial.heading(name),), what, "not recorded there", "note", evidence, places_s=places)]
+    found = noted_in(trial, [name], what, "not recorded there", evidence)
+    return [replace(found, places_s=_places(trial, runs))]
 
 
-def _places(trial: Trial, rows: Sequence[slice]) -> tuple[tuple[float, float], ...]:
+def _places(trial: Trial, rows: Sequence[slice]) -> SeenPlaces:
     """When runs of rows begin and end, s."""
     return tuple((float(trial.time_s[run.start]), float(trial.time_s[run.stop - 1])) for run in rows)
 
@@ -111,11 +109,8 @@ def _stuck(trial: Trial, name: str, values: Array) -> list[Finding]:
     evidence = {"runs": float(len(stuck)), "seconds": seconds, "longest_samples": float(longest + 1)}
     rows = np.concatenate([np.arange(run.start + 1, run.stop + 1) for run in stuck])
     repair = _omitted(name, rows, "where the sensor did not change")
-    kind = _kind(len(rows), values)
-    truth, places = "the sensor was stuck", _places(trial, stuck)
-    return [
-        Finding(trial.path, (trial.heading(name),), what, truth, kind, evidence, repair, safe=True, places_s=places)
-    ]
+    found = found_in(trial, [name], what, "the sensor was stuck", evidence, repair)
+    return [_of_readings(trial, found, len(rows), stuck)]
 
 
 def _jumps(values: Array, run: slice, usual: float) -> bool:
@@ -133,13 +128,12 @@ def _frozen(trial: Trial, name: str, noise: dict[str, float]) -> list[Finding]:
     measured = [noise[other] > _ROUNDING * float(np.nanmax(np.abs(trial.signals[other]))) for other in others]
     if not any(measured):
         return []
-    what = "has one value from beginning to end"
     truth = "the sensor was not read"
 
     def without(other: Trial) -> Trial:
         return with_signals(other, {name: None}, f"{name} left out: {truth}")
 
-    return [Finding(trial.path, (trial.heading(name),), what, truth, repair=without, safe=True)]
+    return [found_in(trial, [name], "has one value from beginning to end", truth, repair=without)]
 
 
 def _spikes(trial: Trial, name: str, values: Array, noise: float, least: float = 0.0) -> list[Finding]:
@@ -164,12 +158,8 @@ def _spikes(trial: Trial, name: str, values: Array, noise: float, least: float =
     rows = np.concatenate([known[run] for run in runs])
     what = f"{len(runs)} spikes, the first at {trial.time_s[rows[0]]:.6g} s"
     evidence = {"spikes": float(len(runs)), "largest_in_noise": float(np.max(np.abs(away)) / usual) if usual else 0.0}
-    repair = _omitted(name, rows, "spikes")
-    truth, kind = "disturbed readings", _kind(len(rows), values)
-    places = _places(trial, [slice(known[run.start], known[run.stop - 1] + 1) for run in runs])
-    return [
-        Finding(trial.path, (trial.heading(name),), what, truth, kind, evidence, repair, safe=True, places_s=places)
-    ]
+    found = found_in(trial, [name], what, "disturbed readings", evidence, _omitted(name, rows, "spikes"))
+    return [_of_readings(trial, found, len(rows), [slice(known[run.start], known[run.stop - 1] + 1) for run in runs])]
 
 
 def _isolated(values: Array, far: NDArray[np.bool_]) -> list[slice]:
@@ -189,8 +179,10 @@ def _exceptional(values: Array, run: slice, far: NDArray[np.bool_]) -> bool:
     return bool(min(edges) > 2 * steps[~touched].max())
 
 
-def _kind(rows: int, values: Array) -> Literal["fault", "note"]:
-    return "fault" if rows > _SHORT * len(values) else "note"
+def _of_readings(trial: Trial, found: Finding, rows: int, runs: Sequence[slice]) -> Finding:
+    """A finding of failed readings in runs of rows; a few of them are a note."""
+    few = rows <= _SHORT * len(trial.time_s)
+    return replace(found, kind="note" if few else "fault", places_s=_places(trial, runs))
 
 
 def _omitted(name: str, rows: NDArray[np.int64], why: str) -> Repair:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +10,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from tank2sim.arrays import Array
 from tank2sim.notices import Notice
-from tank2sim.records.audit.finding import Finding
+from tank2sim.records.audit.finding import Finding, Repair, found_in, noted_in
 from tank2sim.records.trials import Trial, sampling_step, select_rows
 
 GAP = 1.5
@@ -58,15 +57,19 @@ def _stray(trial: Trial) -> Finding | None:
     first = int(rows[0])
     what = f"{rows.size} times are far from all others, first {trial.time_s[first]:.10g} in row {first + 1}"
     evidence = {"rows": float(rows.size), "first_row": float(first + 1)}
-    found = Finding(trial.path, (trial.heading("t_s"),), what, "another clock or another recording", evidence=evidence)
     if rows.size > max(1, _FEW * len(far)) or np.count_nonzero(~far) < 2:
-        return found
+        return found_in(trial, ["t_s"], what, "another clock or another recording", evidence)
     truth = "a time of another clock or a slip in these rows: they are left out"
+    return found_in(trial, ["t_s"], what, truth, evidence, _of_rows(np.flatnonzero(~far), truth))
 
-    def omit(other: Trial) -> Trial:
-        return replace(select_rows(other, np.flatnonzero(~far)), notices=(*other.notices, Notice(f"time: {truth}")))
 
-    return replace(found, likely_truth=truth, repair=omit, safe=True)
+def _of_rows(rows: NDArray[np.int64], truth: str) -> Repair:
+    """The repair that takes some rows, in this order."""
+
+    def repair(trial: Trial) -> Trial:
+        return replace(select_rows(trial, rows), notices=(*trial.notices, Notice(f"time: {truth}")))
+
+    return repair
 
 
 def _of_steps(trial: Trial) -> list[Finding]:
@@ -78,7 +81,6 @@ def _of_steps(trial: Trial) -> list[Finding]:
     scatter = 1.4826 * float(np.median(np.abs(steps - step))) / step  # of normal scatter, gaps left aside
     limit = max(GAP, 1 + 6 * scatter) * step
     wide = np.flatnonzero(steps > limit)
-    column = (trial.heading("t_s"),)
     if wide.size:
         longest = int(wide[np.argmax(steps[wide])])
         lost = int(np.sum(np.round(steps[wide] / step) - 1))
@@ -86,11 +88,11 @@ def _of_steps(trial: Trial) -> list[Finding]:
         evidence = {"gaps": float(wide.size), "longest_s": float(steps[longest]), "samples": float(lost)}
         truth = f"about {lost} rows were not recorded"
         places = tuple((float(trial.time_s[row]), float(trial.time_s[row + 1])) for row in wide)
-        findings.append(Finding(trial.path, column, what, truth, "note", evidence, places_s=places))
+        findings.append(replace(noted_in(trial, ["t_s"], what, truth, evidence), places_s=places))
     if scatter > UNEVEN:
         what = f"the step between rows scatters by {100 * scatter:.0f} % about {step:.4g} s"
         truth = "the rows were recorded at uneven times, or stamped late"
-        findings.append(Finding(trial.path, column, what, truth, "note", {"scatter": scatter, "step_s": step}))
+        findings.append(noted_in(trial, ["t_s"], what, truth, {"scatter": scatter, "step_s": step}))
     return findings
 
 
@@ -111,16 +113,10 @@ def _not_rising(trial: Trial, steps: NDArray[np.float64]) -> Finding:
     elif np.all(np.diff(trial.time_s[sorted_rows]) > 0):
         truth, rows = "the rows are not in the order of time: sorted", sorted_rows
     else:
-        truth, rows = (
-            "times are repeated or fall back: rows that do not come after all before them are left out",
-            rising,
-        )
-
-    def repair(other: Trial) -> Trial:
-        return replace(select_rows(other, rows), notices=(*other.notices, Notice(f"time: {truth}")))
-
-    enough = len(rows) > 1
-    return Finding(trial.path, (trial.heading("t_s"),), what, truth, "fault", evidence, repair, safe=enough)
+        truth = "times are repeated or fall back: rows that do not come after all before them are left out"
+        rows = rising
+    found = found_in(trial, ["t_s"], what, truth, evidence, _of_rows(rows, truth))
+    return replace(found, safe=len(rows) > 1)
 
 
 def _repeats(trial: Trial) -> NDArray[np.bool_]:
@@ -148,8 +144,7 @@ def _uniform(trial: Trial, what: str, evidence: dict[str, float]) -> Finding:
     def repair(other: Trial) -> Trial:
         return replace(other, time_s=other.time_s[0] + step * count, notices=(*other.notices, Notice(f"time: {truth}")))
 
-    figures = {**evidence, "step_s": step}
-    return Finding(trial.path, (trial.heading("t_s"),), what, truth, "fault", figures, repair, safe=True)
+    return found_in(trial, ["t_s"], what, truth, {**evidence, "step_s": step}, repair)
 
 
 def time_unit_findings(trial: Trial) -> list[Finding]:
@@ -163,20 +158,18 @@ def time_unit_findings(trial: Trial) -> list[Finding]:
         return []
     what = f"heading and track change {abs(turned):.4g} and {gone:.4g} times as fast as r and the velocities say"
     evidence = {"factor_heading": abs(turned), "factor_track": gone}
-    found = Finding(trial.path, (trial.heading("t_s"),), what, "", evidence=evidence)
     for factor, name in _UNITS.items():
         if abs(gone / factor - 1) < AGREEMENT:
-            repair = partial(_in_seconds, factor=factor, name=name)
-            return [replace(found, likely_truth=f"time is in {name}", repair=repair, safe=True)]
+            notice = Notice(f"time was in {name} and is in seconds now")
+
+            def repair(other: Trial, factor: float = factor, notice: Notice = notice) -> Trial:
+                return replace(other, time_s=factor * other.time_s, notices=(*other.notices, notice))
+
+            return [found_in(trial, ["t_s"], what, f"time is in {name}", evidence, repair)]
     if max(gone, 1 / gone) < 1 + MISCALIBRATED:
         return []
     truth = f"a second of the file is {gone:.3g} s: its clock or its sampling rate is another"
-    return [replace(found, likely_truth=truth)]
-
-
-def _in_seconds(trial: Trial, factor: float, name: str) -> Trial:
-    text = f"time was in {name} and is in seconds now"
-    return replace(trial, time_s=factor * trial.time_s, notices=(*trial.notices, Notice(text)))
+    return [found_in(trial, ["t_s"], what, truth, evidence)]
 
 
 def _turned(trial: Trial) -> float | None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.records.audit.finding import Finding, Repair
+from tank2sim.records.audit.finding import Finding, Repair, changed, found_in, negated, noted_in
 from tank2sim.records.audit.noise import record_noise
 from tank2sim.records.audit.time_base import MISCALIBRATED
 from tank2sim.records.audit.weak import AuditWindows, Complex, WeakFit, fit, on_uniform_time, windows_of
@@ -35,7 +34,7 @@ class TrackReading:
 
     Velocity over ground follows from w = u + iv and e = exp(i psi), for x + iy is north + i east; ``mirrored`` if y is
     positive to west. A rotation by a quarter of a turn, found with it, makes it ``quarter_truth`` about
-    ``quarter_wrong``.
+    ``quarter_wrong``. Names are those of signals, u and v those of the pair of velocities.
     """
 
     truth: str
@@ -48,6 +47,7 @@ class TrackReading:
 
 
 _AS_LABELLED = TrackReading("", (), lambda w, e: w * e)
+_PLACES = ("x_m", "y_m")
 OTHERWISE = (
     TrackReading(
         "v is positive to port",
@@ -67,18 +67,18 @@ OTHERWISE = (
     ),
     TrackReading(
         "y is positive to west",
-        ("x", "y"),
+        _PLACES,
         lambda w, e: w * e,
         mirrored=True,
         quarter_truth="x and y are interchanged: x is east and y north",
-        quarter_wrong=("x", "y"),
+        quarter_wrong=_PLACES,
     ),
     TrackReading(
         "psi is counted anticlockwise",
-        ("psi", "r"),
+        ("psi_rad", "r_radps"),
         lambda w, e: w * e.conj(),
         quarter_truth="psi is counted anticlockwise from east",
-        quarter_wrong=("psi", "r"),
+        quarter_wrong=("psi_rad", "r_radps"),
     ),
 )
 
@@ -123,22 +123,25 @@ def audited_track(trial: Trial) -> AuditedTrack:
 
 
 def _of_pair(trial: Trial, pair: tuple[str, str]) -> list[Finding]:
-    track = audited_track(trial)
-    given = track.signals[pair[0]] + 1j * track.signals[pair[1]]
+    track, given = _track_and_given(trial, pair)
     if np.count_nonzero(np.isfinite(track.windows.mean(given) + track.ground)) < 10:
         return []
-    findings: list[Finding] = []
     frame = _frame(trial, track, pair, given)
-    earth = frame is not None and frame.likely_truth in _EARTH
-    if frame is not None:
-        findings.append(frame)
-        assert frame.repair is not None
-        trial = frame.repair(trial)
-        track = audited_track(trial)
-        given = track.signals[pair[0]] + 1j * track.signals[pair[1]]
+    if frame is None or frame.repair is None:
+        return _lesser(trial, track, pair, given)
+    trial = frame.repair(trial)
+    track, given = _track_and_given(trial, pair)
     lesser = _lesser(trial, track, pair, given)
     # velocities along the axes of the track have been turned with psi and back: they do not show it
-    return findings + [item for item in lesser if not (earth and item.columns == (trial.heading("psi_rad"),))]
+    of_psi = (trial.heading("psi_rad"),) if frame.likely_truth in _EARTH else None
+    return [frame, *(item for item in lesser if item.columns != of_psi)]
+
+
+def _track_and_given(trial: Trial, names: Sequence[str]) -> tuple[AuditedTrack, Complex]:
+    """The track, and the velocities given, u + iv, or the only one."""
+    track = audited_track(trial)
+    u, *v = (track.signals[name] for name in names)
+    return track, np.asarray(u + 1j * (v[0] if v else 0.0), dtype=np.complex128)
 
 
 def _frame(trial: Trial, track: AuditedTrack, pair: tuple[str, str], given: Complex) -> Finding | None:
@@ -157,16 +160,16 @@ def _frame(trial: Trial, track: AuditedTrack, pair: tuple[str, str], given: Comp
     turned = quarters % 2 == 1 and best.quarter_truth
     truth, wrong = (best.quarter_truth, best.quarter_wrong) if turned else (best.truth, best.wrong)
     # a rate of turn agrees with the heading by now, or there is none
-    names = [name for name in (_signal(pair, item) for item in wrong) if name in trial.signals]
-    columns = tuple(trial.heading(name) for name in names)
+    named = [{"u": pair[0], "v": pair[1]}.get(item, item) for item in wrong]
+    names = [name for name in named if name in trial.signals]
     what = (
         f"({', '.join(trial.heading(name) for name in pair)}) as body velocities, turned by psi, miss d(x, y)/dt "
         f"by {labelled:.2g} m/s rms, and by {misfit:.2g} m/s if read otherwise"
     )
     evidence = {"misfit_as_labelled_mps": labelled, "misfit_mps": misfit, "speed_mps": track.speed}
     repair = _repaired_by(best, pair, f"{', '.join(names)}: {truth}", 1j**quarters)
-    explained = misfit < MISCALIBRATED * track.speed  # else more is wrong than the frame
-    return Finding(trial.path, columns, what, truth, "fault", evidence, repair, safe=explained)
+    found = found_in(trial, names, what, truth, evidence, repair)
+    return replace(found, safe=misfit < MISCALIBRATED * track.speed)  # else more is wrong than the frame
 
 
 def _misfit(track: AuditedTrack, reading: TrackReading, given: Complex, turn: Complex) -> tuple[float, float]:
@@ -182,10 +185,6 @@ def _misfit(track: AuditedTrack, reading: TrackReading, given: Complex, turn: Co
     return float(np.sqrt(np.mean(np.abs(remainder - remainder.mean()) ** 2))), float(np.angle(rotation))
 
 
-def _signal(pair: tuple[str, str], name: str) -> str:
-    return {"u": pair[0], "v": pair[1], "x": "x_m", "y": "y_m", "psi": "psi_rad", "r": "r_radps"}[name]
-
-
 def _repaired_by(reading: TrackReading, pair: tuple[str, str], notice: str, quarter: complex) -> Repair:
     if reading.earth:
         notice += "; turned to body axes by psi (those through the water are the same if there is no current)"
@@ -195,11 +194,9 @@ def _repaired_by(reading: TrackReading, pair: tuple[str, str], notice: str, quar
         if reading.mirrored:
             place = np.conj(signals["x_m"] + 1j * signals["y_m"]) / quarter
             return with_signals(trial, {"x_m": place.real, "y_m": place.imag}, notice)
-        if "psi" in reading.wrong:
-            turned: dict[str, Array | None] = {"psi_rad": np.angle(quarter) - signals["psi_rad"]}
-            if "r_radps" in signals:
-                turned["r_radps"] = 0.0 - signals["r_radps"]
-            return with_signals(trial, turned, notice)
+        if "psi_rad" in reading.wrong:
+            rate = {name: negated(signals[name]) for name in ("r_radps",) if name in signals}
+            return with_signals(trial, {"psi_rad": np.angle(quarter) - signals["psi_rad"], **rate}, notice)
         turn = np.exp(1j * signals["psi_rad"])
         body = quarter * reading.velocity(signals[pair[0]] + 1j * signals[pair[1]], turn) * turn.conj()
         return with_signals(trial, {pair[0]: body.real, pair[1]: body.imag}, notice)
@@ -226,29 +223,29 @@ def _lesser(trial: Trial, track: AuditedTrack, pair: tuple[str, str], given: Com
         findings.append(_antenna(trial, lever, clock))
     if best is None:
         return findings
-    columns = tuple(trial.heading(name) for name in pair)
-    places = tuple(trial.heading(name) for name in ("x_m", "y_m"))
     if best.differs(0, 1.0) and abs(best.values[0] - 1) > SCALE:
         findings.append(_scale(trial, pair, best))
     if best.differs(1) and abs(best.values[1]) > OFFSET:
         findings.append(_offset(trial, best))
     c = complex(best.values[2], best.values[3])
     if (best.differs(2) or best.differs(3)) and abs(c) > CURRENT * track.speed:
-        towards = float(np.rad2deg(np.angle(c)) % 360)
-        truth = f"a current of {abs(c):.3g} m/s towards {towards:.0f} deg, if the velocities are through the water"
-        if pair == PAIRS[1]:
-            truth = f"they are through the water, in a current of {abs(c):.3g} m/s towards {towards:.0f} deg"
-        evidence = {"speed_mps": abs(c), "direction_deg": towards, "standard_error_mps": float(best.errors[2])}
-        what = "velocity over ground and the velocities differ by a constant in earth axes"
-        if abs(c) > FASTEST * track.speed:
-            what += f" of {abs(c):.3g} m/s"
-            truth = "x, y or the velocities are not what their names say: no current is as fast"
-            findings.append(Finding(trial.path, (*columns, *places), what, truth, "fault", evidence))
-        else:
-            # velocities that say they are over ground, and are not, would be used as such
-            kind: Literal["fault", "note"] = "fault" if pair == PAIRS[1] else "note"
-            findings.append(Finding(trial.path, columns, what, truth, kind, evidence))
+        findings.append(_current(trial, pair, c, float(best.errors[2]), track.speed))
     return findings
+
+
+def _current(trial: Trial, pair: tuple[str, str], current: complex, error: float, speed: float) -> Finding:
+    """A constant difference, m/s, in earth axes of the velocity over ground and the velocities."""
+    size, towards = abs(current), float(np.rad2deg(np.angle(current)) % 360)
+    evidence = {"speed_mps": size, "direction_deg": towards, "standard_error_mps": error}
+    what = "velocity over ground and the velocities differ by a constant in earth axes"
+    if size > FASTEST * speed:
+        truth = "x, y or the velocities are not what their names say: no current is as fast"
+        return found_in(trial, (*pair, *_PLACES), f"{what} of {size:.3g} m/s", truth, evidence)
+    if pair == PAIRS[1]:  # velocities that say they are over ground, and are not, would be used as such
+        truth = f"they are through the water, in a current of {size:.3g} m/s towards {towards:.0f} deg"
+        return found_in(trial, pair, what, truth, evidence)
+    truth = f"a current of {size:.3g} m/s towards {towards:.0f} deg, if the velocities are through the water"
+    return noted_in(trial, pair, what, truth, evidence)
 
 
 def _antenna(trial: Trial, lever: WeakFit, clock: WeakFit | None) -> Finding:
@@ -266,28 +263,21 @@ def _antenna(trial: Trial, lever: WeakFit, clock: WeakFit | None) -> Finding:
         rival = f"{'x and y' if delay > 0 else 'the velocities'} are late by {abs(delay):.3g} s"
         better = clock.residual < 0.99 * lever.residual
         truth = f"{rival}; or {truth}" if better else f"{truth}; or {rival}"
-    columns = (trial.heading("x_m"), trial.heading("y_m"))
     what = "x and y move with the heading, or before or after the velocities"
-    return Finding(trial.path, columns, what, truth, "note", evidence)
+    return noted_in(trial, _PLACES, what, truth, evidence)
 
 
 def _scale(trial: Trial, pair: tuple[str, str], found: WeakFit) -> Finding:
     factor = float(found.values[0])
     evidence = {"factor": factor, "standard_error": float(found.errors[0])}
-    truth = f"the log reads {100 * (1 / factor - 1):+.2g} %"
-
-    def scaled(other: Trial) -> Trial:
-        changes = {name: factor * other.signals[name] for name in pair}
-        return with_signals(other, changes, f"{', '.join(pair)} multiplied by {factor:.4g}, by the track")
-
     what = f"velocity over ground is {factor:.4g} times the velocities"
-    columns = tuple(trial.heading(name) for name in pair)
+    notice = f"{', '.join(pair)} multiplied by {factor:.4g}, by the track"
+    scaled = changed(pair, lambda values: factor * values, notice)
     if factor < 0:  # no log reads backwards
-        return Finding(trial.path, columns, what, "both are of the opposite sign", "fault", evidence, scaled)
+        return replace(found_in(trial, pair, what, "both are of the opposite sign", evidence, scaled), safe=False)
     if abs(np.log(factor)) > np.log(1 + MISCALIBRATED):
-        truth = "the factor is that of no unit: velocities, positions or the clock are not what their names say"
-        return Finding(trial.path, columns, what, truth, "fault", evidence)
-    return Finding(trial.path, columns, what, truth, "note", evidence, scaled)
+        return found_in(trial, pair, what, _NO_UNIT, evidence)
+    return noted_in(trial, pair, what, f"the log reads {100 * (1 / factor - 1):+.2g} %", evidence, scaled)
 
 
 def _offset(trial: Trial, found: WeakFit) -> Finding:
@@ -295,16 +285,12 @@ def _offset(trial: Trial, found: WeakFit) -> Finding:
     offset = float(np.arctan2(found.values[1], found.values[0]))
     evidence = {"angle_deg": float(np.rad2deg(-offset)), "standard_error_deg": float(np.rad2deg(found.errors[1]))}
     truth = f"psi reads {np.rad2deg(-offset):+.3g} deg too much (heading offset, or the log's misalignment)"
-
-    def turned(other: Trial) -> Trial:
-        return with_signals(
-            other, {"psi_rad": other.signals["psi_rad"] + offset}, f"psi: offset {offset:.3g} rad added"
-        )
-
+    turned = changed(["psi_rad"], lambda values: values + offset, f"psi: offset {offset:.3g} rad added")
     what = "the track is turned by a constant angle against heading and velocities"
-    return Finding(trial.path, (trial.heading("psi_rad"),), what, truth, "note", evidence, turned)
+    return noted_in(trial, ["psi_rad"], what, truth, evidence, turned)
 
 
+_NO_UNIT = "the factor is that of no unit: velocities, positions or the clock are not what their names say"
 FOOT_M = 0.3048
 _UNITS = {KNOT_MPS: "knots", 1 / 3.6: "km/h", FOOT_M: "ft/s"}
 """Factor between speed over ground and speed as given, to the unit of the velocities that it indicates."""
@@ -361,9 +347,7 @@ def speed_unit_findings(trial: Trial) -> list[Finding]:
 
 
 def _of(trial: Trial, names: tuple[str, ...]) -> Finding | None:
-    track = audited_track(trial)
-    values = [track.signals[name] for name in names]
-    given = np.asarray(values[0] + 1j * (values[1] if len(values) > 1 else 0.0), dtype=np.complex128)
+    track, given = _track_and_given(trial, names)
     if np.count_nonzero(np.isfinite(track.windows.mean(given) + track.ground)) < 10:
         return None
     scale = _scale_by_windows(track, given, names)
@@ -372,47 +356,26 @@ def _of(trial: Trial, names: tuple[str, ...]) -> Finding | None:
     factor = scale.factor
     evidence = {"factor": factor} | ({"standard_error": scale.error} if scale.known else {})
     what = f"speed over ground is {factor:.3g} times the speed given"
-    speeds = tuple(trial.heading(name) for name in names)
-    places = tuple(trial.heading(name) for name in ("x_m", "y_m"))
-    fault = Finding(trial.path, (*speeds, *places), what, "", "fault", evidence)
     for unit, name in _UNITS.items():
         if scale.is_of(unit):
             wrong = names[:1] if len(names) > 1 and _sway_is_right(track, given, unit) else names
-            return _in_unit(fault, wrong, unit, name, trial)
+            truth = f"{'they are' if len(wrong) > 1 else 'it is'} in {name}"
+            in_si = changed(wrong, lambda values: values * unit, f"{', '.join(wrong)}: {truth}")  # noqa: B023
+            return found_in(trial, wrong, what, truth, evidence, in_si)
     for unit, name in LENGTHS.items():
         if scale.is_of(unit):
-            return _in_lengths(fault, places, unit, name, trial)
+            if name == "kilometres" and "r_radps" not in trial.signals:
+                truth = f"x and y are in {name}, or time is in milliseconds"
+                return found_in(trial, (*_PLACES, "t_s"), what, truth, evidence)
+            truth = f"they are in {name}"
+            in_metres = changed(_PLACES, lambda values: values / unit, f"x_m, y_m: {truth}")  # noqa: B023
+            return found_in(trial, _PLACES, what, truth, evidence, in_metres)
     if not scale.known and scale.unexplained < MISCALIBRATED:  # a current may be as fast
         return None
-    nearest = min(_UNITS, key=lambda unit: abs(np.log(factor / unit)))
-    truth = "the factor is that of no unit: velocities, positions or the clock are not what their names say"
+    nearest, truth = min(_UNITS, key=lambda unit: abs(np.log(factor / unit))), _NO_UNIT
     if abs(np.log(factor / nearest)) < np.log(1 + MISCALIBRATED):
         truth += f" ({_UNITS[nearest]} with an error of {100 * (nearest / factor - 1):+.2g} %, or another clock)"
-    return Finding(trial.path, fault.columns, what, truth, "fault", evidence)
-
-
-def _in_unit(fault: Finding, wrong: tuple[str, ...], unit: float, name: str, trial: Trial) -> Finding:
-    truth = f"{'they are' if len(wrong) > 1 else 'it is'} in {name}"
-
-    def in_si(other: Trial) -> Trial:
-        changes = {signal: other.signals[signal] * unit for signal in wrong}
-        return with_signals(other, changes, f"{', '.join(wrong)}: {truth}")
-
-    columns = tuple(trial.heading(signal) for signal in wrong)
-    return Finding(trial.path, columns, fault.what, truth, "fault", fault.evidence, in_si, safe=True)
-
-
-def _in_lengths(fault: Finding, places: tuple[str, ...], unit: float, name: str, trial: Trial) -> Finding:
-    truth = f"they are in {name}"
-    if unit == min(LENGTHS, key=lambda other: abs(other - 1e-3)) and "r_radps" not in trial.signals:
-        truth = f"x and y are in {name}, or time is in milliseconds"
-        return Finding(trial.path, (*places, trial.heading("t_s")), fault.what, truth, "fault", fault.evidence)
-
-    def in_metres(other: Trial) -> Trial:
-        changes = {signal: other.signals[signal] / unit for signal in ("x_m", "y_m")}
-        return with_signals(other, changes, f"x_m, y_m: {truth}")
-
-    return Finding(trial.path, places, fault.what, truth, "fault", fault.evidence, in_metres, safe=True)
+    return found_in(trial, (*names, *_PLACES), what, truth, evidence)
 
 
 def _scale_by_windows(track: AuditedTrack, given: Complex, names: tuple[str, ...]) -> _Scale | None:

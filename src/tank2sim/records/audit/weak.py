@@ -38,14 +38,9 @@ class AuditWindows:
     derivative of g (integration by parts): a signal and the rate of another are compared exactly, at any width.
     g is the square of a Hann window, so that second derivatives are smooth as well.
 
-    Parameters
-    ----------
-    step_s : float
-        Step of the time base.
-    samples : int
-        Width, odd.
-    hop : int
-        Samples from one window to the next; 0: half a width.
+    - `step_s`: Step of the time base.
+    - `samples`: Width, odd.
+    - `hop`: Samples from one window to the next; 0: half a width.
     """
 
     step_s: float
@@ -111,14 +106,8 @@ def windows_for(noise: float, motion: float, step_s: float, count: int) -> Audit
     White noise s in the signal leaves s sqrt(10/9 (2 pi)^2 step/width^3) in its rate. At least eight samples wide,
     and at most a twentieth of the record.
 
-    Parameters
-    ----------
-    noise : float
-        Standard deviation of the signal.
-    motion : float
-        Root mean square of its rate, per s.
-    step_s, count : float, int
-        Time base.
+    `noise`: Standard deviation of the signal; `motion`: Root mean square of its rate, per s; `step_s`, `count`: Time
+    base.
     """
     motion = motion if np.isfinite(motion) else 0.0
     wanted = (10 / 9 * (2 * np.pi) ** 2 * step_s * (noise / max(SHARE * motion, 1e-9 * noise, 1e-300)) ** 2) ** (

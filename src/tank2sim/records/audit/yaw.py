@@ -8,14 +8,15 @@ import numpy as np
 from scipy.signal import correlate, correlation_lags
 
 from tank2sim.arrays import Array
-from tank2sim.records.audit.finding import Finding, Repair
+from tank2sim.records.audit.finding import Finding, Repair, changed, found_in, negated, noted_in
 from tank2sim.records.audit.noise import record_noise, rounding
 from tank2sim.records.audit.rudder import rudder_response
 from tank2sim.records.audit.time_base import MISCALIBRATED
 from tank2sim.records.audit.weak import AuditWindows, WeakFit, fit, on_uniform_time, windows_of
-from tank2sim.records.trials import Trial, unwrapped, with_signals
+from tank2sim.records.trials import Trial, unwrapped
 
 _DEGREE = np.pi / 180
+_YAW = ("r_radps", "psi_rad")
 UNIT_TOLERANCE = 0.023
 """How far a factor may be from that of a unit to be taken for it: half the way from 57.3 to the 60 of a time in minutes
 or of a rate per minute. Project choice."""
@@ -36,15 +37,13 @@ def heading_unit_findings(trial: Trial) -> list[Finding]:
     slope = _course_slope(trial)
     if slope is None:
         return []
-    heading = trial.heading("psi_rad")
-    degrees = "deg" in heading
+    degrees = "deg" in trial.heading("psi_rad")
     factor = 1 / _DEGREE if degrees else _DEGREE
     if abs(np.log(abs(slope) / factor)) > COARSE:
         return []
     truth = "psi is in radians" if degrees else "psi is in degrees"
     what = f"the course over ground turns {abs(slope):.3g} times as far as psi"
-    repair = _scaled("psi_rad", factor, truth)
-    return [Finding(trial.path, (heading,), what, truth, "fault", {"factor": slope}, repair, safe=True)]
+    return [found_in(trial, ["psi_rad"], what, truth, {"factor": slope}, _scaled("psi_rad", factor, truth))]
 
 
 def rate_unit_findings(trial: Trial) -> list[Finding]:
@@ -75,10 +74,9 @@ def yaw_findings(trial: Trial) -> list[Finding]:
         return _without_turn(trial, windows.rate(heading) - windows.mean(rate))
     if _hidden_by_rounding(trial, rate, heading, step):
         return []
-    ends = [trial.heading(name) for name in ("r_radps", "psi_rad")]
-    figures = {"correlation": found.correlation}
     what = f"r and dpsi/dt are not the same motion (correlation {found.correlation:.2f})"
-    return [Finding(trial.path, tuple(ends), what, "one of the two is not a yaw motion of this ship", evidence=figures)]
+    truth = "one of the two is not a yaw motion of this ship"
+    return [found_in(trial, _YAW, what, truth, {"correlation": found.correlation})]
 
 
 def _alike(trial: Trial) -> _Comparison | None:
@@ -213,12 +211,9 @@ def _judged(trial: Trial, found: _Comparison) -> list[Finding]:
         late = "r is late" if found.lag_s > 0 else "psi is late"
         truth = f"{late} by {abs(found.lag_s):.3g} s (its clock, or a filter in the sensor)"
         what = "r and dpsi/dt are alike when one of them is shifted in time"
-        findings.append(_note(trial, what, truth, {"lag_s": found.lag_s, "standard_error_s": found.lag_error_s}))
+        evidence = {"lag_s": found.lag_s, "standard_error_s": found.lag_error_s}
+        findings.append(noted_in(trial, ["r_radps"], what, truth, evidence))
     return findings
-
-
-def _note(trial: Trial, what: str, truth: str, evidence: dict[str, float]) -> Finding:
-    return Finding(trial.path, (trial.heading("r_radps"),), what, truth, "note", evidence)
 
 
 def _without_turn(trial: Trial, difference: Array) -> list[Finding]:
@@ -233,11 +228,8 @@ def _bias(trial: Trial, bias: float, error: float) -> Finding:
     in_degrees = {"bias_degps": bias / _DEGREE, "standard_error_degps": error / _DEGREE}
     truth = f"the gyro reads {bias / _DEGREE:+.3g} deg/s when the ship does not turn (bias)"
 
-    def unbiased(other: Trial) -> Trial:
-        return with_signals(other, {"r_radps": other.signals["r_radps"] - bias}, f"r: bias of {bias:.3g} rad/s removed")
-
-    note = _note(trial, "r differs from dpsi/dt by a constant", truth, in_degrees)
-    return replace(note, repair=unbiased)
+    unbiased = changed(["r_radps"], lambda values: values - bias, f"r: bias of {bias:.3g} rad/s removed")
+    return noted_in(trial, ["r_radps"], "r differs from dpsi/dt by a constant", truth, in_degrees, unbiased)
 
 
 def _factor(trial: Trial, found: _Comparison) -> Finding:
@@ -249,10 +241,9 @@ def _factor(trial: Trial, found: _Comparison) -> Finding:
     largest = factor / found.correlation**2
     if largest < 1 / (1 + MISCALIBRATED) or factor > 1 + MISCALIBRATED:
         truth = "one of them is not what its name says, and the factor is that of no unit"
-        columns = (trial.heading("r_radps"), trial.heading("psi_rad"))
-        return Finding(trial.path, columns, what, truth, "fault", evidence)
+        return found_in(trial, _YAW, what, truth, evidence)
     truth = f"r is to be multiplied by {factor:.4g} if the heading is right"
-    return replace(_note(trial, what, truth, evidence), repair=_scaled("r_radps", factor, truth))
+    return noted_in(trial, ["r_radps"], what, truth, evidence, _scaled("r_radps", factor, truth))
 
 
 def _unit(trial: Trial, found: _Comparison) -> Finding | None:
@@ -274,21 +265,16 @@ def _unit(trial: Trial, found: _Comparison) -> Finding | None:
         readings.append(("r_radps", nearest, "r is in rad/s" if small else "r is in deg/s"))
     if nearest != 1 / 60 and ("deg" in psi) != small and not psi_right:
         readings.append(("psi_rad", 1 / nearest, "psi is in degrees" if small else "psi is in radians"))
-    fault = Finding(trial.path, (r, psi), what, "", "fault", {"factor": factor})
     if len(readings) != 1:
         truth = ", or ".join(truth for *_, truth in readings) or "one of them is in another unit, not that of its name"
-        return replace(fault, likely_truth=truth)
+        return found_in(trial, _YAW, what, truth, {"factor": factor})
     ((name, scale, truth),) = readings
-    repair = _scaled(name, scale, truth)
-    return replace(fault, columns=(trial.heading(name),), likely_truth=truth, repair=repair, safe=True)
+    return found_in(trial, [name], what, truth, {"factor": factor}, _scaled(name, scale, truth))
 
 
 def _scaled(name: str, factor: float, notice: str) -> Repair:
-    def scaled(trial: Trial) -> Trial:
-        values = trial.signals[name] * factor
-        return with_signals(trial, {name: unwrapped(values) if name == "psi_rad" else values}, notice)
-
-    return scaled
+    continuous = unwrapped if name == "psi_rad" else np.asarray
+    return changed([name], lambda values: continuous(values * factor), notice)
 
 
 def _sign(trial: Trial, found: _Comparison) -> Finding:
@@ -299,16 +285,10 @@ def _sign(trial: Trial, found: _Comparison) -> Finding:
     what = "r and dpsi/dt have opposite signs"
     evidence = {"factor": found.factor, "correlation": found.correlation}
     if slope is None and response == 0:
-        columns = (trial.heading("r_radps"), trial.heading("psi_rad"))
-        return Finding(trial.path, columns, what, "one of the two is positive to port", "fault", evidence)
+        return found_in(trial, _YAW, what, "one of the two is positive to port", evidence)
     psi_right = slope > 0 if slope is not None else response < 0
-    wrong = "r_radps" if psi_right else "psi_rad"
-    truth = f"{'r' if psi_right else 'psi'} is positive to port"
-
-    def turned(other: Trial) -> Trial:
-        return with_signals(other, {wrong: 0.0 - other.signals[wrong]}, f"{truth} in the file")
-
-    return Finding(trial.path, (trial.heading(wrong),), what, truth, "fault", evidence, turned, safe=True)
+    wrong, truth = ("r_radps", "r is positive to port") if psi_right else ("psi_rad", "psi is positive to port")
+    return found_in(trial, [wrong], what, truth, evidence, changed([wrong], negated, f"{truth} in the file"))
 
 
 def _against_track(trial: Trial) -> list[Finding]:
@@ -316,12 +296,9 @@ def _against_track(trial: Trial) -> list[Finding]:
     slope = _course_slope(trial)
     if slope is None or abs(np.log(abs(slope))) > 1.0 or slope > 0 or {"u_mps", "v_mps"} <= set(trial.signals):
         return []
-    columns = tuple(trial.heading(name) for name in ("psi_rad", "x_m", "y_m"))
-    what, truth = (
-        "the track turns against the heading",
-        "psi is positive to port, or y to west, or x and y interchanged",
-    )
-    return [Finding(trial.path, columns, what, truth, evidence={"factor": slope})]
+    truth = "psi is positive to port, or y to west, or x and y interchanged"
+    what, names = "the track turns against the heading", ("psi_rad", "x_m", "y_m")
+    return [found_in(trial, names, what, truth, {"factor": slope})]
 
 
 def _course_slope(trial: Trial) -> float | None:

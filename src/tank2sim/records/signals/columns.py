@@ -6,39 +6,14 @@ from dataclasses import dataclass
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.records.trials import Trial
+from tank2sim.records.trials import SIGNALS, Trial
 from tank2sim.units import from_si, to_si
 
-HELD_COLUMNS = frozenset({"delta_order_rad", "n_radps"})
+HELD_COLUMNS = frozenset(name for name in SIGNALS if "held" in SIGNALS[name])
 """Signals that hold until their next value: orders."""
 
-DIRECTION_COLUMNS = frozenset(
-    {"psi_rad", "cog_rad", "wind_direction_rad", "wind_rel_direction_rad", "current_direction_rad"}
-)
+DIRECTION_COLUMNS = frozenset(name for name in SIGNALS if "direction" in SIGNALS[name])
 """Signals that go round the compass: a step through north is not a jump."""
-
-_WORDS = {
-    "delta": "rudder angle",
-    "delta_order": "rudder order",
-    "n": "propeller speed",
-    "u": "surge velocity",
-    "v": "sway velocity",
-    "u_ground": "surge velocity over ground",
-    "v_ground": "sway velocity over ground",
-    "sog": "speed over ground",
-    "cog": "course over ground",
-    "r": "yaw rate",
-    "psi": "heading",
-    "x": "north",
-    "y": "east",
-    "phi": "heel",
-    "wind_speed": "wind speed",
-    "wind_direction": "wind direction",
-    "wind_rel_speed": "relative wind speed",
-    "wind_rel_direction": "relative wind direction",
-    "current_speed": "current speed",
-    "current_direction": "current direction",
-}
 
 # Suffix in SI to the suffix in which the trial format writes it, and to the unit as it is read.
 _FILE_SUFFIX = {"rad": "deg", "radps": "degps"}
@@ -76,7 +51,7 @@ class SignalName:
     @property
     def words(self) -> str:
         """The quantity in words: ``yaw rate``."""
-        return _WORDS.get(self.stem, self.stem.replace("_", " "))
+        return str(SIGNALS.get(self.si, {}).get("words", self.stem.replace("_", " ")))
 
     @property
     def factor(self) -> float:

@@ -38,23 +38,11 @@ def butterworth(
 ) -> Filtered:
     """Butterworth filter, forwards and backwards without shift of phase, or forwards alone as a measuring chain does.
 
-    Parameters
-    ----------
-    series : Series
-        What to filter.
-    kind : FilterType
-        Low, high or band pass.
-    cutoff_hz : sequence of 1 or (band) 2 floats
-        Where one pass has -3 dB; forwards and backwards together have -6 dB there.
-    order : int
-        Order of one pass; in a band pass, of each of its sides.
-    causal : bool
-        Forwards alone; it begins as if the signal had always had its first value.
+    `series`: What to filter; `kind`: Low, high or band pass; `cutoff_hz`: Where one pass has -3 dB; forwards and
+    backwards together have -6 dB there; `order`: Order of one pass; in a band pass, of each of its sides; `causal`:
+    Forwards alone; it begins as if the signal had always had its first value.
 
-    Raises
-    ------
-    InputError
-        A frequency is not between one period a record and the Nyquist frequency, or they do not rise.
+    Raises InputError: A frequency is not between one period a record and the Nyquist frequency, or they do not rise.
     """
     edges = [_within(series, kind.value, edge) for edge in cutoff_hz]
     if len(edges) != (2 if kind is FilterType.BAND else 1) or sorted(set(edges)) != edges:
@@ -78,28 +66,20 @@ def butterworth(
         response = np.abs(response) ** 2 + 0j
     delay = _sections_delay(sections, grid, series) if causal else np.zeros(len(grid))
     effect = FilterEffect(grid, response, delay, (settling, 0.0 if causal else settling), "")
-    sentence = _causal_sentence(effect, kind, edges) if causal else _zero_phase_sentence(effect, edges)
+    where = " and ".join(f"{edge:.3g}" for edge in edges)
+    sentence = f"no phase shift, {decibel(0.5)} at {where} Hz, ends distorted over {settling:.3g} s"
+    sentence = _causal_sentence(effect, kind, edges) if causal else sentence
     return Filtered(series.with_values(values), replace(effect, explanation=sentence))
 
 
 def savitzky_golay(series: Series, samples: int, degree: int, *, derivative: int = 0) -> Filtered:
     """Savitzky-Golay: a polynomial fitted to `samples` about each, and its value or derivative there.
 
-    Parameters
-    ----------
-    series : Series
-        What to smooth.
-    samples : int
-        Length of the window, odd; at most the record.
-    degree : int
-        Degree of the polynomial, below `samples`.
-    derivative : int
-        0 for the value, 1 or more for the derivative by time, in unit/s and so on.
+    `series`: What to smooth; `samples`: Length of the window, odd; at most the record; `degree`: Degree of the
+    polynomial, below `samples`; `derivative`: 0 for the value, 1 or more for the derivative by time, in unit/s and so
+    on.
 
-    Raises
-    ------
-    InputError
-        These do not fit each other.
+    Raises InputError: These do not fit each other.
     """
     if samples % 2 == 0 or not degree < samples <= len(series.values) or not 0 <= derivative <= degree:
         problem = f"{samples} samples of degree {degree} do not fit a record of {len(series.values)}"
@@ -114,7 +94,7 @@ def savitzky_golay(series: Series, samples: int, degree: int, *, derivative: int
     grid = effect_frequencies(series)
     response = _centred_response(taps, grid, series)
     half = samples // 2 * series.step_s
-    found = _falls_to_half(grid, np.abs(response) / (2.0 * np.pi * grid) ** derivative)
+    found = next(iter(grid[np.abs(response) / (2.0 * np.pi * grid) ** derivative < 0.5].tolist()), None)
     limit = f"{decibel(0.5)} at {found:.3g} Hz" if found else "more than half the amplitude at all frequencies"
     what = f"derivative of order {derivative} without delay" if derivative else "no phase shift"
     text = f"{what}, {limit}, side lobes above, some upside down; fit one-sided over {half:.3g} s at both ends"
@@ -127,10 +107,7 @@ def smoothing_spline(series: Series, cutoff_hz: float) -> Filtered:
     Of densely sampled values it is a filter of gain 1/(1 + (f/cutoff)^4) and no phase (Silverman 1984), which makes
     the weight in samples 1/(2 pi cutoff step)^4. Its response is measured here, from what it makes of an impulse.
 
-    Raises
-    ------
-    InputError
-        The frequency is not between one period a record and the Nyquist frequency.
+    Raises InputError: The frequency is not between one period a record and the Nyquist frequency.
     """
     _within(series, "spline", cutoff_hz)
     count = len(series.values)
@@ -154,10 +131,7 @@ def decimate(series: Series, factor: int) -> Filtered:
     The filter is that of scipy.signal.decimate, Chebyshev with 0.05 dB ripple to 0.8 of the new Nyquist frequency, but
     of order 7: one of even order has its ripple at zero frequency too, and would take 1 % off a steady heading.
 
-    Raises
-    ------
-    InputError
-        The factor is below 2 or leaves fewer than 50 samples.
+    Raises InputError: The factor is below 2 or leaves fewer than 50 samples.
     """
     if factor < 2 or len(series.values) // factor < FEWEST_SAMPLES:
         problem = f"every {factor}th of {len(series.values)} samples"
@@ -217,16 +191,6 @@ def _settling(sections: Array, series: Series) -> float:
     return float(np.searchsorted(size, (1.0 - _SETTLED) * size[-1])) * series.step_s
 
 
-def _falls_to_half(grid: Array, gain: Array) -> float | None:
-    below = np.flatnonzero(gain < 0.5)
-    return float(grid[below[0]]) if below.size else None
-
-
-def _zero_phase_sentence(effect: FilterEffect, edges: Sequence[float]) -> str:
-    where = " and ".join(f"{edge:.3g}" for edge in edges)
-    return f"no phase shift, {decibel(0.5)} at {where} Hz, ends distorted over {effect.distorted_ends_s[0]:.3g} s"
-
-
 def _causal_sentence(effect: FilterEffect, kind: FilterType, edges: Sequence[float]) -> str:
     # Stated well inside of the passband: an octave from the edge, or in the middle of the band.
     frequency = {
@@ -257,10 +221,7 @@ def detrend(series: Series, degree: int) -> Filtered:
     What it does to a wave depends on where in the record its crests are; the stated effect is the mean over all such
     places, the part of the wave that stays a wave of this frequency. It has no phase.
 
-    Raises
-    ------
-    InputError
-        The degree is not from 0 to 10.
+    Raises InputError: The degree is not from 0 to 10.
     """
     if not 0 <= degree <= HIGHEST_DEGREE:
         problem = f"{degree} is not a degree of a trend"
@@ -293,18 +254,12 @@ _FREQUENCIES = 400
 class FilterEffect:
     """Frequency response of a filter, and where its ends are not to be believed.
 
-    Parameters
-    ----------
-    frequency_hz : array (m,)
-        Rising, from one period a record to below the Nyquist frequency.
-    response : complex array (m,)
-        Output over input; a negative angle: the output comes later. Its unit is 1, or 1/s of a derivative.
-    group_delay_s : array (m,)
-        Delay of a packet of waves about a frequency.
-    distorted_ends_s : (float, float)
-        Distorted time at the begin and at the end of the record.
-    explanation : str
-        The same in words.
+    - `frequency_hz` (m,): Rising, from one period a record to below the Nyquist frequency.
+    - `response` (m,): Output over input; a negative angle: the output comes later. Its unit is 1, or 1/s of a
+      derivative.
+    - `group_delay_s` (m,): Delay of a packet of waves about a frequency.
+    - `distorted_ends_s`: Distorted time at the begin and at the end of the record.
+    - `explanation`: The same in words.
     """
 
     frequency_hz: Array

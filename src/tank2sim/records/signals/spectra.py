@@ -30,13 +30,9 @@ _FEWEST_IN_SEGMENT = 10
 class Averaging:
     """How a record was cut into segments: Hann windows that overlap by half (Welch 1967).
 
-    Parameters
-    ----------
-    samples_in_segment : int
-    segments : int
-        Number of segments.
-    degrees_of_freedom : float
-        Degrees of freedom of a spectrum's chi-square distribution: two a segment, less what their overlap shares.
+    - `segments`: Number of segments.
+    - `degrees_of_freedom`: Degrees of freedom of a spectrum's chi-square distribution: two a segment, less what their
+      overlap shares.
     """
 
     samples_in_segment: int
@@ -48,16 +44,10 @@ class Averaging:
 class Peak:
     """The largest peak of a spectrum.
 
-    Parameters
-    ----------
-    frequency_hz : float
-        Where it is, to within the distance of two frequencies of the spectrum.
-    density : float
-        Its height.
-    distinct : bool
-        True if it rises above what surrounds it by more than scatter can (see :func:`spectrum`).
-    at_lowest_frequency : bool
-        True if it is at the lowest frequency, where it cannot be distinguished from a slow drift.
+    - `frequency_hz`: Where it is, to within the distance of two frequencies of the spectrum.
+    - `density`: Its height.
+    - `distinct`: True if it rises above what surrounds it by more than scatter can (see :func:`spectrum`).
+    - `at_lowest_frequency`: True if it is at the lowest frequency, where it cannot be distinguished from a slow drift.
     """
 
     frequency_hz: float
@@ -70,17 +60,12 @@ class Peak:
 class Spectrum:
     """One-sided power spectral density; its integral over frequency is the variance.
 
-    Parameters
-    ----------
-    frequency_hz : array (m,)
-        Above zero and below the Nyquist frequency, where the estimate would have half the degrees of freedom.
-    density, low, high : array (m,)
-        The density (unit squared over Hz), and its 95 % confidence limits by chi-square at each frequency.
-    averaging : Averaging
-    peak : Peak or None
-        None if the density only falls or only rises.
-    peak_in_words : str
-        Frequency of the main peak (Hz), and whether it is one.
+    - `frequency_hz` (m,): Above zero and below the Nyquist frequency, where the estimate would have half the degrees of
+      freedom.
+    - `density`, `low`, `high` (m,): The density (unit squared over Hz), and its 95 % confidence limits by chi-square at
+      each frequency.
+    - `peak`: None if the density only falls or only rises.
+    - `peak_in_words`: Frequency of the main peak (Hz), and whether it is one.
     """
 
     frequency_hz: Array
@@ -110,28 +95,18 @@ class Transfer:
     What the output has next to the response (noise, wind) does not bias it unless it comes back in the input: in a
     zigzag the rudder follows the heading, and the estimate holds where the coherence is high only.
 
-    Parameters
-    ----------
-    frequency_hz : array (m,)
-        As in :class:`Spectrum`.
-    response : complex array (m,)
-        Output over input; a negative angle: the output comes later.
-    coherence : array (m,)
-        Part of the output's power that is a linear response to the input, 0 to 1.
-    error : array (m,)
-        Standard error of the gain over the gain, and of the phase in rad (Bendat & Piersol 2010, eq. 9.90 and 9.91):
-        sqrt(1 - coherence) / sqrt(coherence * degrees of freedom).
-    cross_density : complex array (m,)
-        Cross spectral density, product of the units over Hz.
-    coherence_by_chance : float
-        Coherence that 95 % of estimates stay below where there is none.
-    half_width_95 : array (m,)
-        Half the 95 % interval of the gain's logarithm and of the phase (rad), by Student's t: the segments are few. It
-        holds where the output mostly is the response: low coherences that are high by chance have gains that are high
-        by chance.
-    sure : array (m,)
-        Whether the coherence, its median over three neighbours, is above chance: one alone is above now and then.
-    averaging : Averaging
+    - `frequency_hz` (m,): As in :class:`Spectrum`.
+    - `response` (m,): Output over input; a negative angle: the output comes later.
+    - `coherence` (m,): Part of the output's power that is a linear response to the input, 0 to 1.
+    - `error` (m,): Standard error of the gain over the gain, and of the phase in rad (Bendat & Piersol 2010, eq. 9.90
+      and 9.91): sqrt(1 - coherence) / sqrt(coherence * degrees of freedom).
+    - `cross_density` (m,): Cross spectral density, product of the units over Hz.
+    - `coherence_by_chance`: Coherence that 95 % of estimates stay below where there is none.
+    - `half_width_95` (m,): Half the 95 % interval of the gain's logarithm and of the phase (rad), by Student's t: the
+      segments are few. It holds where the output mostly is the response: low coherences that are high by chance have
+      gains that are high by chance.
+    - `sure` (m,): Whether the coherence, its median over three neighbours, is above chance: one alone is above now and
+      then.
     """
 
     frequency_hz: Array
@@ -162,18 +137,10 @@ def spectrum(series: Series, segment_s: float | None = None) -> Spectrum:
     surroundings: the geometric mean of the medians over the octave below and the octave above, which on a spectrum
     that is any power of the frequency is the spectrum itself.
 
-    Parameters
-    ----------
-    series : Series
-        What to analyse.
-    segment_s : float, optional
-        Length of a segment; by default that of which eight cover the record, or twenty correlation times if these
-        are longer, but at most half the record.
+    `series`: What to analyse; `segment_s`: Length of a segment; by default that of which eight cover the record, or
+    twenty correlation times if these are longer, but at most half the record.
 
-    Raises
-    ------
-    InputError
-        The segment is shorter than ten samples or longer than half the record.
+    Raises InputError: The segment is shorter than ten samples or longer than half the record.
     """
     averaging = _averaging([series], segment_s)
     frequency, density = signal.welch(series.values, **_options(series, averaging))
@@ -212,7 +179,8 @@ def transfer_function(source: Series, result: Series, segment_s: float | None = 
     inner = _inner(averaging)
     frequency, power = signal.welch(source.values, **options)
     _, cross = signal.csd(source.values, result.values, **options)
-    _, coherence = signal.coherence(source.values, result.values, **_without_scaling(options))
+    unscaled = {key: value for key, value in options.items() if key != "scaling"}
+    _, coherence = signal.coherence(source.values, result.values, **unscaled)
     names = " and ".join(SignalName(item.name).file for item in (source, result))
     if not np.all(power[inner] > 0):
         raise InputError(source.source, f"columns {names}", "have no power at some frequency", "leave them out")
@@ -266,10 +234,6 @@ def _options(series: Series, averaging: Averaging) -> dict[str, object]:
         "fs": series.rate_hz, "window": "hann", "nperseg": samples, "noverlap": samples // 2,
         "detrend": "constant", "scaling": "density",
     }  # fmt: skip
-
-
-def _without_scaling(options: dict[str, object]) -> dict[str, object]:
-    return {key: value for key, value in options.items() if key != "scaling"}
 
 
 def _inner(averaging: Averaging) -> slice:

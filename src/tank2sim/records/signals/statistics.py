@@ -6,14 +6,13 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 from scipy import signal, stats
 
 from tank2sim.arrays import Array, Number
-from tank2sim.errors import InputError
+from tank2sim.errors import optional_library
 from tank2sim.records.signals.columns import DIRECTION_COLUMNS
 from tank2sim.records.signals.sampling import Series, at_common_times
 
@@ -58,13 +57,9 @@ _MEANINGS = {
 class UnitRootTests:
     """p-values of the two tests about a constant level, or about a linear trend.
 
-    Parameters
-    ----------
-    dickey_fuller : float
-        Augmented Dickey-Fuller; null hypothesis: a random walk. Small: it returns to its level.
-    kpss : float
-        Kwiatkowski, Phillips, Schmidt & Shin; null hypothesis: stationary. Small: it does not. Their table ends at
-        0.01 and 0.1, which bound what is beyond.
+    - `dickey_fuller`: Augmented Dickey-Fuller; null hypothesis: a random walk. Small: it returns to its level.
+    - `kpss`: Kwiatkowski, Phillips, Schmidt & Shin; null hypothesis: stationary. Small: it does not. Their table ends
+      at 0.01 and 0.1, which bound what is beyond.
     """
 
     dickey_fuller: Number
@@ -75,18 +70,13 @@ class UnitRootTests:
 class Stationarity:
     """Whether a signal keeps its level and its spread.
 
-    Parameters
-    ----------
-    verdict : Stationary
-        In words, at 5 %.
-    meaning : str
-        The verdict in full.
-    about_level, about_trend : UnitRootTests
-        About a constant level, and about a linear trend.
-    samples_averaged : int
-        Samples averaged to one value of the tests, so that their few lags reach over the correlation time.
-    mean_of_halves, variance_of_halves : (float, float)
-        Both halves, in the signal's unit and its square, as by :func:`mean_and_deviation`.
+    - `verdict`: In words, at 5 %.
+    - `meaning`: The verdict in full.
+    - `about_level`, `about_trend`: About a constant level, and about a linear trend.
+    - `samples_averaged`: Samples averaged to one value of the tests, so that their few lags reach over the correlation
+      time.
+    - `mean_of_halves`, `variance_of_halves`: Both halves, in the signal's unit and its square, as by
+      :func:`mean_and_deviation`.
     """
 
     verdict: Stationary
@@ -112,20 +102,13 @@ class Stationarity:
 class Normality:
     """Whether values are normally distributed, tested on samples far enough apart to be independent.
 
-    Parameters
-    ----------
-    verdict : str
-        In a few words, with the samples tested; the smallest p-value times the number of tests is held against 5 %
-        (Bonferroni).
-    normal : bool or None
-        False: rejected; None: too few samples to test.
-    p_values : mapping
-        By test: ``dagostino_pearson jarque_bera shapiro_wilk anderson_darling``.
-    independent_samples : int
-        Samples tested, one every two correlation times. All samples together would make the tests reject what is
-        normal: they take each for new evidence.
-    skewness, excess_kurtosis : float
-        Skewness and excess kurtosis of all samples; both 0 for a normal distribution.
+    - `verdict`: In a few words, with the samples tested; the smallest p-value times the number of tests is held against
+      5 % (Bonferroni).
+    - `normal`: False: rejected; None: too few samples to test.
+    - `p_values`: By test: ``dagostino_pearson jarque_bera shapiro_wilk anderson_darling``.
+    - `independent_samples`: Samples tested, one every two correlation times. All samples together would make the tests
+      reject what is normal: they take each for new evidence.
+    - `skewness`, `excess_kurtosis`: Skewness and excess kurtosis of all samples; both 0 for a normal distribution.
     """
 
     verdict: str
@@ -140,12 +123,8 @@ class Normality:
 class Density:
     """Probability density next to that of a normal distribution of the same mean and standard deviation.
 
-    Parameters
-    ----------
-    values : array (m,)
-        In the signal's unit.
-    density, normal : array (m,)
-        In one over that unit.
+    - `values` (m,): In the signal's unit.
+    - `density`, `normal` (m,): In one over that unit.
     """
 
     values: Array
@@ -231,12 +210,7 @@ def probability_density(series: Series) -> Density:
 
 def _of_statsmodels(module: str, name: str) -> Callable[..., Any]:
     """A test of the extra ``tank2sim[signals]``, loaded where it is used: it takes more than a second."""
-    try:
-        found: Callable[..., Any] = getattr(import_module(f"statsmodels.{module}"), name)
-    except ImportError:
-        remedy = "install it with: pip install 'tank2sim[signals]'"
-        raise InputError("signals", "", "needs statsmodels, which is not installed", remedy) from None
-    return found
+    return getattr(optional_library(f"statsmodels.{module}", "signals", "signals"), name)  # type: ignore[no-any-return]
 
 
 def _unit_root_tests(values: Array, about: str) -> UnitRootTests:
@@ -273,17 +247,13 @@ _NORMAL = 1.959964
 class Correlation:
     """Correlation coefficient of two signals, or of one with itself, against the lag.
 
-    Parameters
-    ----------
-    lag_s : array (m,)
-        Rising, from minus to plus a quarter of the record; positive: the second signal comes after the first.
-    coefficient : array (m,)
-        Between -1 and 1.
-    bound_if_independent : float
-        95 % of the coefficients of two independent signals with these autocorrelations are smaller, by Bartlett's
-        formula: 1.96 sqrt(sum over the lags of rho_1 rho_2 / n) (Box & Jenkins 1976, section 11.1.3).
-    lag_of_largest_s, largest : float
-        Lag and coefficient where the coefficient is largest in size.
+    - `lag_s` (m,): Rising, from minus to plus a quarter of the record; positive: the second signal comes after the
+      first.
+    - `coefficient` (m,): Between -1 and 1.
+    - `bound_if_independent`: 95 % of the coefficients of two independent signals with these autocorrelations are
+      smaller, by Bartlett's formula: 1.96 sqrt(sum over the lags of rho_1 rho_2 / n) (Box & Jenkins 1976, section
+      11.1.3).
+    - `lag_of_largest_s`, `largest`: Lag and coefficient where the coefficient is largest in size.
     """
 
     lag_s: Array
@@ -297,15 +267,11 @@ class Correlation:
 class Autocorrelation:
     """Correlation of a signal with itself later.
 
-    Parameters
-    ----------
-    lag_s, coefficient : array (m,)
-        From lag 0, where it is 1, to a quarter of the record.
-    correlation_time_s : float
-        Integral of the coefficient from 0 to its first zero: the time constant of a first-order process.
-    effective_count : float
-        Independent samples that the record is worth, its length over twice the correlation time (Bayley & Hammersley
-        1946); at most its number of samples.
+    - `lag_s`, `coefficient` (m,): From lag 0, where it is 1, to a quarter of the record.
+    - `correlation_time_s`: Integral of the coefficient from 0 to its first zero: the time constant of a first-order
+      process.
+    - `effective_count`: Independent samples that the record is worth, its length over twice the correlation time
+      (Bayley & Hammersley 1946); at most its number of samples.
     """
 
     lag_s: Array

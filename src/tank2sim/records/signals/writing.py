@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice
-from tank2sim.records.signals.columns import HELD_COLUMNS, SignalName, file_columns
+from tank2sim.records.signals.columns import DIRECTION_COLUMNS, HELD_COLUMNS, SignalName, file_columns
 from tank2sim.records.signals.filtering import Filtered
-from tank2sim.records.signals.sampling import Series, even_series
+from tank2sim.records.signals.sampling import even_series
 from tank2sim.records.trials import Trial, with_signals
-
-_CIRCLE = frozenset({"cog_rad", "wind_direction_rad", "wind_rel_direction_rad", "current_direction_rad"})
 
 
 def with_filtered(trial: Trial, filtered: Filtered, notice: str) -> Trial:
@@ -58,12 +57,14 @@ def thinned(trial: Trial, filtered: Sequence[Filtered], notice: str) -> Trial:
         signals[series.name] = _on_circle(series.name, series.values)
     for name in trial.signals:
         if name in HELD_COLUMNS:
-            signals[name] = _held(even_series(trial, name), time)
+            order = even_series(trial, name)
+            places = np.searchsorted(order.time_s, time + 1e-6 * order.step_s, side="right") - 1
+            signals[name] = order.values[np.clip(places, 0, None)]
     return replace(trial, time_s=time, signals=signals, noise={}, notices=(*trial.notices, Notice(notice)))
 
 
-def trial_text(trial: Trial, remarks: Sequence[str]) -> str:
-    """Text of a trial CSV, rudder positive to starboard; `remarks` are its first comment lines."""
+def trial_text(trial: Trial, remarks: Sequence[str], more: Mapping[str, Array] = MappingProxyType({})) -> str:
+    """Text of a trial CSV, rudder positive to starboard, with `remarks` as first comment lines and `more` columns."""
     text = io.StringIO()
     for remark in remarks:
         text.write(f"# {' '.join(remark.split())}\n")
@@ -71,7 +72,7 @@ def trial_text(trial: Trial, remarks: Sequence[str]) -> str:
         text.write(f"# scale: {trial.scale:.10g}\n")
     if stated := [f"{SignalName(name).file} {SignalName(name).factor * trial.noise[name]:.6g}" for name in trial.noise]:
         text.write(f"# noise: {', '.join(stated)}\n")
-    columns = file_columns(trial)
+    columns = file_columns(trial) | dict(more)
     text.write(",".join(columns) + "\n")
     for time, *values in zip(*(column.tolist() for column in columns.values()), strict=True):
         cells = (f"{value + 0.0:.10g}" if math.isfinite(value) else "" for value in values)
@@ -80,9 +81,4 @@ def trial_text(trial: Trial, remarks: Sequence[str]) -> str:
 
 
 def _on_circle(name: str, values: Array) -> Array:
-    return np.mod(values, 2.0 * np.pi) if name in _CIRCLE else values
-
-
-def _held(order: Series, time: Array) -> Array:
-    places = np.searchsorted(order.time_s, time + 1e-6 * order.step_s, side="right") - 1
-    return order.values[np.clip(places, 0, None)]
+    return np.mod(values, 2.0 * np.pi) if name in DIRECTION_COLUMNS - {"psi_rad"} else values

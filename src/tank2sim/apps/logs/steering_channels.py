@@ -1,0 +1,427 @@
+"""Channels of rudders and thrusters, by the turn that follows them, and of all quantities that nothing tests."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from tank2sim.apps.logs.candidates import REFUTED, STATED, ChannelSearch, Judgement
+from tank2sim.apps.logs.channels import SURE_FROM, USED_FROM, LogChannel
+from tank2sim.apps.logs.clock import usual_step, utc_text
+from tank2sim.apps.logs.content import (
+    AGREES,
+    DIFFERS,
+    FEW_SAMPLES,
+    UNIT_SLACK,
+    UNTESTED,
+    ContentEvidence,
+    angle_unit,
+    rudder_unit,
+    steering_evidence,
+)
+from tank2sim.apps.logs.quantities import QUANTITIES, names_another, names_thrust, plain_words, sign_of_name
+from tank2sim.apps.logs.reference import LEAST_SPEED_MPS, interpolated
+from tank2sim.apps.logs.streams import LogStream, note
+from tank2sim.arrays import Array
+
+FULL_RUDDER_DEG = 35.0
+"""Rudder angle at full order where a log has shares alone: 35 deg on either side (SOLAS II-1, regulation 29.3.1)."""
+
+LARGEST_LOGGED_RUDDER_RAD = math.radians(75.0)
+"""Angle that no rudder goes beyond: Schilling rudders go to 70 or 75 deg."""
+
+ALONE_LESS = 0.1
+"""A pair of orders is one of thrusters if either alone agrees with the turn by so much less than their difference
+(project choice)."""
+
+_HOLDS, _MOVES = 0.5, 0.2
+"""Share of samples equal to the one before of a stream that holds its values, as an order does, and of one that moves
+(project choice)."""
+
+_CLEARLY, _CLEARLY_REVERSED = 0.05, 0.2
+"""By how much the agreement of a rudder with the turn is above that of all other streams, and of the speed with the
+difference of two orders above that with their sum, where one controller is reversed (project choices)."""
+
+_LITTLE, _TURNED_RAD = 0.4, math.pi / 2
+"""Size of the sum of two orders over that of their difference, and change of heading, rad, below which a vessel goes
+straight although its orders are opposite (project choice)."""
+
+_DOUBTED = 0.85
+"""Largest confidence of a stream of which one thing is open: whether it is measured or ordered, or its unit."""
+
+_ASTERN_SHARE, _ASTERN_S = 0.15, 8.0
+"""Shares of the usual speed and of the usual revolutions, and a time, s, from which a vessel goes astern against them.
+Project choice: beyond what a current or a coasting propeller does."""
+
+_FASTEST_SHAFT_HZ, _LARGEST_HEEL_RAD = 100.0, 0.8
+"""Revolutions beyond which a record without a unit is in rpm, 1/s (small thrusters reach 80), and heel beyond which it
+is in deg: 46 deg in rad (project choices)."""
+
+_LEAST_ZERO, _LEAST_ZERO_SHARE = 10.0, 0.4
+"""Rudder on straight legs, deg or %, from which a zero of the record is taken out, and the same of a rudder of unknown
+unit, as a share of its range. Project choice: wind and a single propeller ask for some degrees (SNAME, PNA vol. III,
+IX.17); servos rest at 90 deg, sensors amid their range; a rudder hardly crosses such a zero."""
+
+_LEAST_HELM = 4.0
+"""Rudder on straight legs, deg, that is doubted. Project choice: from here on a held rudder is taken to turn."""
+
+_SHOWN = 0.6
+"""Agreement of a rudder with the turn from which its sign and zero are shown. Project choice: waves and currents turn
+a ship too."""
+
+_SERVO_DEG = 90.0
+"""Servos rest at 90 deg of 180, or at 180 of 360."""
+
+_STRAIGHT_S, _STRAIGHT_SHARE, _LEAST_STRAIGHT = 10.0, 0.1, 0.02
+"""Time before and after for which a straight leg has been one, s, rate of turn there as a share of its 99th percentile,
+and share of a log that must be such legs (project choice: rudders cross their zero faster)."""
+
+_PAIRS = (("thrust_order_port", "thrust_order_starboard"), ("rpm_port", "rpm_starboard"))
+
+
+def find_steering(search: ChannelSearch) -> None:
+    """Find thrusters and rudders, and take the other streams by their names."""
+    _find_unnamed_thrusters(search)
+    _find_held_rudder(search)
+    for stream in search.named("rudder_angle", "rudder_order", "port_rudder_angle"):
+        _judge_rudder(search, stream)
+    _refuse_exchanged_rudders(search)
+    if not search.named("rudder_angle", "rudder_order", "thrust_order_port", "rpm_port"):
+        _find_unnamed_rudder(search)
+    _scale_rudder_shares(search)
+    for names in _PAIRS:
+        ports, starboards = (search.named(name) for name in names)
+        for port, starboard in zip(ports, starboards, strict=False):
+            _judge_pair(search, names, (port, starboard))
+        for stream in ports[len(starboards) :] + starboards[len(ports) :]:
+            search.add(Judgement(stream, 0.6, "the other side is missing", _share_unit(stream, stream.quantity)))
+    _take_others(search)
+    _scale_engine_shares(search)
+    _report_lost_signs(search)
+
+
+def _evidence(search: ChannelSearch, time: Array, values: Array) -> ContentEvidence:
+    return steering_evidence(time, values, *search.rate)
+
+
+def _held_share(stream: LogStream) -> float:
+    return float((np.diff(stream.values) == 0).mean())
+
+
+# Rudders --------------------------------------------------------------------------------------------------------
+
+
+def _find_held_rudder(search: ChannelSearch) -> None:
+    """If several streams are a rudder by their names, the one that holds its values is the order."""
+    angles = search.named("rudder_angle")
+    held = [stream for stream in angles if stream.stated_by == "name" and _held_share(stream) > _HOLDS]
+    if not search.named("rudder_order") and len(held) == 1 and any(_held_share(other) < _MOVES for other in angles):
+        search.rename(held[0], "rudder_order")
+
+
+def _refuse_exchanged_rudders(search: ChannelSearch) -> None:
+    """Refuse an angle that stays at its values and an order that never does: an order holds until the next."""
+    angle, order = search.best("rudder_angle"), search.best("rudder_order")
+    if angle is None or order is None:
+        return
+    held = [_held_share(search.stream(channel.stream)) for channel in (angle, order)]
+    if held[0] > _HOLDS and held[1] < _MOVES:
+        search.fault(angle.stream, f"holds its values as an order does, and {order.stream} does not")
+        search.doubt("order and angle seem exchanged", angle.stream, order.stream)
+
+
+def _zero(search: ChannelSearch, stream: LogStream, evidence: ContentEvidence) -> float:
+    """Rudder reading on straight legs (slow turn, also a time before); 0 if that is near its zero or unknown."""
+    time, rate = search.rate
+    if stream.unit == "1" or not len(rate) or evidence.known < _SHOWN:
+        return 0.0
+    values = interpolated(time, stream.time_s, stream.values, 10.0)
+    small = np.abs(rate) < _STRAIGHT_SHARE * float(np.percentile(np.abs(rate), 99))
+    reach = max(1, round(_STRAIGHT_S / usual_step(time)))
+    straight = (np.convolve(small, np.ones(2 * reach + 1), "same") > 2 * reach) & np.isfinite(values)
+    if straight.sum() < max(FEW_SAMPLES, _LEAST_STRAIGHT * len(time)):
+        return 0.0
+    zero, span = float(np.median(values[straight])), float(np.nanmax(values) - np.nanmin(values))
+    size = abs(zero) * math.degrees(QUANTITIES["rudder_angle"].units.get(stream.unit or "deg", 1.0))
+    if size >= _LEAST_ZERO if stream.unit else abs(zero) > _LEAST_ZERO_SHARE * span:
+        words = f"{stream.name} is at {zero:.4g} {stream.unit}".strip() + " on straight legs"
+        text = f"{words}, which is taken as its zero (offset in channels.toml)"
+        search.findings.append(note(text, stream.name, zero=zero))
+        return zero
+    if size > _LEAST_HELM:
+        text = f"at {zero:.3g} {stream.unit or 'deg'} on straight legs: helm against wind, or its zero"
+        search.fault(stream.name, text)
+    return 0.0
+
+
+def _judge_rudder(search: ChannelSearch, stream: LogStream) -> None:
+    evidence = _evidence(search, *search.thin(stream))
+    zero = _zero(search, stream, evidence)
+    found = search.judged(stream, evidence, agrees=_SHOWN)
+    found.unit, found.offset = stream.unit or rudder_unit(stream.values - zero), zero
+    stated, shown = sign_of_name(stream.name), evidence.known >= _SHOWN
+    if stated:
+        found.sign = stated
+        if shown and evidence.sign != stated:
+            found.refuse(f"{found.why}: the turn contradicts the sign in its name")
+    elif shown and evidence.sign < 0:
+        found.turn(0.9, "it is positive to port, against its format")
+        if found.sign < 0:
+            search.findings.append(note(f"{stream.name} is positive to port", stream.name))
+    if found.confidence < DIFFERS:
+        search.fault(stream.name, found.why)
+    if stream.quantity == "rudder_order" and not stream.unit and found.unit == "deg":
+        found.doubt(_DOUBTED, "; deg by its size, and it may be in %")
+    if stream.quantity == "rudder_angle" and stream.stated_by == "name" and _held_share(stream) > _HOLDS:
+        found.doubt(_DOUBTED, "; it holds its values as an order does")
+    factor = QUANTITIES["rudder_angle"].units.get(found.unit, 0)
+    most = factor * float(np.nanpercentile(np.abs(stream.values - zero), 99.9))
+    if found.unit in ("deg", "rad") and most > LARGEST_LOGGED_RUDDER_RAD:
+        found.doubt(0.6, f"; it goes to {math.degrees(most):.3g} deg, as no rudder does")
+    if zero and not stream.unit and abs(zero / _SERVO_DEG - round(zero / _SERVO_DEG)) > 0.01:
+        found.doubt(0.6, "; its unit is known by its size alone")
+    if zero:
+        found.doubt(STATED["name"], f"; {zero:.4g} on straight legs is taken as its zero")
+    search.add(found)
+
+
+def _find_unnamed_rudder(search: ChannelSearch) -> None:
+    """The stream without a name that leads the turn as a rudder does; none where no rate of turn is known."""
+    rates = [best.confidence for name in ("yaw_rate", "heading") if (best := search.best(name)) is not None]
+    taken = {channel.stream for channel in search.found if channel.confidence >= USED_FROM}
+    candidates: list[tuple[ContentEvidence, LogStream]] = []
+    for stream in search.streams if rates else ():
+        if stream.name in taken or stream.quantity or np.ptp(stream.values) == 0 or names_another(stream.name):
+            continue
+        evidence = _evidence(search, *search.thin(stream))
+        if evidence.known > AGREES and evidence.lag_s >= 1.0 and (stream.unit or rudder_unit(stream.values)):
+            candidates.append((evidence, stream))
+    candidates.sort(key=lambda entry: -entry[0].known)
+    for place, (evidence, stream) in enumerate(candidates):
+        quantity = "rudder_order" if _held_share(stream) > _HOLDS else "rudder_angle"
+        others = [entry for entry in candidates if not _alike(candidates[0][1], entry[1])]
+        clear = not others or (place == 0 and evidence.known > others[0][0].known + _CLEARLY)
+        why = f"by content alone: {evidence.text}"
+        if not clear:
+            why += f"; the same is true of {', '.join(other.name for _, other in candidates if other is not stream)}"
+        confidence = (0.75 if max(rates) > 0.8 else 0.7) if clear else 0.7 if place == 0 else 0.5
+        unit = stream.unit or rudder_unit(stream.values)
+        search.add(Judgement(stream, confidence, why, unit, evidence.sign), quantity)
+
+
+def _alike(first: LogStream, second: LogStream) -> bool:
+    """Whether two streams are the order and the angle of one rudder."""
+    other = np.interp(first.time_s, second.time_s, second.values)
+    return abs(float(np.corrcoef(first.values, other)[0, 1])) > 0.95
+
+
+def _scale_rudder_shares(search: ChannelSearch) -> None:
+    """Orders in shares of the full rudder, scaled by the angle where it is known, else by the usual full rudder."""
+    for place, given in enumerate(search.found):
+        angle = next((c for c in search.found if c.quantity == "rudder_angle" and c.unit in ("deg", "rad")), None)
+        known = angle if angle is not None and angle.confidence >= USED_FROM else None
+        channel = search.found[place] = _by_angle(search, given, known)
+        if channel.quantity not in ("rudder_order", "rudder_angle") or channel.unit not in ("1", "%"):
+            continue
+        share = QUANTITIES["rudder_order"].units[channel.unit]
+        full = FULL_RUDDER_DEG / max(1 - abs(share * channel.offset), 0.5)  # 50 of 0 to 100 % leaves 50 to a side
+        confidence, why = min(channel.confidence, 0.75), channel.why
+        if known is None:
+            why += f"; full order is taken as {FULL_RUDDER_DEG:g} deg"
+        elif (ratio := _ratio(search, known, channel)) is not None:
+            full, confidence = math.degrees(ratio), channel.confidence
+            why += f"; full order is {full:.3g} deg by {known.stream}"
+        search.found[place] = replace(channel, unit="deg", scale=full * share, confidence=confidence, why=why)
+
+
+def _by_angle(search: ChannelSearch, order: LogChannel, angle: LogChannel | None) -> LogChannel:
+    """An order without a unit that is deg by its size: sure, or in %, by the angle that follows it; any other as is."""
+    by_size = order.quantity == "rudder_order" and order.unit == "deg" and not search.stream(order.stream).unit
+    ratio = _ratio(search, angle, order, least_share=0.0) if by_size and angle is not None else None
+    if angle is None or ratio is None:
+        return order
+    if abs(ratio - 1) < UNIT_SLACK:
+        why = f"{order.why}; {angle.stream} shows deg"
+        return replace(order, confidence=max(order.confidence, SURE_FROM), why=why)
+    return replace(order, unit="%")
+
+
+def _ratio(search: ChannelSearch, measured: LogChannel, order: LogChannel, least_share: float = 0.3) -> float | None:
+    """Measured value (SI) over ordered share, where the order is held and not small; None where it never is."""
+    time, share = search.series(order)
+    value = interpolated(time, *search.series(measured), 10.0)
+    good = np.isfinite(value) & (np.abs(share) > (least_share or 0.3 * np.abs(share).max()))
+    if good.sum() < FEW_SAMPLES:
+        return None
+    ratio = value[good] / share[good]
+    middle = float(np.median(ratio))
+    return middle if np.median(np.abs(ratio - middle)) < 0.1 * abs(middle) and middle > 0 else None
+
+
+# Thrusters ------------------------------------------------------------------------------------------------------
+
+
+def _find_unnamed_thrusters(search: ChannelSearch) -> None:
+    """Two streams of orders without a name whose difference turns the vessel, which neither does alone."""
+    if search.named("thrust_order_port", "thrust_order_starboard", "rudder_order", "rudder_angle"):
+        return
+    orders = [
+        stream
+        for stream in search.streams
+        if not stream.quantity
+        and (stream.unit == "1" or (not stream.unit and names_thrust(stream.name)))
+        and np.ptp(stream.values) > 0.1
+        and np.nanmax(np.abs(stream.values)) < 2
+    ]
+    if len(orders) != 2:
+        return
+    time, port, starboard = _pair_series(search, *orders)
+    both, *alone = (_evidence(search, time, values).known for values in (port - starboard, port, starboard))
+    if both > 0.6 and both > max(alone) + ALONE_LESS:
+        for stream, quantity in zip(orders, _PAIRS[0], strict=True):
+            search.rename(stream, quantity)
+
+
+def _pair_series(search: ChannelSearch, port: LogStream, starboard: LogStream) -> tuple[Array, Array, Array]:
+    """Times and values of two orders at the times of the first."""
+    time, values = search.thin(port)
+    return time, values, np.interp(time, *search.thin(starboard))
+
+
+def _judge_pair(search: ChannelSearch, names: tuple[str, str], pair: tuple[LogStream, LogStream]) -> None:
+    """Judge two orders or revolutions: their sides by the turn, and their signs by the speed ahead."""
+    signs, reversal = _reversed(search, *pair)
+    time, port, starboard = _pair_series(search, *pair)
+    evidence = _evidence(search, time, signs[0] * port - signs[1] * starboard)
+    swap = evidence.known > _SHOWN and evidence.sign < 0
+    for stream, name, other, sign in zip(pair, names, names[::-1], signs, strict=True):
+        found = search.judged(stream, evidence, agrees=_SHOWN)
+        # A reversed controller is found by the speed, and then the turn shows the sides, or nothing.
+        exchanged = swap and (stream.stated_by == "" or -1 in signs)
+        quantity, found.sign = other if exchanged else name, sign
+        if exchanged:
+            found.confidence, found.why = 0.9, f"{evidence.text} with the sides exchanged"
+        elif swap:
+            found.refuse(f"{found.why}: the turn contradicts its side")
+            search.fault(stream.name, found.why)
+        if reversal and signs == (1, 1):
+            found.confidence = REFUTED
+            search.fault(stream.name, reversal)
+        elif reversal:
+            found.confidence = _DOUBTED if swap or (evidence.agreement or 1.0) >= _SHOWN else STATED["name"]
+            found.why += f"; {reversal}"
+        found.unit = _share_unit(stream, quantity)
+        shown = "rpm" in plain_words(stream.name).split() or np.abs(stream.values).max() > _FASTEST_SHAFT_HZ
+        if found.unit == "rpm" != stream.unit and not shown:
+            found.doubt(_DOUBTED, "; rpm by their size")
+        search.add(found, quantity)
+        if exchanged and stream.stated_by == "name":
+            search.fault(stream.name, f"is {QUANTITIES[quantity].words}, against its name: {evidence.text}")
+        if sign < 0:
+            search.fault(stream.name, f"is positive astern: {reversal}")
+
+
+def _speed_ahead(search: ChannelSearch) -> Array:
+    """Speed ahead over the ground at the times of the motion (n,), m/s."""
+    angle = search.heading_at(search.motion.time_s)
+    return search.motion.v_north_mps * np.cos(angle) + search.motion.v_east_mps * np.sin(angle)
+
+
+def _reversed(search: ChannelSearch, port: LogStream, starboard: LogStream) -> tuple[tuple[int, int], str]:
+    """Signs of two orders by the speed ahead, which follows their sum, and why one is reversed.
+
+    1, 1 without a reason where none is, and with one where it is not known which of the two.
+    """
+    at, ahead = search.motion.time_s, _speed_ahead(search)
+    good = np.isfinite(ahead)
+    if search.best("heading") is None or good.sum() < FEW_SAMPLES or port.stated_by == "format":
+        return (1, 1), ""
+    if np.percentile(np.abs(ahead[good]), 95) < 2 * LEAST_SPEED_MPS:
+        return (1, 1), ""
+    time, first, second = _pair_series(search, port, starboard)
+    total, difference = (
+        steering_evidence(time, values, at[good], ahead[good]) for values in (first + second, first - second)
+    )
+    # A pair that pulls apart for long turns the vessel about, unless one of it is reversed.
+    turned = np.ptp(search.heading_at(at)[good])
+    straight = np.std(first + second) < _LITTLE * np.std(first - second) and turned < _TURNED_RAD
+    if difference.known >= max(_SHOWN, 0.0 if straight else total.known + _CLEARLY_REVERSED):
+        way = difference.sign
+        return (way, -way), f"the speed ahead follows the difference of the orders by {difference.known:.2f}"
+    if total.known >= _SHOWN and total.sign < 0:
+        return (1, 1), "the speed falls with the orders: one or both are reversed"
+    return (1, 1), ""
+
+
+def _share_unit(stream: LogStream, quantity: str) -> str:
+    """Unit of an order or of revolutions by size, where nothing states it."""
+    units = QUANTITIES[quantity].units
+    if stream.unit in units:
+        return stream.unit
+    most = float(np.nanpercentile(np.abs(stream.values), 99.9))
+    # Slower shafts turn at 60 rpm and more at full ahead; above 30 per second none do.
+    fitting = {"1": most <= 1.05, "%": most <= 105, "rpm": most > 30}
+    return next((unit for unit, fits in fitting.items() if fits and unit in units), "")
+
+
+# The others -----------------------------------------------------------------------------------------------------
+
+
+def _take_others(search: ChannelSearch) -> None:
+    """Take the streams that nothing tests, by format or name, and their units by size."""
+    done = {channel.stream for channel in search.found}
+    for stream in search.streams:
+        if stream.name in done or not stream.quantity:
+            continue
+        found, quantity = search.judged(stream, UNTESTED), stream.quantity
+        if quantity in ("rpm", "rpm_order"):
+            found.unit = _share_unit(stream, quantity)
+        elif not stream.unit and quantity.startswith("wind") and quantity.endswith("direction"):
+            found.unit = angle_unit(stream.values, "")
+        elif not stream.unit and quantity == "heel":
+            found.unit = "deg" if np.percentile(np.abs(stream.values), 99.9) > _LARGEST_HEEL_RAD else ""
+        search.add(found)
+
+
+def _scale_engine_shares(search: ChannelSearch) -> None:
+    """Orders of the engine in shares of the full order, by the measured revolutions."""
+    measured = next((c for c in search.found if c.quantity == "rpm" and c.unit), None)
+    for place, channel in enumerate(search.found):
+        if channel.quantity != "rpm_order" or channel.unit not in ("1", "%"):
+            continue
+        ratio = None if measured is None else _ratio(search, measured, channel)
+        if ratio is None:
+            why = f"{channel.why}; the revolutions at full order are not known"
+            search.found[place] = replace(channel, confidence=min(channel.confidence, 0.6), why=why)
+            continue
+        share = QUANTITIES["rpm_order"].units[channel.unit]
+        rpm = ratio * 60 / (2 * math.pi)
+        why = f"{channel.why}; full order is {rpm:.4g} rpm by the measured revolutions"
+        confidence = max(channel.confidence, 0.9)
+        search.found[place] = replace(channel, unit="rpm", scale=rpm * share, confidence=confidence, why=why)
+
+
+def _report_lost_signs(search: ChannelSearch) -> None:
+    """Report revolutions that stay ahead while the vessel goes astern, for many engines count without a sign, and
+    refuse revolutions astern while it goes ahead."""
+    heading = search.best("heading")
+    if heading is None or heading.confidence < SURE_FROM:
+        return
+    at, ahead = search.motion.time_s, _speed_ahead(search)
+    usual = float(np.percentile(search.motion.speed_mps, 95)) if len(at) else 0.0
+    fast = max(_ASTERN_SHARE * usual, LEAST_SPEED_MPS)
+    for stream in search.named("rpm", "rpm_port", "rpm_starboard", "rpm_order"):
+        values = interpolated(at, stream.time_s, stream.values, 10.0)
+        shown = values[(ahead > fast) & np.isfinite(values)]
+        if len(shown) > FEW_SAMPLES and (shown < 0).mean() > AGREES:
+            search.fault(stream.name, "is negative while the vessel goes ahead: its sign is the other one")
+            search.doubt("the motion contradicts its sign", stream.name)
+            continue
+        turning = values > _ASTERN_SHARE * float(np.percentile(stream.values, 95))
+        astern = (ahead < -fast) & turning & (stream.values.min() >= 0)
+        if astern.sum() * usual_step(at) > _ASTERN_S:
+            where = f"stays ahead while the vessel goes astern ({utc_text(at[np.argmax(astern)])})"
+            remedy = "its sign is lost, or the pitch is astern; leave out the trials that go astern"
+            search.fault(stream.name, f"{where}: {remedy}")
