@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -12,10 +13,10 @@ from numpy.polynomial import Polynomial
 from scipy import stats
 
 from tank2sim.apps.rigs.tow import equation_error
-from tank2sim.apps.rigs.tow.fit import DELAY, surge_coefficients
+from tank2sim.apps.rigs.tow.findings import DELAY, surge_coefficients
 from tank2sim.apps.rigs.tow.output_error import OutputErrorFit, TowOptions, fit_speeds
 from tank2sim.apps.rigs.tow.records import Tows
-from tank2sim.apps.rigs.tow.surge import SurgeCoefficients, drag
+from tank2sim.apps.rigs.tow.surge import SurgeCoefficients
 from tank2sim.arrays import Array, Number, Unbounded
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import COLLINEAR, SINGULAR_CONDITION, scaled_condition
@@ -102,7 +103,7 @@ class FittedModel:
     @property
     def coefficients(self) -> SurgeCoefficients:
         """Mass and drag."""
-        return surge_coefficients(self.unknowns, np.array(list(self.estimates.values())))
+        return surge_coefficients(self.estimates)
 
     @property
     def mass_interval_kg(self) -> tuple[float, float]:
@@ -127,18 +128,23 @@ def compare_models(tows: Tows, force: Polynomial, models: Sequence[TowModel] = M
 
 
 def _fitted(model: TowModel, fit: OutputErrorFit, top_speed_mps: float) -> FittedModel:
+    estimates = dict(zip(model.unknowns, fit.estimates.tolist(), strict=True))
+    half_widths = stats.t.ppf(0.975, fit.freedom) * np.sqrt(np.diag(fit.covariance))
+    condition, count = scaled_condition(fit.design) ** 2, len(fit.residuals_mps)
+    mean_square = max(float(np.mean(fit.residuals_mps**2)), np.finfo(float).tiny)
+    lowest = float(np.min(surge_coefficients(estimates).drag_N(np.linspace(0.0, top_speed_mps, 401))))
     late = not model.start_delay or fit.estimates[-1] > _NO_DELAY_S
     return FittedModel(
         unknowns=model.unknowns,
-        estimates=dict(zip(model.unknowns, fit.estimates.tolist(), strict=True)),
-        half_widths_95=dict(zip(model.unknowns, fit.half_widths.tolist(), strict=True)),
+        estimates=estimates,
+        half_widths_95=dict(zip(model.unknowns, half_widths.tolist(), strict=True)),
         covariance=fit.covariance,
         freedom=fit.freedom,
         scatter_mps=fit.scatter_mps,
-        aic=fit.aic,
-        condition_scaled=fit.condition_scaled,
-        drag_nowhere_negative=bool(fit.estimates[0] > 0 and _lowest_drag(model, fit, top_speed_mps) >= 0),
-        determined=bool(late and fit.condition_scaled <= COLLINEAR**2),
+        aic=count * math.log(mean_square) + 2 * len(estimates),
+        condition_scaled=condition,
+        drag_nowhere_negative=bool(fit.estimates[0] > 0 and lowest >= 0),
+        determined=bool(late and condition <= COLLINEAR**2),
     )
 
 
@@ -184,9 +190,6 @@ class TowByTow:
     spread_standard_errors: Array
 
 
-TowEstimator = Callable[[Tows], Array | None]
-
-
 def tow_by_tow(tows: Tows, force: Polynomial, terms: tuple[str, ...], speed_degree: int = 2) -> dict[str, TowByTow]:
     """Single-tow and jackknife estimates by the paper's algorithm with `terms`, and by the simple models.
 
@@ -194,19 +197,17 @@ def tow_by_tow(tows: Tows, force: Polynomial, terms: tuple[str, ...], speed_degr
     """
     if len(tows.names) < 3:
         return {}
-    ways: list[tuple[str, tuple[str, ...], TowEstimator]] = [
-        (
-            f"as published: {', '.join(('M', *terms))}",
-            ("M", *terms),
-            lambda tow: _by_paper(tow, force, terms, speed_degree),
+    found = {
+        f"as published: {', '.join(('M', *terms))}": _each(
+            tows, ("M", *terms), lambda tow: _by_paper(tow, force, terms, speed_degree)
         )
-    ]
+    }
     for model in (SIMPLE, SIMPLE_LATE):
-        ways.append((f"output error: {model.label}", model.unknowns, _by_output_error(force, model)))
-    return {label: _each(tows, unknowns, estimate) for label, unknowns, estimate in ways}
+        found[f"output error: {model.label}"] = _each(tows, model.unknowns, partial(_by_output_error, force, model))
+    return found
 
 
-def _each(tows: Tows, unknowns: tuple[str, ...], estimate: TowEstimator) -> TowByTow:
+def _each(tows: Tows, unknowns: tuple[str, ...], estimate: Callable[[Tows], Array | None]) -> TowByTow:
     def row(tows: Tows) -> Array:
         found = estimate(tows) if tows.top_speed_mps > 0 else None
         return np.full(len(unknowns), np.nan) if found is None else found
@@ -236,12 +237,9 @@ def _by_paper(tows: Tows, force: Polynomial, terms: tuple[str, ...], degree: int
     return None if scaled_condition(problem.design) > SINGULAR_CONDITION else equation_error.solve_by_qr(problem)
 
 
-def _by_output_error(force: Polynomial, model: TowModel) -> TowEstimator:
-    def estimate(tows: Tows) -> Array | None:
-        fit = _fit_or_none(tows, force, model)
-        return None if fit is None else fit.estimates
-
-    return estimate
+def _by_output_error(force: Polynomial, model: TowModel, tows: Tows) -> Array | None:
+    fit = _fit_or_none(tows, force, model)
+    return None if fit is None else fit.estimates
 
 
 def _fit_or_none(tows: Tows, force: Polynomial, model: TowModel) -> OutputErrorFit | None:
@@ -249,9 +247,3 @@ def _fit_or_none(tows: Tows, force: Polynomial, model: TowModel) -> OutputErrorF
         return fit_speeds(tows, force, model.terms, TowOptions(start_delay=model.start_delay))
     except InputError:
         return None
-
-
-def _lowest_drag(model: TowModel, fit: OutputErrorFit, top_speed_mps: float) -> float:
-    values = dict(zip(model.unknowns, fit.estimates, strict=True))
-    speeds = np.linspace(0.0, top_speed_mps, 401)
-    return float(np.min(drag(speeds, values.get("B1", 0.0), values.get("B2", 0.0), values.get("B3", 0.0))))

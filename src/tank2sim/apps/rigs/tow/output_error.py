@@ -4,26 +4,20 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 from numpy.polynomial import Polynomial
-from scipy import stats
-from scipy.optimize import least_squares
 
+from tank2sim.apps.rigs.search import WithSlopes, least_misfit, pseudo_inverse
 from tank2sim.apps.rigs.tow.records import Tows, as_force, mean_force
 from tank2sim.apps.rigs.tow.surge import DRAG_POWERS, SurgeCoefficients, surge_model
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.identification.conditioning import column_norms, scaled_condition
-from tank2sim.identification.trials.methods.gauss_newton import is_minimum
 from tank2sim.simulation.scheme import runge_kutta_step
 from tank2sim.simulation.sensitivity import augmented_step
-
-Predictor = Callable[[Array], tuple[Array, Array]]
 
 MOST_STEPS = 5000
 """Most steps of the integration over a record; a longer record has longer steps than the model's, because its body is
@@ -84,32 +78,13 @@ class OutputErrorFit:
     @property
     def covariance(self) -> Array:
         """Covariance of the estimates, for independent readings of equal variance and a true model."""
-        norms = column_norms(self.design)
-        inverse = np.linalg.pinv(self.design / norms) / norms[:, None]
+        inverse = pseudo_inverse(self.design)
         return self.scatter_mps**2 * inverse @ inverse.T
-
-    @property
-    def half_widths(self) -> Array:
-        """Half-widths of the 95 % intervals of the estimates, by Student's t, (unknowns,)."""
-        half: Array = stats.t.ppf(0.975, self.freedom) * np.sqrt(np.diag(self.covariance))
-        return half
-
-    @property
-    def condition_scaled(self) -> float:
-        """Condition number of J'J with a diagonal of ones."""
-        return scaled_condition(self.design) ** 2
-
-    @property
-    def aic(self) -> float:
-        """Akaike's n ln(SSE/n) + 2 k, with n readings and k estimates; lower is better, only differences matter."""
-        n = len(self.residuals_mps)
-        mean_square = max(float(np.mean(self.residuals_mps**2)), np.finfo(float).tiny)
-        return n * math.log(mean_square) + 2 * len(self.estimates)
 
 
 def speed_predictor(
     times_s: Array, force: float | Polynomial, terms: tuple[str, ...], options: TowOptions = AT_ONCE
-) -> Predictor:
+) -> WithSlopes:
     """Speeds of (1.5) from rest, and their sensitivities.
 
     The body is at rest until t = 0, or until the start delay, and then moves under T(t) of the same clock. The
@@ -198,30 +173,16 @@ def fit_speeds(
         problem = f"{len(readings)} readings after the release do not test {len(scale)} estimates"
         raise InputError(tows.path, "", problem, "give more readings, or take fewer terms (--terms B3)")
 
-    @functools.lru_cache(maxsize=2)  # residuals and Jacobian are evaluated at the same point
-    def at(*scaled: float) -> tuple[Array, Array]:
-        speeds, sensitivities = predict(np.array(scaled) * scale)
+    def misfit(scaled: Array) -> tuple[Array, Array]:
+        speeds, sensitivities = predict(scaled * scale)
         return speeds[row_of_reading] - readings, sensitivities[row_of_reading] * scale
 
     lowest = np.where(np.isinf(highest), -np.inf, 0.0)
-    found = least_squares(
-        lambda scaled: at(*scaled)[0],
-        start,
-        lambda scaled: at(*scaled)[1],
-        (lowest, highest),
-        xtol=1e-12,
-        ftol=1e-12,
-        gtol=1e-12,
-    )
-    if not found.success or not np.isfinite(found.x).all():
-        return None
-    variance = max(float(np.mean(found.fun**2)), np.finfo(float).tiny)
-    H, g = found.jac.T @ found.jac, found.jac.T @ found.fun
-    stays = is_minimum(H, g, variance=variance, bounded=(found.x, lowest, highest))
-    if np.array_equal(found.x, start) and not stays:  # the search did not move: it would be the guess
+    found = least_misfit(misfit, start, (lowest, highest), tolerances=(1e-12, 1e-12, 1e-12))
+    if found is None:
         return None
     best = np.where(found.active_mask < 0, 0.0, found.x)
-    residuals, design = at(*best)
+    residuals, design = misfit(best)
     return OutputErrorFit(best * scale, design / scale, residuals)
 
 

@@ -23,7 +23,7 @@ from tank2sim.answer.parts import (
 from tank2sim.answer.result import Result
 from tank2sim.apps.rigs.tow import paper as tow_paper
 from tank2sim.apps.rigs.tow.charts import drag_chart, ellipse_chart, model_chart, tow_speed_chart
-from tank2sim.apps.rigs.tow.fit import TOW_PARAMETERS, TowFit
+from tank2sim.apps.rigs.tow.findings import TOW_PARAMETERS, TowFit
 from tank2sim.apps.rigs.tow.identify import tow_card_text
 from tank2sim.apps.rigs.tow.model_selection import TowByTow
 from tank2sim.apps.rigs.tow.records import force_words

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import stats
 
 from tank2sim.apps.rigs.tow.equation_error import discretise, fit_mean_speed, solve_by_qr
-from tank2sim.apps.rigs.tow.fit import DELAY
+from tank2sim.apps.rigs.tow.findings import DELAY
 from tank2sim.apps.rigs.tow.identify import TowIdentification
 from tank2sim.apps.rigs.tow.model_selection import (
     SIMPLE,
@@ -163,7 +163,7 @@ def study_tows(result: TowIdentification, tows: Tows, body: TowedBody | None = N
     models = compare_models(tows, result.force)
     near = [model for model in models if model.unknowns in (SIMPLE.unknowns, SIMPLE_LATE.unknowns)]
     study = TowStudy(
-        **{part.name: getattr(result, part.name) for part in fields(result)},
+        **vars(result),
         tows_of_the_paper=are_of_the_paper(tows),
         speed_polynomials=tuple(speed_polynomials(tows)),
         models=models,
@@ -179,10 +179,10 @@ def study_tows(result: TowIdentification, tows: Tows, body: TowedBody | None = N
 
 
 def _drag_coefficients(result: TowIdentification, body: TowedBody) -> dict[str, DragCoefficients]:
-    found = {name: drag_polynomial(fit.coefficients, body) for name, fit in result.methods.items()}
+    drags = {name: drag_polynomial(fit.coefficients, body) for name, fit in result.methods.items()}
     return {
         name: DragCoefficients(by_length_squared=drag, by_volume_two_thirds=drag.times(body.area_ratio))
-        for name, drag in found.items()
+        for name, drag in drags.items()
     }
 
 

@@ -41,6 +41,10 @@ class SurgeCoefficients:
     B2_kgspm2: float = 0.0
     B3_kgpm: float = 0.0
 
+    def drag_N(self, speed_mps: Any) -> Any:
+        """Drag in N at speeds in m/s."""
+        return drag(speed_mps, self.B1_kgs2pm3, self.B2_kgspm2, self.B3_kgpm)
+
 
 def drag(speed: Any, b1: Any, b2: Any, b3: Any) -> Any:
     """Drag of (1.5) in N at a speed in m/s, positive at positive speed; numbers, arrays or CasADi expressions."""

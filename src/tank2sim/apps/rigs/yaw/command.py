@@ -152,7 +152,6 @@ def yaw(
     from tank2sim.apps.rigs.yaw.identify import YawOptions, identify_yaw, parse_yaw_terms, torque_constant
     from tank2sim.apps.rigs.yaw.records import read_yaw_record
     from tank2sim.apps.rigs.yaw.result import YawResult
-    from tank2sim.apps.rigs.yaw.study import study_yaw
     from tank2sim.apps.rigs.yaw.theory import theory_values
     from tank2sim.records.csv_table import is_frame, table_or_path
 
@@ -182,7 +181,7 @@ def yaw(
     def result(read: Sequence[YawRecord]) -> YawResult:
         found = identify_yaw(read, options)
         values = theory_values(body, found.records[0].programme.max_rate_radps) if body else ()
-        return YawResult(study_yaw(found, values), method, found, known)
+        return YawResult(found.study(values), method, found, known)
 
     rest = {
         "medium": medium != "water",
@@ -252,9 +251,8 @@ def _simulated(
     noise_A: float,
 ) -> tuple[YawRecord, str]:
     """A simulated record, and the text of its file."""
-    from tank2sim.apps.rigs.yaw.control import AdaptiveController
     from tank2sim.apps.rigs.yaw.records import yaw_record_text
-    from tank2sim.apps.rigs.yaw.simulation import simulated_record
+    from tank2sim.apps.rigs.yaw.simulation import AdaptiveController, simulated_record
 
     if path.exists():
         raise InputError(path, "", "exists, and may be a measurement", "give the simulated record a new name")

@@ -27,8 +27,8 @@ _STEP_S = 0.001
 _KNEE_RADPS = 2.5e-4
 
 
-_TORQUE_CONSTANT_NMPA = 0.051
-"""Torque constant of the paper's motor, N m/A."""
+TORQUE_CONSTANT_NMPA = 0.051
+"""k_t of the paper's motor."""
 
 ELLIPSOID_T1 = YawRig(
     inertia_kgm2=204.3e-4,
@@ -36,7 +36,7 @@ ELLIPSOID_T1 = YawRig(
     coulomb_Nm=7.9e-4,
     viscous_Nms=117.4e-4,
     quadratic_Nms2=381.0e-4,
-    torque_constant_NmpA=_TORQUE_CONSTANT_NMPA,
+    torque_constant_NmpA=TORQUE_CONSTANT_NMPA,
 )
 """The paper's ellipsoid in water, its least squares of Tables 1 and 2."""
 SHIP_T1 = YawRig(
@@ -45,7 +45,7 @@ SHIP_T1 = YawRig(
     coulomb_Nm=9.8e-4,
     viscous_Nms=43.5e-4,
     quadratic_Nms2=1434.6e-4,
-    torque_constant_NmpA=_TORQUE_CONSTANT_NMPA,
+    torque_constant_NmpA=TORQUE_CONSTANT_NMPA,
 )
 SHIP_T2 = YawRig(
     inertia_kgm2=179.6e-4,
@@ -53,13 +53,13 @@ SHIP_T2 = YawRig(
     coulomb_Nm=2.7e-4,
     viscous_Nms=216.7e-4,
     quadratic_Nms2=1480.9e-4,
-    torque_constant_NmpA=_TORQUE_CONSTANT_NMPA,
+    torque_constant_NmpA=TORQUE_CONSTANT_NMPA,
 )
 ELLIPSOID_AIR = YawRig(
-    inertia_kgm2=204.3e-4, coulomb_Nm=10.9e-4, viscous_Nms=7.6e-4, torque_constant_NmpA=_TORQUE_CONSTANT_NMPA
+    inertia_kgm2=204.3e-4, coulomb_Nm=10.9e-4, viscous_Nms=7.6e-4, torque_constant_NmpA=TORQUE_CONSTANT_NMPA
 )
 SHIP_AIR = YawRig(
-    inertia_kgm2=179.6e-4, coulomb_Nm=10.3e-4, viscous_Nms=10.7e-4, torque_constant_NmpA=_TORQUE_CONSTANT_NMPA
+    inertia_kgm2=179.6e-4, coulomb_Nm=10.3e-4, viscous_Nms=10.7e-4, torque_constant_NmpA=TORQUE_CONSTANT_NMPA
 )
 UNKNOWN_RIG = YawRig(inertia_kgm2=1.0, torque_constant_NmpA=1.0)
 """A rig of which nothing is known: the first two numbers are placeholders for those that are to be found."""

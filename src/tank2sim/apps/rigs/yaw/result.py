@@ -25,18 +25,10 @@ from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.rigs.yaw.card import YawRigCard
-from tank2sim.apps.rigs.yaw.found_card import (
-    BEST,
-    body_length,
-    known_added_inertia,
-    nrdot_prime,
-    rig_card_text,
-    tank_density,
-    with_nrdot,
-)
+from tank2sim.apps.rigs.yaw.energy import YawMethodEstimate, term_and_unit
+from tank2sim.apps.rigs.yaw.found_card import nrdot_prime, rig_card_text, with_nrdot
 from tank2sim.apps.rigs.yaw.identify import YAW_METHODS, YawIdentification
-from tank2sim.apps.rigs.yaw.intervals import ENERGY_TERMS
-from tank2sim.apps.rigs.yaw.study import EnergyBalance, EnergyResidual, YawMethodEstimate, YawStudy
+from tank2sim.apps.rigs.yaw.study import EnergyBalance, EnergyResidual, YawStudy
 from tank2sim.arrays import Columns
 from tank2sim.cards import Card, parse_card
 from tank2sim.errors import ArgumentError, InputError
@@ -92,7 +84,7 @@ class YawResult(Result[YawStudy]):
     """
 
     study: YawStudy
-    method: str = BEST
+    method: str = YAW_METHODS[0]
     identification: YawIdentification | None = None
     rig: YawRigCard | None = None
     files: Mapping[Path, str | bytes] = field(default_factory=dict)
@@ -146,9 +138,7 @@ class YawResult(Result[YawStudy]):
         InputError
             The added inertia or the length is not known, or the added inertia is negative.
         """
-        found, method = self._identified, self._known_method()
-        known_added_inertia(found, method)  # before the length: without it no length helps
-        return nrdot_prime(found, method, body_length(found, length_m), tank_density(found))
+        return nrdot_prime(self._identified, self._known_method(), length_m)
 
     def with_nrdot(self, card: Any, length_m: float | None = None) -> Any:
         """A ship with N_rdot of the body on the rig on its card, the value before in a comment.
@@ -164,12 +154,11 @@ class YawResult(Result[YawStudy]):
         InputError
             As :meth:`nrdot`, or the card is not one of a ship that manoeuvres.
         """
-        self.nrdot(length_m)
         from tank2sim import Ship
         from tank2sim.dynamics.vessel import as_vessel
 
-        ship, length = as_vessel(card).manoeuvring(), body_length(self._identified, length_m)
-        return Ship(with_nrdot(ship, self._identified, self._known_method(), length))
+        found = self.nrdot(length_m)
+        return Ship(with_nrdot(as_vessel(card).manoeuvring(), *found, self.method))
 
     def rig_card(self, name: str = "yaw rig") -> Card:
         """The card of the rig with its body, called `name`.
@@ -323,13 +312,13 @@ def _friction(methods: Mapping[str, YawMethodEstimate]) -> Table:
     terms = dict.fromkeys(term for found in given.values() for term in found.friction)
     rows: list[list[Cell]] = []
     for term in terms:
-        unit = next(unit for name, (_, unit) in ENERGY_TERMS.items() if term == f"{name}_{unit}")
+        words, unit = term_and_unit(term)
         cells: list[Cell] = []
         for found in given.values():
             value, error = _scaled(found.friction.get(term)), found.friction_standard_errors.get(term)
             shown = None if value is None else format_number(value)
             cells.append(shown if error is None else f"{shown} ± {format_number(1e4 * error, 2)}")
-        rows.append([term.removesuffix(f"_{unit}").replace("_", " "), _UNITS[unit], *cells])
+        rows.append([words.replace("_", " "), _UNITS[unit], *cells])
     heads = ("term", "unit", *(name.replace("_", " ") for name in given))
     return table("Friction and water, times 10⁴", heads, rows, folded=True)
 

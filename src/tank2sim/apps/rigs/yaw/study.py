@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from tank2sim.apps.rigs.yaw.energy import EnergyFit
-from tank2sim.apps.rigs.yaw.identify import YawIdentification
-from tank2sim.apps.rigs.yaw.intervals import ENERGY_TERMS
-from tank2sim.apps.rigs.yaw.output_error import AngleFit
+from tank2sim.apps.rigs.yaw.energy import EnergyFit, YawMethodEstimate
 from tank2sim.apps.rigs.yaw.records import YawRecord
 from tank2sim.apps.rigs.yaw.theory import TheoryValue
 from tank2sim.arrays import Array, Columns
@@ -22,49 +18,6 @@ _HISTORY_SAMPLES = 900
 """Samples of a record, enough to show each peak of its signals."""
 
 STAGES = ("accelerating", "braking")
-
-
-@dataclass(frozen=True, kw_only=True)
-class YawMethodEstimate:
-    """Estimates by one method, SI.
-
-    Parameters
-    ----------
-    added_inertia_kgm2, added_inertia_standard_error_kgm2 : float, optional
-        lambda661; None where J_zz is not known.
-    total_inertia_kgm2, total_inertia_standard_error_kgm2 : float
-        J_zz + lambda661 (in air J_zz); no error where the data do not determine it.
-    dissipation_J, dissipation_standard_error_J : float
-        B + D over one interval.
-    friction, friction_standard_errors : dict
-        Term of friction and water with its unit (``coulomb_Nm``) to its value and standard error; empty for a method
-        that does not estimate them.
-    bias_against_least_squares_kgm2 : float, optional
-        Difference of a two-interval formula from the energy least squares of the same records.
-    bias_from_kgm2 : dict
-        Parts of the bias: ``dissipation`` (different in both intervals) and ``speeds`` (w1, w2 differ from w6, w5).
-    total_inertia_by_hump_kgm2 : tuple of float
-        J_zz + lambda661 of each pair of intervals by a two-interval formula, of which the estimate is the mean.
-    """
-
-    added_inertia_kgm2: float | None
-    added_inertia_standard_error_kgm2: float | None
-    total_inertia_kgm2: float
-    total_inertia_standard_error_kgm2: float | None
-    dissipation_J: float
-    dissipation_standard_error_J: float | None
-    friction: dict[str, float]
-    friction_standard_errors: dict[str, float | None]
-    bias_against_least_squares_kgm2: float | None
-    bias_from_kgm2: dict[str, float]
-    total_inertia_by_hump_kgm2: tuple[float, ...]
-
-    @property
-    def inertia(self) -> tuple[str, float, float | None]:
-        """``added`` or, where J_zz is not known, ``total``; that inertia and its standard error, kg m2."""
-        if self.added_inertia_kgm2 is None:
-            return "total", self.total_inertia_kgm2, self.total_inertia_standard_error_kgm2
-        return "added", self.added_inertia_kgm2, self.added_inertia_standard_error_kgm2
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -154,54 +107,6 @@ class YawStudy(YawEstimates):
     theory: tuple[TheoryValue, ...]
 
 
-def study_yaw(identified: YawIdentification, theory: Sequence[TheoryValue] = ()) -> YawStudy:
-    """The study of an identification."""
-    air = YawEstimates(**_estimates(identified.air)) if identified.air else None
-    return YawStudy(**_estimates(identified), air=air, theory=tuple(theory))
-
-
-def _estimates(identified: YawIdentification) -> dict[str, Any]:
-    """Fields of :class:`YawEstimates`."""
-    methods = {name: _method(identified, name) for name in identified.estimates}
-    body = identified.body
-    return {
-        "records": tuple(str(record.path) for record in identified.records),
-        "medium": identified.medium,
-        "torque_constant_NmpA": identified.torque_constant_NmpA,
-        "body_inertia_kgm2": body.value_kgm2 if body else None,
-        "body_inertia_standard_error_kgm2": body.error_kgm2 if body else None,
-        "body_inertia_source": body.source if body else None,
-        "added_inertia_kgm2": {name: found.added_inertia_kgm2 for name, found in methods.items()},
-        "dissipation_J": {name: found.dissipation_J for name, found in methods.items()},
-        "methods": methods,
-        "mirror_difference": identified.mirror,
-        "histories": record_histories(identified.records, identified.fit),
-        "energy_balance": energy_balance_means(identified.fit),
-        "energy_residuals": _residuals(identified.fit),
-        "angle_residual": _angle_residual(identified.angle),
-        "notices": identified.notices,
-    }
-
-
-def _method(identified: YawIdentification, method: str) -> YawMethodEstimate:
-    estimate = identified.estimates[method]
-    added, error = identified.added_inertia(method) or (None, None)
-    friction = {f"{term}_{ENERGY_TERMS[term][1]}": found for term, found in estimate.friction.items()}
-    return YawMethodEstimate(
-        added_inertia_kgm2=added,
-        added_inertia_standard_error_kgm2=error,
-        total_inertia_kgm2=estimate.total_inertia_kgm2,
-        total_inertia_standard_error_kgm2=estimate.inertia_error_kgm2,
-        dissipation_J=estimate.dissipation_J,
-        dissipation_standard_error_J=estimate.dissipation_error_J,
-        friction={name: value for name, (value, _) in friction.items()},
-        friction_standard_errors={name: error for name, (_, error) in friction.items()},
-        bias_against_least_squares_kgm2=estimate.bias_kgm2,
-        bias_from_kgm2=dict(estimate.bias_from),
-        total_inertia_by_hump_kgm2=estimate.by_hump_kgm2,
-    )
-
-
 def record_histories(records: Sequence[YawRecord], fit: EnergyFit) -> dict[str, Columns]:
     """Record name to histories: evaluated rate, rate of the programme, tracking error and current."""
     found, before = {}, 0
@@ -244,7 +149,8 @@ def energy_balance_means(fit: EnergyFit) -> EnergyBalance:
     )
 
 
-def _residuals(fit: EnergyFit) -> tuple[EnergyResidual, ...]:
+def energy_residuals(fit: EnergyFit) -> tuple[EnergyResidual, ...]:
+    """Residual work of each subinterval."""
     balance, residuals = fit.balance, iter(fit.residuals_J.tolist())
     return tuple(
         EnergyResidual(
@@ -259,11 +165,8 @@ def _residuals(fit: EnergyFit) -> tuple[EnergyResidual, ...]:
     )
 
 
-def _angle_residual(angle: AngleFit | None) -> Columns | None:
+def angle_residual(time_s: Array, residual_rad: Array) -> Columns:
     """Residual angle of the integrated equation, with a gap (nan) between fitted parts."""
-    if angle is None:
-        return None
-    time, residual = angle.time_s, angle.residual_rad
-    breaks = np.flatnonzero(np.abs(np.diff(time)) > 1.0) + 1
-    time = np.insert(time, breaks, time[breaks - 1] + 0.01)
-    return drawn_columns({"t_s": time, "residual_rad": np.insert(residual, breaks, np.nan)}, peaks=True)
+    breaks = np.flatnonzero(np.abs(np.diff(time_s)) > 1.0) + 1
+    time = np.insert(time_s, breaks, time_s[breaks - 1] + 0.01)
+    return drawn_columns({"t_s": time, "residual_rad": np.insert(residual_rad, breaks, np.nan)}, peaks=True)
