@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from tank2sim.answer.charts.picture import chart_specification
-from tank2sim.apps.signals.charts import (
+from tank2sim.apps.signals.result import (
     autocorrelation_chart,
     cross_correlation_chart,
     density_chart,

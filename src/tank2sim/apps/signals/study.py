@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tank2sim.arrays import Columns, Number
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.notices import Notice
 from tank2sim.records.signals.columns import DIRECTION_COLUMNS, SignalName, file_columns, find_signal
-from tank2sim.records.signals.filtering import Filtered, FilterEffect
+from tank2sim.records.signals.filtering import (
+    Filtered,
+    FilterEffect,
+    FilterType,
+    butterworth,
+    decimate,
+    detrend,
+    savitzky_golay,
+    smoothing_spline,
+)
 from tank2sim.records.signals.sampling import Series, even_series
 from tank2sim.records.signals.spectra import Spectrum, Transfer, spectrum, transfer_function
 from tank2sim.records.signals.statistics import (
@@ -264,3 +273,63 @@ def _cautions(correlation: Correlation, transfer: Transfer, step_s: float) -> tu
     if not np.any(transfer.sure):
         messages.append("no coherence of rudder and yaw rate is above chance: the transfer function says nothing")
     return tuple(map(Notice, messages))
+
+
+REQUEST_FORMS = (
+    "lowpass:HZ, highpass:HZ, bandpass:HZ,HZ (each also with ,causal), savgol:SAMPLES,DEGREE, spline:HZ, "
+    "detrend:DEGREE, decimate:FACTOR"
+)
+"""What may be asked for."""
+
+
+@dataclass(frozen=True)
+class FilterRequest:
+    """A filter asked for by name.
+
+    Parameters
+    ----------
+    text : str
+        As it was written.
+    apply : callable
+        The filter.
+    thins : bool
+        True if it changes the times of the samples.
+    """
+
+    text: str
+    apply: Callable[[Series], Filtered]
+    thins: bool = False
+
+
+def parse_filter(text: str) -> FilterRequest:
+    """Read a filter's name and its numbers.
+
+    Raises
+    ------
+    InputError
+        The filter does not exist, or its numbers are not as many and of the kind that it takes.
+    """
+    kind, _, parameters = text.strip().partition(":")
+    words = [word.strip() for word in parameters.split(",") if word.strip()]
+    causal = bool(words) and words[-1] == "causal" and kind in set(FilterType)
+    try:
+        numbers = [float(word) for word in (words[:-1] if causal else words)]
+        whole = [int(number) for number in numbers if number == int(number)]
+    except (ValueError, OverflowError):
+        raise _refusal(text) from None
+    match kind, len(numbers), len(whole) == len(numbers):
+        case ("lowpass" | "highpass", 1, _) | ("bandpass", 2, _):
+            return FilterRequest(text, lambda series: butterworth(series, FilterType(kind), numbers, causal=causal))
+        case "savgol", 2, True:
+            return FilterRequest(text, lambda series: savitzky_golay(series, whole[0], whole[1]))
+        case "spline", 1, _:
+            return FilterRequest(text, lambda series: smoothing_spline(series, numbers[0]))
+        case "detrend", 1, True:
+            return FilterRequest(text, lambda series: detrend(series, whole[0]))
+        case "decimate", 1, True:
+            return FilterRequest(text, lambda series: decimate(series, whole[0]), thins=True)
+    raise _refusal(text)
+
+
+def _refusal(text: str) -> InputError:
+    return ArgumentError("filter", "", f"{text!r} is not a filter", f"write one of {REQUEST_FORMS}")

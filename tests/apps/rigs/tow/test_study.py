@@ -10,11 +10,19 @@ from scipy import stats
 from tank2sim.apps.rigs.tow import paper as tow_paper
 from tank2sim.apps.rigs.tow.equation_error import discretise, solve_by_qr
 from tank2sim.apps.rigs.tow.identify import identify_tow
-from tank2sim.apps.rigs.tow.model_selection import SIMPLE, SIMPLE_LATE, TowModel, compare_models, mass_range
 from tank2sim.apps.rigs.tow.output_error import TowOptions, fit_speeds, simulated_speeds
 from tank2sim.apps.rigs.tow.records import Tows, read_tows
 from tank2sim.apps.rigs.tow.result import TowResult
-from tank2sim.apps.rigs.tow.study import speed_polynomials, study_tows, towed_body
+from tank2sim.apps.rigs.tow.study import (
+    SIMPLE,
+    SIMPLE_LATE,
+    TowModel,
+    compare_models,
+    mass_range,
+    speed_polynomials,
+    study_tows,
+    towed_body,
+)
 from tank2sim.bundled import bundled
 from tank2sim.errors import InputError
 

@@ -10,9 +10,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from tank2sim.apps.rigs.glider.card import GliderCard
-from tank2sim.apps.rigs.glider.path import GlidePath, fly
-from tank2sim.apps.rigs.glider.programme import GlideProgramme
-from tank2sim.apps.rigs.glider.quasi_steady_error import SwingError, swing_errors
+from tank2sim.apps.rigs.glider.path import GlidePath, GlideProgramme, fly
 from tank2sim.apps.rigs.glider.steady import (
     SteadyGlide,
     ballast_kg,
@@ -24,13 +22,14 @@ from tank2sim.apps.rigs.glider.steady import (
 from tank2sim.apps.rigs.glider.transient import (
     Compared,
     ProgrammeError,
+    SwingError,
     compare_with_steady,
     equilibrium,
     quasi_steady_error,
+    swing_errors,
 )
 from tank2sim.arrays import Array, Columns, Number, Unbounded
 from tank2sim.dynamics.build import build
-from tank2sim.dynamics.model import Model
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.notices import Notice
 from tank2sim.simulation.integrator import NO_COMPILER, Integrator
@@ -38,33 +37,28 @@ from tank2sim.simulation.integrator import NO_COMPILER, Integrator
 _STEEPEST = math.radians(89.5)
 
 
-def glide_polar(
-    card: GliderCard, *, roll_rad: float = 0.0, buoyancy_kg: float | None = None, points: int = 200
-) -> tuple[SteadyGlide, ...]:
-    """Dives from the smallest angle to almost straight down; `buoyancy_kg` is a magnitude, by default the card's."""
-    least = smallest_angle(card, roll_rad)
+def glide_polar(card: GliderCard) -> tuple[SteadyGlide, ...]:
+    """Dives with the card's buoyancy from the smallest angle to almost straight down."""
+    least = smallest_angle(card)
     # Closer where the path is shallow: speed and incidence change there as the root of the angle above the smallest.
-    angles = least + (_STEEPEST - least) * np.linspace(0, 1, points) ** 2
-    size = card.glider.buoyancy_kg if buoyancy_kg is None else abs(buoyancy_kg)
-    return tuple(steady_glide(card, -angle, roll_rad=roll_rad, buoyancy_kg=-size) for angle in angles.tolist())
+    angles = least + (_STEEPEST - least) * np.linspace(0, 1, 200) ** 2
+    return tuple(steady_glide(card, -angle) for angle in angles.tolist())
 
 
-def best_glide(card: GliderCard, *, buoyancy_kg: float | None = None) -> SteadyGlide:
+def best_glide(card: GliderCard) -> SteadyGlide:
     """The dive of largest range for its depth: the smallest angle, at the greatest ratio of lift to drag."""
-    size = card.glider.buoyancy_kg if buoyancy_kg is None else abs(buoyancy_kg)
-    return steady_glide(card, -smallest_angle(card), buoyancy_kg=-size)
+    return steady_glide(card, -smallest_angle(card))
 
 
-def fastest_glide(card: GliderCard, *, buoyancy_kg: float | None = None) -> SteadyGlide:
+def fastest_glide(card: GliderCard) -> SteadyGlide:
     """The dive with the greatest speed over the ground, v cos(epsilon). Its angle does not depend on the buoyancy."""
-    size = card.glider.buoyancy_kg if buoyancy_kg is None else abs(buoyancy_kg)
     found = minimize_scalar(
         lambda angle: -steady_glide(card, -angle).horizontal_speed_mps,
         bounds=(smallest_angle(card), _STEEPEST),
         method="bounded",
         options={"xatol": 1e-10},
     )
-    return steady_glide(card, -float(found.x), buoyancy_kg=-size)
+    return steady_glide(card, -float(found.x))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -352,11 +346,11 @@ def study_glider(card: GliderCard, question: GlideQuestion) -> GlideStudy:
         An angle or a step cannot be flown, or budget and depth are not both given.
     """
     model = build(card)
-    glides = tuple(_glides(card, question))
+    glides = _glides(card, question)
     printed = _glides(card, question, as_printed=True) if question.as_printed else ()
-    path = fly(card, question.programme) if question.programme else None
-    printed_path = (
-        fly(card, question.programme, as_printed=True) if question.programme and question.as_printed else None
+    path, printed_path = (
+        fly(card, question.programme, as_printed=as_printed) if question.programme and asked else None
+        for as_printed, asked in ((False, True), (True, question.as_printed))
     )
     integrator = Integrator(model) if path or question.views else None
     best, fastest = best_glide(card), fastest_glide(card)
@@ -372,7 +366,9 @@ def study_glider(card: GliderCard, question: GlideQuestion) -> GlideStudy:
             AngleGlide(
                 **_state_fields(glide),
                 force_residual_N=force_residual(card, glide),
-                turning_radius_with_added_mass_m=_radius(model, glide),
+                turning_radius_with_added_mass_m=(
+                    equilibrium(model, glide).turning_radius_m if glide.turn_rate_radps else math.inf
+                ),
                 ballast_kg=ballast_kg(card, glide.buoyancy_kg),
             )
             for glide in glides
@@ -446,18 +442,13 @@ def _transient(found: Compared) -> TransientPath:
 
 
 def _glides(card: GliderCard, question: GlideQuestion, *, as_printed: bool = False) -> list[SteadyGlide]:
-    equations = glide_as_printed if as_printed else steady_glide
-    found = []
-    for angle in question.angles_rad:
-        size = question.buoyancy_kg
-        buoyancy = None if size is None else math.copysign(size, angle)
-        found.append(equations(card, angle, roll_rad=question.roll_rad, buoyancy_kg=buoyancy))
-    return found
-
-
-def _radius(model: Model, glide: SteadyGlide) -> float:
-    """Turning radius of the transient model, m; inf where the glide does not turn."""
-    return equilibrium(model, glide).turning_radius_m if glide.turn_rate_radps else math.inf
+    equations, size = glide_as_printed if as_printed else steady_glide, question.buoyancy_kg
+    return [
+        equations(
+            card, angle, roll_rad=question.roll_rad, buoyancy_kg=None if size is None else math.copysign(size, angle)
+        )
+        for angle in question.angles_rad
+    ]
 
 
 def _ranges(card: GliderCard, question: GlideQuestion, glides: tuple[SteadyGlide, ...]) -> list[Range]:
