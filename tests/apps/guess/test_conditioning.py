@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tank2sim.analysis.ensemble.draws import draws_of
+from tank2sim.apps.guess import study
 from tank2sim.apps.guess.prior import ShipDimensions, prior_card, rudder_by_rules
 from tank2sim.apps.guess.study import (
     FIGURE_KEYS,

@@ -202,7 +202,7 @@ def _signal(column: str) -> SignalName:
 def _filter_section(applied: FilterStudy) -> Section:
     runs = {"as measured": applied.before, applied.name: applied.after}
     title = f"{_signal(applied.column).words} before and after"
-    response = effect_chart(applied.name, applied.effect, title=f"Effect of {applied.name}")
+    response = effect_chart(applied.name, applied.effect)
     drawn = [Illustration(chart=response, name="filter_response")]
     if chart := columns_chart(runs, title, measured=("as measured",), height_px=300):
         drawn.append(Illustration(chart=chart, name="filter_signal"))
@@ -220,9 +220,8 @@ def _trial_section(label: str, trial: TrialSignals) -> Section:
 
 def _steering_charts(label: str, steering: Steering) -> list[Illustration]:
     rudder, rate = _signal(steering.rudder), _signal("r_degps")
-    transfer = transfer_chart(rudder, rate, steering.transfer, title=f"From {rudder.words} to {rate.words}")
-    title = f"Cross-correlation of {rudder.words} and {rate.words}"
-    correlation = cross_correlation_chart(rudder, rate, steering.cross_correlation, title=title)
+    transfer = transfer_chart(rudder, rate, steering.transfer)
+    correlation = cross_correlation_chart(rudder, rate, steering.cross_correlation)
     return [
         Illustration(
             chart=transfer,
@@ -247,24 +246,24 @@ def _signals_section(label: str, trial: TrialSignals) -> Section:
 
 def _signal_charts(label: str, name: SignalName, signal: SignalStudy) -> Iterator[Illustration]:
     """Density, autocorrelation and spectrum of a signal, side by side."""
-    stem, subject = f"{label}_{name.stem}", name.words[:1].upper() + name.words[1:]
+    stem = f"{label}_{name.stem}"
     if signal.probability_density:
         yield Illustration(
-            chart=density_chart(name, signal.probability_density, title=f"{subject}: probability density"),
+            chart=density_chart(name, signal.probability_density),
             caption="Kernel estimate next to the normal density of the same mean and standard deviation.",
             half=True,
             name=f"{stem}_density",
         )
     if signal.autocorrelation:
         yield Illustration(
-            chart=autocorrelation_chart(name, signal.autocorrelation, title=f"{subject}: autocorrelation"),
+            chart=autocorrelation_chart(name, signal.autocorrelation),
             caption="Red: the correlation time.",
             half=True,
             name=f"{stem}_autocorrelation",
         )
     if signal.spectrum:
         yield Illustration(
-            chart=spectrum_chart(name, signal.spectrum, title=f"{subject}: spectrum"),
+            chart=spectrum_chart(name, signal.spectrum),
             caption="The band is the 95 % confidence interval at each frequency.",
             half=True,
             name=f"{stem}_spectrum",
@@ -320,44 +319,47 @@ _PHASE = "phase (deg), below zero: later"
 _DOTTED = (2, 3)
 
 
-def density_chart(name: SignalName, density: Density, *, title: str = "") -> ChartSpec:
+def _subject(name: SignalName) -> str:
+    return name.words[:1].upper() + name.words[1:]
+
+
+def density_chart(name: SignalName, density: Density) -> ChartSpec:
     """Probability density of a signal next to the normal one."""
     curves = {"estimated": density.density, "normal": density.normal}
     series = [PlotSeries(label=label, x=density.values, y=curve) for label, curve in curves.items()]
     up = PlotAxis(title=with_unit("probability density", f"1/({name.unit})"), zero=True)
-    return curve_chart(
-        Plot(series=series, up=up), PlotAxis(title=with_unit(name.words, name.unit), nice=False), title=title
-    )
+    across = PlotAxis(title=with_unit(name.words, name.unit), nice=False)
+    return curve_chart(Plot(series=series, up=up), across, title=f"{_subject(name)}: probability density")
 
 
-def autocorrelation_chart(name: SignalName, found: Autocorrelation, *, title: str = "") -> ChartSpec:
+def autocorrelation_chart(name: SignalName, found: Autocorrelation) -> ChartSpec:
     """Autocorrelation against the lag, the correlation time marked."""
+    title, label = f"{_subject(name)}: autocorrelation", f"{name.words} with itself"
     described = f"Autocorrelation of {name.words}; the upright line is the correlation time."
-    return _correlation(found, f"{name.words} with itself", [0.0], found.correlation_time_s, title, described)
+    return _correlation(found, label, ([0.0], found.correlation_time_s), title, described)
 
 
-def cross_correlation_chart(first: SignalName, second: SignalName, found: Correlation, *, title: str) -> ChartSpec:
+def cross_correlation_chart(first: SignalName, second: SignalName, found: Correlation) -> ChartSpec:
     """Cross-correlation against the lag, with its largest value and the bound of two independent signals."""
-    bound = found.bound_if_independent
+    bound, title = found.bound_if_independent, f"Cross-correlation of {first.words} and {second.words}"
     described = f"Correlation of {second.words} with {first.words} against the lag."
     label = f"{second.words} after {first.words}"
-    return _correlation(found, label, [-bound, 0.0, bound], found.lag_of_largest_s, title, described)
+    return _correlation(found, label, ([-bound, 0.0, bound], found.lag_of_largest_s), title, described)
 
 
 def _correlation(
-    found: Autocorrelation | Correlation, label: str, levels: Sequence[float], mark_s: float, title: str, described: str
+    found: Autocorrelation | Correlation, label: str, marks: tuple[Sequence[float], float], title: str, described: str
 ) -> ChartSpec:
-    rules = [
-        Rule(at=levels, dash=_DOTTED),
-        Rule(at=[mark_s], upright=True, style="limit", dash=_DOTTED),
-    ]
+    """Coefficients against the lag, with levels and a lag (s) that are marked."""
+    levels, lag_s = marks
+    rules = [Rule(at=levels, dash=_DOTTED), Rule(at=[lag_s], upright=True, style="limit", dash=_DOTTED)]
     series = [PlotSeries(label=label, x=found.lag_s, y=found.coefficient)]
     up = PlotAxis(title="correlation coefficient", domain=(-1.0, 1.0))
     across = PlotAxis(title="lag (s)", nice=False)
     return curve_chart(Plot(series=series, up=up, rules=rules), across, title=title, described=described)
 
 
-def spectrum_chart(name: SignalName, spectrum: Spectrum, *, title: str = "") -> ChartSpec:
+def spectrum_chart(name: SignalName, spectrum: Spectrum) -> ChartSpec:
     """Power spectral density with its 95 % confidence band, both axes logarithmic."""
     kept = thin_line([np.log10(np.maximum(spectrum.density, np.finfo(float).tiny))], LINE_SAMPLES)
     kept = kept[spectrum.low[kept] > 0]  # what is exactly zero has no place on a logarithmic scale
@@ -372,12 +374,12 @@ def spectrum_chart(name: SignalName, spectrum: Spectrum, *, title: str = "") -> 
     return curve_chart(
         Plot(series=[series], up=up),
         PlotAxis(title="frequency (Hz)", log=True, nice=False, form="~g"),
-        title=title,
+        title=f"{_subject(name)}: spectrum",
         described=f"Power spectral density of {name.words} with its 95 % confidence band.",
     )
 
 
-def transfer_chart(source: SignalName, result: SignalName, transfer: Transfer, *, title: str = "") -> ChartSpec:
+def transfer_chart(source: SignalName, result: SignalName, transfer: Transfer) -> ChartSpec:
     """Gain (1/s), phase and coherence against frequency; gain and phase with 95 % intervals, where coherence is
     above chance."""
     frequency, gain, phase, coherence = transfer.frequency_hz, transfer.gain, transfer.phase_rad, transfer.coherence
@@ -410,11 +412,13 @@ def transfer_chart(source: SignalName, result: SignalName, transfer: Transfer, *
         ),
     ]
     described = f"Transfer function from {label}: gain and phase with 95 % intervals, and coherence."
-    return curve_panels(plots, _frequency(frequency), title=title, described=described)
+    return curve_panels(
+        plots, _frequency(frequency), title=f"From {source.words} to {result.words}", described=described
+    )
 
 
-def effect_chart(label: str, effect: FilterEffect, *, title: str = "") -> ChartSpec:
-    """Gain (dB), phase (deg) and group delay (s) of a filter against frequency."""
+def effect_chart(label: str, effect: FilterEffect) -> ChartSpec:
+    """Gain (dB), phase (deg) and group delay (s) of the filter `label` against frequency."""
     frequency, gain, phase, delay = effect.frequency_hz, effect.gain, effect.phase_rad, effect.group_delay_s
     decibel = np.maximum(20.0 * np.log10(np.maximum(gain, 1e-30)), _LEAST_DECIBEL)
     # Where nothing passes, the phase is that of rounding.
@@ -424,7 +428,7 @@ def effect_chart(label: str, effect: FilterEffect, *, title: str = "") -> ChartS
         for up, curve in {"gain (dB)": decibel, _PHASE: phase, "group delay (s)": delay}.items()
     ]
     described = f"Gain, phase and group delay of {label}."
-    return curve_panels(plots, _frequency(frequency), title=title, described=described)
+    return curve_panels(plots, _frequency(frequency), title=f"Effect of {label}", described=described)
 
 
 def _frequency(values: Array) -> PlotAxis:

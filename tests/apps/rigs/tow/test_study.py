@@ -173,7 +173,7 @@ def test_json_keeps_its_keys_and_has_more(study):
 def test_one_tow_is_not_compared_tow_by_tow(table_1):
     alone = table_1.only(0)
     study = study_tows(identify_tow(alone, terms=("B3",)), alone)
-    assert study.tow_by_tow == {} and SIMPLE.label in [one.label for one in study.models]
+    assert study.tow_by_tow == {} and SIMPLE.unknowns in [one.unknowns for one in study.models]
 
 
 def test_the_body_is_what_is_given_before_what_the_file_says(table_1):

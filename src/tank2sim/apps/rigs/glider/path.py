@@ -1,4 +1,4 @@
-"""Programmes of a glider, and their paths of steady glides, equations (13) to (25) of paper 5, corrected and as printed.
+"""Programmes of a glider, and their paths of steady glides, equations (13) to (25) of paper 5, as printed, too.
 
     dphi_i = v_i cos(epsilon_i) t_i / R_i                                                                (13), (14)
     X_n = X_{n-1} + R_n (sin dphi_n cos phi_{n-1} - (1 - cos dphi_n) sin phi_{n-1})                            (23)

@@ -204,7 +204,7 @@ class GlideResult(Result[GlideStudy]):
             caption = f"Range on {first.budget_kg:g} kg of ballast pushed out at {first.depth_m:g} m"
             tables.append(table(caption, heads, rows))
         polar = Illustration(
-            chart=polar_chart(self.study.polar, marked, title="Glide polar"),
+            chart=polar_chart(self.study.polar, marked),
             caption="From the best glide to almost straight down. Grey: the path of the best glide; no path is less "
             "steep.",
         )
@@ -240,19 +240,17 @@ class GlideResult(Result[GlideStudy]):
         if study.path_as_printed:
             tables.append(_path_table("Path by the equations as printed", study.path_as_printed))
             paths["as printed"] = study.path_as_printed_histories
-        isometric = isometric_chart(
-            "steady glides", study.path_histories, study.path, title="Path in isometric projection"
-        )
+        isometric = isometric_chart("steady glides", study.path_histories, study.path)
         charts = [
-            Illustration(chart=plan_chart(paths, title="Path from above")),
-            Illustration(chart=elevation_chart(paths, title="Path from the side, rolled out")),
+            Illustration(chart=plan_chart(paths)),
+            Illustration(chart=elevation_chart(paths)),
             Illustration(
                 chart=isometric,
                 caption="Plumb lines lead from the shadow, at the height of the start, to the ends of the steps.",
             ),
         ]
         if study.transient:
-            charts.append(Illustration(chart=programme_chart(study.transient, title="Programme and motion")))
+            charts.append(Illustration(chart=programme_chart(study.transient)))
         return Section(heading="Path of the programme", tables=tables, charts=charts)
 
 
@@ -285,8 +283,8 @@ def _path_table(caption: str, places: Sequence[PathPlace]) -> Table:
 
 
 def _quasi_steady(errors: QuasiSteadyErrors) -> Section:
-    swings = swing_chart(errors.swings, title="Error of the quasi-steady motion, swings")
-    steps = quasi_steady_chart(errors.steps, title="Error of the quasi-steady path, steps")
+    swings = swing_chart(errors.swings)
+    steps = quasi_steady_chart(errors.steps)
     return Section(
         heading="How slowly the controls must change",
         text="A path of steady glides holds where the controls change slowly. The transient model, with mass and added "
@@ -300,25 +298,27 @@ SpacePaths = Mapping[str, Columns]
 """Label to the columns of a path in space in the order of time: ``x_m`` north, ``y_m`` east, ``height_m``."""
 
 
-def plan_chart(paths: SpacePaths, *, title: str = "") -> ChartSpec:
+def plan_chart(paths: SpacePaths) -> ChartSpec:
     """Paths from above: north up, east to the right, one scale."""
     drawn = [(label, vector(path["y_m"]), vector(path["x_m"])) for label, path in paths.items()]
-    return _plane(drawn, ("east y (m)", "north x (m)"), title=title, height_px=480)
+    return _plane(drawn, ("east y (m)", "north x (m)"), title="Path from above", height_px=480)
 
 
-def elevation_chart(paths: SpacePaths, *, title: str = "") -> ChartSpec:
+def elevation_chart(paths: SpacePaths) -> ChartSpec:
     """Paths from the side, rolled out: height above the start against the way over the ground, one scale."""
     drawn = []
     for label, path in paths.items():
         steps = np.hypot(np.diff(vector(path["x_m"])), np.diff(vector(path["y_m"])))
         drawn.append((label, np.concatenate([[0.0], np.cumsum(steps)]), vector(path["height_m"])))
-    return _plane(drawn, ("way over the ground (m)", "height (m)"), title=title, height_px=360)
+    return _plane(
+        drawn, ("way over the ground (m)", "height (m)"), title="Path from the side, rolled out", height_px=360
+    )
 
 
-def isometric_chart(label: str, path: Columns, corners: Sequence[PathPlace], *, title: str = "") -> ChartSpec:
+def isometric_chart(label: str, path: Columns, corners: Sequence[PathPlace]) -> ChartSpec:
     """A path in isometric projection: north to the upper right, east to the lower right, height up, one scale.
 
-    Its shadow is drawn at the height of the start, and plumb lines from there to the `corners` of the path.
+    Its shadow is drawn at the height of the start, and plumb lines from there to the `corners` of the path `label`.
     """
     north, east, height = (vector(path[name]) for name in ("x_m", "y_m", "height_m"))
     drawn = [(label, *_projected(north, east, height)), ("seen from above", *_projected(north, east, 0 * height))]
@@ -335,7 +335,7 @@ def isometric_chart(label: str, path: Columns, corners: Sequence[PathPlace], *, 
         for axis, name, points in lines
         for i, (across, up) in enumerate(points)
     ]
-    return _plane(drawn, ("", ""), title=title, height_px=480, arms=arms)
+    return _plane(drawn, ("", ""), title="Path in isometric projection", height_px=480, arms=arms)
 
 
 def _projected(north: Any, east: Any, height: Any) -> tuple[Any, Any]:
@@ -344,7 +344,7 @@ def _projected(north: Any, east: Any, height: Any) -> tuple[Any, Any]:
     return cos * (north + east), sin * (north - east) + height
 
 
-def polar_chart(polar: Columns, marked: Mapping[str, GlideState], *, title: str = "") -> ChartSpec:
+def polar_chart(polar: Columns, marked: Mapping[str, GlideState]) -> ChartSpec:
     """The polar: speed down against speed over the ground, with marked glides."""
     line = PlotSeries(
         label="polar",
@@ -371,7 +371,7 @@ def polar_chart(polar: Columns, marked: Mapping[str, GlideState], *, title: str 
     return curve_chart(
         Plot(series=[line, *glides], up=up, height_px=380, over=over),
         across,
-        title=title,
+        title="Glide polar",
         width_px=620,
         described="Glide polar: speed down against speed over the ground.",
         shown={"run:N": "glide", "x:Q": "over the ground (m/s)", "v:Q": "down (m/s)", "angle:Q": "path angle (deg)"},
@@ -388,26 +388,30 @@ _PROGRAMME = {
 }
 
 
-def programme_chart(transient: TransientPath, *, title: str = "") -> ChartSpec:
+def programme_chart(transient: TransientPath) -> ChartSpec:
     """Orders and the motion of the transient model over time."""
     histories = []
     for label, columns in (("orders and steady glides", transient.orders), ("transient", transient.histories)):
         values = {name: to_si(name, 1.0)[1] * columns[name] for name in _PROGRAMME}
         histories.append(History(label=label, time_s=columns["t_s"], values=values))
     panels = [Signal(name=name, title=words, unit=unit) for name, (words, unit) in _PROGRAMME.items()]
-    return history_chart(histories, panels, title=title, height_px=90)
+    return history_chart(histories, panels, title="Programme and motion", height_px=90)
 
 
-def quasi_steady_chart(errors: Sequence[ProgrammeError], *, title: str = "") -> ChartSpec:
+def quasi_steady_chart(errors: Sequence[ProgrammeError]) -> ChartSpec:
     """Largest distance from the transient path, per cent of the way, against the length of a step."""
     series = [(error.label, error.duration_s, error.share) for error in errors]
-    return _errors(series, ("length of a step (s)", "distance of the paths (% of the way)"), title=title)
+    return _errors(
+        series,
+        ("length of a step (s)", "distance of the paths (% of the way)"),
+        title="Error of the quasi-steady path, steps",
+    )
 
 
-def swing_chart(errors: Sequence[SwingError], *, title: str = "") -> ChartSpec:
+def swing_chart(errors: Sequence[SwingError]) -> ChartSpec:
     """Error of velocity or rate of turn, per cent, against the period of a swing."""
     series = [(error.label, error.period_s, error.share) for error in errors]
-    return _errors(series, ("period of the swing (s)", "error (%)"), title=title)
+    return _errors(series, ("period of the swing (s)", "error (%)"), title="Error of the quasi-steady motion, swings")
 
 
 def _errors(series: Sequence[tuple[str, Array, Array]], titles: tuple[str, str], *, title: str) -> ChartSpec:

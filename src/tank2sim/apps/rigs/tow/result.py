@@ -207,7 +207,7 @@ class TowResult(Result[TowStudy]):
         if not speeds.simulated_mps:
             return []
         chart = Illustration(
-            chart=tow_speed_chart(speeds, title="Speeds of the tows and of the models"),
+            chart=tow_speed_chart(speeds),
             caption=f"The lower panel shows the differences from {next(iter(speeds.simulated_mps))}.",
             name="measured_and_computed_speeds",
         )
@@ -401,7 +401,7 @@ _SPEEDS = (
 )
 
 
-def tow_speed_chart(speeds: TowSpeeds, *, title: str = "") -> ChartSpec:
+def tow_speed_chart(speeds: TowSpeeds) -> ChartSpec:
     """Readings as points and simulated speeds as lines; below, all of them less the first simulation.
 
     Parameters
@@ -420,7 +420,7 @@ def tow_speed_chart(speeds: TowSpeeds, *, title: str = "") -> ChartSpec:
         runs.append(
             History(label=name, time_s=speeds.simulated_t_s, values={"speed": speed, "left": speed - reference})
         )
-    return history_chart(runs, _SPEEDS, title=title, height_px=230)
+    return history_chart(runs, _SPEEDS, title="Speeds of the tows and of the models", height_px=230)
 
 
 def drag_chart(drags: Mapping[str, DragPolynomial], body: TowedBody, top_speed_mps: float) -> ChartSpec:

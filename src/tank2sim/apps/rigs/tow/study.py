@@ -12,7 +12,6 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from scipy import stats
 
-from tank2sim.apps.rigs.tow import equation_error
 from tank2sim.apps.rigs.tow.equation_error import discretise, fit_mean_speed, solve_by_qr
 from tank2sim.apps.rigs.tow.findings import DELAY, surge_coefficients
 from tank2sim.apps.rigs.tow.identify import TowIdentification
@@ -34,9 +33,6 @@ from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import COLLINEAR, SINGULAR_CONDITION, scaled_condition
 from tank2sim.notices import Notice
 from tank2sim.records.thinning import drawn_columns
-
-_LEVEL = 0.95
-_DEGREES = range(4)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,15 +143,7 @@ class TowStudy(TowIdentification):
 
 
 def study_tows(result: TowIdentification, tows: Tows, body: TowedBody | None = None) -> TowStudy:
-    """The study of a result; with the size of the body also its drag coefficients and the theory.
-
-    Parameters
-    ----------
-    result : TowIdentification
-    tows : Tows
-        Its readings.
-    body : TowedBody, optional
-    """
+    """The study of a result of tows; with the size of the body also its drag coefficients and the theory."""
     models = compare_models(tows, result.force)
     near = [model for model in models if model.unknowns in (SIMPLE.unknowns, SIMPLE_LATE.unknowns)]
     study = TowStudy(
@@ -205,16 +193,9 @@ def _speeds(result: TowIdentification, tows: Tows, best: FittedModel | None) -> 
 
 
 def towed_body(tows: Tows, mass_kg: float, given: Mapping[str, float | None]) -> TowedBody | None:
-    """The body from the given values, else from the file of the tows; None if its length is unknown.
+    """The body from the `given` values of :data:`.BODY_KEYS`, else from the tows' file; None if its length is unknown.
 
     The default volume is the mass of the body, with the water inside, over the density of water: it floats.
-
-    Parameters
-    ----------
-    mass_kg : float
-        m, with the water inside.
-    given : mapping
-        Keys of :data:`tank2sim.apps.rigs.tow.records.BODY_KEYS` to values, None if not given.
 
     Raises
     ------
@@ -224,7 +205,7 @@ def towed_body(tows: Tows, mass_kg: float, given: Mapping[str, float | None]) ->
     for key, value in given.items():
         if value is not None and not (np.isfinite(value) and value > 0):
             raise InputError("--" + key.replace("_", "-"), "", f"is {value:g}", "a positive number was expected")
-    known = {**tows.body, **{key: value for key, value in given.items() if value is not None}}
+    known = tows.body | {key: value for key, value in given.items() if value is not None}
     if "length_m" not in known:
         return None
     density = known.get("water_density_kgpm3", WATER_KGPM3)
@@ -237,28 +218,27 @@ def towed_body(tows: Tows, mass_kg: float, given: Mapping[str, float | None]) ->
     )
 
 
-def speed_polynomials(tows: Tows, degrees: Sequence[int] = _DEGREES) -> Iterator[SpeedPolynomial]:
-    """Rows of Table 2, while readings outnumber coefficients."""
-    for degree in degrees:
+def speed_polynomials(tows: Tows) -> Iterator[SpeedPolynomial]:
+    """Rows of Table 2, degrees 0 to 3, while readings outnumber coefficients."""
+    for degree in range(4):
         try:
             fitted = fit_mean_speed(tows, degree).polynomial
         except InputError:
             return
         square = float(np.sum((fitted(tows.time_s) - tows.mean_speed_mps) ** 2))
         count = len(tows.time_s)
-        coefficients = tuple(float(value) for value in fitted.coef)
         yield SpeedPolynomial(
             degree=degree,
-            coefficients=coefficients,
+            coefficients=tuple(fitted.coef.tolist()),
             rms_mps=(square / count) ** 0.5,
             rms_less_one_mps=(square / (count - 1)) ** 0.5,
         )
 
 
-def confidence_ellipse(fitted: FittedModel, points: int = 121) -> Ellipse:
+def confidence_ellipse(fitted: FittedModel) -> Ellipse:
     """Joint 95 % region of M and B3, the first unknowns of a model, by the linearised covariance and Fisher's F."""
-    radius = np.sqrt(2 * stats.f.ppf(_LEVEL, 2, fitted.freedom))
-    angle = np.linspace(0, 2 * np.pi, points)
+    radius = np.sqrt(2 * stats.f.ppf(0.95, 2, fitted.freedom))
+    angle = np.linspace(0, 2 * np.pi, 121)
     circle = radius * np.vstack([np.cos(angle), np.sin(angle)])
     # By the eigenvectors, which also describe a region without width.
     squares, axes = np.linalg.eigh(fitted.covariance[:2, :2])
@@ -293,15 +273,9 @@ def _notes(study: TowStudy) -> Iterator[Notice]:
         )
     best = min(study.models, key=lambda fitted: fitted.aic, default=None)
     if best is not None and not best.usable:
-        yield Notice(
-            f"The model of lowest AIC is {best.label}, with "
-            + (
-                "a drag that is negative at some speeds"
-                if not best.drag_nowhere_negative
-                else "unknowns that cannot be separated"
-            )
-            + "; a better fit is not a better model."
-        )
+        separated = "unknowns that cannot be separated"
+        fault = separated if best.drag_nowhere_negative else "a drag that is negative at some speeds"
+        yield Notice(f"The model of lowest AIC is {best.label}, with {fault}; a better fit is not a better model.")
     late = {model.unknowns: model.aic for model in study.models}
     if not study.start_delay and late.get(SIMPLE_LATE.unknowns, 0.0) < late.get(SIMPLE.unknowns, 0.0) - 4:
         yield Notice("A start delay explains these tows much better than none (--start-delay).")
@@ -338,11 +312,6 @@ class TowModel(NamedTuple):
     def unknowns(self) -> tuple[str, ...]:
         """Names of the unknowns."""
         return ("M", *self.terms, *([DELAY] if self.start_delay else []))
-
-    @property
-    def label(self) -> str:
-        """``M, B3, delay``."""
-        return ", ".join(self.unknowns)
 
 
 MODELS = tuple(
@@ -491,21 +460,32 @@ class TowByTow:
     spread_standard_errors: Array
 
 
-def tow_by_tow(tows: Tows, force: Polynomial, terms: tuple[str, ...], speed_degree: int = 2) -> dict[str, TowByTow]:
-    """Single-tow and jackknife estimates by the paper's algorithm with `terms`, and by the simple models.
+def tow_by_tow(tows: Tows, force: Polynomial, terms: tuple[str, ...], degree: int = 2) -> dict[str, TowByTow]:
+    """Single-tow and jackknife estimates by the paper's algorithm with `terms` and a polynomial of that `degree`, and
+    by the simple models.
 
     Empty for fewer than three tows, whose spread is not informative. Names are the methods with their unknowns.
     """
+
+    def by_paper(tows: Tows) -> Array | None:
+        try:
+            speed = fit_mean_speed(tows, degree).polynomial
+        except InputError:
+            return None
+        problem = discretise(speed, tows.time_s, terms, force)
+        return None if scaled_condition(problem.design) > SINGULAR_CONDITION else solve_by_qr(problem)
+
+    def by_output_error(model: TowModel, tows: Tows) -> Array | None:
+        fit = _fit_or_none(tows, force, model)
+        return None if fit is None else fit.estimates
+
+    ways: list[tuple[str, tuple[str, ...], Callable[[Tows], Array | None]]] = [
+        ("as published", ("M", *terms), by_paper),
+        *(("output error", model.unknowns, partial(by_output_error, model)) for model in (SIMPLE, SIMPLE_LATE)),
+    ]
     if len(tows.names) < 3:
         return {}
-    found = {
-        f"as published: {', '.join(('M', *terms))}": _each(
-            tows, ("M", *terms), lambda tow: _by_paper(tow, force, terms, speed_degree)
-        )
-    }
-    for model in (SIMPLE, SIMPLE_LATE):
-        found[f"output error: {model.label}"] = _each(tows, model.unknowns, partial(_by_output_error, force, model))
-    return found
+    return {f"{way}: {', '.join(unknowns)}": _each(tows, unknowns, estimate) for way, unknowns, estimate in ways}
 
 
 def _each(tows: Tows, unknowns: tuple[str, ...], estimate: Callable[[Tows], Array | None]) -> TowByTow:
@@ -527,20 +507,6 @@ def _each(tows: Tows, unknowns: tuple[str, ...], estimate: Callable[[Tows], Arra
         jackknife_half_widths_95=stats.t.ppf(0.975, count - 1) * errors,
         spread_standard_errors=np.std(alone, axis=0, ddof=1) / math.sqrt(count),
     )
-
-
-def _by_paper(tows: Tows, force: Polynomial, terms: tuple[str, ...], degree: int) -> Array | None:
-    try:
-        speed = equation_error.fit_mean_speed(tows, degree).polynomial
-    except InputError:
-        return None
-    problem = equation_error.discretise(speed, tows.time_s, terms, force)
-    return None if scaled_condition(problem.design) > SINGULAR_CONDITION else equation_error.solve_by_qr(problem)
-
-
-def _by_output_error(force: Polynomial, model: TowModel, tows: Tows) -> Array | None:
-    fit = _fit_or_none(tows, force, model)
-    return None if fit is None else fit.estimates
 
 
 def _fit_or_none(tows: Tows, force: Polynomial, model: TowModel) -> OutputErrorFit | None:

@@ -58,14 +58,17 @@ def write_yaw_card(
     from tank2sim.dynamics.vessel import as_vessel
 
     if card is None:
-        text, files = f"{path}: the rig's card has the estimates of {result.method}", result.rig_card(path.stem)
-        return _with_notice(replace(result, files=files.files(path)), text)
-    before, ship = as_vessel(card).manoeuvring(), result.with_nrdot(card, length_m)
-    value, error = result.nrdot(length_m)
-    spread = "" if error is None else f" ± {error:.2g}"
-    was = f"{before.derivatives['Nrdot']:.4g} before" if "Nrdot" in before.derivatives else "not on the card before"
-    text = f"{path}: N_rdot' = {value:.4g}{spread} ({was}) of {ship.name}, by {result.method}"
-    return _with_notice(replace(result, files={path: ship.card.text}), text)
+        text, files = f"the rig's card has the estimates of {result.method}", result.rig_card(path.stem).files(path)
+    else:
+        before, ship = as_vessel(card).manoeuvring().derivatives, result.with_nrdot(card, length_m)
+        value, error = result.nrdot(length_m)
+        spread = "" if error is None else f" ± {error:.2g}"
+        was = f"{before['Nrdot']:.4g} before" if "Nrdot" in before else "not on the card before"
+        text, files = (
+            f"N_rdot' = {value:.4g}{spread} ({was}) of {ship.name}, by {result.method}",
+            {path: ship.card.text},
+        )
+    return _with_notice(replace(result, files=files), f"{path}: {text}")
 
 
 @verb(
@@ -183,14 +186,14 @@ def yaw(
         values = theory_values(body, found.records[0].programme.max_rate_radps) if body else ()
         return YawResult(found.study(values), method, found, known)
 
-    rest = {
-        "medium": medium != "water",
-        "controller": controller != "tuned",
-        "similar_to": similar_to,
-        "noise_A": noise_A,
-    }
     if simulate is None:
-        if given := next((name for name, value in rest.items() if value), ""):
+        simulated = {
+            "medium": medium != "water",
+            "controller": controller != "tuned",
+            "similar_to": similar_to,
+            "noise_A": noise_A,
+        }
+        if given := next((name for name, value in simulated.items() if value), ""):
             raise ArgumentError(given, "", "is of a simulated rig", "give the card to simulate as well")
         return result([read_yaw_record(source) for source in sources])
     path = sources[0] if sources else None
@@ -203,9 +206,8 @@ def yaw(
     except InputError as fault:
         if fault.source != str(path):
             raise
-        raise InputError(
-            card.source, fault.place, f"the record simulated of it: {fault.problem}", fault.remedy
-        ) from None
+        problem = f"the record simulated of it: {fault.problem}"
+        raise InputError(card.source, fault.place, problem, fault.remedy) from None
     write_together({path: text}, inputs=[Path(card.source)])
     return _with_notice(found, _similarity(record, similar_to)) if similar_to else found
 
@@ -272,16 +274,22 @@ def _rig_card(given: Vessel | Card | str | Path, argument: str) -> YawRigCard:
     return card
 
 
+def _numbers(text: str, counts: tuple[int, ...]) -> list[float]:
+    """Finite numbers of a text with commas; none unless there are as many as one of `counts`."""
+    try:
+        numbers = [float(word) for word in text.split(",")]
+    except ValueError:
+        return []
+    return numbers if len(numbers) in counts and all(map(math.isfinite, numbers)) else []
+
+
 def _ship_motion(text: str) -> tuple[float, ...]:
     """Length and beam (m), yaw rate (deg/min) and time (s) of a text ``L,B,R,T``."""
-    try:
-        length, beam, rate_degpmin, time_s = (float(word) for word in text.split(","))
-    except ValueError:
-        length = beam = rate_degpmin = time_s = 0.0
-    if not all(0 < value < math.inf for value in (length, beam, abs(rate_degpmin), time_s)):
+    numbers = _numbers(text, (4,))
+    if not numbers or not numbers[2] or min(numbers[0], numbers[1], numbers[3]) <= 0:
         remedy = "write length and beam in m, yaw rate in deg/min and time in s: 38,8,100,120"
         raise ArgumentError("similar_to", "", f"{text!r} is not a motion of a ship", remedy)
-    return length, beam, rate_degpmin, time_s
+    return tuple(numbers)
 
 
 def _similar(card: YawRigCard, text: str) -> YawProgramme:
@@ -318,19 +326,15 @@ def _floating_body(text: str) -> FloatingBody:
     from tank2sim.apps.rigs.yaw.theory import FloatingBody
     from tank2sim.dynamics.vessel import as_vessel
 
-    if "," not in text:
+    if "," in text:
+        sizes: list[float | None] = [*_numbers(text, (4, 5)), None][:5]
+    else:
         ship = as_vessel(text).card.ship
         sizes = [ship.length_m, ship.beam_m, ship.draught_m, ship.water_depth_m, ship.block_coefficient]
-    else:
-        try:
-            sizes = [float(word) for word in text.split(",")]
-        except ValueError:
-            sizes = []
-    missing = len(sizes) not in (4, 5) or any(size is None or not size > 0 for size in sizes[:4])
-    if missing or (sizes[4:] and sizes[4] is not None and not 0 < sizes[4] <= 1):
+    length, beam, draught, depth = (size if size and size > 0 else 0.0 for size in (*sizes, 0.0, 0.0, 0.0)[:4])
+    block = sizes[4] if len(sizes) > 4 else None
+    if not min(length, beam, draught, depth) or (block is not None and not 0 < block <= 1):
         problem = f"{text!r} does not state length, beam, draught and depth of water"
         remedy = "write for example 0.67,0.20,0.08,0.22,0.47, or name a card with them"
         raise ArgumentError("theory", "", problem, remedy)
-    length, beam, draught, depth = (size or 0.0 for size in sizes[:4])
-    block = sizes[4] if len(sizes) > 4 else None
     return FloatingBody(length_m=length, beam_m=beam, draught_m=draught, depth_m=depth, block_coefficient=block)
