@@ -99,7 +99,6 @@ class GuessStudy:
     next_figures : dict
         Figures not given, to the mean share of the variance of all figures not given that each would take away; the
         most helpful first.
-    notices : tuple of Notice
     """
 
     ship: str
@@ -125,10 +124,7 @@ def default_error(name: str, value: float) -> float:
 def parse_figures(manoeuvre: str, text: str) -> list[GivenFigure]:
     """Figures of an option: ``advance_m=970 tactical_diameter_m=980+-30``, the standard error after ``+-``.
 
-    Raises
-    ------
-    InputError
-        A name is not that of a figure of the manoeuvre or is given twice, or a number is not positive.
+    InputError if a name is not that of a figure of the manoeuvre or is given twice, or a number is not positive.
     """
     names, found = FIGURES[manoeuvre], {}
     for part in text.split():
@@ -151,22 +147,9 @@ def parse_figures(manoeuvre: str, text: str) -> list[GivenFigure]:
 def guess_ship(
     ship: ShipDimensions, given: Sequence[GivenFigure], name: str, members: int, seed: int
 ) -> tuple[GuessStudy, ManoeuvringCard]:
-    """A ship from its dimensions and figures: the study, and the card, which has a covariance with samples.
+    """A ship from its dimensions and figures: the study, and the card `name`, which has a covariance with samples.
 
-    Parameters
-    ----------
-    ship : ShipDimensions
-    given : sequence of GivenFigure
-    name : str
-        Name of the ship on the card.
-    members : int
-        Ships of the prior.
-    seed : int
-
-    Raises
-    ------
-    InputError
-        As :func:`tank2sim.apps.guess.study.conditioned`.
+    Raises as :func:`conditioned`, whose `members` and `seed` these are.
     """
     prior = prior_card(ship, name)
     found = conditioned(prior, given, members, seed)
@@ -176,14 +159,7 @@ def guess_ship(
 def study_members(
     ship: ShipDimensions, name: str, given: Sequence[GivenFigure], found: GuessMembers, members: int, seed: int
 ) -> GuessStudy:
-    """The study of members that were found.
-
-    Parameters
-    ----------
-    ship, name, given, members, seed
-        As of :func:`guess_ship`.
-    found : GuessMembers
-    """
+    """The study of members that were found; `members` were drawn. Other arguments as of :func:`guess_ship`."""
     by_key = {figure.key: figure for figure in given}
     figures = {}
     for key, before in found.before.items():
@@ -373,16 +349,7 @@ class GivenFigure:
 
 @dataclass(frozen=True, eq=False)
 class GuessMembers:
-    """Members (n, k) of the parameters of `draws`, and their figures (n,) by key; before and after.
-
-    Parameters
-    ----------
-    draws : Draws
-        The prior.
-    prior, posterior : arrays (n, k)
-    before, after : mapping
-        Key of :data:`FIGURE_KEYS` to figures.
-    """
+    """Members (n, k) of the parameters of the prior `draws`, before and after, and their figures (n,) by key."""
 
     draws: Draws
     prior: Array
@@ -392,13 +359,7 @@ class GuessMembers:
 
 
 class PosterFigures:
-    """Figures of the ships of a card by their parameters, in lanes.
-
-    Raises
-    ------
-    InputError
-        There is no C compiler.
-    """
+    """Figures of the ships of a card by their parameters, in lanes; InputError if there is no C compiler."""
 
     def __init__(self, card: ManoeuvringCard, names: Sequence[str]):
         require_compiler("guessing a ship by thousands of simulations")
@@ -422,16 +383,7 @@ class PosterFigures:
 
 
 def conditioned(card: ManoeuvringCard, given: Sequence[GivenFigure], members: int, seed: int) -> GuessMembers:
-    """Ships of a prior card, moved to the figures that are given.
-
-    Parameters
-    ----------
-    card : ManoeuvringCard
-        The prior.
-    given : sequence of GivenFigure
-    members : int
-        Number of ships that are drawn from it.
-    seed : int
+    """Ships of a prior card, of which `members` are drawn with `seed`, moved to the figures that are given.
 
     Raises
     ------

@@ -48,19 +48,12 @@ class SignalStudy:
 
     Parameters
     ----------
-    unit : str
-    samples : int
-    step_s : float
     mean, standard_deviation : float
         Of directions on the circle.
     on_circle : bool
         Whether it is a direction.
     constant : bool
         A constant signal has none of the following.
-    autocorrelation : Autocorrelation, optional
-    stationarity : Stationarity, optional
-    normality : Normality, optional
-    probability_density : Density, optional
     spectrum : Spectrum, optional
         In the square of the unit over Hz.
     """
@@ -87,10 +80,8 @@ class Steering:
     ----------
     rudder : str
         Column taken for the rudder, angle before order.
-    cross_correlation : Correlation
     transfer : Transfer
         Yaw rate over rudder angle, 1/s.
-    notices : tuple of Notice
     """
 
     rudder: str
@@ -111,7 +102,6 @@ class TrialSignals:
         Signals by their columns in the trial format.
     rudder_to_yaw_rate : Steering or None
         None where one of both is missing or does not move.
-    notices : tuple of Notice
     histories : dict
         The signals over time, thinned to draw.
     """
@@ -135,7 +125,6 @@ class FilterStudy:
         The (first) signal filtered.
     sentence : str
         The signal, the filter and its effect in words.
-    effect : FilterEffect
     before, after : dict
         The signal over time in the unit of its column, thinned to draw.
     """
@@ -168,11 +157,8 @@ class SignalSettings:
 def analyse(trial: Trial, settings: SignalSettings) -> TrialSignals:
     """Analyse the signals of a trial.
 
-    Raises
-    ------
-    InputError
-        A signal asked for by name cannot be analysed; of all signals, those that cannot are left out with a notice,
-        and it is raised if none is left.
+    InputError if a signal asked for by name cannot be analysed; of all signals, those that cannot are left out with a
+    notice, and it is raised if none is left.
     """
     notices = list(trial.notices)
     series: dict[str, Series] = {}
@@ -284,17 +270,7 @@ REQUEST_FORMS = (
 
 @dataclass(frozen=True)
 class FilterRequest:
-    """A filter asked for by name.
-
-    Parameters
-    ----------
-    text : str
-        As it was written.
-    apply : callable
-        The filter.
-    thins : bool
-        True if it changes the times of the samples.
-    """
+    """A filter asked for by name, as it was written; `thins` is True if it changes the times of the samples."""
 
     text: str
     apply: Callable[[Series], Filtered]
@@ -304,10 +280,7 @@ class FilterRequest:
 def parse_filter(text: str) -> FilterRequest:
     """Read a filter's name and its numbers.
 
-    Raises
-    ------
-    InputError
-        The filter does not exist, or its numbers are not as many and of the kind that it takes.
+    InputError if the filter does not exist, or its numbers are not as many and of the kind that it takes.
     """
     kind, _, parameters = text.strip().partition(":")
     words = [word.strip() for word in parameters.split(",") if word.strip()]

@@ -49,17 +49,7 @@ class PathPoint(NamedTuple):
 
 @dataclass(frozen=True)
 class GlidePath:
-    """A path of steady glides.
-
-    Parameters
-    ----------
-    glides : tuple of SteadyGlide
-        One for each step.
-    durations_s : tuple of float
-        Durations of the steps.
-    places : tuple of PathPoint
-        The start, and the end of each step.
-    """
+    """A path of steady glides: each with its duration, and the places of the start and of the end of each step."""
 
     glides: tuple[SteadyGlide, ...]
     durations_s: tuple[float, ...]
@@ -92,13 +82,7 @@ class GlidePath:
 
 
 def fly(card: GliderCard, programme: GlideProgramme, *, as_printed: bool = False) -> GlidePath:
-    """The path of a programme.
-
-    Raises
-    ------
-    InputError
-        A step cannot be flown; the message names its line and the limit.
-    """
+    """The path of a programme; InputError names the line of a step that cannot be flown, and the limit."""
     glides = tuple(_glide(card, programme.source, step, as_printed) for step in programme.steps)
     return path_of(glides, [step.duration_s for step in programme.steps])
 

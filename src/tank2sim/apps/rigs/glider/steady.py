@@ -35,28 +35,10 @@ _STEEPEST = math.radians(89.9)
 class SteadyGlide:
     """A steady glide: angles in rad, SI.
 
-    Parameters
-    ----------
-    path_angle_rad, pitch_rad : float
-        epsilon and theta, + up.
-    incidence_rad : float
-        alpha, + when the flow comes from below.
-    roll_rad : float
-        gamma, + starboard side down.
-    buoyancy_kg : float
-        Net buoyancy m0, + light.
-    speed_mps : float
-        Speed v along the path.
-    lift_coefficient, drag_coefficient : float
-        C_L has the sign of the incidence.
-    lift_N, drag_N : float
-        With the sign of their coefficients.
-    turning_radius_m : float
-        R, without sign; inf without roll.
-    turn_rate_radps : float
-        Rate of the course, + to starboard.
-    as_printed : bool
-        True for the equations as printed in the paper.
+    epsilon (path angle) and theta (pitch) are + up, alpha (incidence) + when the flow comes from below, gamma (roll) +
+    starboard side down, m0 (net buoyancy) + light. Lift has the sign of the incidence; R, the turning radius, is
+    without sign and inf without roll; the rate of the course is + to starboard. `as_printed` is True for the equations
+    as printed.
     """
 
     path_angle_rad: float
@@ -87,10 +69,7 @@ class SteadyGlide:
 def ballast_kg(card: GliderCard, buoyancy_kg: float) -> float | None:
     """m_b of (1), m0 = m - (m_h + m_b), kg; None if the card does not state the mass m_h of the hull.
 
-    Raises
-    ------
-    InputError
-        It would be negative.
+    InputError if it would be negative.
     """
     hull = card.glider.hull_mass_kg
     if hull is None:
@@ -119,16 +98,10 @@ def smallest_angle(card: GliderCard, roll_rad: float = 0.0) -> float:
 def steady_glide(
     card: GliderCard, path_angle_rad: float, *, roll_rad: float = 0.0, buoyancy_kg: float | None = None
 ) -> SteadyGlide:
-    """The steady glide on a path.
+    """The steady glide on a path (rad, + up), with a roll (rad, + starboard side down) and a net buoyancy m0 (kg, +
+    light).
 
-    Parameters
-    ----------
-    path_angle_rad : float
-        epsilon, + up.
-    roll_rad : float
-        gamma, + starboard side down.
-    buoyancy_kg : float, optional
-        Net buoyancy m0, + light; by default that of the card, light to climb and heavy to dive. 0 gives speed 0.
+    By default m0 is that of the card, light to climb and heavy to dive. 0 gives speed 0.
 
     Raises
     ------
@@ -163,10 +136,7 @@ def glide_at_pitch(
 ) -> SteadyGlide:
     """The steady glide at a pitch theta (rad, + up) in place of a path angle: (2) and (8) together.
 
-    Raises
-    ------
-    InputError
-        As :func:`steady_glide`; the message names the smallest pitch.
+    Raises as :func:`steady_glide`; the message names the smallest pitch.
     """
     _check(pitch_rad, roll_rad)
     buoyancy = _buoyancy(card, pitch_rad, buoyancy_kg)

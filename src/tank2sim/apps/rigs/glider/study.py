@@ -95,10 +95,7 @@ class Range:
 def glide_range(card: GliderCard, glide: SteadyGlide, *, budget_kg: float, depth_m: float) -> Range:
     """The range of dives and climbs at the angle and net buoyancy of a glide.
 
-    Raises
-    ------
-    InputError
-        Budget or depth is not positive, or the glide has no buoyancy or turns.
+    InputError if budget or depth is not positive, or the glide has no buoyancy or turns.
     """
     for name, value in (("budget_kg", budget_kg), ("depth_m", depth_m)):
         if not 0 < value < math.inf:
@@ -124,19 +121,10 @@ def glide_range(card: GliderCard, glide: SteadyGlide, *, budget_kg: float, depth
 class GlideQuestion:
     """Settings of the study.
 
-    Parameters
-    ----------
-    angles_rad : tuple of float
-        Paths of steady glides, + up, which all have `roll_rad` and a net buoyancy of the size `buoyancy_kg` (by default
-        the card's).
-    programme : GlideProgramme, optional
-        To be flown, by the steady glides and by the transient model.
-    as_printed : bool
-        True for the paper's equations in addition to the corrected ones.
-    budget_kg, depth_m : float, optional
-        Ballast that can be expelled, and the depth of the dives, for the range. Both or neither.
-    views : bool
-        True for the polar and the error of the quasi-steady assumption against the speed of a programme.
+    Steady glides are on the paths `angles_rad`, + up, with `roll_rad` and a net buoyancy of the size `buoyancy_kg`, by
+    default the card's. The programme is flown by the steady glides and by the transient model; `as_printed` adds the
+    paper's equations. Ballast that can be expelled and depth of the dives, for the range: both or neither. With `views`
+    also the polar and the error of the quasi-steady assumption against the speed of a programme.
     """
 
     angles_rad: tuple[float, ...] = ()
@@ -300,7 +288,6 @@ class GlideStudy:
         Size of the net buoyancy of the card.
     states : tuple of AngleGlide
         Glides at the given angles.
-    design : GlideDesign
     polar : dict
         Columns ``path_angle_deg``, ``horizontal_speed_mps``, ``climb_mps``.
     as_printed : tuple of BalancedGlide
@@ -313,10 +300,8 @@ class GlideStudy:
         Length of the path through the water.
     path_histories, path_as_printed_histories : dict
         Columns ``t_s``, ``x_m``, ``y_m``, ``height_m`` to draw.
-    transient : TransientPath, optional
     quasi_steady_error : QuasiSteadyErrors, optional
         Only if views were asked for.
-    notices : tuple of Notice
     """
 
     glider: str
@@ -338,13 +323,7 @@ class GlideStudy:
 
 
 def study_glider(card: GliderCard, question: GlideQuestion) -> GlideStudy:
-    """Run the study.
-
-    Raises
-    ------
-    InputError
-        An angle or a step cannot be flown, or budget and depth are not both given.
-    """
+    """Run the study; InputError for an angle or step that cannot be flown, or a budget without depth or the reverse."""
     model = build(card)
     glides = _glides(card, question)
     printed = _glides(card, question, as_printed=True) if question.as_printed else ()

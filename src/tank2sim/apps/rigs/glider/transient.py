@@ -50,12 +50,7 @@ def equilibrium(model: Model, glide: SteadyGlide) -> GlideEquilibrium:
     """The equilibrium of the transient model under the pitch, roll and buoyancy of a glide, by CasADi's Newton solver.
 
     `glide` is the first guess. Its u and w are constant; on a straight path it is the same glide, in a turn it includes
-    the added mass, which the closed form neglects.
-
-    Raises
-    ------
-    InputError
-        No equilibrium exists near the glide.
+    the added mass, which the closed form neglects. InputError if there is none near the glide.
     """
     p = model.parameter_values()
     orders = {"buoyancy": glide.buoyancy_kg, "pitch": glide.pitch_rad, "roll": glide.roll_rad}
@@ -95,19 +90,8 @@ def follow_programme(
 ) -> Trajectory:
     """The motion of a glider model under orders that hold for their durations, from the steady glide of the first.
 
-    Without buoyancy in the first it starts at rest.
-
-    Parameters
-    ----------
-    integrator : Integrator
-        Integrator of a model by :func:`tank2sim.apps.rigs.glider.model.glider_model`.
-    orders : sequence of mapping
-        For each step ``buoyancy.command`` (kg), ``pitch.command`` and ``roll.command`` (rad).
-
-    Raises
-    ------
-    InputError
-        No steady glide exists near the start, or the motion leaves all bounds.
+    Orders are ``buoyancy.command`` (kg), ``pitch.command`` and ``roll.command`` (rad). Without buoyancy in the first it
+    starts at rest. InputError if no steady glide exists near the start, or the motion leaves all bounds.
     """
     first = {f"initial.{name}": orders[0][f"{name}.command"] for name in ("buoyancy", "pitch", "roll")}
     # Newton's first guess: some incidence of the right sign.

@@ -140,18 +140,8 @@ def tow_findings(
 ) -> Iterator[Notice]:
     """Sentences on terms that are not identifiable, impossible values, and misfits beyond the scatter.
 
-    Parameters
-    ----------
-    tows : Tows
-        The readings.
-    force : Polynomial
-        Towing force, N over s.
-    speed : Polynomial
-        v*(t) of the equation error, m/s over s.
-    fits : mapping
-        Method to its fit. The method of the paper is omitted if QR, with the same estimates, is included.
-    designs : mapping
-        Method to its design matrix (rows, free unknowns).
+    `force` is in N over s, `speed` is v*(t) of the equation error, m/s over s; `designs` are the design matrices (rows,
+    free unknowns) by method. The method of the paper is omitted if QR, with the same estimates, is among the fits.
     """
     chosen = [fit for name, fit in fits.items() if name != "paper" or "qr" not in fits]
     yield from _collinear(chosen, designs)

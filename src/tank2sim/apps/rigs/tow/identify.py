@@ -87,10 +87,7 @@ class TowIdentification:
 def parse_terms(text: str) -> tuple[str, ...]:
     """Drag terms from an option's text, ``"B3,B2,B1"`` or ``"none"``, in the order of (1.5).
 
-    Raises
-    ------
-    InputError
-        A term is unknown or repeated.
+    InputError if a term is unknown or repeated.
     """
     return () if text.strip().lower() == "none" else _checked_terms(word.strip() for word in text.split(","))
 
@@ -267,14 +264,7 @@ def tow_card_text(
 ) -> str:
     """TOML text of the card with the numbers of one method; its notes are the notices of the result.
 
-    Parameters
-    ----------
-    fit : TowFit
-        One of ``result.methods``.
-    name, source : str
-        Name of the body, and source of the numbers.
-    length_m : float, optional
-        Length of the body, if known.
+    `fit` is one of ``result.methods``; name of the body, source of the numbers, and length if known.
     """
     values = {key: value for key, value in fit.estimates.items() if key not in ("added_mass_kg", "start_delay_s")}
     return surge_card_text(

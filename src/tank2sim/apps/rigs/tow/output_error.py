@@ -29,14 +29,8 @@ _LATEST_START = 0.5
 
 @dataclass(frozen=True)
 class TowOptions:
-    """Assumptions on the tows in addition to (1.5).
-
-    Parameters
-    ----------
-    start_delay : bool
-        Estimate a delay of the start after t = 0, the same in all tows.
-    total_mass_kg : float, optional
-        M, if known: it is not estimated.
+    """Assumptions on the tows in addition to (1.5): a start delay after t = 0, the same in all tows, is estimated; and
+    M, if it is known, is not.
     """
 
     start_delay: bool = False
@@ -51,14 +45,8 @@ AT_ONCE = TowOptions()
 class OutputErrorFit:
     """The least-squares fit of the integrated speeds.
 
-    Parameters
-    ----------
-    estimates : array, (unknowns,)
-        M (unless known), the drag coefficients, the start delay (if estimated); SI.
-    design : array, (readings, unknowns)
-        Sensitivities of the speeds at the readings to the estimates.
-    residuals_mps : array, (readings,)
-        Fitted speed less reading.
+    Estimates (unknowns,) are M (unless known), the drag coefficients and the start delay (if estimated), SI; `design`
+    (readings, unknowns) the sensitivities of the speeds; residuals (readings,) the fitted speed less the reading.
     """
 
     estimates: Array
@@ -85,16 +73,11 @@ class OutputErrorFit:
 def speed_predictor(
     times_s: Array, force: float | Polynomial, terms: tuple[str, ...], options: TowOptions = AT_ONCE
 ) -> WithSlopes:
-    """Speeds of (1.5) from rest, and their sensitivities.
+    """Speeds of (1.5) from rest (times,), and their sensitivities (times, unknowns), as a function of the estimates.
 
-    The body is at rest until t = 0, or until the start delay, and then moves under T(t) of the same clock. The
-    force of each integration step is the mean of T over the step, which preserves the impulse.
-
-    Returns
-    -------
-    callable
-        ``predict(estimates) -> (speeds (times,), sensitivities (times, unknowns))`` with estimates = (M, B..., delay),
-        SI; without M if it is known, without delay if it is not estimated. A delay is >= 0.
+    Estimates are (M, B..., delay), SI; without M if it is known, without delay (>= 0) if it is not estimated. The body
+    is at rest until t = 0, or until the start delay, and then moves under T(t) of the same clock. The force of each
+    integration step is the mean of T over the step, which preserves the impulse.
     """
     pull = as_force(force)
     model = _unit_model()
@@ -159,10 +142,7 @@ def fit_speeds(
 ) -> OutputErrorFit | None:
     """Least squares of the integrated speeds against all readings after the release; None if it does not converge.
 
-    Raises
-    ------
-    InputError
-        The readings after the release do not outnumber the estimates.
+    InputError if the readings after the release do not outnumber the estimates.
     """
     read = ~np.isnan(tows.speed_mps) & (tows.time_s > 0)[:, None]
     row_of_reading = np.nonzero(read)[0]

@@ -34,20 +34,9 @@ BODY_KEYS = ("length_m", "beam_m", "volume_m3", "water_density_kgpm3", "kinemati
 class Tows:
     """Speeds of one body in tows by the same force.
 
-    Parameters
-    ----------
-    path : Path
-        The file they come from.
-    names : tuple of str
-        Column of each tow.
-    time_s : array, (times,)
-        Rising; 0 is the moment of release.
-    speed_mps : array, (times, tows)
-        nan where nothing was recorded; each row and each tow has at least one reading.
-    force_N, mass_kg : float or None
-        Towing force and mass of the body with the water in it, where the file states them.
-    body : dict
-        Other numbers that the file gives of the body and the water, SI: the keys of :data:`BODY_KEYS` to numbers.
+    Times (s) rise from the release, 0; speeds (times, tows) are nan where nothing was recorded; each row and each tow
+    has at least one reading. Force and mass of the body with the water in it, and the keys of :data:`BODY_KEYS`, are as
+    the file states them. `names` are the columns.
     """
 
     path: Path
@@ -170,13 +159,7 @@ def as_force(force: float | Polynomial) -> Polynomial:
 
 
 def parse_force(text: str) -> Polynomial:
-    """T(t) from an option's text ``c0,c1,...``: T = c0 + c1 t + ..., N over s.
-
-    Raises
-    ------
-    InputError
-        It is not a list of finite numbers.
-    """
+    """T(t) from an option's text ``c0,c1,...``: T = c0 + c1 t + ..., N over s; InputError for any other text."""
     try:
         coefficients = [float(word) for word in text.split(",")]
     except ValueError:
@@ -187,13 +170,8 @@ def parse_force(text: str) -> Polynomial:
 
 
 def checked_force(force: Polynomial, times_s: Array) -> Polynomial:
-    """The force, if it pulls forward from the release to the last reading.
-
-    Raises
-    ------
-    InputError
-        It is negative at some time, or zero throughout.
-    """
+    """The force, if it pulls forward from the release to the last reading; InputError if negative, or zero
+    throughout."""
     end = float(times_s[-1])
     times = np.linspace(0.0, end, 201)
     values = force(times)

@@ -41,7 +41,6 @@ class SpeedPolynomial:
 
     Parameters
     ----------
-    degree : int
     coefficients : tuple of float
         In rising powers of t, m/s over s.
     rms_mps : float
@@ -118,7 +117,6 @@ class TowStudy(TowIdentification):
         Regions of M and B3, without and with a start delay.
     mass_by_theory : tuple of MassByTheory
         (2.5); empty without the size.
-    speeds : TowSpeeds
     body : TowedBody, optional
         Size of the body, if known.
     drag_coefficients : dict

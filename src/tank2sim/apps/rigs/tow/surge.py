@@ -28,12 +28,8 @@ _STEP_S = 0.1
 class SurgeCoefficients:
     """Coefficients of (1.5), SI; the drag is positive against the motion.
 
-    Parameters
-    ----------
-    total_mass_kg : float
-        M, the mass of the body with the water in it plus its added mass lambda11.
-    B1_kgs2pm3, B2_kgspm2, B3_kgpm : float
-        Coefficients of the fourth, third and second power of the speed.
+    M is the mass of the body with the water in it plus its added mass lambda11; B1, B2, B3 multiply the fourth, third
+    and second power of the speed.
     """
 
     total_mass_kg: float

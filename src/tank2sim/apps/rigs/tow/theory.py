@@ -54,13 +54,7 @@ class TowedBody:
 
     @property
     def height_m(self) -> float:
-        """Height of the ellipsoid that has this length, breadth and volume.
-
-        Raises
-        ------
-        ValueError
-            There is no breadth.
-        """
+        """Height of the ellipsoid that has this length, breadth and volume; ValueError if there is no breadth."""
         if self.beam_m is None:
             raise ValueError("the height needs a breadth")
         return 6 * self.volume_m3 / (math.pi * self.length_m * self.beam_m)

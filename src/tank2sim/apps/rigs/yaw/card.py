@@ -89,7 +89,6 @@ class YawRig(CardSection):
         Moment of gravity -G sin(psi - psi_0).
     pulses_per_turn : float
         Pulses of the encoder in a turn.
-    walls : TankWalls, optional
     """
 
     inertia_kgm2: Annotated[float, Field(ge=1e-9, le=1e15)]

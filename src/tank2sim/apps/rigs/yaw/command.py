@@ -327,14 +327,14 @@ def _floating_body(text: str) -> FloatingBody:
     from tank2sim.dynamics.vessel import as_vessel
 
     if "," in text:
-        sizes: list[float | None] = [*_numbers(text, (4, 5)), None][:5]
+        sizes: list[float | None] = [*_numbers(text, (4, 5))]
     else:
         ship = as_vessel(text).card.ship
         sizes = [ship.length_m, ship.beam_m, ship.draught_m, ship.water_depth_m, ship.block_coefficient]
-    length, beam, draught, depth = (size if size and size > 0 else 0.0 for size in (*sizes, 0.0, 0.0, 0.0)[:4])
-    block = sizes[4] if len(sizes) > 4 else None
-    if not min(length, beam, draught, depth) or (block is not None and not 0 < block <= 1):
+    stated, block = [size for size in sizes[:4] if size and size > 0], sizes[4] if len(sizes) > 4 else None
+    if len(stated) < 4 or (block is not None and not 0 < block <= 1):
         problem = f"{text!r} does not state length, beam, draught and depth of water"
         remedy = "write for example 0.67,0.20,0.08,0.22,0.47, or name a card with them"
         raise ArgumentError("theory", "", problem, remedy)
+    length, beam, draught, depth = stated
     return FloatingBody(length_m=length, beam_m=beam, draught_m=draught, depth_m=depth, block_coefficient=block)

@@ -157,10 +157,7 @@ class YawMethodEstimate:
 def intervals(record: YawRecord, speeds: Speeds = "actual") -> tuple[IntervalPair, ...]:
     """Accelerating and braking interval of each pair, with the speeds as measured, or of the programme.
 
-    Raises
-    ------
-    InputError
-        An interval has too few steps of the encoder.
+    InputError if an interval has too few steps of the encoder.
     """
     return tuple(
         (
@@ -196,10 +193,7 @@ def _interval(record: YawRecord, ends: tuple[float, float], speeds: Speeds, *, b
 def smooth_angle(record: YawRecord, ends: tuple[float, float]) -> BSpline:
     """Spline of the angle over an interval, whose derivatives are rate and acceleration.
 
-    Raises
-    ------
-    InputError
-        The encoder steps too rarely there.
+    InputError if the encoder steps too rarely there.
     """
     begin, end = ends[0] - _MARGIN_S, ends[1] + _MARGIN_S
     within = (record.time_s >= begin) & (record.time_s <= end)
@@ -272,16 +266,10 @@ def mirror_difference(pair: IntervalPair) -> float:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Balance:
-    """The energy balance of every subinterval.
+    """The energy balance of every subinterval: work per unit of each term, (n, terms), and of the motor less known
+    work, J.
 
-    Parameters
-    ----------
-    rows : array, (n, terms)
-        Work per unit of each term.
-    work_J : array, (n,)
-        Work of the motor, less known work.
-    pairs : tuple
-        The intervals; row ``((pair * 2 + braking) * parts + part)``.
+    Row ``((pair * 2 + braking) * parts + part)`` belongs to a part of an interval.
     """
 
     terms: tuple[str, ...]

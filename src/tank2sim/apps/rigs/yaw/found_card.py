@@ -30,10 +30,7 @@ _OF_THE_RIG = (
 def known_added_inertia(found: YawIdentification, method: str) -> tuple[float, float | None]:
     """lambda661 and its standard error, kg m2.
 
-    Raises
-    ------
-    InputError
-        It is unknown, because the records are of air or J_zz is unknown; or it is negative, which is impossible.
+    InputError if it is unknown, because the records are of air or J_zz is unknown; or negative, which is impossible.
     """
     source, estimate = found.records[0].path, found.methods[method]
     added = estimate.added_inertia_kgm2
@@ -49,12 +46,7 @@ def nrdot_prime(found: YawIdentification, method: str, length_m: float | None) -
     """N_rdot' = -lambda661 / (1/2 rho L^5) of the body in the tank, and its standard error.
 
     At equal Froude number the ship's is the same: an added inertia does not depend on viscosity. By default the length
-    is that of the records.
-
-    Raises
-    ------
-    InputError
-        As :func:`known_added_inertia`, or the length is not known.
+    is that of the records. InputError as :func:`known_added_inertia`, or if the length is not known.
     """
     value, error = known_added_inertia(found, method)
     length = length_m if length_m is not None else _stated(found, "length_m")
@@ -102,10 +94,7 @@ def _replace_key(text: str, source: str, key: tuple[str, str], value: float, ori
 def rig_card_text(found: YawIdentification, method: str, *, name: str, source: str, known: YawRig | None) -> str:
     """TOML text of a rig card with the numbers of one method; the notes come from the result.
 
-    Raises
-    ------
-    InputError
-        The method gives no friction, or as :func:`known_added_inertia`.
+    InputError if the method gives no friction, or as :func:`known_added_inertia`.
     """
     study, estimate, base = found.estimates, found.methods[method], known or UNKNOWN_RIG
     if not estimate.friction:

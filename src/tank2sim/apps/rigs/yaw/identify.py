@@ -70,18 +70,10 @@ _SLIGHT = 0.01
 class YawOptions:
     """Known values in addition to the records, and options of their evaluation.
 
-    Parameters
-    ----------
-    inertia_kgm2, inertia_error_kgm2 : float, optional
-        J_zz, and its standard error; by default from records in air or from the file.
-    torque_constant_NmpA, torque_constant_error : float, optional
-        k_t, and its relative standard error.
-    known : YawRig, optional
-        Known walls, gravity, and differences between accelerating and braking.
-    terms : tuple of str, optional
-        Terms to estimate, by default those of (3) for the medium.
-    mirror_limit : float
-        Largest accepted difference of the rates of two mirror images, over the largest rate.
+    J_zz and its standard error are by default from records in air or from the file, k_t (with its relative standard
+    error) from the file. `known` has walls, gravity, and differences between accelerating and braking. Terms are by
+    default those of (3) for the medium. `mirror_limit` is the largest accepted difference of the rates of two mirror
+    images, over the largest rate.
     """
 
     inertia_kgm2: float | None = None
@@ -151,11 +143,7 @@ def torque_constant(reference: YawIdentification, known_inertia_kgm2: float) -> 
     """k_t (N m/A) and its relative standard error, from records in air of a body whose inertia is known.
 
     All terms of (3) are proportional to k_t: the records give J/k_t, independent of the k_t of the evaluation.
-
-    Raises
-    ------
-    InputError
-        The records are of water, where the added inertia is unknown, too.
+    InputError for records of water, where the added inertia is unknown, too.
     """
     if reference.estimates.medium != "air":
         path = reference.records[0].path
@@ -168,10 +156,7 @@ def torque_constant(reference: YawIdentification, known_inertia_kgm2: float) -> 
 def parse_yaw_terms(text: str) -> tuple[str, ...]:
     """Terms from an option's text, ``"coulomb,viscous,quadratic"``; the inertia is always among them.
 
-    Raises
-    ------
-    InputError
-        A term is unknown or repeated.
+    InputError if a term is unknown or repeated.
     """
     words = [word.strip() for word in text.split(",") if word.strip() not in ("", "inertia")]
     for word in words:

@@ -96,17 +96,10 @@ def wall_terms(
 
 
 def yaw_rig_model(name: str, rig: YawRig, *, with_current_loop: bool = True) -> Model:
-    """The rig as a model.
+    """The rig as a model of the body `name`; the tunable parameters start with the values of `rig`.
 
-    Parameters
-    ----------
-    name : str
-        The body.
-    rig : YawRig
-        Start values of the tunable parameters.
-    with_current_loop : bool
-        The input is ``motor.command`` (A), and the current follows; else the input is ``motor.current`` itself, as a
-        record has it.
+    The input is ``motor.command`` (A), and the current follows; `with_current_loop` False makes it ``motor.current``
+    itself, as a record has it.
     """
     parameters = {parameter.name: parameter for parameter in _parameters(rig)}
     p = {key: parameter.symbol for key, parameter in parameters.items()}

@@ -63,14 +63,8 @@ def fit_angle(
 ) -> tuple[YawMethodEstimate, Array, Array] | None:
     """Fit (3) to the angle of all humps: the estimate, times (s) and residuals (rad); None if it does not converge.
 
-    Parameters
-    ----------
-    rig : YawRig
-        Its torque constant, and known effects beyond (3).
-    first : EnergyFit
-        Start values, and the terms to fit.
-    ideal : Interval
-        The programme's interval, whose dissipation is reported.
+    `rig` has the torque constant and known effects beyond (3), `first` the start values and the terms; the dissipation
+    that is reported is that of the programme's interval `ideal`.
     """
     known = dict(zip(first.balance.terms, first.coefficients.tolist(), strict=True))
     terms = tuple(term for term in (*_NAMES, *_GRAVITY) if term in known)

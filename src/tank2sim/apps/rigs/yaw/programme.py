@@ -167,13 +167,7 @@ PAPER_PROGRAMME = YawProgramme(max_rate_radps=math.pi / 12, rise_s=40 / 9)
 
 
 def programme_of(card: YawRigCard) -> YawProgramme:
-    """The programme of a card; the paper's if it has none.
-
-    Raises
-    ------
-    InputError
-        It is none that can be run.
-    """
+    """The programme of a card; the paper's if it has none. InputError if it cannot be run."""
     stated = card.programme
     if stated is None:
         return PAPER_PROGRAMME
@@ -203,10 +197,7 @@ def full_turns(programme: YawProgramme) -> YawProgramme:
 class Similarity:
     """A ship's turning motion at model size, by the Froude number over the beam and the Strouhal number of turning.
 
-    Parameters
-    ----------
-    ship_length_m, ship_beam_m, length_m, beam_m : float
-        Waterline dimensions of ship and model.
+    Lengths and beams of ship and model are those of the waterline.
     """
 
     ship_length_m: float

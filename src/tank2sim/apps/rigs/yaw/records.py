@@ -121,10 +121,7 @@ def read_yaw_record(path: Path | str | CsvTable) -> YawRecord:
 def refuse_copied_records(records: Sequence[YawRecord]) -> tuple[Notice, ...]:
     """Refuse a record that is another one again, also turned, cut, thinned or rounded; notices of mirror images.
 
-    Raises
-    ------
-    InputError
-        Names the second file, and which one it is again.
+    InputError names the second file, and which one it is again.
     """
     seen = [
         Recording(record.time_s, {"angle_rad": record.angle_rad, "current_A": record.current_A}) for record in records

@@ -37,21 +37,10 @@ class Law(NamedTuple):
 class TunedController:
     """(4): u = (K_P + K_I/p) e + K_D (w_ref - p/(T_o p + 1) phi), e = phi_ref - phi.
 
-    Parameters
-    ----------
-    inertia_kgm2 : float
-        a10 = J* + lambda66, from which the first gains are taken, with a20 = 0.1 a10 (N m s) for the friction.
-    divisor : float
-        n1.
-    integral_gain : float
-        K_I.
-    filter_s : float
-        T_o.
-    tune : bool
-        Take new gains after every pair of intervals.
-    as_printed : bool
-        Take the first gains as they are printed, with a10 and a20 exchanged, and t4, t5 for the limits of braking where
-        t5, t6 are meant.
+    `inertia_kgm2` is a10 = J* + lambda66, from which the first gains are taken, with a20 = 0.1 a10 (N m s) for the
+    friction; `divisor` is n1, `integral_gain` K_I, `filter_s` T_o. `tune` takes new gains after every pair of
+    intervals. `as_printed` takes the first gains as they are printed, with a10 and a20 exchanged, and t4, t5 for the
+    limits of braking where t5, t6 are meant.
     """
 
     inertia_kgm2: float
@@ -72,14 +61,8 @@ class TunedController:
     ) -> tuple[float, float]:
         """K_P and K_D from a run: the first fractions of (1) and (2), with the braking limits t5, t6.
 
-        Parameters
-        ----------
-        works : pair of float
-            int w I dt over the accelerating and the braking interval, A rad.
-        rates : tuple of float
-            w1 and w2 (rad/s) and int w^2 dt over the accelerating interval (rad2/s).
-        lag_s : float
-            T_c.
+        `works` is int w I dt over the accelerating and the braking interval, A rad; `rates` are w1 and w2 (rad/s) and
+        int w^2 dt over the accelerating interval (rad2/s); `lag_s` is T_c.
         """
         w1, w2, square = rates
         scale = self.divisor * lag_s
@@ -138,18 +121,9 @@ Controller = TunedController | AdaptiveController
 class Measuring:
     """Measurement settings of a rig.
 
-    Parameters
-    ----------
-    encoder : bool
-        Controller and record use whole pulses; else the exact angle.
-    current_noise_A : float
-        Standard deviation of the recorded current.
-    control_s : float
-        Sampling interval of the controller; a millisecond is a project choice, the paper states none.
-    record_every : int
-        Samples of the controller per row of the record.
-    seed : int
-        Seed of the noise.
+    With the encoder, controller and record use whole pulses, else the exact angle. The noise of the recorded current is
+    a standard deviation. The controller samples every millisecond, a project choice, the paper states none;
+    `record_every` of its samples make a row of the record.
     """
 
     encoder: bool = True
@@ -168,18 +142,11 @@ class Saturation(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class YawRun:
-    """Result of a run; all arrays (rows,).
+    """Result of a run, arrays (rows,): the record, with the noise of the current, and the true values, which a rig does
+    not measure.
 
-    Parameters
-    ----------
-    time_s, angle_rad, current_A : array
-        The record: angle as measured, current with noise.
-    true_angle_rad, true_rate_radps, true_current_A : array
-        True values, which a rig does not measure.
-    gains : tuple
-        Gains of each hump, by name; empty for a controller without gains.
-    memory : tuple of float
-        States of the controller at the end.
+    `gains` are those of each hump, by name; none for a controller without gains. `memory` has the states of the
+    controller at the end.
     """
 
     programme: YawProgramme
@@ -209,10 +176,7 @@ def run_yaw_rig(
 ) -> YawRun:
     """Simulate a programme on the rig under a controller, from rest.
 
-    Raises
-    ------
-    InputError
-        The motor saturates without `allow_saturation`: the message states the time and the required current.
+    InputError if the motor saturates without `allow_saturation`: the message states the time and the required current.
     """
     measuring = measuring or Measuring()
     h = measuring.control_s
@@ -333,26 +297,11 @@ def simulated_record(
     controller: Controller | None = None,
     programme: YawProgramme | None = None,
 ) -> YawRecord:
-    """Simulate the record of a programme on the card's rig, including its encoder.
+    """Simulate the record of a programme on the card's rig, including its encoder, for the file `path`.
 
-    Parameters
-    ----------
-    card : YawRigCard
-    path : Path
-        The file of the record.
-    current_noise_A : float
-        Standard deviation of the recorded current.
-    medium : str
-        In ``air`` the rig is that of :func:`rig_in_air`.
-    controller : optional
-        By default (4), with the true inertia.
-    programme : optional
-        By default the card's.
-
-    Raises
-    ------
-    InputError
-        The motor saturates, or the card lacks a rig or a programme.
+    In ``air`` the rig is that of :func:`rig_in_air`. The controller is by default (4), with the true inertia, the
+    programme that of the card; the noise of the recorded current is a standard deviation. InputError if the motor
+    saturates, or the card lacks a programme.
     """
     wet, programme = card.yaw_rig, programme or programme_of(card)
     rig = rig_in_air(wet) if medium == "air" else wet

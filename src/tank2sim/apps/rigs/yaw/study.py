@@ -56,7 +56,6 @@ class YawEstimates:
         Files.
     medium : str
         ``water`` or ``air``.
-    torque_constant_NmpA : float
     body_inertia_kgm2, body_inertia_standard_error_kgm2, body_inertia_source
         J_zz, its standard error and its source; None where it is not known, and in air, where it is estimated.
     added_inertia_kgm2, dissipation_J : dict
@@ -67,11 +66,8 @@ class YawEstimates:
         Difference of the rates of each pair of mirror images, over the largest.
     histories : dict
         Record to its columns, to draw.
-    energy_balance : EnergyBalance
-    energy_residuals : tuple of EnergyResidual
     angle_residual : dict, optional
         ``t_s`` and ``residual_rad`` of the nonlinear least squares, where they converged.
-    notices : tuple of Notice
     """
 
     records: tuple[str, ...]

@@ -63,15 +63,10 @@ def ellipsoid_water_inertia(body: FloatingBody) -> float:
 
 
 def ratio_by_7(length_over_beam: float, draught_ratio: float, *, as_printed: bool = False) -> float:
-    """Added over displaced inertia of a triaxial ellipsoid by (7), p = L/B > 1 and q = 2T/B < 1.
+    """Added over displaced inertia of a triaxial ellipsoid by (7), p = L/B > 1 and q = 2T/B < 1; else ValueError.
 
     The print has (p^2 - 1) in the numerator where (p^2 - 1)^2 belongs, and the letter E for both elliptic integrals;
     with the square and F for the second it is Lamb's value (k66). `as_printed` leaves the square out.
-
-    Raises
-    ------
-    ValueError
-        The axes are not in the order L > B > 2T > 0 that (7) is written for.
     """
     p, q = length_over_beam, draught_ratio
     if not p > 1 > q > 0:
@@ -105,20 +100,9 @@ def rotational_froude_number(body: FloatingBody, rate_radps: float, gravity_mps2
 def added_inertia_by_8(body: FloatingBody, rate_radps: float, stage: Stage, *, bracket: float = 0.088) -> float:
     """lambda66 of a ship by (8), as printed: a regression over models turned in a circulating tank.
 
-    Parameters
-    ----------
-    rate_radps : float
-        Yaw rate, rad/s.
-    stage : str
-        The water is being set in motion, or overtakes the body.
-    bracket : float
-        Second factor of the last bracket; 0.088 in the print, 0.08 (with a rate 3/4 as large) comes nearest to the
-        paper's own table.
-
-    Raises
-    ------
-    ValueError
-        The body has no block coefficient.
+    The stage says whether the water is being set in motion, or overtakes the body. `bracket` is the second factor of
+    the last bracket; 0.088 in the print, 0.08 (with a rate 3/4 as large) comes nearest to the paper's own table.
+    ValueError for a body without block coefficient.
     """
     a, b = _SPEED_FACTORS[stage]
     length, beam, draught, block = body.length_m, body.beam_m, body.draught_m, body.block
