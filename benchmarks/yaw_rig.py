@@ -17,13 +17,13 @@ from tempfile import TemporaryDirectory
 from typing import get_args
 
 import numpy as np
+from alyshev_rigs import ELLIPSOID_AIR, ELLIPSOID_T1, SHIP_AIR, SHIP_T1, SHIP_T2
 from paper_numbers import PaperNumbers
 
 from tank2sim.apps.rigs.yaw import theory
 from tank2sim.apps.rigs.yaw.card import YawRig, YawRigCard
 from tank2sim.apps.rigs.yaw.energy import Speeds, YawMethodEstimate, energy_balance, fit_energy, intervals
 from tank2sim.apps.rigs.yaw.identify import GRAVITY, WATER_TERMS, YawIdentification, YawOptions, identify_yaw
-from tank2sim.apps.rigs.yaw.model import ELLIPSOID_AIR, ELLIPSOID_T1, SHIP_AIR, SHIP_T1, SHIP_T2
 from tank2sim.apps.rigs.yaw.programme import (
     PAPER_PROGRAMME,
     Similarity,

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import printed_tows
 import pytest
 from numpy.polynomial import Polynomial
 from scipy import stats
@@ -58,12 +59,12 @@ def test_speed_polynomials_of_the_printed_means_next_to_table_2():
 
 def test_largest_deviation_of_the_printed_model_settles_the_sign_of_B2():
     def deviation(coefficients):
-        speeds = simulated_speeds(coefficients, tow_paper.FORCE_N, tow_paper.TIMES_S)
+        speeds = simulated_speeds(coefficients, printed_tows.FORCE_N, tow_paper.TIMES_S)
         return np.max(np.abs(speeds - tow_paper.MEANS_MPS))
 
     assert deviation(tow_paper.SOLUTION) == pytest.approx(0.0142, abs=5e-5)
     assert deviation(replace(tow_paper.SOLUTION, B2_kgspm2=26096.0)) == pytest.approx(0.113, abs=5e-4)
-    problem = discretise(tow_paper.SPEED, tow_paper.TIMES_S, ("B1", "B2", "B3"), tow_paper.FORCE_N)
+    problem = discretise(printed_tows.SPEED, tow_paper.TIMES_S, ("B1", "B2", "B3"), printed_tows.FORCE_N)
     right = dict(zip(vars(tow_paper.SOLUTION), solve_by_qr(problem), strict=True))
     assert deviation(replace(tow_paper.SOLUTION, **right)) == pytest.approx(0.0128, abs=5e-5)
 

@@ -5,12 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from alyshev_rigs import SHIP_T1
 
 from tank2sim.apps.rigs.yaw.card import TankWalls
 from tank2sim.apps.rigs.yaw.energy import intervals, known_work
 from tank2sim.apps.rigs.yaw.found_card import rig_card_text
 from tank2sim.apps.rigs.yaw.identify import WATER_TERMS, YawOptions, identify_yaw, parse_yaw_terms, torque_constant
-from tank2sim.apps.rigs.yaw.model import SHIP_T1, UNKNOWN_RIG
+from tank2sim.apps.rigs.yaw.model import UNKNOWN_RIG
 from tank2sim.apps.rigs.yaw.programme import PAPER_PROGRAMME
 from tank2sim.apps.rigs.yaw.records import read_yaw_record, yaw_record_text
 from tank2sim.apps.rigs.yaw.simulation import Measuring, TunedController, run_yaw_rig, yaw_record
