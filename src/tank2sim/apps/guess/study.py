@@ -111,11 +111,6 @@ class GuessStudy:
     notices: tuple[Notice, ...]
 
 
-def figure_unit(key: str) -> str:
-    """Unit of a figure by its key."""
-    return FIGURE_KEYS[key][1].rpartition("_")[2]
-
-
 def default_error(name: str, value: float) -> float:
     """Standard error of a figure (``advance_m``) that comes without."""
     return OVERSHOOT_ERROR_DEG if name.startswith("overshoot") else TRIAL_ERROR * value
@@ -161,16 +156,16 @@ def study_members(
 ) -> GuessStudy:
     """The study of members that were found; `members` were drawn. Other arguments as of :func:`guess_ship`."""
     by_key = {figure.key: figure for figure in given}
-    figures = {}
-    for key, before in found.before.items():
-        figure = by_key.get(key)
-        figures[key] = GuessedFigure(
-            unit=figure_unit(key),
-            given=figure.value if figure else None,
-            standard_error=figure.standard_error if figure else None,
+    figures = {
+        key: GuessedFigure(
+            unit=FIGURE_KEYS[key][1].rpartition("_")[2],
+            given=by_key[key].value if key in by_key else None,
+            standard_error=by_key[key].standard_error if key in by_key else None,
             by_dimensions=band_of(before),
             found=band_of(found.after[key]),
         )
+        for key, before in found.before.items()
+    }
     return GuessStudy(
         ship=name,
         dimensions=vars(ship),

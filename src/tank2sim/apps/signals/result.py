@@ -120,8 +120,7 @@ class SignalsResult(Result[SignalsStudy]):
     def headline(self) -> tuple[str, ...]:
         """The filter, if there is one, and how many signals are stationary."""
         filtered = (self.study.filter.sentence,) if self.study.filter else ()
-        varying = self._varying_signals
-        steady = sum(map(_is_stationary, varying))
+        steady, varying = self._steady, self._varying_signals
         if not varying:
             return (*filtered, "No signal varies.")
         if steady == len(varying):
@@ -146,8 +145,7 @@ class SignalsResult(Result[SignalsStudy]):
     def key_figures(self) -> Sequence[KeyFigure]:
         """Stationary signals, the slowest of them, and the lag of the yaw rate."""
         varying = self._varying_signals
-        steady = sum(map(_is_stationary, varying))
-        figures = [KeyFigure(label="Stationary signals", value=f"{steady} of {len(varying)}")]
+        figures = [KeyFigure(label="Stationary signals", value=f"{self._steady} of {len(varying)}")]
         correlations = [signal.autocorrelation for signal in varying if signal.autocorrelation]
         if correlations:
             time_s = max(one.correlation_time_s for one in correlations)
@@ -185,13 +183,15 @@ class SignalsResult(Result[SignalsStudy]):
     def _varying_signals(self) -> list[SignalStudy]:
         return [signal for trial in self.study.trials for _, signal in _varying(trial)]
 
+    @property
+    def _steady(self) -> int:
+        """Number of stationary signals."""
+        tests = [signal.stationarity for signal in self._varying_signals if signal.stationarity]
+        return sum(test.verdict is Stationary.YES for test in tests)
+
 
 def _varying(trial: TrialSignals) -> list[tuple[str, SignalStudy]]:
     return [(name, signal) for name, signal in trial.columns.items() if not signal.constant]
-
-
-def _is_stationary(signal: SignalStudy) -> bool:
-    return signal.stationarity is not None and signal.stationarity.verdict is Stationary.YES
 
 
 def _signal(column: str) -> SignalName:
@@ -246,28 +246,19 @@ def _signals_section(label: str, trial: TrialSignals) -> Section:
 
 def _signal_charts(label: str, name: SignalName, signal: SignalStudy) -> Iterator[Illustration]:
     """Density, autocorrelation and spectrum of a signal, side by side."""
-    stem = f"{label}_{name.stem}"
-    if signal.probability_density:
-        yield Illustration(
-            chart=density_chart(name, signal.probability_density),
-            caption="Kernel estimate next to the normal density of the same mean and standard deviation.",
-            half=True,
-            name=f"{stem}_density",
-        )
-    if signal.autocorrelation:
-        yield Illustration(
-            chart=autocorrelation_chart(name, signal.autocorrelation),
-            caption="Red: the correlation time.",
-            half=True,
-            name=f"{stem}_autocorrelation",
-        )
-    if signal.spectrum:
-        yield Illustration(
-            chart=spectrum_chart(name, signal.spectrum),
-            caption="The band is the 95 % confidence interval at each frequency.",
-            half=True,
-            name=f"{stem}_spectrum",
-        )
+    described = {
+        "density": "Kernel estimate next to the normal density of the same mean and standard deviation.",
+        "autocorrelation": "Red: the correlation time.",
+        "spectrum": "The band is the 95 % confidence interval at each frequency.",
+    }
+    charts = {
+        "density": signal.probability_density and density_chart(name, signal.probability_density),
+        "autocorrelation": signal.autocorrelation and autocorrelation_chart(name, signal.autocorrelation),
+        "spectrum": signal.spectrum and spectrum_chart(name, signal.spectrum),
+    }
+    for kind, chart in charts.items():
+        if chart:
+            yield Illustration(chart=chart, caption=described[kind], half=True, name=f"{label}_{name.stem}_{kind}")
 
 
 def _statistics(label: str, trial: TrialSignals) -> Table:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -175,19 +175,17 @@ def analyse(trial: Trial, settings: SignalSettings) -> TrialSignals:
         if not series:
             raise InputError(trial.path, "", "no signal of it can be analysed", notices[-1])
     notices += [notice for item in series.values() for notice in item.notices]
+    whole = file_columns(trial)
     columns = {SignalName(name).file: _analysed(item, settings.segment_s) for name, item in series.items()}
     return TrialSignals(
         trial=str(trial.path),
         columns=columns,
         rudder_to_yaw_rate=_steering(series, settings.segment_s),
         notices=tuple(notices),
-        histories=_histories(trial, columns),
+        histories=drawn_columns(
+            {"t_s": whole["t_s"], **{name: whole[name] for name in columns}}, MEASURED_SAMPLES, peaks=True
+        ),
     )
-
-
-def _histories(trial: Trial, names: Collection[str]) -> Columns:
-    whole = file_columns(trial)
-    return drawn_columns({"t_s": whole["t_s"], **{name: whole[name] for name in names}}, MEASURED_SAMPLES, peaks=True)
 
 
 def filtered(text: str, sentence: str, before: Series, after: Filtered) -> FilterStudy:

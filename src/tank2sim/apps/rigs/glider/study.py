@@ -223,7 +223,7 @@ class GlideDesign:
     ranges: tuple[Range, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class PathPlace:
     """A place of a path: north, east, height, and heading clockwise from north."""
 
@@ -234,7 +234,7 @@ class PathPlace:
     heading_deg: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class TransientPlace:
     """A place of the transient motion: north, east, depth; and its speed."""
 
@@ -382,10 +382,12 @@ def study_glider(card: GliderCard, question: GlideQuestion) -> GlideStudy:
 
 def _state_fields(glide: SteadyGlide) -> dict[str, Any]:
     """Fields of :class:`GlideState`."""
-    angles = ("path_angle", "pitch", "incidence", "roll")
-    found = {f"{name}_deg": math.degrees(getattr(glide, f"{name}_rad")) for name in angles}
-    found |= {"turn_rate_degps": math.degrees(glide.turn_rate_radps)}
-    return found | {part.name: getattr(glide, part.name) for part in fields(GlideState) if part.name not in found}
+    found = {}
+    for part in fields(GlideState):
+        name = part.name.replace("_degps", "_radps").replace("_deg", "_rad")
+        value = getattr(glide, name)
+        found[part.name] = value if name == part.name else math.degrees(value)
+    return found
 
 
 def _state(glide: SteadyGlide) -> GlideState:
@@ -393,26 +395,14 @@ def _state(glide: SteadyGlide) -> GlideState:
 
 
 def _places(path: GlidePath | None) -> tuple[PathPlace, ...]:
-    return tuple(
-        PathPlace(
-            t_s=place.time_s,
-            x_m=place.north_m,
-            y_m=place.east_m,
-            height_m=place.height_m,
-            heading_deg=math.degrees(place.heading_rad),
-        )
-        for place in (path.places if path else ())
-    )
+    return tuple(PathPlace(*place[:4], math.degrees(place.heading_rad)) for place in (path.places if path else ()))
 
 
 def _transient(found: Compared) -> TransientPath:
-    motion = found.motion
-    named = {"x_m": "motion.x", "y_m": "motion.y", "depth_m": "motion.z", "speed_mps": "motion.speed"}
+    motion, named = found.motion, ("motion.x", "motion.y", "motion.z", "motion.speed")
+    times = [place.time_s for place in found.path.places]
     return TransientPath(
-        path=tuple(
-            TransientPlace(t_s=place.time_s, **{key: motion.at(name, place.time_s) for key, name in named.items()})
-            for place in found.path.places
-        ),
+        path=tuple(TransientPlace(time, *(motion.at(name, time) for name in named)) for time in times),
         distance_m=found.distance_m,
         distance_by_length=found.share,
         histories=found.histories(),

@@ -12,7 +12,7 @@ import numpy as np
 
 from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_layers, look_of
 from tank2sim.answer.charts.motion import History, Signal, history_chart
-from tank2sim.answer.charts.parts import plain, series_look
+from tank2sim.answer.charts.parts import plain, series_look, vector
 from tank2sim.answer.charts.rows import RowPlot, row_layers
 from tank2sim.answer.charts.vega import STACKS, ChartRecord, ChartSpec, PlotAxis, Rule, layered
 from tank2sim.answer.numbers import format_number
@@ -34,7 +34,6 @@ from tank2sim.apps.rigs.tow.identify import tow_card_text
 from tank2sim.apps.rigs.tow.records import force_words
 from tank2sim.apps.rigs.tow.study import Ellipse, FittedModel, TowByTow, TowSpeeds, TowStudy
 from tank2sim.apps.rigs.tow.theory import DragPolynomial, TowedBody, drag_polynomial
-from tank2sim.arrays import Array
 from tank2sim.cards import Card, parse_card
 from tank2sim.identification.conditioning import COLLINEAR
 
@@ -61,6 +60,9 @@ _ELLIPSES = (
     "The regions are linearised and take the readings as independent; the points are the same models fitted to single "
     "tows. A long slanting region means that only a combination of mass and drag is known. Where the two regions part, "
     "the start decides."
+)
+_BY_TOW = (
+    "Each tow by itself, and one left out in turn. These errors hold also where the readings of one tow err together."
 )
 _THEORY = (
     "M_s = k* (1 + k₁₁) ρ V, with Lamb's k₁₁ of ellipsoids and the published k* = 0.96 for the free surface. "
@@ -193,25 +195,21 @@ class TowResult(Result[TowStudy]):
     @property
     def sections(self) -> Sequence[Section]:
         """Speeds, estimates, models of other size, drag, theory, single tows."""
-        body = self.study.body
-        return [
-            *self._speeds(),
-            self._estimates(),
-            self._models(),
-            *([self._drag(body), self._theory()] if body else []),
-            *self._by_tow(),
-        ]
-
-    def _speeds(self) -> list[Section]:
-        speeds = self.study.speeds
-        if not speeds.simulated_mps:
-            return []
-        chart = Illustration(
-            chart=tow_speed_chart(speeds),
-            caption=f"The lower panel shows the differences from {next(iter(speeds.simulated_mps))}.",
-            name="measured_and_computed_speeds",
-        )
-        return [Section(heading="Measured and computed speeds", charts=[chart])]
+        study, sections = self.study, []
+        if study.speeds.simulated_mps:
+            chart = Illustration(
+                chart=tow_speed_chart(study.speeds),
+                caption=f"The lower panel shows the differences from {next(iter(study.speeds.simulated_mps))}.",
+                name="measured_and_computed_speeds",
+            )
+            sections.append(Section(heading="Measured and computed speeds", charts=[chart]))
+        sections += [self._estimates(), self._models()]
+        if study.body:
+            sections += [self._drag(study.body), self._theory()]
+        if study.tow_by_tow:
+            by_tow = [_subset_table(label, subset) for label, subset in study.tow_by_tow.items()]
+            sections.append(Section(heading="Tow by tow", text=_BY_TOW, tables=by_tow, folded=True))
+        return sections
 
     def _estimates(self) -> Section:
         fits = self.study.methods.values()
@@ -259,6 +257,11 @@ class TowResult(Result[TowStudy]):
             chart = ellipse_chart(study.confidence_ellipses, study.tow_by_tow)
             charts.append(Illustration(chart=chart, caption=_ELLIPSES, name=name))
         unknowns = [name for name in _UNITS if any(name in model.estimates for model in study.models)]
+        by_tow = [
+            f"M by single tows, {label}: {', '.join(f'{row[0]:.0f}' for row in subset.alone)} kg. With one tow left "
+            f"out in turn: ± {subset.jackknife_half_widths_95[0]:.0f} kg (95 %)."
+            for label, subset in study.tow_by_tow.items()
+        ]
         estimates: list[list[Cell]] = [
             [
                 model.label,
@@ -291,7 +294,7 @@ class TowResult(Result[TowStudy]):
             text="The same readings by output error with fewer and with more unknowns (delay: time from t = 0 to the "
             "start of the body).",
             tables=[
-                table("Output error, models of different size", columns, rows, *self._masses_by_tow(), folded=True),
+                table("Output error, models of different size", columns, rows, *by_tow, folded=True),
                 table(
                     "Estimates of these models with 95 % half-widths",
                     ("model", *heads),
@@ -303,47 +306,32 @@ class TowResult(Result[TowStudy]):
             charts=charts,
         )
 
-    def _masses_by_tow(self) -> list[str]:
-        return [
-            f"M by single tows, {label}: {', '.join(f'{row[0]:.0f}' for row in subset.alone)} kg. With one tow left "
-            f"out in turn: ± {subset.jackknife_half_widths_95[0]:.0f} kg (95 %)."
-            for label, subset in self.study.tow_by_tow.items()
-        ]
-
     def _drag(self, body: TowedBody) -> Section:
-        drags = self._drags(body)
-        orders = ("A1 (s²/m²)", "A2 (s/m)", "A3")
-        rows: list[list[Cell]] = [
-            [name, area, *values]
-            for name, drag in drags.items()
-            for area, values in (
-                ("L²", asdict(drag).values()),
-                ("V^(2/3)", asdict(drag.times(body.area_ratio)).values()),
-            )
-        ]
-        chart = Illustration(
-            chart=drag_chart(drags, body, self.study.top_speed_mps),
-            caption=f"L = {body.length_m:g} m, V = {body.volume_m3:.4g} m³, ν = {format_number(body.viscosity_m2ps)} "
-            "m²/s. The axes fit the curves that stay above zero; no hull has a coefficient below zero.",
-        )
-        caption = "Drag coefficient C = A1 v² + A2 v + A3"
-        drag_table = table(caption, ("method", "referred to", *orders), rows, folded=True)
-        return Section(heading="Drag coefficient", tables=[drag_table], charts=[chart])
-
-    def _drags(self, body: TowedBody) -> dict[str, DragPolynomial]:
-        """C referred to L^2 by method, by the best usable model, and as printed."""
+        study = self.study
+        found = study.drag_coefficients
         drags = {
             _METHODS[name]: drag.by_length_squared
-            for name, drag in self.study.drag_coefficients.items()
-            if name != "paper" or "qr" not in self.study.drag_coefficients
+            for name, drag in found.items()
+            if name != "paper" or "qr" not in found
         }
-        if best := self.study.best:
+        if best := study.best:
             drag = drag_polynomial(best.coefficients, body)
             if drag not in drags.values():
                 drags[f"best usable: {best.label}"] = drag
-        if self.study.tows_of_the_paper:
+        if study.tows_of_the_paper:
             drags["as printed"] = drag_polynomial(tow_paper.SOLUTION, body)
-        return drags
+        rows: list[list[Cell]] = []
+        for name, drag in drags.items():
+            rows.append([name, "L²", *asdict(drag).values()])
+            rows.append([name, "V^(2/3)", *asdict(drag.times(body.area_ratio)).values()])
+        chart = Illustration(
+            chart=drag_chart(drags, body, study.top_speed_mps),
+            caption=f"L = {body.length_m:g} m, V = {body.volume_m3:.4g} m³, ν = {format_number(body.viscosity_m2ps)} "
+            "m²/s. The axes fit the curves that stay above zero; no hull has a coefficient below zero.",
+        )
+        heads = ("method", "referred to", "A1 (s²/m²)", "A2 (s/m)", "A3")
+        drag_table = table("Drag coefficient C = A1 v² + A2 v + A3", heads, rows, folded=True)
+        return Section(heading="Drag coefficient", tables=[drag_table], charts=[chart])
 
     def _theory(self) -> Section:
         estimate = ""
@@ -358,19 +346,6 @@ class TowResult(Result[TowStudy]):
         }
         masses = records_table("Mass in surge by theory (2.5)", self.study.mass_by_theory, fields=fields)
         return Section(heading="Mass by theory", text=_THEORY + estimate, tables=[masses])
-
-    def _by_tow(self) -> list[Section]:
-        if not self.study.tow_by_tow:
-            return []
-        return [
-            Section(
-                heading="Tow by tow",
-                text="Each tow by itself, and one left out in turn. These errors hold also where the readings of one "
-                "tow err together.",
-                tables=[_subset_table(label, subset) for label, subset in self.study.tow_by_tow.items()],
-                folded=True,
-            )
-        ]
 
 
 def _with_error(fit: TowFit, key: str) -> Cell:
@@ -448,7 +423,12 @@ def drag_chart(drags: Mapping[str, DragPolynomial], body: TowedBody, top_speed_m
             both = {"c": drag.at(speeds), "cv": drag.times(body.area_ratio).at(speeds)}
             more = {"speed": speeds, "re": body.reynolds(speeds), **both}
             series.append(PlotSeries(label=label, x=values, y=drag.times(factor).at(speeds), more=more))
-        up = PlotAxis(title=name, domain=_frame(drags, speeds, factor))
+        # From a little below 0 to above the highest C of the curves that stay above zero; of all, if none does.
+        curves = [vector(line.y) for line in series]
+        kept = [curve for curve in curves if curve.min() >= 0] or curves
+        low, high = min(0.0, *(float(curve.min()) for curve in kept)), max(float(curve.max()) for curve in kept)
+        margin = 0.08 * (high - low)
+        up = PlotAxis(title=name, domain=(low - margin, high + margin))
         plot = Plot(series=series, up=up, rules=[Rule(at=[0.0])])
         layers = curve_layers(plot, across, look_of(series), shown=shown)
         panels.append(layered(layers, size=(330, 300)))
@@ -459,15 +439,6 @@ def drag_chart(drags: Mapping[str, DragPolynomial], body: TowedBody, top_speed_m
         "description": "Drag coefficient referred to length squared over speed, and to volume over Reynolds number.",
         "usermeta": STACKS,
     }
-
-
-def _frame(drags: Mapping[str, DragPolynomial], speeds: Array, factor: float) -> tuple[float, float]:
-    """From a little below 0 to above the highest C of the curves that stay above zero; of all, if none does."""
-    curves = [drag.times(factor).at(speeds) for drag in drags.values()]
-    kept = [curve for curve in curves if curve.min() >= 0] or curves
-    low, high = min(0.0, *(float(curve.min()) for curve in kept)), max(float(curve.max()) for curve in kept)
-    margin = 0.08 * (high - low)
-    return low - margin, high + margin
 
 
 def ellipse_chart(ellipses: Sequence[Ellipse], by_tow: Mapping[str, TowByTow]) -> ChartSpec:
@@ -503,8 +474,9 @@ def model_chart(models: Sequence[FittedModel]) -> ChartSpec:
     rows: list[ChartRecord] = []
     for model in models:
         mass, half = model.estimates["M"], model.half_widths_95["M"]
+        verdict = 0 if model.usable else 1 if model.drag_nowhere_negative else 2
         rows.append(
-            {"name": model.label, "run": _verdict(model), "v": plain(mass), "m": plain(mass)}
+            {"name": model.label, "run": _VERDICTS[verdict], "v": plain(mass), "m": plain(mass)}
             | {"low": plain(mass - half), "high": plain(mass + half)}
             | {"least": plain(mass - half), "most": plain(mass + half), "aic": plain(model.aic - lowest)}
         )
@@ -537,7 +509,3 @@ def model_chart(models: Sequence[FittedModel]) -> ChartSpec:
         "description": "Mass and AIC of each model fitted by output error.",
         "usermeta": STACKS,
     }
-
-
-def _verdict(model: FittedModel) -> str:
-    return _VERDICTS[0] if model.usable else _VERDICTS[1] if model.drag_nowhere_negative else _VERDICTS[2]

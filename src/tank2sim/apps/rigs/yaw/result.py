@@ -27,8 +27,7 @@ from tank2sim.answer.result import Result
 from tank2sim.apps.rigs.yaw.card import YawRigCard
 from tank2sim.apps.rigs.yaw.energy import YawMethodEstimate, term_and_unit
 from tank2sim.apps.rigs.yaw.found_card import nrdot_prime, rig_card_text, with_nrdot
-from tank2sim.apps.rigs.yaw.identify import YAW_METHODS, YawIdentification
-from tank2sim.apps.rigs.yaw.study import EnergyBalance, EnergyResidual, YawStudy
+from tank2sim.apps.rigs.yaw.identify import YAW_METHODS, EnergyBalance, EnergyResidual, YawIdentification, YawStudy
 from tank2sim.arrays import Columns
 from tank2sim.cards import Card, parse_card
 from tank2sim.errors import ArgumentError, InputError
@@ -115,10 +114,8 @@ class YawResult(Result[YawStudy]):
             for name, unit in (("added_inertia", "kgm2"), ("total_inertia", "kgm2"), ("dissipation", "J"))
             for error in ("", "_standard_error")
         ]
-        rows = [
-            (method, *(getattr(found, column) for column in columns)) for method, found in self.study.methods.items()
-        ]
-        return pd.DataFrame(rows, columns=["method", *columns]).set_index("method")
+        rows = [[getattr(found, column) for column in columns] for found in self.study.methods.values()]
+        return pd.DataFrame(rows, columns=columns, index=pd.Index(self.study.methods, name="method"))
 
     @property
     def added_inertia_kgm2(self) -> float | None:
@@ -191,7 +188,7 @@ class YawResult(Result[YawStudy]):
     @property
     def headline(self) -> tuple[str, ...]:
         """The inertia by the energy least squares, and the records."""
-        kind, inertia, error = self._best.inertia
+        kind, inertia, error = self.study.methods[YAW_METHODS[0]].inertia
         shown = f"{1e4 * inertia:.4g}" if error is None else f"({1e4 * inertia:.4g} ± {1e4 * error:.2g})"
         return (
             f"The {kind} yaw inertia is {shown} · 10⁻⁴ kg m² by the energy least squares; ± is one standard error.",
@@ -199,13 +196,9 @@ class YawResult(Result[YawStudy]):
         )
 
     @property
-    def _best(self) -> YawMethodEstimate:
-        return self.study.methods[YAW_METHODS[0]]
-
-    @property
     def key_figures(self) -> Sequence[KeyFigure]:
         """Inertia, dissipation, bias of the two-interval formula, mirror images."""
-        best = self._best
+        best = self.study.methods[YAW_METHODS[0]]
         kind, inertia, error = best.inertia
         bias = 100 * (self.study.methods["two_intervals"].bias_against_least_squares_kgm2 or 0.0)
         bias /= best.total_inertia_kgm2
@@ -241,19 +234,27 @@ class YawResult(Result[YawStudy]):
     def sections(self) -> Sequence[Section]:
         """Estimates, energy balance, records, residuals, theory."""
         study = self.study
-        estimates = _chart(_estimates_chart(study.methods), "Dashed: the energy least squares.", "estimates_by_method")
-        balance = _chart(_balance_chart(study.energy_balance), "The mean over all pairs.", "energy_balance")
-        residuals = _chart(_energy_residual_chart(study.energy_residuals), "", "energy_balance")
         records = [
             _chart(_record_chart(name, columns), "", "record_and_programme")
             for name, columns in study.histories.items()
         ]
         sections = [
             Section(
-                heading="Estimates by method", text=_ESTIMATES, tables=[_estimates(study.methods)], charts=[estimates]
+                heading="Estimates by method",
+                text=_ESTIMATES,
+                tables=[_estimates(study.methods)],
+                charts=[
+                    _chart(_estimates_chart(study.methods), "Dashed: the energy least squares.", "estimates_by_method")
+                ],
             ),
             Section(
-                heading="Energy balance", text=_BALANCE, tables=[_friction(study.methods)], charts=[balance, residuals]
+                heading="Energy balance",
+                text=_BALANCE,
+                tables=[_friction(study.methods)],
+                charts=[
+                    _chart(_balance_chart(study.energy_balance), "The mean over all pairs.", "energy_balance"),
+                    _chart(_energy_residual_chart(study.energy_residuals), "", "energy_balance"),
+                ],
             ),
             Section(heading="Record and programme", text="The rate is shown where it is evaluated.", charts=records),
         ]
@@ -281,16 +282,16 @@ def _scaled(value: float | None) -> float | None:
 
 
 def _estimates(methods: Mapping[str, YawMethodEstimate]) -> Table:
+    fields = (
+        "added_inertia_kgm2",
+        "added_inertia_standard_error_kgm2",
+        "total_inertia_kgm2",
+        "dissipation_J",
+        "dissipation_standard_error_J",
+        "bias_against_least_squares_kgm2",
+    )
     rows: list[list[Cell]] = [
-        [
-            method.replace("_", " "),
-            _scaled(found.added_inertia_kgm2),
-            _scaled(found.added_inertia_standard_error_kgm2),
-            _scaled(found.total_inertia_kgm2),
-            _scaled(found.dissipation_J),
-            _scaled(found.dissipation_standard_error_J),
-            _scaled(found.bias_against_least_squares_kgm2),
-        ]
+        [method.replace("_", " "), *(_scaled(getattr(found, field)) for field in fields)]
         for method, found in methods.items()
     ]
     columns = [
@@ -325,13 +326,11 @@ def _friction(methods: Mapping[str, YawMethodEstimate]) -> Table:
 
 def _record_chart(name: str, columns: Columns) -> ChartSpec:
     """Rate where it is evaluated next to the programme's, tracking error, and current, over the whole record."""
-    time = columns["t_s"]
-    columns_shown = {"rate": "rate_radps", "error": "tracking_error_rad", "current": "current_A"}
-    values = {key: columns[column] for key, column in columns_shown.items()}
-    programme = {"rate": columns["programme_rate_radps"]}
+    shown = {"rate": "rate_radps", "error": "tracking_error_rad", "current": "current_A"}
+    runs = {name: shown, "programme": {"rate": "programme_rate_radps"}}
     histories = [
-        History(label=name, time_s=time, values=values),
-        History(label="programme", time_s=time, values=programme),
+        History(label=label, time_s=columns["t_s"], values={key: columns[column] for key, column in signals.items()})
+        for label, signals in runs.items()
     ]
     return history_chart(histories, _SIGNALS, title=f"{name}: programme and record")
 
