@@ -16,17 +16,7 @@ from tank2sim.answer.charts.parts import plain, series_look, vector
 from tank2sim.answer.charts.rows import RowPlot, row_layers
 from tank2sim.answer.charts.vega import STACKS, ChartRecord, ChartSpec, PlotAxis, Rule, layered
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.parts import (
-    Cell,
-    Column,
-    Illustration,
-    KeyFigure,
-    Section,
-    Table,
-    Verdict,
-    records_table,
-    table,
-)
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, records_table, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.rigs.tow import paper as tow_paper
 from tank2sim.apps.rigs.tow.findings import TOW_PARAMETERS, TowFit
@@ -338,12 +328,7 @@ class TowResult(Result[TowStudy]):
         if best := self.study.best:
             mass, half = best.estimates["M"], best.half_widths_95["M"]
             estimate = f" The tows give {mass:.0f} ± {half:.0f} kg by the best usable model."
-        fields = {
-            "basis": "body",
-            "k11": "k₁₁",
-            "deep_kg": "(1 + k₁₁) ρ V",
-            "near_surface_kg": "near the surface, M_s",
-        }
+        fields = {"basis": "body", "k11": "k₁₁", "deep_kg": "(1 + k₁₁) ρ V", "near_surface_kg": "near the surface, M_s"}
         masses = records_table("Mass in surge by theory (2.5)", self.study.mass_by_theory, fields=fields)
         return Section(heading="Mass by theory", text=_THEORY + estimate, tables=[masses])
 
@@ -370,10 +355,7 @@ def _subset_table(label: str, subset: TowByTow) -> Table:
     return table(label[0].upper() + label[1:], heads, rows, on_screen=False)
 
 
-_SPEEDS = (
-    Signal(name="speed", title="speed", unit="m/s"),
-    Signal(name="left", title="less the model", unit="m/s"),
-)
+_SPEEDS = (Signal(name="speed", title="speed", unit="m/s"), Signal(name="left", title="less the model", unit="m/s"))
 
 
 def tow_speed_chart(speeds: TowSpeeds) -> ChartSpec:

@@ -9,14 +9,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from tank2sim.cards.card import Card
-from tank2sim.cards.form import (
-    BodyModel,
-    BodySection,
-    CardSection,
-    Environment,
-    Length,
-    TimeConstant,
-)
+from tank2sim.cards.form import BodyModel, BodySection, CardSection, Environment, Length, TimeConstant
 
 
 class YawRigModel(BodyModel):

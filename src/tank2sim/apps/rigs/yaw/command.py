@@ -37,11 +37,7 @@ YawMethod = Literal[
 
 
 def write_yaw_card(
-    result: YawResult,
-    path: Path,
-    *,
-    card: Vessel | str | Path | None = None,
-    length_m: PositiveArgument | None = None,
+    result: YawResult, path: Path, *, card: Vessel | str | Path | None = None, length_m: PositiveArgument | None = None
 ) -> YawResult:
     """Return the result with the card as its file, and a notice about it.
 

@@ -87,12 +87,19 @@ def yaw_rig_model(name: str, rig: YawRig, *, with_current_loop: bool = True) -> 
         derivative="motion.rdot",
         start=p["initial.r"],
     )
-    motor = _current_loop(p) if with_current_loop else (_current_input(),)
+    recorded = Input(name="motor.current", unit="A", description="Current of the motor, + turns clockwise")
+    motor = _current_loop(p) if with_current_loop else (recorded,)
+    pulse = 2 * math.pi / p["encoder.pulses"]
     current = motor[0]
     quantities = [
         Quantity(name="motion.psidot", unit="rad/s", description="Rate of the yaw angle", value=rate.symbol),
         *_mechanics(heading.symbol, rate.symbol, current.symbol, p, rig.walls),
-        _encoder(heading.symbol, p),
+        Quantity(
+            name="encoder.angle",
+            unit="rad",
+            description="Yaw angle as the encoder counts it, whole pulses",
+            value=ca.floor(heading.symbol / pulse) * pulse,
+        ),
         *(variable for variable in motor if isinstance(variable, Quantity)),
     ]
     outputs = [heading.name, rate.name, "motion.rdot", "encoder.angle", "moment.motor", "moment.resistance"]
@@ -106,10 +113,6 @@ def yaw_rig_model(name: str, rig: YawRig, *, with_current_loop: bool = True) -> 
         outputs=(*outputs, current.name) if with_current_loop else tuple(outputs),
         step_s=_STEP_S,
     )
-
-
-def _current_input() -> Input:
-    return Input(name="motor.current", unit="A", description="Current of the motor, + turns clockwise")
 
 
 def _current_loop(p: dict[str, ca.SX]) -> tuple[State, Input, Quantity]:
@@ -131,16 +134,6 @@ def _current_loop(p: dict[str, ca.SX]) -> tuple[State, Input, Quantity]:
         value=(allowed - current.symbol) / p["motor.lag"],
     )
     return current, command, loop
-
-
-def _encoder(heading: ca.SX, p: dict[str, ca.SX]) -> Quantity:
-    pulse = 2 * math.pi / p["encoder.pulses"]
-    return Quantity(
-        name="encoder.angle",
-        unit="rad",
-        description="Yaw angle as the encoder counts it, whole pulses",
-        value=ca.floor(heading / pulse) * pulse,
-    )
 
 
 def _mechanics(

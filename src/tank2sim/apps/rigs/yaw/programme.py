@@ -149,12 +149,7 @@ class YawProgramme:
         slope = 2 * k * t1
         joints = np.array([0, t1, t2, t3, 2 * t3, 2 * t3 + t1, 2 * t3 + t2, 3 * t3, _REST * t3])
         rising = [(k, 0, 0), (0, slope, k * t1**2), (-k, 2 * k * (t3 - t2), top - k * (t3 - t2) ** 2), (0, 0, top)]
-        falling = [
-            (-k, 0, top),
-            (0, -slope, top - k * t1**2),
-            (k, -2 * k * (t3 - t2), k * (t3 - t2) ** 2),
-            (0, 0, 0),
-        ]
+        falling = [(-k, 0, top), (0, -slope, top - k * t1**2), (k, -2 * k * (t3 - t2), k * (t3 - t2) ** 2), (0, 0, 0)]
         return PPoly(np.array(rising + falling, dtype=float).T, joints)
 
     @cached_property

@@ -57,16 +57,27 @@ class TunedController:
         return (derivative, proportional) if self.as_printed else (proportional, derivative)
 
     def tuned_gains(
-        self, works: tuple[float, float], rates: tuple[float, float, float], lag_s: float
-    ) -> tuple[float, float]:
-        """K_P and K_D from a run: the first fractions of (1) and (2), with the braking limits t5, t6.
+        self, programme: YawProgramme, time: Array, current: Array, lag_s: float
+    ) -> tuple[float, float] | None:
+        """K_P and K_D from the last completed pair of intervals: the first fractions of (1) and (2).
 
-        `works` is int w I dt over the accelerating and the braking interval, A rad; `rates` are w1 and w2 (rad/s) and
-        int w^2 dt over the accelerating interval (rad2/s); `lag_s` is T_c.
+        With the programme's rates, the braking limits t5, t6, and `lag_s` T_c; None without a pair.
         """
-        w1, w2, square = rates
-        scale = self.divisor * lag_s
-        return dissipation_from_work(*works) / (scale * square), inertia_from_work(*works, w1, w2) / scale
+        pairs = [pair for pair in programme.pairs() if max(pair.accelerating_s[1], pair.braking_s[1]) <= time[-1]]
+        if not pairs:
+            return None
+        speeding, braking = pairs[-1]
+        if self.as_printed:  # t4 to t5, where the rate has hardly begun to fall
+            t4 = braking[0] - programme.settle_s - programme.rise_s / 6
+            braking = t4, t4 + programme.rise_s / 6
+        works: list[float] = []  # int w I dt, A rad
+        for ends in (braking, speeding):
+            times = np.linspace(*ends, 401)
+            rate = programme.at(times).rate_radps
+            works.insert(0, float(np.trapezoid(rate * np.interp(times, time, current), times)))
+        square, scale = float(np.trapezoid(rate**2, times)), self.divisor * lag_s
+        derivative = inertia_from_work(works[0], works[1], float(rate[0]), float(rate[-1])) / scale
+        return dissipation_from_work(works[0], works[1]) / (scale * square), derivative
 
     def law(self, h: float, lag_s: float, torque_constant_NmpA: float) -> Law:
         """The controller at the sampling interval `h`, s, for a motor with T_c and k_t."""
@@ -196,21 +207,22 @@ def run_yaw_rig(
         states.append(np.asarray(after))
         commands.append(np.asarray(ordered).ravel())
         if isinstance(controller, TunedController) and controller.tune:
-            gains = _tuned(controller, rig, programme, time[: end + 1], np.hstack(states)[2]) or gains
+            current = np.hstack(states)[2]
+            gains = controller.tuned_gains(programme, time[: end + 1], current, rig.current_lag_s) or gains
     path = np.hstack(states)
     saturation = _saturation(rig, np.concatenate(commands), h, allowed=allow_saturation)
     every = slice(None, None, measuring.record_every)
-    angle, rate, current = path[:3, every]
+    angle, rate, driven_A = path[:3, every]
     pulse = 2 * math.pi / rig.pulses_per_turn
-    noise = measuring.current_noise_A * np.random.default_rng(measuring.seed).standard_normal(len(current))
+    noise = measuring.current_noise_A * np.random.default_rng(measuring.seed).standard_normal(len(driven_A))
     return YawRun(
         programme=programme,
         time_s=time[every],
         angle_rad=np.floor(angle / pulse) * pulse if measuring.encoder else angle,
-        current_A=current + noise,
+        current_A=driven_A + noise,
         true_angle_rad=angle,
         true_rate_radps=rate,
-        true_current_A=current,
+        true_current_A=driven_A,
         gains=tuple(used),
         memory=tuple(path[3:, -1].tolist()),
         saturation=saturation,
@@ -230,27 +242,6 @@ def _closed_loop(rig: YawRig, law: Law, measuring: Measuring) -> tuple[Array, ca
     after = runge_kutta_step(model)(x, command, parameters, measuring.control_s)
     start: Array = np.concatenate([np.asarray(model.initial(parameters)).ravel(), law.start])
     return start, ca.Function("sample", [whole, given], [ca.vertcat(after, following), command], {"cse": True})
-
-
-def _tuned(
-    controller: TunedController, rig: YawRig, programme: YawProgramme, time: Array, current: Array
-) -> tuple[float, float] | None:
-    """Gains from the last completed pair of intervals, with the programme's rates; None without a pair."""
-    done = [pair for pair in programme.pairs() if max(pair.accelerating_s[1], pair.braking_s[1]) <= time[-1]]
-    if not done:
-        return None
-    works, square, rates = [], [], []
-    speeding, braking = done[-1]
-    if controller.as_printed:  # t4 to t5, where the rate has hardly begun to fall
-        t4 = braking[0] - programme.settle_s - programme.rise_s / 6
-        braking = t4, t4 + programme.rise_s / 6
-    for begin, end in (speeding, braking):
-        times = np.linspace(begin, end, 401)
-        rate = programme.at(times).rate_radps
-        works.append(float(np.trapezoid(rate * np.interp(times, time, current), times)))
-        square.append(float(np.trapezoid(rate**2, times)))
-        rates.append((float(rate[0]), float(rate[-1])))
-    return controller.tuned_gains((works[0], works[1]), (*rates[0], square[0]), rig.current_lag_s)
 
 
 def _saturation(rig: YawRig, command_A: Array, h: float, *, allowed: bool) -> Saturation | None:
