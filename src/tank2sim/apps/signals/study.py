@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -241,22 +241,20 @@ def _steering(series: dict[str, Series], segment_s: float | None) -> Steering | 
         rudder=SignalName(rudder).file,
         cross_correlation=correlation,
         transfer=transfer,
-        notices=_cautions(correlation, transfer, source.step_s),
+        notices=tuple(_cautions(correlation, transfer, source.step_s)),
     )
 
 
-def _cautions(correlation: Correlation, transfer: Transfer, step_s: float) -> tuple[Notice, ...]:
-    messages = []
+def _cautions(correlation: Correlation, transfer: Transfer, step_s: float) -> Iterator[Notice]:
     segment = transfer.averaging.samples_in_segment * step_s
     lag = correlation.lag_of_largest_s
     if abs(lag) > 0.1 * segment:
-        messages.append(
+        yield Notice(
             f"the yaw rate is most like the rudder of {lag:.3g} s before, which is long for spectral segments of "
             f"{segment:.3g} s: gain and coherence come out low; a longer --segment helps"
         )
     if not np.any(transfer.sure):
-        messages.append("no coherence of rudder and yaw rate is above chance: the transfer function says nothing")
-    return tuple(map(Notice, messages))
+        yield Notice("no coherence of rudder and yaw rate is above chance: the transfer function says nothing")
 
 
 REQUEST_FORMS = (

@@ -60,13 +60,6 @@ class GlidePath:
         """Length of the path through the water."""
         return math.fsum(glide.speed_mps * time for glide, time in zip(self.glides, self.durations_s, strict=True))
 
-    def orders(self) -> list[dict[str, float]]:
-        """The orders of the same glides for the transient model."""
-        return [
-            {"buoyancy.command": glide.buoyancy_kg, "pitch.command": glide.pitch_rad, "roll.command": glide.roll_rad}
-            for glide in self.glides
-        ]
-
     def sampled(self) -> Array:
         """The path in points dense enough for a chart, (n, 5) in the order of :class:`PathPoint`."""
         rows: list[PathPoint] = [self.places[0]]
@@ -110,14 +103,11 @@ def _glide(card: GliderCard, source: str, step: ProgrammeStep, as_printed: bool)
 
 def _after(begin: PathPoint, glide: SteadyGlide, duration: float) -> PathPoint:
     change = glide.turn_rate_radps * duration
-    height = begin.height_m + glide.climb_mps * duration
     cos, sin = math.cos(begin.heading_rad), math.sin(begin.heading_rad)
-    if not glide.turn_rate_radps:
-        # (13) in print has the whole speed along the ground
-        run = (glide.speed_mps if glide.as_printed else glide.horizontal_speed_mps) * duration
-        ahead, aside = run, 0.0
-        across = aside
-    else:
+    # (13) in print has the whole speed along the ground
+    ahead = (glide.speed_mps if glide.as_printed else glide.horizontal_speed_mps) * duration
+    aside = across = 0.0
+    if glide.turn_rate_radps:
         radius = math.copysign(glide.turning_radius_m, change)
         ahead, aside = radius * math.sin(change), radius * (1 - math.cos(change))
         across = 1 - math.cos(change) if glide.as_printed else aside
@@ -125,7 +115,7 @@ def _after(begin: PathPoint, glide: SteadyGlide, duration: float) -> PathPoint:
         begin.time_s + duration,
         begin.north_m + ahead * cos - across * sin,
         begin.east_m + ahead * sin + across * cos,
-        height,
+        begin.height_m + glide.climb_mps * duration,
         begin.heading_rad + change,
     )
 

@@ -142,7 +142,11 @@ class Compared(NamedTuple):
 
 def compare_with_steady(integrator: Integrator, path: GlidePath) -> Compared:
     """Fly the glides of a path with the transient model. Raises as :func:`follow_programme`."""
-    motion = follow_programme(integrator, path.orders(), path.durations_s)
+    orders = [
+        {"buoyancy.command": glide.buoyancy_kg, "pitch.command": glide.pitch_rad, "roll.command": glide.roll_rad}
+        for glide in path.glides
+    ]
+    motion = follow_programme(integrator, orders, path.durations_s)
     distance = []
     for place in path.places:
         flown = [motion.at(name, place.time_s) for name in ("motion.x", "motion.y", "motion.z")]

@@ -64,15 +64,8 @@ class Tows:
         """The highest reading."""
         return float(np.nanmax(self.speed_mps))
 
-    def only(self, number: int) -> Tows:
-        """One of the tows by itself, from 0, at the times when it was read."""
-        return self._of([number])
-
-    def without(self, number: int) -> Tows:
-        """All tows but one."""
-        return self._of([other for other in range(len(self.names)) if other != number])
-
-    def _of(self, numbers: list[int]) -> Tows:
+    def only(self, *numbers: int) -> Tows:
+        """Some of the tows, from 0, at the times when they were read."""
         speed = self.speed_mps[:, numbers]
         read = ~np.isnan(speed).all(axis=1)
         names = tuple(self.names[number] for number in numbers)
@@ -137,13 +130,11 @@ def read_tows(path: Path | str | CsvTable) -> Tows:
 
 
 def _check_name(table: CsvTable, name: str) -> None:
-    if _SPEED.fullmatch(name):
-        return
-    if name.startswith("speed") and not name.endswith("_mps"):
-        problem, remedy = "is not a speed in m/s", "convert it to m/s and call it speed_1_mps, speed_2_mps, ..."
-    else:
-        problem, remedy = "is not a speed of a tow", "delete it, or call it speed_1_mps, speed_2_mps, ..."
-    raise InputError(table.path, f"column {name}", problem, remedy)
+    if not _SPEED.fullmatch(name):
+        other = name.startswith("speed") and not name.endswith("_mps")
+        problem = "is not a speed in m/s" if other else "is not a speed of a tow"
+        remedy = f"{'convert it to m/s and' if other else 'delete it, or'} call it speed_1_mps, speed_2_mps, ..."
+        raise InputError(table.path, f"column {name}", problem, remedy)
 
 
 def _positive(table: CsvTable, key: str) -> float | None:

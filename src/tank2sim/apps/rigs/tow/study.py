@@ -493,7 +493,8 @@ def _each(tows: Tows, unknowns: tuple[str, ...], estimate: Callable[[Tows], Arra
 
     count = len(tows.names)
     alone = np.array([row(tows.only(number)) for number in range(count)])
-    left_out = np.array([row(tows.without(number)) for number in range(count)])
+    others = [[other for other in range(count) if other != number] for number in range(count)]
+    left_out = np.array([row(tows.only(*rest)) for rest in others])
     # sqrt((n - 1)/n sum (x_i - mean x)^2): Efron 1982, The jackknife, the bootstrap and other resampling plans.
     errors = np.sqrt((count - 1) / count * np.sum((left_out - left_out.mean(axis=0)) ** 2, axis=0))
     return TowByTow(

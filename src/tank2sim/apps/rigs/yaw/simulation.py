@@ -59,7 +59,7 @@ class TunedController:
     def tuned_gains(
         self, programme: YawProgramme, time: Array, current: Array, lag_s: float
     ) -> tuple[float, float] | None:
-        """K_P and K_D from the last completed pair of intervals: the first fractions of (1) and (2).
+        """K_P and K_D from the `current` of the last completed pair of intervals: the first fractions of (1) and (2).
 
         With the programme's rates, the braking limits t5, t6, and `lag_s` T_c; None without a pair.
         """
