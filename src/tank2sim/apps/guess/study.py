@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 import tomlkit
-from numpy.typing import NDArray
 
 from tank2sim.analysis.ensemble.draws import by_file_name, draws_of
 from tank2sim.apps.guess.prior import SHIP_OF_MODEL_M, ShipDimensions, prior_card
@@ -389,27 +388,29 @@ def conditioned(card: ManoeuvringCard, given: Sequence[GivenFigure], members: in
     draws, _ = draws_of(card, seed)
     run = PosterFigures(card, draws.names)
     first = np.array([list(draws.member(number).values()) for number in range(members)])
-    figures = run.at(first)
-    keep = _showing(figures)
-    prior, figures = first[keep], _rows(figures, keep)
+
+    def showing(values: Array) -> tuple[Array, dict[str, Array]]:
+        """Members that show every figure, all positive, and their figures."""
+        figures = run.at(values)
+        with np.errstate(invalid="ignore"):
+            keep = np.all([each > 0 for each in figures.values()], axis=0)
+        return values[keep], {key: each[keep] for key, each in figures.items()}
+
+    prior, before = showing(first)
     if len(prior) < LEAST_MEMBERS:
         problem = f"only {len(prior)} of {members} ships of these dimensions come round in all manoeuvres"
         raise ArgumentError("length_m", "", problem, "check the dimensions and the speed, or take more members")
-    before = figures
     for figure in given:
         _refuse_impossible(figure, before[figure.key])
     _refuse_contradiction(given, before, only_beyond=SURPRISE)
     wanted = np.log([figure.value for figure in given])
     errors = np.array([figure.standard_error / figure.value for figure in given])
     stream = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(members, STEPS)))
-    values = prior
+    values, figures = prior, before
     for _ in range(STEPS if given else 0):
         shown = np.log(np.column_stack([figures[figure.key] for figure in given]))
         values = _moved(values, shown, (wanted, errors), stream)
-        values = np.clip(values, draws.lowest, draws.highest)
-        figures = run.at(values)
-        keep = _showing(figures)
-        values, figures = values[keep], _rows(figures, keep)
+        values, figures = showing(np.clip(values, draws.lowest, draws.highest))
         if len(values) < LEAST_MEMBERS:
             _refuse_contradiction(given, before)
     for figure in given:
@@ -418,17 +419,6 @@ def conditioned(card: ManoeuvringCard, given: Sequence[GivenFigure], members: in
         if off > SURPRISE:
             _refuse_contradiction(given, before)
     return GuessMembers(draws, prior, values, before, figures)
-
-
-def _showing(figures: Mapping[str, Array]) -> NDArray[np.bool_]:
-    """Members that show every figure, all positive."""
-    with np.errstate(invalid="ignore"):
-        shown: NDArray[np.bool_] = np.all([values > 0 for values in figures.values()], axis=0)
-    return shown
-
-
-def _rows(figures: Mapping[str, Array], keep: NDArray[np.bool_]) -> dict[str, Array]:
-    return {key: values[keep] for key, values in figures.items()}
 
 
 def _moved(values: Array, shown: Array, wanted: tuple[Array, Array], stream: np.random.Generator) -> Array:

@@ -172,20 +172,18 @@ def covariance(problem: EquationError, estimates: Array, speed: SpeedFit) -> Arr
     is not used: these residuals are the misfit of smooth curves, not noise, and on simulated tows it gave less than
     half of the true standard error of M.
     """
-    first = len(problem.known)
-    norms = column_norms(problem.free_design)
-    r = np.linalg.qr(problem.free_design / norms)[1]
+    first, free = len(problem.known), problem.free_design
+    norms = column_norms(free)
+    r = np.linalg.qr(free / norms)[1]
     residuals = problem.target - problem.design @ estimates
-    v = speed.polynomial(problem.time_s)
-    root_weights = np.sqrt(problem.weights)[:, None]
-    scaled_time = problem.time_s / speed.span_s
+    v, scaled_time = speed.polynomial(problem.time_s), problem.time_s / speed.span_s
     columns = []
     for k in range(len(speed.covariance)):
         v_change = scaled_time**k
         a_change = k * scaled_time ** max(k - 1, 0) / speed.span_s
         drag_changes = [DRAG_POWERS[term] * v ** (DRAG_POWERS[term] - 1) * v_change for term in problem.terms]
-        design_change = root_weights * np.column_stack([a_change, *drag_changes])
-        right = (design_change.T @ residuals)[first:] - problem.free_design.T @ (design_change @ estimates)
+        design_change = np.sqrt(problem.weights)[:, None] * np.column_stack([a_change, *drag_changes])
+        right = (design_change.T @ residuals)[first:] - free.T @ (design_change @ estimates)
         columns.append(np.linalg.solve(r, np.linalg.solve(r.T, right / norms)) / norms)
     sensitivity = np.vstack([np.zeros((first, len(columns))), np.column_stack(columns)])
     return sensitivity @ speed.covariance @ sensitivity.T
