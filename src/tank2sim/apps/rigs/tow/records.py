@@ -65,7 +65,7 @@ class Tows:
         return float(np.nanmax(self.speed_mps))
 
     def only(self, *numbers: int) -> Tows:
-        """Some of the tows, from 0, at the times when they were read."""
+        """The tows of these `numbers`, from 0, at the times when they were read."""
         speed = self.speed_mps[:, numbers]
         read = ~np.isnan(speed).all(axis=1)
         names = tuple(self.names[number] for number in numbers)

@@ -18,10 +18,19 @@ import numpy as np
 
 from tank2sim.apps.rigs.yaw.card import YawRig, YawRigCard
 from tank2sim.apps.rigs.yaw.model import yaw_rig_model
-from tank2sim.apps.rigs.yaw.programme import YawProgramme, dissipation_from_work, inertia_from_work, programme_of
-from tank2sim.apps.rigs.yaw.records import Medium, YawRecord
+from tank2sim.apps.rigs.yaw.programme import (
+    Similarity,
+    YawProgramme,
+    dissipation_from_work,
+    inertia_from_work,
+    programme_of,
+)
+from tank2sim.apps.rigs.yaw.records import Medium, YawRecord, yaw_record_text
+from tank2sim.apps.rigs.yaw.theory import numbers_of
 from tank2sim.arrays import Array
-from tank2sim.errors import InputError
+from tank2sim.cards import Card
+from tank2sim.dynamics.vessel import Vessel, as_vessel
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.simulation.scheme import runge_kutta_step
 
 
@@ -57,13 +66,13 @@ class TunedController:
         return (derivative, proportional) if self.as_printed else (proportional, derivative)
 
     def tuned_gains(
-        self, programme: YawProgramme, time: Array, current: Array, lag_s: float
+        self, programme: YawProgramme, time_s: Array, current: Array, lag_s: float
     ) -> tuple[float, float] | None:
         """K_P and K_D from the `current` of the last completed pair of intervals: the first fractions of (1) and (2).
 
         With the programme's rates, the braking limits t5, t6, and `lag_s` T_c; None without a pair.
         """
-        pairs = [pair for pair in programme.pairs() if max(pair.accelerating_s[1], pair.braking_s[1]) <= time[-1]]
+        pairs = [pair for pair in programme.pairs() if max(pair.accelerating_s[1], pair.braking_s[1]) <= time_s[-1]]
         if not pairs:
             return None
         speeding, braking = pairs[-1]
@@ -74,7 +83,7 @@ class TunedController:
         for ends in (braking, speeding):
             times = np.linspace(*ends, 401)
             rate = programme.at(times).rate_radps
-            works.insert(0, float(np.trapezoid(rate * np.interp(times, time, current), times)))
+            works.insert(0, float(np.trapezoid(rate * np.interp(times, time_s, current), times)))
         square, scale = float(np.trapezoid(rate**2, times)), self.divisor * lag_s
         derivative = inertia_from_work(works[0], works[1], float(rate[0]), float(rate[-1])) / scale
         return dissipation_from_work(works[0], works[1]) / (scale * square), derivative
@@ -316,3 +325,60 @@ def rig_in_air(rig: YawRig) -> YawRig:
     """
     water = ("added_inertia_kgm2", "quadratic_Nms2", "inertia_accelerating_kgm2", "inertia_braking_kgm2")
     return rig.model_copy(update={**dict.fromkeys(water, 0.0), "braking_quadratic_Nms2": None, "walls": None})
+
+
+def simulated_file(
+    rig: YawRigCard,
+    path: Path,
+    medium: Medium,
+    controller: str,
+    similar_to: str | None,
+    noise_A: float,
+) -> tuple[YawRecord, str]:
+    """A simulated record, and the text of its file; `controller` and `similar_to` as of :func:`tank2sim.yaw`."""
+    if path.exists():
+        raise InputError(path, "", "exists, and may be a measurement", "give the simulated record a new name")
+    chosen = AdaptiveController() if controller == "adaptive" else None
+    programme = similar_programme(rig, similar_to) if similar_to else None
+    record = simulated_record(rig, path, noise_A, medium=medium, controller=chosen, programme=programme)
+    return record, yaw_record_text(record)
+
+
+def rig_card_of(given: Vessel | Card | str | Path, argument: str) -> YawRigCard:
+    """The card of a yaw rig `given` as `argument`; InputError for a card of another kind."""
+    card = as_vessel(given).card
+    if not isinstance(card, YawRigCard):
+        raise card.fault("model.kind", f"is {card.model.kind!r}", f"give a card of the yaw rig as {argument}")
+    return card
+
+
+def similar_programme(card: YawRigCard, text: str) -> YawProgramme:
+    """The programme of a ship's motion (`text` ``L,B,R,T``) at the size of the card's body."""
+    length, beam, rate_degpmin, time_s = _ship_motion(text)
+    body = card.ship
+    if body.length_m is None or body.beam_m is None:
+        raise card.fault("ship", "has no length_m or no beam_m", "add them, on the waterline")
+    ratio = Similarity(ship_length_m=length, ship_beam_m=beam, length_m=body.length_m, beam_m=body.beam_m)
+    try:
+        return ratio.programme(math.radians(rate_degpmin / 60), time_s, programme_of(card))
+    except ValueError as error:
+        raise ArgumentError("similar_to", "", str(error), "give another motion of the ship") from None
+
+
+def _ship_motion(text: str) -> tuple[float, ...]:
+    """Length and beam (m), yaw rate (deg/min) and time (s) of a text ``L,B,R,T``."""
+    numbers = numbers_of(text, (4,))
+    if not numbers or not numbers[2] or min(numbers[0], numbers[1], numbers[3]) <= 0:
+        remedy = "write length and beam in m, yaw rate in deg/min and time in s: 38,8,100,120"
+        raise ArgumentError("similar_to", "", f"{text!r} is not a motion of a ship", remedy)
+    return tuple(numbers)
+
+
+def similarity_words(record: YawRecord, text: str) -> str:
+    """Sentence on the scale of rates between a ship's motion (`text` ``L,B,R,T``) and its record."""
+    length, beam, rate_degpmin, time_s = _ship_motion(text)
+    model_degps = math.degrees(record.programme.max_rate_radps)
+    return (
+        f"{length:g} m x {beam:g} m at model size: rates times {60 * model_degps / rate_degpmin:.4g}, so "
+        f"{rate_degpmin:g} deg/min in {time_s:g} s is {model_degps:.4g} deg/s in {3 * record.programme.rise_s:.4g} s"
+    )

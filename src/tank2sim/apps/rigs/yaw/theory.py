@@ -12,6 +12,8 @@ from typing import Literal
 from scipy.special import ellipeinc, ellipkinc
 
 from tank2sim.dynamics.ellipsoid import lamb_coefficients
+from tank2sim.dynamics.vessel import as_vessel
+from tank2sim.errors import ArgumentError
 
 Stage = Literal["accelerating", "braking"]
 
@@ -177,3 +179,28 @@ def theory_values(body: FloatingBody, rate_radps: float) -> tuple[TheoryValue, .
         values.append(row(f"(8) {stage}", added_inertia_by_8(body, rate_radps, stage), remark))
     values.append(row("(9)", added_inertia_by_9(body), "spheroid's ratio with the ship's inertia of water"))
     return tuple(values)
+
+
+def numbers_of(text: str, counts: tuple[int, ...]) -> list[float]:
+    """Finite numbers of a `text` with commas; none unless there are as many as one of `counts`."""
+    try:
+        numbers = [float(word) for word in text.split(",")]
+    except ValueError:
+        return []
+    return numbers if len(numbers) in counts and all(map(math.isfinite, numbers)) else []
+
+
+def parse_body(text: str) -> FloatingBody:
+    """From a text ``L,B,T,H`` or ``L,B,T,H,CB``, or from a card that states these."""
+    if "," in text:
+        sizes: list[float | None] = [*numbers_of(text, (4, 5))]
+    else:
+        ship = as_vessel(text).card.ship
+        sizes = [ship.length_m, ship.beam_m, ship.draught_m, ship.water_depth_m, ship.block_coefficient]
+    stated, block = [size for size in sizes[:4] if size and size > 0], sizes[4] if len(sizes) > 4 else None
+    if len(stated) < 4 or (block is not None and not 0 < block <= 1):
+        problem = f"{text!r} does not state length, beam, draught and depth of water"
+        remedy = "write for example 0.67,0.20,0.08,0.22,0.47, or name a card with them"
+        raise ArgumentError("theory", "", problem, remedy)
+    length, beam, draught, depth = stated
+    return FloatingBody(length_m=length, beam_m=beam, draught_m=draught, depth_m=depth, block_coefficient=block)
