@@ -21,18 +21,9 @@ def identified_craft(
 ) -> SteeredCard:
     """The card with the estimates and their standard errors, in the scaling of its own text.
 
-    Parameters
-    ----------
-    card : SteeredCard
-        The card of the problem; numbers that were not estimated stay.
-    fit : CraftFit
-    responses : mapping, optional
-        Thruster to its response to orders: lag, and dead band where it is determined.
-
-    Raises
-    ------
-    InputError
-        With the estimates the damping of the craft would drive it on.
+    `card`: The card of the problem; numbers that were not estimated stay. `responses`: Thruster to its response to
+    orders: lag, and dead band where it is determined. Raises InputError: With the estimates the damping of the craft
+    would drive it on.
     """
     changes: dict[str, object] = {}
     for number, thruster in enumerate(card.thrusters):
@@ -73,11 +64,7 @@ def identified_craft(
 def estimated_numbers(card: SteeredCard, fit: CraftFit) -> dict[str, int]:
     """Parameter of the model to the place of its estimate; twins of an estimated number have its place.
 
-    Parameters
-    ----------
-    card : SteeredCard
-        The card of the problem.
-    fit : CraftFit
+    `card`: The card of the problem.
     """
     found, free = {}, fit.problem.free
     for place, name in enumerate(free):

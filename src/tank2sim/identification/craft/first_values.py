@@ -51,10 +51,7 @@ def estimate_by_velocities(problem: Problem) -> Estimate | None:
     The sum is over sqrt(1 + e^2) - 1 of the errors e in standard deviations (``soft_l1``), so that the stretches that
     the model does not hold do not decide. Neighbouring errors are alike: standard errors count independent ones.
 
-    Parameters
-    ----------
-    problem : Problem
-        By :func:`.craft_problem`.
+    `problem`: By :func:`.craft_problem`.
     """
     runs = tuple(_by_velocities(run) for run in problem.runs)
     try:

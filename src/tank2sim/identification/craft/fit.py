@@ -98,26 +98,13 @@ class CoefficientVerdict(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class CraftFit:
-    """Fit of a craft.
-
-    Parameters
-    ----------
-    problem : Problem
-    estimate : KalmanEstimate
-        Estimate of the k free parameters.
-    levels : Levels
-        Noise levels.
-    by_run : array (runs, k, k)
-        Information of each run.
-    gust_share : float
-        Random acceleration in surge that the filter needs, over that by the largest thrust.
-    """
+    """Fit of a craft."""
 
     problem: Problem
-    estimate: KalmanEstimate
-    levels: Levels
-    by_run: Array
-    gust_share: float = 0.0
+    estimate: KalmanEstimate  # Estimate of the k free parameters
+    levels: Levels  # Noise levels
+    by_run: Array  # (runs, k, k): Information of each run
+    gust_share: float = 0.0  # Random acceleration in surge that the filter needs, over that by the largest thrust
 
     @property
     def holds(self) -> bool:
@@ -159,12 +146,7 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
     twice: the second time current, wind and bias of each trial are known beforehand as well as they agreed between
     trials the first time (empirical Bayes), for they change slowly.
 
-    Parameters
-    ----------
-    problem : Problem
-        By :func:`.craft_problem`.
-    progress : callable
-        Called with each better estimate.
+    `problem`: By :func:`.craft_problem`. `progress`: Called with each better estimate.
     """
     found = estimate_by_velocities(problem)
     if found is None or not deviates(found):
@@ -299,11 +281,7 @@ def spread_between(found: Array, errors: Array, before: float) -> tuple[float, f
     Normal in the trials and between them; the greatest likelihood, by expectation and maximisation (Dempster, Laird
     and Rubin 1977, J. R. Stat. Soc. B 39).
 
-    Parameters
-    ----------
-    found, errors : array (n,)
-        Value of each trial and its standard error, known beforehand to be 0 within `before`.
-    before : float
+    `found`, `errors` (n,): Value of each trial and its standard error, known beforehand to be 0 within `before`.
 
     Examples
     --------
@@ -343,10 +321,7 @@ def information(problem: Problem, values: Array, levels: Levels) -> Array:
 def _point(problem: Problem, values: Array, levels: Levels) -> tuple[SearchTask, SearchPoint]:
     """A pass of the filter over the runs; a linearisation that fails is left out.
 
-    Raises
-    ------
-    InputError
-        The filter loses the motion of a trial; the message names trial, time and axis.
+    Raises InputError: The filter loses the motion of a trial; the message names trial, time and axis.
     """
     task = task_of(problem, drifting=True)
     try:
@@ -368,23 +343,15 @@ def _point(problem: Problem, values: Array, levels: Levels) -> tuple[SearchTask,
 
 @dataclass(frozen=True, eq=False)
 class FreePrediction:
-    """Free-running predictions of a held-out run, and the motion that the smoother gives.
-
-    Parameters
-    ----------
-    run : SampledRun
-    rows : sequence of int (m,)
-        Instants predicted.
-    predicted, smoothed : array (m, 3)
-        u, v (m/s through the water) and r (rad/s).
-    ends : array (p, 3)
-        Error of x, y (m) and psi (rad) at the end of each prediction: predicted less measured, nan if not measured.
-    """
+    """Free-running predictions of a held-out run, and the motion that the smoother gives."""
 
     run: SampledRun
-    rows: Sequence[int]
+    rows: Sequence[int]  # Instants predicted
+    # `predicted`, `smoothed`: (m, 3): u, v (m/s through the water) and r (rad/s)
     predicted: Array
     smoothed: Array
+    # (p, 3): Error of x, y (m) and psi (rad) at the end of each prediction: predicted less measured, nan if not
+    # measured
     ends: Array
 
 
@@ -393,11 +360,7 @@ def predict_free(fit: CraftFit, runs: Sequence[SampledRun]) -> list[FreePredicti
 
     Nothing measured after its beginning enters a prediction; current and wind stay as they were found until then.
 
-    Parameters
-    ----------
-    fit : CraftFit
-    runs : sequence of SampledRun
-        Held-out trials, of the same problem.
+    `runs`: Held-out trials, of the same problem.
     """
     problem = fit.problem.with_runs(tuple(runs))
     names = problem.model.state_names
@@ -440,10 +403,7 @@ def predict_by_card(problem: Problem) -> list[FreePrediction]:
 
     Current and wind of a run are known beforehand by those of the other runs, if there are enough of them.
 
-    Parameters
-    ----------
-    problem : Problem
-        By :func:`.craft_problem`.
+    `problem`: By :func:`.craft_problem`.
     """
     # The filter estimates something: one number of the card, within a millionth.
     first, error = problem.prior_mean[:1], 1e-6 * (np.abs(problem.prior_mean[:1]) + 1e-6)
@@ -463,9 +423,7 @@ def predict_by_card(problem: Problem) -> list[FreePrediction]:
 def determination(predicted: Array, truth: Array) -> Array:
     """R^2 of each column (n, m): 1 less the sum of squared errors over that about the mean.
 
-    Parameters
-    ----------
-    predicted, truth : array (n, m)
+    `predicted`, `truth` (n, m).
 
     Examples
     --------

@@ -28,24 +28,15 @@ TRIAL_S = 300.0
 
 @dataclass(frozen=True, eq=False)
 class CandidateTrial:
-    """A manoeuvre of five minutes.
+    """A manoeuvre of five minutes."""
 
-    Parameters
-    ----------
-    words : str
-        Orders in words, revolutions in % of the largest: port/starboard.
-    t_s : tuple of float
-    order_port, order_starboard : tuple of float
-        Orders of the thrusters at these times, shares of their largest revolutions.
-    determines : tuple of str
-        Coefficients that the trials so far do not determine and that it would.
-    """
-
-    words: str
+    words: str  # Orders in words, revolutions in % of the largest: port/starboard
     t_s: tuple[float, ...]
+    # `order_port`, `order_starboard`: Orders of the thrusters at these times, shares of their largest
+    # revolutions
     order_port: tuple[float, ...]
     order_starboard: tuple[float, ...]
-    determines: tuple[str, ...]
+    determines: tuple[str, ...]  # Coefficients that the trials so far do not determine and that it would
 
 
 def _patterns() -> dict[str, list[tuple[float, float, float]]]:
@@ -78,11 +69,6 @@ def next_trials(card: SteeredCard, fit: CraftFit) -> list[CandidateTrial]:
     """The candidates, the one first that determines most of the coefficients that the trials do not.
 
     Empty for a craft whose thrusters are not two.
-
-    Parameters
-    ----------
-    card : SteeredCard
-    fit : CraftFit
     """
     if len(card.thrusters) != 2:
         return []

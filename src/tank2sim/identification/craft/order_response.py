@@ -40,18 +40,13 @@ _LEVEL = 1e-3
 
 @dataclass(frozen=True)
 class OrderResponse:
-    """How a thruster follows its orders.
+    """How a thruster follows its orders."""
 
-    Parameters
-    ----------
-    lag_s, lag_error_s : float
-        T and its standard error.
-    rest_radps, turning_radps : float
-        Largest order at which the propeller rested, 0 without any, and least one at which it turned, rad/s.
-    """
-
+    # `lag_s`, `lag_error_s`: T and its standard error
     lag_s: float
     lag_error_s: float
+    # `rest_radps`, `turning_radps`: Largest order at which the propeller rested, 0 without any, and least one
+    # at which it turned, rad/s
     rest_radps: float
     turning_radps: float
 
@@ -70,11 +65,7 @@ class OrderResponse:
 def order_responses(card: SteeredCard, trials: Sequence[Trial]) -> dict[str, OrderResponse]:
     """The response of each thruster whose orders and revolutions are in the trials; those that share numbers have one.
 
-    Parameters
-    ----------
-    card : SteeredCard
-    trials : sequence of Trial
-        By :func:`tank2sim.records.craft_trials.read_craft_trial`.
+    `trials`: By :func:`tank2sim.records.craft_trials.read_craft_trial`.
     """
     first, shared = card.thrusters[0].name, twins(card)
     found: dict[str, OrderResponse] = {}

@@ -91,14 +91,9 @@ apart it is a whole part, and the motion is measured at the rows alone."""
 def craft_fit_model(card: SteeredCard, driven_by: str = "revolutions", *, turned: bool = False) -> Model:
     """The model of a card driven by measured or ordered revolutions, with disturbances as constant states.
 
-    Parameters
-    ----------
-    card : SteeredCard
-    driven_by : str
-        ``revolutions``: lag, dead band and exponent of the card are left out, for they lie before the revolutions;
-        ``orders``: they are in, except a lag shorter than a step.
-    turned : bool
-        The directions of thrusters that turn were measured: their lag is left out.
+    `driven_by`: ``revolutions``: lag, dead band and exponent of the card are left out, for they lie before the
+    revolutions; ``orders``: they are in, except a lag shorter than a step. `turned`: The directions of thrusters that
+    turn were measured: their lag is left out.
     """
     thrusters = tuple(
         thruster.model_copy(update={"time_constant_s": None, "dead_band_radps": 0.0, "order_exponent": None})
@@ -244,16 +239,8 @@ def craft_prior(card: SteeredCard, model: Model) -> dict[str, tuple[float, float
 def craft_problem(card: SteeredCard, trials: Sequence[Trial]) -> Problem:
     """The problem of a card and trials.
 
-    Parameters
-    ----------
-    card : SteeredCard
-    trials : sequence of Trial
-        By :func:`tank2sim.records.craft_trials.read_craft_trial`.
-
-    Raises
-    ------
-    InputError
-        A trial is too short, or some trials have revolutions and others orders alone.
+    `trials`: By :func:`tank2sim.records.craft_trials.read_craft_trial`. Raises InputError: A trial is too short, or
+    some trials have revolutions and others orders alone.
     """
     by = craft_driven_by(card, trials)
     turned = not any(name.startswith("azimuth_order_") for trial in trials for name in trial.signals)
@@ -300,10 +287,7 @@ def without_compass(problem: Problem) -> Problem:
 def craft_driven_by(card: SteeredCard, trials: Sequence[Trial]) -> str:
     """What drives the model in all trials: ``revolutions``, which were measured, or else ``orders``.
 
-    Raises
-    ------
-    InputError
-        Some trials have revolutions and no orders, others orders alone.
+    Raises InputError: Some trials have revolutions and no orders, others orders alone.
     """
     if all(f"n_{thruster.name}_radps" in trial.signals for trial in trials for thruster in card.thrusters):
         return "revolutions"
@@ -317,12 +301,7 @@ def craft_driven_by(card: SteeredCard, trials: Sequence[Trial]) -> str:
 def with_disturbances(problem: Problem, means: Array, spreads: Array) -> Problem:
     """The problem in which the disturbances of a trial are `means` within `spreads` (5,) before it is looked at.
 
-    Parameters
-    ----------
-    problem : Problem
-        By :func:`craft_problem`.
-    means, spreads : array (5,)
-        Means and spreads of the :data:`DISTURBANCES`.
+    `problem`: By :func:`craft_problem`. `means`, `spreads` (5,): Means and spreads of the :data:`DISTURBANCES`.
     """
     known = dict(zip(DISTURBANCES, zip(means.tolist(), spreads.tolist(), strict=True), strict=True))
 

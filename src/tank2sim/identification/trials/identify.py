@@ -101,70 +101,42 @@ METHOD_WORDS = {"kalman": ("the Kalman filter", "output_error"), "output_error":
 
 @dataclass(frozen=True, eq=False)
 class Identification:
-    """Result of an identification.
+    """Result of an identification."""
 
-    Parameters
-    ----------
-    started : ManoeuvringCard
-        The start card of the estimate: the given card in the requested structure.
-    card : ManoeuvringCard
-        With the estimates and their standard errors.
-    problem : Problem
-        The problem of the fitted trials.
-    estimate : Estimate
-    identifiability : Identifiability
-    noise : mapping
-        Standard deviation of measurement noise by variable, stated in the files or estimated: the unit of misfit.
-    fit, holdout : Comparison
-        Comparison of the new card with the fitted trials, and with the held-out trials (None without any).
-    before, before_holdout : Comparison
-        The same for the given card.
-    structure : str
-        Structure of the model, as requested or chosen.
-    manoeuvres : mapping
-        Trial to a description of the recognised manoeuvre.
-    forced : tuple of str
-        Evidence that the trials are not of the card's ship, where the fit was forced.
-    structures : mapping
-        Cross-validation of each structure; empty unless the structure is :data:`.options.AUTO` or
-        :data:`.options.AVERAGE`.
-    weights : mapping
-        Weight of each structure in the intervals of held-out trials; empty unless it is :data:`.options.AVERAGE`.
-    criteria : Criteria or None
-        Information criteria of the fit, for comparison with another model of the same trials; None where the
-        velocities were not measured.
-    posterior : PosteriorSamples or None
-        On request; values and covariance of the estimate are then its means and covariance.
-    bootstrap : array (members, k) or None
-        Estimates from trials simulated with the estimate (:mod:`.prediction_intervals`), on request.
-    notices : tuple of Notice
-    current : WaterCurrent or None
-        Estimated with the coefficients; None where the card or a sensor states it, and in a basin. All cards have it.
-    choice : MethodChoice or None
-        Choice of the method, and its reason; None where the options name the method.
-    """
-
-    started: ManoeuvringCard
-    card: ManoeuvringCard
-    problem: Problem
+    started: ManoeuvringCard  # The start card of the estimate: the given card in the requested structure
+    card: ManoeuvringCard  # With the estimates and their standard errors
+    problem: Problem  # The problem of the fitted trials
     estimate: Estimate
     identifiability: Identifiability
+    # Standard deviation of measurement noise by variable, stated in the files or estimated: the unit of misfit
     noise: Mapping[str, float]
+    # `fit`, `holdout`: Comparison of the new card with the fitted trials, and with the held-out trials (None
+    # without any)
     fit: Comparison
     holdout: Comparison | None
+    # `before`, `before_holdout`: The same for the given card
     before: Comparison
     before_holdout: Comparison | None
-    structure: str
+    structure: str  # Structure of the model, as requested or chosen
+    # Cross-validation of each structure; empty unless the structure is :data:`.options.AUTO` or
+    # :data:`.options.AVERAGE`
     structures: Mapping[str, CrossValidation]
+    # Weight of each structure in the intervals of held-out trials; empty unless it is :data:`.options.AVERAGE`
     weights: Mapping[str, float]
+    # Information criteria of the fit, for comparison with another model of the same trials; None where the
+    # velocities were not measured
     criteria: Criteria | None
+    # On request; values and covariance of the estimate are then its means and covariance
     posterior: PosteriorSamples | None
+    # (members, k): Estimates from trials simulated with the estimate (:mod:`.prediction_intervals`), on request
     bootstrap: Array | None
-    manoeuvres: Mapping[str, str]
-    forced: tuple[str, ...]
+    manoeuvres: Mapping[str, str]  # Trial to a description of the recognised manoeuvre
+    forced: tuple[str, ...]  # Evidence that the trials are not of the card's ship, where the fit was forced
     notices: tuple[Notice, ...]
+    # Estimated with the coefficients; None where the card or a sensor states it, and in a basin. All cards have
+    # it.
     current: WaterCurrent | None = None
-    choice: MethodChoice | None = None
+    choice: MethodChoice | None = None  # Choice of the method, and its reason; None where the options name the method
 
     @property
     def comparisons(self) -> tuple[tuple[str, Comparison, Comparison], ...]:
@@ -188,24 +160,12 @@ def identify_trials(
 ) -> Identification:
     """Estimate the coefficients of a card from free-running trials, alone or together with captive tests.
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-        Prior of the ship: values and standard errors.
-    trials, holdout : Measured
-        Trials to fit, and trials for comparison only.
-    options : IdentificationOptions, optional
-    progress : callable
-        Called with each better estimate. A KeyboardInterrupt ends the search with the best estimate so far.
-    executor : concurrent.futures.Executor, optional
-        For the fits of cross-validation and bootstrap, and the simulations behind intervals.
-
-    Raises
-    ------
-    InputError
-        The captive tests are of another ship, or the method is not output error; the trials look like those of another
-        ship than the card's, or of two ships, do not excite the estimated parameters, lack necessary signals, or are
-        driven by another rudder signal than the held-out trials.
+    `card`: Prior of the ship: values and standard errors. `trials`, `holdout`: Trials to fit, and trials for comparison
+    only. `progress`: Called with each better estimate. A KeyboardInterrupt ends the search with the best estimate so
+    far. `executor`: For the fits of cross-validation and bootstrap, and the simulations behind intervals. Raises
+    InputError: The captive tests are of another ship, or the method is not output error; the trials look like those of
+    another ship than the card's, or of two ships, do not excite the estimated parameters, lack necessary signals, or
+    are driven by another rudder signal than the held-out trials.
     """
     options = options or IdentificationOptions()
     try:

@@ -40,20 +40,13 @@ _LEAST_NOISE = 1e-3
 
 @dataclass(frozen=True)
 class Following:
-    """Errors of a model on one run.
-
-    Parameters
-    ----------
-    name : str
-    windows : mapping
-        Signal to (root mean square of the error, of the measurement less its mean) over windows of :data:`_WINDOW`,
-        each with its own initial state; SI.
-    whole : mapping
-        Signal to root mean square error over the whole run from one initial state; inf where the motion diverged.
-    """
+    """Errors of a model on one run."""
 
     name: str
+    # Signal to (root mean square of the error, of the measurement less its mean) over windows of
+    # :data:`_WINDOW`, each with its own initial state; SI
     windows: Mapping[str, tuple[float, float]]
+    # Signal to root mean square error over the whole run from one initial state; inf where the motion diverged
     whole: Mapping[str, float]
 
     def relative(self, signal: str) -> float:
@@ -101,24 +94,14 @@ def pooled(results: Sequence[Following], signal: str) -> float:
 
 @dataclass(frozen=True)
 class FigureComparison:
-    """A figure of a manoeuvre.
+    """A figure of a manoeuvre."""
 
-    Parameters
-    ----------
-    trial, name : str
-        Trial, and name of the figure with its unit.
-    measured : float
-    predicted : float or None
-        By the closed-loop simulation; None where the simulation does not reach it.
-    interval : (float, float) or None
-        95 % prediction interval; None where it was not computed.
-    """
-
+    # `trial`, `name`: Trial, and name of the figure with its unit
     trial: str
     name: str
     measured: float
-    predicted: float | None
-    interval: tuple[float, float] | None = None
+    predicted: float | None  # By the closed-loop simulation; None where the simulation does not reach it
+    interval: tuple[float, float] | None = None  # 95 % prediction interval; None where it was not computed
 
     @property
     def error(self) -> float:
@@ -132,12 +115,7 @@ class FigureComparison:
 def predicted_figures(card: ManoeuvringCard, trials: Sequence[Trial]) -> tuple[FigureComparison, ...]:
     """Figures of the turns and zigzags among trials, measured and simulated in closed loop from the measured start.
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-        Card of the ship.
-    trials : sequence of Trial
-        At the ship's size; trials other than turns and zigzags are ignored.
+    `card`: Card of the ship. `trials`: At the ship's size; trials other than turns and zigzags are ignored.
     """
     model = build(steerable(card))
     integrator = Integrator(model)
@@ -161,31 +139,16 @@ def predicted_figures(card: ManoeuvringCard, trials: Sequence[Trial]) -> tuple[F
 
 @dataclass(frozen=True, eq=False)
 class Passage:
-    """One trial and its simulation by a model.
+    """One trial and its simulation by a model."""
 
-    Parameters
-    ----------
-    name : str
-        Name of the trial.
-    closed_loop : bool
-        True for a turn or zigzag: the model was steered as in the manoeuvre, from the measured start. False: it was
-        driven by the recorded rudder, from the initial state that fits the record best.
-    time_s : array (n,)
-        In the trial's own time.
-    measured : mapping
-        Measured signals among :data:`_SHOWN` (n,), nan where not measured.
-    model_time_s : array (m,)
-        In the trial's own time; empty where the motion left all bounds.
-    simulated : mapping
-        Each of :data:`_SHOWN` (m,).
-    """
-
-    name: str
+    name: str  # Name of the trial
+    # True for a turn or zigzag: the model was steered as in the manoeuvre, from the measured start. False: it
+    # was driven by the recorded rudder, from the initial state that fits the record best.
     closed_loop: bool
-    time_s: Array
-    measured: Mapping[str, Array]
-    model_time_s: Array
-    simulated: Mapping[str, Array]
+    time_s: Array  # (n,): In the trial's own time
+    measured: Mapping[str, Array]  # Measured signals among :data:`_SHOWN` (n,), nan where not measured
+    model_time_s: Array  # (m,): In the trial's own time; empty where the motion left all bounds
+    simulated: Mapping[str, Array]  # Each of :data:`_SHOWN` (m,)
 
 
 _SHOWN = ("rudder", "motion.psi", "motion.r", "motion.speed", "motion.beta", "motion.x", "motion.y")
@@ -198,16 +161,9 @@ def comparison_windows(
 ) -> tuple[Passage, ...]:
     """Trials and their simulations by a card's model: turns and zigzags in closed loop, others replayed.
 
-    Parameters
-    ----------
-    problem : Problem
-        Set up with a card and these trials; its prior means are the card's values.
-    card : ManoeuvringCard
-        That card.
-    trials : sequence of Trial
-        One for each run of the problem.
-    noise : mapping
-        Standard deviation by variable: weighs signals in the initial state of a replayed trial.
+    `problem`: Set up with a card and these trials; its prior means are the card's values. `card`: That card. `trials`:
+    One for each run of the problem. `noise`: Standard deviation by variable: weighs signals in the initial state of a
+    replayed trial.
     """
     model = build(steerable(card))
     integrator, shooting = Integrator(model), None
@@ -312,15 +268,9 @@ def compare_card(
 ) -> Comparison:
     """Compare a card's model with trials.
 
-    Parameters
-    ----------
-    card, trials
-        Card and trials of the same size.
-    residual : mapping
-        Expected standard deviation of each variable's error: it weighs the signals in the fit of a window's initial
-        state. With weights of sensor noise alone, the state would follow a single signal.
-    whole : bool
-        Compare also outside the card's range of speeds.
+    `card`, `trials`: Card and trials of the same size. `residual`: Expected standard deviation of each variable's
+    error: it weighs the signals in the fit of a window's initial state. With weights of sensor noise alone, the state
+    would follow a single signal. `whole`: Compare also outside the card's range of speeds.
     """
     problem = problem_from_card(card, trials.trials, trials.driven_by, whole=whole)
     weights = {name: residual.get(name) or 1.0 for name in problem.seen}

@@ -46,47 +46,25 @@ STILL = {"motion.u": 0.002, "motion.v": 0.002, "motion.r": 0.002, "rudder": 0.00
 
 @dataclass(frozen=True, eq=False)
 class Identifiability:
-    """Identifiability of k parameters; everything in units of the prior's standard errors (with its scale).
+    """Identifiability of k parameters; everything in units of the prior's standard errors (with its scale)."""
 
-    Parameters
-    ----------
-    free : tuple of str
-        Names of the parameters.
-    singular_values : array (k,)
-        Singular values of the weighted sensitivities, falling; below 1 the prior has more information than the trials.
-    condition : float
-        Largest over smallest of them, inf where the smallest is zero.
-    correlation : array (k, k)
-        Correlation of the estimates by the trials alone.
-    pairs : tuple of (str, str, float)
-        Parameters whose absolute correlation exceeds :data:`CLOSE_CORRELATION`, the closest first.
-    unseen : tuple of tuple of str
-        Combinations of parameters that the trials do not determine.
-    share : array (k,)
-        Share of each parameter's information from the trials: 1 - (variance after / variance before).
-    notices : tuple of Notice
-        The same in words.
-    """
-
-    free: tuple[str, ...]
+    free: tuple[str, ...]  # Names of the parameters
+    # (k,): Singular values of the weighted sensitivities, falling; below 1 the prior has more information than
+    # the trials
     singular_values: Array
-    condition: float
-    correlation: Array
+    condition: float  # Largest over smallest of them, inf where the smallest is zero
+    correlation: Array  # (k, k): Correlation of the estimates by the trials alone
+    # Parameters whose absolute correlation exceeds :data:`CLOSE_CORRELATION`, the closest first
     pairs: tuple[tuple[str, str, float], ...]
-    unseen: tuple[tuple[str, ...], ...]
-    share: Array
-    notices: tuple[Notice, ...]
+    unseen: tuple[tuple[str, ...], ...]  # Combinations of parameters that the trials do not determine
+    share: Array  # (k,): Share of each parameter's information from the trials: 1 - (variance after / variance before)
+    notices: tuple[Notice, ...]  # The same in words
 
 
 def identifiability(problem: Problem, estimate: Estimate) -> Identifiability:
     """Identifiability of the parameters after a fit.
 
-    Parameters
-    ----------
-    problem : Problem
-        The prior.
-    estimate : Estimate
-        Its information and the scale of the prior.
+    `problem`: The prior. `estimate`: Its information and the scale of the prior.
     """
     unit = scaled_prior(problem, estimate.prior_scale)
     information = estimate.information * np.outer(unit, unit)
@@ -120,10 +98,7 @@ def refuse_unseen(problem: Problem) -> tuple[str, ...]:
     constant, and the constant part of a term that needs motion is not counted, because a constant force has the same
     effect.
 
-    Raises
-    ------
-    InputError
-        With the refused parameters, and the motions that show them.
+    Raises InputError: With the refused parameters, and the motions that show them.
     """
     estimate = equation_error(problem, settings=EquationErrorSettings(rounds=2))
     form = WeakForm(problem)

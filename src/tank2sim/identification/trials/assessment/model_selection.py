@@ -36,36 +36,21 @@ Score = Callable[[Problem, Estimate], float]
 
 @dataclass(frozen=True)
 class Criteria:
-    """Information criteria, the smaller the better; to compare models of the same runs.
+    """Information criteria, the smaller the better; to compare models of the same runs."""
 
-    Parameters
-    ----------
-    aic, bic : float
-        Akaike (1974) and Schwarz (1978): -2 log likelihood + 2 k, + k log n.
-    samples : float
-        n, number of independent residuals with the same information as these coloured ones.
-    parameters : float
-        k, effective number that the trials determine: a parameter held by the prior counts less than one.
-    """
-
+    # `aic`, `bic`: Akaike (1974) and Schwarz (1978): -2 log likelihood + 2 k, + k log n
     aic: float
     bic: float
-    samples: float
+    samples: float  # n, number of independent residuals with the same information as these coloured ones
+    # k, effective number that the trials determine: a parameter held by the prior counts less than one
     parameters: float
 
 
 def criteria(problem: Problem, estimate: Estimate, samples: float | None = None) -> Criteria:
     """Information criteria from the weak form's residuals, which are comparable between models of the same runs.
 
-    Parameters
-    ----------
-    problem : Problem
-        Prior and runs.
-    estimate : Estimate
-        By any method.
-    samples : float, optional
-        n, by default from the residuals of this model; give every model the n of the first, or differences in n exceed
-        those in fit.
+    `problem`: Prior and runs. `estimate`: By any method. `samples`: n, by default from the residuals of this model;
+    give every model the n of the first, or differences in n exceed those in fit.
     """
     form = WeakForm(problem)
     windows = form.at(estimate.values)
@@ -108,37 +93,19 @@ def effective_samples(series: Sequence[Array]) -> float:
 
 @dataclass(frozen=True)
 class HeldOutFold:
-    """A fit without some of the runs, and its error on them.
+    """A fit without some of the runs, and its error on them."""
 
-    Parameters
-    ----------
-    held_out : tuple of str
-        Names of the runs.
-    error : float
-        Error on them, by the score; inf where the fit or the prediction failed.
-    values : array (k,)
-        Estimates without them, empty where the fit failed.
-    """
-
-    held_out: tuple[str, ...]
-    error: float
-    values: Array
+    held_out: tuple[str, ...]  # Names of the runs
+    error: float  # Error on them, by the score; inf where the fit or the prediction failed
+    values: Array  # (k,): Estimates without them, empty where the fit failed
 
 
 @dataclass(frozen=True)
 class CrossValidation:
-    """Prediction of manoeuvres held out of the fit.
+    """Prediction of manoeuvres held out of the fit."""
 
-    Parameters
-    ----------
-    single : tuple of HeldOutFold
-        Each run held out once, in the order of the runs.
-    extrapolation : HeldOutFold
-        The runs of largest amplitude held out together.
-    """
-
-    single: tuple[HeldOutFold, ...]
-    extrapolation: HeldOutFold
+    single: tuple[HeldOutFold, ...]  # Each run held out once, in the order of the runs
+    extrapolation: HeldOutFold  # The runs of largest amplitude held out together
 
     @property
     def errors(self) -> Array:
@@ -151,22 +118,11 @@ def cross_validate(
 ) -> CrossValidation:
     """Hold out one run at a time, and then the runs of largest amplitude together.
 
-    Parameters
-    ----------
-    problem : Problem or Portable
-        Portable (:func:`tank2sim.identification.trials.problem.picklable.portable`) if the executor works in other
-        processes; `estimator` and `score` are then functions of a module, or partials of one.
-    estimator : callable
-        ``estimator(problem) -> Estimate``.
-    score : callable
-        ``score(problem, estimate) -> float``, where the problem has the held-out runs.
-    executor : concurrent.futures.Executor, optional
-        By default the folds run in sequence in this process.
-
-    Raises
-    ------
-    InputError
-        The problem has fewer than two runs.
+    `problem`: Portable (:func:`tank2sim.identification.trials.problem.picklable.portable`) if the executor works in
+    other processes; `estimator` and `score` are then functions of a module, or partials of one. `estimator`:
+    ``estimator(problem) -> Estimate``. `score`: ``score(problem, estimate) -> float``, where the problem has the
+    held-out runs. `executor`: By default the folds run in sequence in this process. Raises InputError: The problem has
+    fewer than two runs.
     """
     runs = problem.runs
     if len(runs) < 2:
@@ -195,13 +151,8 @@ def farthest(runs: Sequence[SampledRun]) -> tuple[int, ...]:
 def simplest(candidates: Mapping[str, CrossValidation]) -> str:
     """Name of the simplest model whose errors are not significantly larger than those of the best.
 
-    Parameters
-    ----------
-    candidates : mapping
-        Name to cross-validation over the same runs, from the simplest model to the one with most parameters.
+    `candidates`: Name to cross-validation over the same runs, from the simplest model to the one with most parameters.
 
-    Notes
-    -----
     The best model has the least mean error over all folds. A simpler model is as good if the mean of its paired
     differences from the best is within one standard error of that mean; pairs cancel the difficulty of each fold.
     """
@@ -227,12 +178,8 @@ def predictive_weights(candidates: Mapping[str, CrossValidation], samples: Seque
     are averaged over random weights of the folds, the Bayesian bootstrap: pseudo-BMA+ of Yao, Vehtari, Simpson and
     Gelman (2018), Bayesian Analysis 13, (7) to (10).
 
-    Parameters
-    ----------
-    candidates : mapping
-        Name to cross-validation over the same runs.
-    samples : sequence of float
-        n_f, number of independent residuals in each run.
+    `candidates`: Name to cross-validation over the same runs. `samples`: n_f, number of independent residuals in each
+    run.
     """
     names = list(candidates)
     errors = np.array([[fold.error for fold in candidates[name].single] for name in names])

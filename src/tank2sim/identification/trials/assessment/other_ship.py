@@ -107,12 +107,8 @@ def not_of_ship(card: ManoeuvringCard, trials: Measured, evidence: Sequence[str]
 def far_from_card(fitted: Problem, estimate: Estimate) -> tuple[str, ...]:
     """Evidence in an estimate: coefficients of sway or yaw, or the rudder's moment, that are another ship's.
 
-    Parameters
-    ----------
-    fitted : Problem
-        With the standard errors of the card.
-    estimate : Estimate
-        Its ``prior_scale`` has the factors on these errors that the trials demand, by equation (``Y``, ``N``).
+    `fitted`: With the standard errors of the card. `estimate`: Its ``prior_scale`` has the factors on these errors that
+    the trials demand, by equation (``Y``, ``N``).
     """
     far = []
     for letter, what in (("Y", "sway"), ("N", "yaw")):
@@ -156,19 +152,13 @@ def _mean(values_and_errors: list[tuple[float, float]]) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class RudderEffect:
-    """Yaw acceleration by the rudder in one trial: regression coefficients over the card's own derivative.
+    """Yaw acceleration by the rudder in one trial: regression coefficients over the card's own derivative."""
 
-    Parameters
-    ----------
-    measured, modelled : float
-        Coefficients of the measured accelerations and of the accelerations of the card along the same motion.
-    covariance : array (2, 2)
-        Covariance of the two coefficients.
-    """
-
+    # `measured`, `modelled`: Coefficients of the measured accelerations and of the accelerations of the card
+    # along the same motion
     measured: float
     modelled: float
-    covariance: Array
+    covariance: Array  # (2, 2): Covariance of the two coefficients
 
     @property
     def determined(self) -> bool:

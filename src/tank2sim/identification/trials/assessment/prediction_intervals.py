@@ -73,41 +73,22 @@ class WeightedFit:
 
 @dataclass(frozen=True)
 class PredictionSettings:
-    """Number of members, seed and quantiles.
+    """Number of members, seed and quantiles."""
 
-    Parameters
-    ----------
-    members : int
-        Simulations; 200 give the ends of a 95 % band to about a tenth of its width (project choice).
-    seed : int
-    levels : tuple of float
-        Levels of the quantiles.
-    """
-
-    members: int = 200
+    members: int = 200  # Simulations; 200 give the ends of a 95 % band to about a tenth of its width (project choice)
     seed: int = 0
-    levels: tuple[float, ...] = (0.025, 0.5, 0.975)
+    levels: tuple[float, ...] = (0.025, 0.5, 0.975)  # Levels of the quantiles
 
 
 @dataclass(frozen=True, eq=False)
 class Bands:
-    """Predicted distribution of the figures of a manoeuvre.
-
-    Parameters
-    ----------
-    levels : tuple of float
-    quantiles : mapping
-        Figure to its value at each level; those of a list are ``overshoots_deg.1`` and so on.
-    members : mapping
-        Figure to its value in each member (members,), nan where not reached.
-    failed : int
-        Members whose motion left all bounds.
-    """
+    """Predicted distribution of the figures of a manoeuvre."""
 
     levels: tuple[float, ...]
+    # Figure to its value at each level; those of a list are ``overshoots_deg.1`` and so on
     quantiles: Mapping[str, tuple[float, ...]]
-    members: Mapping[str, Array]
-    failed: int
+    members: Mapping[str, Array]  # Figure to its value in each member (members,), nan where not reached
+    failed: int  # Members whose motion left all bounds
 
 
 def bands(
@@ -121,24 +102,11 @@ def bands(
     """Bands of a manoeuvre's figures: coefficients drawn from their covariance, or from samples of their posterior, and
     random forces during the manoeuvre.
 
-    Parameters
-    ----------
-    ship : PicklableShip
-        The model is driven by the rudder's order, also if the trials were driven by its angle.
-    estimate : Estimate
-        Values and covariance of parameters of the ship's model; drawn values stay within the model's bounds.
-    manoeuvre
-        One of :mod:`tank2sim.simulation.manoeuvres`, or a recorded one, repeated from its start.
-    disturbances : Disturbances, optional
-        By default none: only coefficients are uncertain.
-    settings : PredictionSettings, optional
-    executor : concurrent.futures.Executor, optional
-        By default the members run in sequence in this process.
-
-    Raises
-    ------
-    InputError
-        The motion of every member leaves all bounds.
+    `ship`: The model is driven by the rudder's order, also if the trials were driven by its angle. `estimate`: Values
+    and covariance of parameters of the ship's model; drawn values stay within the model's bounds. `manoeuvre`: One of
+    :mod:`tank2sim.simulation.manoeuvres`, or a recorded one, repeated from its start. `disturbances`: By default none:
+    only coefficients are uncertain. `executor`: By default the members run in sequence in this process. Raises
+    InputError: The motion of every member leaves all bounds.
     """
     settings = settings or PredictionSettings()
     ship = replace(ship, driven_by="order")
@@ -177,18 +145,9 @@ def bootstrap(
     are drawn, too, around the estimate. Members in which a run leaves all bounds are omitted; this happens in long runs
     of a course-unstable ship.
 
-    Parameters
-    ----------
-    problem : Portable
-        The estimated problem.
-    estimate : Estimate
-        The true values of the simulation.
-    estimator : callable
-        ``estimator(problem) -> Estimate``; a function of a module for an executor of processes.
-    disturbances : Disturbances
-        Random forces on the simulated ship.
-    settings, executor
-        As for :func:`bands`.
+    `problem`: The estimated problem. `estimate`: The true values of the simulation. `estimator`: ``estimator(problem)
+    -> Estimate``; a function of a module for an executor of processes. `disturbances`: Random forces on the simulated
+    ship. `settings`, `executor`: As for :func:`bands`.
     """
     tasks = [(problem, estimate, estimator, disturbances, rng) for rng in _generators(settings or PredictionSettings())]
     estimates = [values for values in map_tasks(_again, tasks, executor) if values is not None]

@@ -32,18 +32,10 @@ FORCES = {"X": "N", "Y": "N", "N": "N.m"}
 
 @dataclass(frozen=True, eq=False)
 class Disturbances:
-    """Gauss-Markov forces.
+    """Gauss-Markov forces."""
 
-    Parameters
-    ----------
-    covariance : array (3, 3)
-        Covariance of X, Y (N) and N (N m).
-    correlation_s : float
-        Time in which their correlation falls to 1/e, s.
-    """
-
-    covariance: Array
-    correlation_s: float
+    covariance: Array  # (3, 3): Covariance of X, Y (N) and N (N m)
+    correlation_s: float  # Time in which their correlation falls to 1/e, s
 
     @property
     def deviations(self) -> Array:
@@ -127,15 +119,10 @@ def disturbed(model: Model) -> Model:
 
 
 def draw_disturbances(disturbances: Disturbances, fastest: float, rng: np.random.Generator) -> dict[str, float]:
-    """Parameters of a :func:`disturbed` model for one random course of the forces.
+    """Parameters of a :func:`disturbed` model for one course of the forces, drawn by `rng`.
 
-    Parameters
-    ----------
-    disturbances : Disturbances
-        Their covariance and correlation time.
-    fastest : float
-        Highest frequency that integration resolves, rad/s: higher frequencies are set to it.
-    rng : numpy.random.Generator
+    `disturbances`: Their covariance and correlation time. `fastest`: Highest frequency that integration resolves,
+    rad/s: higher frequencies are set to it.
     """
     share = (np.arange(HARMONICS) + rng.random(HARMONICS)) / HARMONICS  # one in each part of equal power
     rates = np.minimum(np.tan(np.pi / 2 * share) / disturbances.correlation_s, fastest)

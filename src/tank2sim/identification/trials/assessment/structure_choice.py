@@ -199,20 +199,11 @@ class MethodChoice:
 
 @dataclass(frozen=True)
 class SignalResidual:
-    """Residuals of output error in one signal.
+    """Residuals of output error in one signal."""
 
-    Parameters
-    ----------
-    name : str
-        Variable of the model.
-    above_noise : float
-        Root mean square over whole runs, over the standard deviation of the sensor's white noise.
-    samples : float
-        Samples after which the autocorrelation in pieces of the runs has fallen to 1/e; 0 for white residuals.
-    """
-
-    name: str
-    above_noise: float
+    name: str  # Variable of the model
+    above_noise: float  # Root mean square over whole runs, over the standard deviation of the sensor's white noise
+    # Samples after which the autocorrelation in pieces of the runs has fallen to 1/e; 0 for white residuals
     samples: float
 
     @property
@@ -224,11 +215,7 @@ class SignalResidual:
 def signal_residuals(problem: Problem, estimate: Estimate) -> tuple[SignalResidual, ...]:
     """Residuals of output error in each seen signal, of runs simulated from their first state.
 
-    Parameters
-    ----------
-    problem : Problem
-    estimate : Estimate
-        By output error, with its `motion`.
+    `estimate`: By output error, with its `motion`.
     """
     assert estimate.motion is not None
     white = np.sqrt(np.mean([sensor_noise(problem, run) ** 2 for run in problem.runs], axis=0))

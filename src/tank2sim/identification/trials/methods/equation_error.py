@@ -28,37 +28,20 @@ REPORTED_NOISE = 0.01
 
 @dataclass(frozen=True)
 class EquationErrorSettings:
-    """Settings of equation error.
+    """Settings of equation error."""
 
-    Parameters
-    ----------
-    width : float
-        Width of the test functions, in L/u0.
-    scale_prior : bool
-        Multiply the prior's standard errors, by groups, by the factor of largest evidence, at least 1.
-    rounds : int
-        Number of estimates of noise (and prior).
-    """
-
-    width: float = WIDTH
+    width: float = WIDTH  # Width of the test functions, in L/u0
+    # Multiply the prior's standard errors, by groups, by the factor of largest evidence, at least 1
     scale_prior: bool = True
-    rounds: int = 3
+    rounds: int = 3  # Number of estimates of noise (and prior)
 
 
 @dataclass(frozen=True, eq=False)
 class WhiteningWeights:
-    """Weights that whiten residuals: the root of the covariance of the three equations, and the colour of each.
+    """Weights that whiten residuals: the root of the covariance of the three equations, and the colour of each."""
 
-    Parameters
-    ----------
-    inverse : array (3, 3)
-        L^-1, with L L' the covariance of the residuals, L lower triangular.
-    colour : tuple of ColouredNoise
-        Colour of the three components of L^-1 e.
-    """
-
-    inverse: Array
-    colour: tuple[ColouredNoise, ...]
+    inverse: Array  # (3, 3): L^-1, with L L' the covariance of the residuals, L lower triangular
+    colour: tuple[ColouredNoise, ...]  # Colour of the three components of L^-1 e
 
     def whitened(self, values: Array, pieces: tuple[slice, ...]) -> Array:
         """Residuals (windows, 3) or their derivatives (windows, 3, k), whitened."""
@@ -92,21 +75,10 @@ def equation_error(
 ) -> Estimate:
     """Estimate the free parameters by equation error.
 
-    Parameters
-    ----------
-    problem : Problem
-        k free parameters.
-    start : array (k,), optional
-        Start of the search; by default the prior's mean.
-    settings : EquationErrorSettings, optional
-    progress : callable
-        Called with each better estimate; its exceptions propagate.
-
-    Raises
-    ------
-    InputError
-        A run lacks velocities and signals that determine them, all runs are shorter than a window, or the search
-        cannot move from its start, although the data ask for it (:class:`.StoppedSearchError`).
+    `problem`: k free parameters. `start` (k,): Start of the search; by default the prior's mean. `progress`: Called
+    with each better estimate; its exceptions propagate. Raises InputError: A run lacks velocities and signals that
+    determine them, all runs are shorter than a window, or the search cannot move from its start, although the data ask
+    for it (:class:`.StoppedSearchError`).
     """
     settings = settings or EquationErrorSettings()
     form = WeakForm(problem, settings.width)

@@ -42,90 +42,54 @@ SAME_SCALE = 0.05
 
 @dataclass(frozen=True)
 class KalmanSettings:
-    """Settings of the Kalman smoother.
+    """Settings of the Kalman smoother."""
 
-    Parameters
-    ----------
-    white : bool
-        Random accelerations are independent from step to step; else their time constant is estimated.
-    drifting : bool
-        Each sensor has a drift next to its white noise, also first-order Gauss-Markov (three to six times as slow).
-    scale_prior : bool
-        Multiply the prior's standard errors, by groups, by the factor of largest evidence, at least 1.
-    iterations : int
-        Most iterations for each width of the prior.
-    """
-
-    white: bool = False
+    white: bool = False  # Random accelerations are independent from step to step; else their time constant is estimated
+    # Each sensor has a drift next to its white noise, also first-order Gauss-Markov (three to six times as
+    # slow)
     drifting: bool = False
+    # Multiply the prior's standard errors, by groups, by the factor of largest evidence, at least 1
     scale_prior: bool = True
-    iterations: int = 40
+    iterations: int = 40  # Most iterations for each width of the prior
 
 
 @dataclass(frozen=True)
 class CorrelatedNoise:
-    """Time-correlated noise: a random acceleration on the rate of a state, or the drift of a sensor.
+    """Time-correlated noise: a random acceleration on the rate of a state, or the drift of a sensor."""
 
-    Parameters
-    ----------
-    deviation : float
-        Standard deviation in m/s2, rad/s2 or the signal's unit; for white noise, of its mean over a step.
-    time_s : float
-        Time constant, s; 0 for white noise.
-    """
-
+    # Standard deviation in m/s2, rad/s2 or the signal's unit; for white noise, of its mean over a step
     deviation: float
-    time_s: float
+    time_s: float  # Time constant, s; 0 for white noise
 
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """Smoothed run.
+    """Smoothed run."""
 
-    Parameters
-    ----------
-    name : str
-        Name of the run.
-    states, state_errors : arrays (n, nx)
-        The model's states and their standard errors (parameters taken as exact).
-    accelerations, acceleration_errors : arrays (n, m)
-        Random accelerations, unexplained by the model, over the step after each instant, in the order of
-        :attr:`KalmanEstimate.process_noise`, m/s2 or rad/s2. Times the mass matrix they are unexplained forces.
-    drifts : array (n, ny)
-        Drifts of the sensors, in the signals' units; (n, 0) without drift.
-    innovations : array (n, ny)
-        Whitened: independent with unit variance if the model holds; nan where not measured.
-    """
-
-    name: str
+    name: str  # Name of the run
+    # `states`, `state_errors`: (n, nx): The model's states and their standard errors (parameters taken as
+    # exact)
     states: Array
     state_errors: Array
+    # `accelerations`, `acceleration_errors`: (n, m): Random accelerations, unexplained by the model, over the
+    # step after each instant, in the order of :attr:`KalmanEstimate.process_noise`, m/s2 or rad/s2. Times the
+    # mass matrix they are unexplained forces.
     accelerations: Array
     acceleration_errors: Array
-    drifts: Array
-    innovations: Array
+    drifts: Array  # (n, ny): Drifts of the sensors, in the signals' units; (n, 0) without drift
+    innovations: Array  # (n, ny): Whitened: independent with unit variance if the model holds; nan where not measured
 
 
 @dataclass(frozen=True, eq=False)
 class KalmanEstimate(Estimate):
-    """An estimate with its noise levels.
+    """An estimate with its noise levels."""
 
-    Parameters
-    ----------
-    process_noise : mapping
-        By state, as ``motion.u``.
-    measurement_noise : mapping
-        Standard deviation of the white noise by measured variable (``noise`` holds that of the innovations).
-    drift : mapping
-        Drift of each sensor by measured variable; empty without drift.
-    smoothed : tuple of Smoothed
-        In the order of the runs.
-    """
-
-    process_noise: Mapping[str, CorrelatedNoise] = field(default_factory=dict)
+    process_noise: Mapping[str, CorrelatedNoise] = field(default_factory=dict)  # By state, as ``motion.u``
+    # Standard deviation of the white noise by measured variable (``noise`` holds that of the innovations)
     measurement_noise: Mapping[str, float] = field(default_factory=dict)
+    # Drift of each sensor by measured variable; empty without drift
     drift: Mapping[str, CorrelatedNoise] = field(default_factory=dict)
-    smoothed: tuple[Smoothed, ...] = ()
+    smoothed: tuple[Smoothed, ...] = ()  # In the order of the runs
 
 
 def kalman(
@@ -137,22 +101,10 @@ def kalman(
 ) -> KalmanEstimate:
     """Estimate the free parameters and the noise levels by maximum likelihood of the innovations.
 
-    Parameters
-    ----------
-    problem : Problem
-        k free parameters; the model has at least one of u, v and r as a state.
-    start : array (k,), optional
-        Start of the search; by default the prior's mean.
-    settings : KalmanSettings, optional
-    progress : callable
-        Called with each better estimate; its exceptions propagate.
-    levels : Levels, optional
-        Noise levels at the start; by default from the measurements.
-
-    Raises
-    ------
-    StoppedSearchError
-        The search cannot move from its start, although the data ask for it.
+    `problem`: k free parameters; the model has at least one of u, v and r as a state. `start` (k,): Start of the
+    search; by default the prior's mean. `progress`: Called with each better estimate; its exceptions propagate.
+    `levels`: Noise levels at the start; by default from the measurements. Raises StoppedSearchError: The search cannot
+    move from its start, although the data ask for it.
     """
     settings = settings or KalmanSettings()
     task = task_of(problem, white=settings.white, drifting=settings.drifting)
@@ -187,14 +139,7 @@ def estimate_at(
 ) -> KalmanEstimate:
     """The estimate at a point of the search.
 
-    Parameters
-    ----------
-    task : SearchTask
-    best : SearchPoint
-    costs : tuple of float
-        Of the search.
-    scale : mapping, optional
-        Factors on the prior's standard errors by group.
+    `costs`: Of the search. `scale`: Factors on the prior's standard errors by group.
     """
     problem, batch = task.problem, task.batch
     information = _information(task, best)

@@ -20,46 +20,25 @@ from tank2sim.identification.trials.methods.process_noise import Tangents
 
 @dataclass(frozen=True, eq=False)
 class Variances:
-    """Variances of the process and of the measurements.
+    """Variances of the process and of the measurements."""
 
-    Parameters
-    ----------
-    process : array (..., runs, nz)
-        Variances of the noise added to the state in a step (diagonal).
-    measurement : array (..., runs, n, ny)
-        1 where not measured.
-    start : array (..., runs, nz, nz)
-        Covariance of the first state.
-    lengths : sequence of int (runs,), optional
-        Instants of each run, of which the rest of the n is padding; by default all have n.
-    """
-
-    process: Array
-    measurement: Array
-    start: Array
+    process: Array  # (..., runs, nz): Variances of the noise added to the state in a step (diagonal)
+    measurement: Array  # (..., runs, n, ny): 1 where not measured
+    start: Array  # (..., runs, nz, nz): Covariance of the first state
+    # Instants of each run, of which the rest of the n is padding; by default all have n
     lengths: Sequence[int] | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Gains:
-    """Gains and covariances of a pass of the filter.
+    """Gains and covariances of a pass of the filter."""
 
-    Parameters
-    ----------
-    K : array (runs, n, nz, ny)
-        Gains; 0 in the padding.
-    whitener : array (runs, n, ny, ny)
-        W, the inverse of the Cholesky factor of the innovation's covariance S: ``W S W' = 1``; 1 in the padding.
-    P : array (runs, n, nz, nz)
-        Covariance of the state before each measurement; 0 in the padding.
-    lengths : sequence of int (runs,), optional
-        As those of :class:`Variances`.
-    """
-
-    K: Array
+    K: Array  # (runs, n, nz, ny): Gains; 0 in the padding
+    # (runs, n, ny, ny): W, the inverse of the Cholesky factor of the innovation's covariance S: ``W S W' = 1``;
+    # 1 in the padding
     whitener: Array
-    P: Array
-    lengths: Sequence[int] | None = None
+    P: Array  # (runs, n, nz, nz): Covariance of the state before each measurement; 0 in the padding
+    lengths: Sequence[int] | None = None  # As those of :class:`Variances`
 
     @property
     def log_determinant(self) -> float:
@@ -70,10 +49,7 @@ class Gains:
 class FilterFault(np.linalg.LinAlgError):
     """The covariance of a filter is no longer positive, because the linearised motion is too unstable.
 
-    Parameters
-    ----------
-    place : (int, int, int)
-        Run, instant, and the state whose variance is largest.
+    `place`: Run, instant, and the state whose variance is largest.
     """
 
     def __init__(self, place: tuple[int, int, int]):
@@ -139,25 +115,14 @@ def variant_likelihoods(
 ) -> tuple[Array, Array]:
     """Likelihood of filters with other noise levels, along the same linearised trajectory.
 
-    Parameters
-    ----------
-    tangents : Tangents
-        Stacked (runs, n, ...).
-    variances : Variances
-        With a leading axis of variants; the first variant is the filter of the trajectory itself.
-    innovations, after : arrays (runs, n, ny), (runs, n, nz)
-        Innovations of the first variant, and its states after each measurement.
-    factors : array (variants, runs, g)
-        Share of each of the last g states that remains after a step.
-
-    Returns
-    -------
-    cost : array (variants,)
-        -2 log likelihood: sum of log det S and of squared whitened innovations.
-    information : array (variants, variants)
-        Sum of ``d d' + t t' / 2``, with d and t the changes against the first variant of each innovation over its
-        standard deviation and of the logarithm of its variance: Fisher's information for small changes if the signals
-        of an instant were independent. (With the true information the steps are too short where the model is far off.)
+    `tangents`: Stacked (runs, n, ...). `variances`: With a leading axis of variants; the first variant is the filter of
+    the trajectory itself. `innovations`, `after` (runs, n, ny), (runs, n, nz): Innovations of the first variant, and
+    its states after each measurement. `factors` (variants, runs, g): Share of each of the last g states that remains
+    after a step. Returns `cost` (variants,): -2 log likelihood: sum of log det S and of squared whitened innovations.
+    Returns `information` (variants, variants): Sum of ``d d' + t t' / 2``, with d and t the changes against the first
+    variant of each innovation over its standard deviation and of the logarithm of its variance: Fisher's information
+    for small changes if the signals of an instant were independent. (With the true information the steps are too short
+    where the model is far off.).
     """
     count, runs, g = factors.shape
     n, _, nz = tangents.C.shape[1:]

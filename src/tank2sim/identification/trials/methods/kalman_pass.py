@@ -24,32 +24,17 @@ _SMOOTHED_S = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Runs padded to one length.
+    """Runs padded to one length."""
 
-    Parameters
-    ----------
-    inputs : array (runs, n, nu)
-    measured : array (runs, n, ny)
-        0 where not measured.
-    known : array of bool (runs, n, ny)
-        True where measured; False in the padding.
-    lengths : tuple of int
-        Instants of each run.
-    steps : array (runs,)
-        s.
-    starts : array (runs, nz)
-        First guess of the first states, from the nearby measurements; without random acceleration or drift.
-    spread : array (runs, nz, nz), optional
-        Covariance of the first states; by default wide.
-    """
-
-    inputs: Array
-    measured: Array
-    known: NDArray[np.bool_]
-    lengths: tuple[int, ...]
-    steps: Array
+    inputs: Array  # (runs, n, nu)
+    measured: Array  # (runs, n, ny): 0 where not measured
+    known: NDArray[np.bool_]  # (runs, n, ny): True where measured; False in the padding
+    lengths: tuple[int, ...]  # Instants of each run
+    steps: Array  # (runs,): s
+    # (runs, nz): First guess of the first states, from the nearby measurements; without random acceleration or
+    # drift
     starts: Array
-    spread: Array | None = None
+    spread: Array | None = None  # (runs, nz, nz): Covariance of the first states; by default wide
 
     def part(self, run: int, begin: int, end: int, start: Array, spread: Array | None) -> Batch:
         """Instants of a run from `begin` to `end`, the last only predicted, from a state (nz,) and its covariance."""
@@ -83,21 +68,12 @@ def batch_of(problem: Problem, correlated: int) -> Batch:
 
 @dataclass(frozen=True, eq=False)
 class Levels:
-    """Noise levels as natural logarithms.
+    """Noise levels as natural logarithms."""
 
-    Parameters
-    ----------
-    process : array (g,)
-        Standard deviations of each random acceleration, m/s2 or rad/s2, and then of each sensor's drift.
-    time : array (g,)
-        Time constants, s; -inf for white.
-    measurement : array (ny,)
-        Standard deviation of each measured signal's noise, in the signal's unit.
-    """
-
+    # (g,): Standard deviations of each random acceleration, m/s2 or rad/s2, and then of each sensor's drift
     process: Array
-    time: Array
-    measurement: Array
+    time: Array  # (g,): Time constants, s; -inf for white
+    measurement: Array  # (ny,): Standard deviation of each measured signal's noise, in the signal's unit
 
     @property
     def vector(self) -> Array:
@@ -130,30 +106,16 @@ class Levels:
 
 @dataclass(frozen=True, eq=False)
 class FilterPass:
-    """Filtered runs with given parameters and levels.
+    """Filtered runs with given parameters and levels."""
 
-    Parameters
-    ----------
-    before, after : arrays (runs, n, nz)
-        States before and after each measurement.
-    innovations : array (runs, n, ny)
-        Measured less predicted; 0 where not measured.
-    tangents : Tangents
-        Stacked (runs, n, ...), along the trajectory at which the gains were computed.
-    gains : Gains
-    cost : float
-        -2 log likelihood except for a constant; inf where the motion leaves all bounds.
-    wild : (int, int, int), optional
-        Run, instant and state that leave all bounds first.
-    """
-
+    # `before`, `after`: (runs, n, nz): States before and after each measurement
     before: Array
     after: Array
-    innovations: Array
-    tangents: Tangents
+    innovations: Array  # (runs, n, ny): Measured less predicted; 0 where not measured
+    tangents: Tangents  # Stacked (runs, n, ...), along the trajectory at which the gains were computed
     gains: Gains
-    cost: float
-    wild: tuple[int, int, int] | None = None
+    cost: float  # -2 log likelihood except for a constant; inf where the motion leaves all bounds
+    wild: tuple[int, int, int] | None = None  # Run, instant and state that leave all bounds first
 
     @property
     def trajectory(self) -> tuple[Array, Array]:
@@ -224,12 +186,7 @@ def measured_trajectory(problem: Problem, batch: Batch) -> tuple[Array, Array]:
 def velocities_of(columns: Mapping[str, Array], step: float) -> dict[str, Array]:
     """Velocities (n,) over the ground, along and across the vessel, and the yaw rate, by smooth position and heading.
 
-    Parameters
-    ----------
-    columns : mapping
-        ``motion.x``, ``motion.y`` and ``motion.psi`` (n,), without gaps.
-    step : float
-        s.
+    `columns`: ``motion.x``, ``motion.y`` and ``motion.psi`` (n,), without gaps. `step`: s.
     """
     width = max(1, round(_SMOOTHED_S / step))
     north, east, rate = (

@@ -55,24 +55,12 @@ LONGEST_STEP = 1.5
 
 @dataclass(frozen=True, eq=False)
 class SearchTask:
-    """Constants of a search.
+    """Constants of a search."""
 
-    Parameters
-    ----------
-    problem : Problem
-        k free parameters.
-    disturbed : Disturbed
-        The problem's model with random accelerations.
-    batch : Batch
-        The problem's runs.
-    first : Levels
-        First noise levels.
-    """
-
-    problem: Problem
-    disturbed: Disturbed
-    batch: Batch
-    first: Levels
+    problem: Problem  # k free parameters
+    disturbed: Disturbed  # The problem's model with random accelerations
+    batch: Batch  # The problem's runs
+    first: Levels  # First noise levels
 
     def point(self, values: Array, levels: Levels, along: tuple[Array, Array]) -> SearchPoint:
         """A pass of the filter, linearised along a trajectory (before, after), and -2 log posterior."""

@@ -40,24 +40,13 @@ INTERRUPTED = Notice("interrupted: the estimates are the best found so far")
 
 @dataclass(frozen=True)
 class OutputErrorSettings:
-    """Settings of output error.
+    """Settings of output error."""
 
-    Parameters
-    ----------
-    piece_s : float or None
-        Length of a piece, s; None takes whole runs (not for a course-unstable ship: its motion diverges).
-    coloured : bool
-        Noise with an autoregressive part; else white.
-    scale_prior : bool
-        Multiply the prior's standard errors by the factor of largest evidence, at least 1.
-    rounds : int
-        Number of estimates of noise (and prior).
-    """
-
+    # Length of a piece, s; None takes whole runs (not for a course-unstable ship: its motion diverges)
     piece_s: float | None = None
-    coloured: bool = True
-    scale_prior: bool = True
-    rounds: int = 4
+    coloured: bool = True  # Noise with an autoregressive part; else white
+    scale_prior: bool = True  # Multiply the prior's standard errors by the factor of largest evidence, at least 1
+    rounds: int = 4  # Number of estimates of noise (and prior)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,20 +77,9 @@ def output_error(
 ) -> Estimate:
     """Estimate the free parameters by output error.
 
-    Parameters
-    ----------
-    problem : Problem
-        k free parameters.
-    start : array (k,), optional
-        Start of the search; by default the prior's mean.
-    settings : OutputErrorSettings, optional
-    progress : callable
-        Called with each better estimate; its exceptions propagate.
-
-    Raises
-    ------
-    StoppedSearchError
-        The search cannot move from its start, although the data ask for it.
+    `problem`: k free parameters. `start` (k,): Start of the search; by default the prior's mean. `progress`: Called
+    with each better estimate; its exceptions propagate. Raises StoppedSearchError: The search cannot move from its
+    start, although the data ask for it.
     """
     settings = settings or OutputErrorSettings()
     shooting = Shooting(problem)

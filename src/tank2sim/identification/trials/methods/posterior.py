@@ -28,16 +28,8 @@ def evidence_scale(problem: Problem, information: Array, values: Array, scale: M
     """Factor on the prior's errors of each group that has the largest evidence, at least 1 (MacKay 1992, Neural
     Computation 4): distance from the prior's mean over the number of parameters that the trials determine.
 
-    Parameters
-    ----------
-    problem : Problem
-        k free parameters.
-    information : array (k, k)
-        Information of the trials alone.
-    values : array (k,)
-        Estimates.
-    scale : mapping
-        The factors of these estimates.
+    `problem`: k free parameters. `information` (k, k): Information of the trials alone. `values` (k,): Estimates.
+    `scale`: The factors of these estimates.
     """
     prior = scaled_prior(problem, scale)
     scaled = information * np.outer(prior, prior)
@@ -56,16 +48,10 @@ def sandwich(information: Array, unit: Array, scores: Sequence[Array], before: A
     """Covariance (k, k) of estimates, robust to the true correlation of the residuals (Huber 1967; Newey and West
     1987).
 
-    Parameters
-    ----------
-    information : array (k, k)
-        Information of the trials alone, under the noise model.
-    unit : array (k,)
-        Sizes of the parameters, which scale the matrices: the prior's errors.
-    scores : sequence of arrays (blocks, k)
-        Gradient of each run by blocks of :data:`BLOCK` ship lengths, in the order of time.
-    before : array (k, k)
-        Information before the trials: of the prior, and of captive tests that were fitted with them.
+    `information` (k, k): Information of the trials alone, under the noise model. `unit` (k,): Sizes of the parameters,
+    which scale the matrices: the prior's errors. `scores` each (blocks, k): Gradient of each run by blocks of
+    :data:`BLOCK` ship lengths, in the order of time. `before` (k, k): Information before the trials: of the prior, and
+    of captive tests that were fitted with them.
     """
     # In units of the prior's errors the matrices are well scaled: a parameter without trials has information 0 against
     # 1.

@@ -61,28 +61,16 @@ LEAST_LIKELY = 1e8
 
 @dataclass(frozen=True, eq=False)
 class PosteriorSamples:
-    """Samples of the posterior.
+    """Samples of the posterior."""
 
-    Parameters
-    ----------
-    free : tuple of str
-        The k parameters.
-    values : array (chains, draws, k)
-        In the units of the model's parameters.
-    r_hat, effective : array (k,)
-        Rank-normalised split R-hat, and bulk effective sample size (Vehtari et al. 2021).
-    sampler : str
-        One of :data:`.options.Sampler`.
-    simulations : int
-        Simulations of all trials; one with its adjoint is one.
-    """
-
-    free: tuple[str, ...]
-    values: Array
+    free: tuple[str, ...]  # The k parameters
+    values: Array  # (chains, draws, k): In the units of the model's parameters
+    # `r_hat`, `effective`: (k,): Rank-normalised split R-hat, and bulk effective sample size (Vehtari et al.
+    # 2021).
     r_hat: Array
     effective: Array
-    sampler: Sampler
-    simulations: int
+    sampler: Sampler  # One of :data:`.options.Sampler`
+    simulations: int  # Simulations of all trials; one with its adjoint is one
 
     @property
     def flat(self) -> Array:
@@ -132,14 +120,8 @@ class LogPosterior:
     The parameters are the estimate + root @ z, reflected at the model's bounds: the folded density is the truncated
     one, and its trajectories do not end at a bound.
 
-    Parameters
-    ----------
-    problem : Problem
-        k free parameters.
-    estimate : Estimate
-        By output error, with its `motion`.
-    robust : bool
-        Stretch the trials' density to the curvature of the estimate's covariance.
+    `problem`: k free parameters. `estimate`: By output error, with its `motion`. `robust`: Stretch the trials' density
+    to the curvature of the estimate's covariance.
     """
 
     def __init__(self, problem: Problem, estimate: Estimate, *, robust: bool = True):
@@ -321,22 +303,11 @@ def sample_posterior(
 ) -> PosteriorSamples:
     """Sample the posterior about an estimate of output error.
 
-    Parameters
-    ----------
-    problem, estimate, robust
-        As for :class:`LogPosterior`.
-    sampler : str
-        "nuts": the no-U-turn sampler with exact gradients (Hoffman and Gelman 2014, J. Mach. Learn. Res. 15; library
-        nutpie); "ensemble": walkers that move along differences of others, without gradients (ter Braak 2006, Stat.
-        Comput. 16; library emcee).
-    draws : int
-        Kept draws of each chain; of each walker :data:`WALKER_SHARE` of it.
-    seed : int
-
-    Raises
-    ------
-    InputError
-        The library of the sampler is not installed.
+    `problem`, `estimate`, `robust`: As for :class:`LogPosterior`. `sampler`: "nuts": the no-U-turn sampler with exact
+    gradients (Hoffman and Gelman 2014, J. Mach. Learn. Res. 15; library nutpie); "ensemble": walkers that move along
+    differences of others, without gradients (ter Braak 2006, Stat. Comput. 16; library emcee). `draws`: Kept draws of
+    each chain; of each walker :data:`WALKER_SHARE` of it. Raises InputError: The library of the sampler is not
+    installed.
     """
     check_sampler(sampler)
     density = LogPosterior(problem, estimate, robust=robust)

@@ -34,18 +34,14 @@ _PROBED_S = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Tangents:
-    """Derivatives along a run of n instants.
+    """Derivatives along a run of n instants."""
 
-    Parameters
-    ----------
-    A, B : arrays (n, nz, nz), (n, nz, k)
-        Slopes of the next state by the state (after the measurement) and by the free parameters.
-    C, D : arrays (n, ny, nz), (n, ny, k)
-        Slopes of the observed values by the state (before the measurement) and by the free parameters.
-    """
-
+    # `A`, `B`: (n, nz, nz), (n, nz, k): Slopes of the next state by the state (after the measurement) and by
+    # the free parameters
     A: Array
     B: Array
+    # `C`, `D`: (n, ny, nz), (n, ny, k): Slopes of the observed values by the state (before the measurement) and
+    # by the free parameters
     C: Array
     D: Array
 
@@ -53,16 +49,9 @@ class Tangents:
 class Disturbed:
     """Filter steps of a model with random accelerations.
 
-    Parameters
-    ----------
-    model : Model
-        nx states; m of :data:`PUSHED` are among them.
-    free : sequence of str
-        Names of the k parameters of the derivatives.
-    seen : sequence of str
-        Names of the ny states and quantities that are measured.
-    drifting : bool
-        Every sensor drifts: nz = nx + m + ny, else nz = nx + m.
+    `model`: nx states; m of :data:`PUSHED` are among them. `free`: Names of the k parameters of the derivatives.
+    `seen`: Names of the ny states and quantities that are measured. `drifting`: Every sensor drifts: nz = nx + m + ny,
+    else nz = nx + m.
     """
 
     def __init__(self, model: Model, free: Sequence[str], seen: Sequence[str], *, drifting: bool = False):
@@ -104,17 +93,9 @@ class Disturbed:
     ) -> Array:
         """States (n, nz) before each measurement, of the observer with given gains.
 
-        Parameters
-        ----------
-        start : array (nz,)
-        inputs : array (n, nu)
-        measured : array (n, ny)
-            Without nan: any value where not measured, with a column of zeros in the gain.
-        gains : array (n, nz, ny)
-        case : tuple
-            Parameters p, factors phi (nz - nx,), step h (1,).
-        parts : int
-            Integration steps from an instant to the next.
+        `start` (nz,). `inputs` (n, nu). `measured` (n, ny): Without nan: any value where not measured, with a column of
+        zeros in the gain. `gains` (n, nz, ny). `case`: Parameters p, factors phi (nz - nx,), step h (1,). `parts`:
+        Integration steps from an instant to the next.
         """
         p, phi, h = case
         columns = gains[:-1].transpose(0, 2, 1).reshape(len(gains) - 1, -1)

@@ -25,23 +25,13 @@ START_WINDOW = 5
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """A run cut into pieces of equal length that share their ends.
+    """A run cut into pieces of equal length that share their ends."""
 
-    Parameters
-    ----------
-    run : SampledRun
-        The run.
-    inputs : array (pieces, n + 1, nu)
-    measured : array (pieces, n + 1, ny)
-        The last row is nan except in the last piece: it is the first of the next piece.
-    starts : array (pieces, nx)
-        First guess of the initial states.
-    """
-
-    run: SampledRun
-    inputs: Array
+    run: SampledRun  # The run
+    inputs: Array  # (pieces, n + 1, nu)
+    # (pieces, n + 1, ny): The last row is nan except in the last piece: it is the first of the next piece
     measured: Array
-    starts: Array
+    starts: Array  # (pieces, nx): First guess of the initial states
 
 
 SENSED_BY = {
@@ -97,44 +87,24 @@ def _local(column: Array, first: int) -> float | None:
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """Simulated motion of the pieces of one run.
+    """Simulated motion of the pieces of one run."""
 
-    Parameters
-    ----------
-    starts : array (pieces, nx)
-        Initial states.
-    states : array (pieces, n + 1, nx)
-    residuals : array (pieces, n + 1, ny)
-        Simulated less measured.
-    cost : float
-        Sum of squares, with the weak prior of the initial states; inf where the motion leaves all bounds.
-    """
-
-    starts: Array
-    states: Array
-    residuals: Array
-    cost: float
+    starts: Array  # (pieces, nx): Initial states
+    states: Array  # (pieces, n + 1, nx)
+    residuals: Array  # (pieces, n + 1, ny): Simulated less measured
+    cost: float  # Sum of squares, with the weak prior of the initial states; inf where the motion leaves all bounds
 
 
 @dataclass(frozen=True, eq=False)
 class Normal:
-    """Normal equations of one run with the initial states eliminated, at given parameters and initial states.
+    """Normal equations of one run with the initial states eliminated, at given parameters and initial states."""
 
-    Parameters
-    ----------
-    matrix : array (k, k)
-    vector : array (k,)
-        ``matrix @ step = -vector`` for the parameters alone.
-    states : array (unknown, k), and step (unknown,)
-        Change of the initial states: ``-(step + states @ parameter step)``.
-    white, white_by : arrays (pieces, samples) and (pieces, samples, nx + k)
-        Whitened residuals, and their derivatives by the initial state of the piece and by the parameters.
-    """
-
-    matrix: Array
-    vector: Array
-    states: Array
+    matrix: Array  # (k, k)
+    vector: Array  # (k,): ``matrix @ step = -vector`` for the parameters alone
+    states: Array  # (unknown, k): Change of the initial states: ``-(step + states @ parameter step)``
     step: Array
+    # `white`, `white_by`: (pieces, samples) and (pieces, samples, nx + k): Whitened residuals, and their
+    # derivatives by the initial state of the piece and by the parameters
     white: Array
     white_by: Array
 
@@ -142,11 +112,7 @@ class Normal:
 class Shooting:
     """Motion of pieces and its normal equations, for the parameters `free` of a problem.
 
-    Parameters
-    ----------
-    problem : Problem
-    starts_alone : bool
-        Derivatives by initial states alone: the normal equations have no parameters.
+    `starts_alone`: Derivatives by initial states alone: the normal equations have no parameters.
     """
 
     def __init__(self, problem: Problem, *, starts_alone: bool = False):

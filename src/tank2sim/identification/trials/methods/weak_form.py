@@ -36,18 +36,10 @@ WEAK_EQUATIONS = ("motion.udot", "motion.vdot", "motion.rdot")
 
 @dataclass(frozen=True, eq=False)
 class WeakWindows:
-    """The weak form of one run at given parameters.
+    """The weak form of one run at given parameters."""
 
-    Parameters
-    ----------
-    residuals : array (windows, 3)
-        Measured less modelled mean acceleration, m/s2, m/s2, rad/s2.
-    jacobian : array (windows, 3, k)
-        Derivative of the *modelled* acceleration by the free parameters.
-    """
-
-    residuals: Array
-    jacobian: Array
+    residuals: Array  # (windows, 3): Measured less modelled mean acceleration, m/s2, m/s2, rad/s2
+    jacobian: Array  # (windows, 3, k): Derivative of the *modelled* acceleration by the free parameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,17 +64,8 @@ class _Prepared:
 class WeakForm:
     """Weak-form residuals of a problem's runs.
 
-    Parameters
-    ----------
-    problem : Problem
-        k free parameters.
-    width : float
-        Width of a window, in L/u0.
-
-    Raises
-    ------
-    InputError
-        A run lacks velocities and signals that determine them.
+    `problem`: k free parameters. `width`: Width of a window, in L/u0. Raises InputError: A run lacks velocities and
+    signals that determine them.
     """
 
     def __init__(self, problem: Problem, width: float = WIDTH):

@@ -56,56 +56,29 @@ eight times."""
 
 @dataclass(frozen=True, eq=False)
 class CaptiveRuns:
-    """Reduced runs of a campaign, from which :func:`captive_tests` makes equations for any model of the ship.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    runs : tuple of ReducedRun
-        Means and harmonics of each run's forces.
-    """
+    """Reduced runs of a campaign, from which :func:`captive_tests` makes equations for any model of the ship."""
 
     campaign: Campaign
-    runs: tuple[ReducedRun, ...]
+    runs: tuple[ReducedRun, ...]  # Means and harmonics of each run's forces
 
 
 @dataclass(frozen=True, eq=False)
 class CaptiveTests:
-    """Equations of a campaign in the k free parameters of a model.
+    """Equations of a campaign in the k free parameters of a model."""
 
-    Parameters
-    ----------
-    forces : casadi.Function
-        ``forces(motion, p) -> (F, J, R)``: the water's X', Y', N' at one instant, their slopes by the free parameters,
-        and the rudder's part of them.
-    motion : array (9, instants)
-        u, v, r, rudder angle, dv/dt, dr/dt, propeller speed over its nominal one, and the run's scales of force and
-        moment (N, N m); ship size, SI.
-    projection : tuple of array
-        For each run (coefficients, instants): histories to mean and harmonics.
-    measured : array (m,)
-        Coefficients of X', Y', N' of all runs, run by run, force by force.
-    force : array of int (m,)
-        0, 1, 2 for X, Y, N.
-    mean : array of bool (m,)
-        True for a mean, False for a harmonic.
-    noise : array (3,)
-        Standard deviation of the residual of each force, prime.
-    columns : array of int (k,)
-        Columns of J that belong to the free parameters.
-    source : CaptiveRuns
-        What the equations were made from.
-    """
-
+    # ``forces(motion, p) -> (F, J, R)``: the water's X', Y', N' at one instant, their slopes by the free
+    # parameters, and the rudder's part of them
     forces: ca.Function
+    # (9, instants): u, v, r, rudder angle, dv/dt, dr/dt, propeller speed over its nominal one, and the run's
+    # scales of force and moment (N, N m); ship size, SI
     motion: Array
-    projection: tuple[Array, ...]
-    measured: Array
-    force: NDArray[np.int64]
-    mean: NDArray[np.bool_]
-    noise: Array
-    columns: NDArray[np.int64]
-    source: CaptiveRuns
+    projection: tuple[Array, ...]  # For each run (coefficients, instants): histories to mean and harmonics
+    measured: Array  # (m,): Coefficients of X', Y', N' of all runs, run by run, force by force
+    force: NDArray[np.int64]  # (m,): 0, 1, 2 for X, Y, N
+    mean: NDArray[np.bool_]  # (m,): True for a mean, False for a harmonic
+    noise: Array  # (3,): Standard deviation of the residual of each force, prime
+    columns: NDArray[np.int64]  # (k,): Columns of J that belong to the free parameters
+    source: CaptiveRuns  # What the equations were made from
 
     def residuals(self, p: Array) -> tuple[Array, Array]:
         """Residuals (m,), model less measured, and their slopes (m, k), prime, at the model's parameters `p`."""
@@ -163,20 +136,8 @@ class CaptiveTests:
 def captive_tests(card: ManoeuvringCard, model: Model, free: Sequence[str], source: CaptiveRuns) -> CaptiveTests:
     """The equations of a campaign's runs in the free parameters of a model.
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-        Card of the ship, at the size of `model`.
-    model : Model
-        Driven by the rudder's angle or order.
-    free : sequence of str
-        Names of the k free parameters.
-    source : CaptiveRuns
-
-    Raises
-    ------
-    InputError
-        The campaign is of a ship of other proportions.
+    `card`: Card of the ship, at the size of `model`. `model`: Driven by the rudder's angle or order. `free`: Names of
+    the k free parameters. Raises InputError: The campaign is of a ship of other proportions.
     """
     campaign, runs = source.campaign, source.runs
     _refuse_other_form(card, campaign)

@@ -28,30 +28,17 @@ changes by less than 1 % in the last (project choice)."""
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Free parameters of a model, their prior, and the runs that determine them.
+    """Free parameters of a model, their prior, and the runs that determine them."""
 
-    Parameters
-    ----------
-    model : Model
-        Driven by the input that the runs recorded (:func:`.problem_from_card.driven_model`).
-    free : tuple of str
-        Names of the k parameters to estimate.
-    prior_mean, prior_error : array (k,)
-        Value and standard error before the trials, in the parameter's own unit; the error is positive.
-    runs : tuple of SampledRun
-        Each with the same `seen`.
-    captive : CaptiveTests, optional
-        Captive tests of the ship, which output error fits together with the runs.
-    prior_inverse : array (k, k), optional
-        Inverse of the correlations before the trials; None where the parameters are independent.
-    """
-
-    model: Model
-    free: tuple[str, ...]
+    model: Model  # Driven by the input that the runs recorded (:func:`.problem_from_card.driven_model`)
+    free: tuple[str, ...]  # Names of the k parameters to estimate
+    # `prior_mean`, `prior_error`: (k,): Value and standard error before the trials, in the parameter's own
+    # unit; the error is positive
     prior_mean: Array
     prior_error: Array
-    runs: tuple[SampledRun, ...]
-    captive: CaptiveTests | None = None
+    runs: tuple[SampledRun, ...]  # Each with the same `seen`
+    captive: CaptiveTests | None = None  # Captive tests of the ship, which output error fits together with the runs
+    # (k, k): Inverse of the correlations before the trials; None where the parameters are independent
     prior_inverse: Array | None = None
 
     @property
@@ -118,63 +105,31 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class FittedMotion:
-    """Initial states and noise of a fit by output error.
+    """Initial states and noise of a fit by output error."""
 
-    Parameters
-    ----------
-    piece_s : float or None
-        Length of the pieces, s; None for whole runs.
-    starts : tuple of array (pieces, nx)
-        Initial states of the pieces of each run.
-    noise : tuple of ColouredNoise
-        Noise of each seen variable.
-    """
-
-    piece_s: float | None
-    starts: tuple[Array, ...]
-    noise: tuple[ColouredNoise, ...]
+    piece_s: float | None  # Length of the pieces, s; None for whole runs
+    starts: tuple[Array, ...]  # each (pieces, nx): Initial states of the pieces of each run
+    noise: tuple[ColouredNoise, ...]  # Noise of each seen variable
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Estimate of the free parameters by one method.
+    """Estimate of the free parameters by one method."""
 
-    Parameters
-    ----------
-    method : str
-        Name of the method.
-    free : tuple of str
-        The k parameters.
-    values : array (k,)
-        Estimates.
-    covariance : array (k, k)
-        Covariance of the estimates, for the residuals as they are (coloured, with model error), not as white noise.
-    information : array (k, k)
-        Information of the trials alone: the inverse covariance without the prior.
-    noise : mapping
-        Standard deviation of the residual by variable.
-    cost : tuple of float
-        Minimised function after each iteration.
-    prior_scale : mapping
-        Chosen factor on the prior's standard errors by group (:attr:`Problem.groups`).
-    notices : tuple of Notice
-        Messages for the user.
-    motion : FittedMotion, optional
-        What output error fitted in addition to the parameters.
-    samples : array (draws, k), optional
-        Samples of the posterior, where it was sampled: `values` and `covariance` are then theirs.
-    """
-
-    method: str
-    free: tuple[str, ...]
-    values: Array
+    method: str  # Name of the method
+    free: tuple[str, ...]  # The k parameters
+    values: Array  # (k,): Estimates
+    # (k, k): Covariance of the estimates, for the residuals as they are (coloured, with model error), not as
+    # white noise
     covariance: Array
-    information: Array
-    noise: Mapping[str, float] = field(default_factory=dict)
-    cost: tuple[float, ...] = ()
+    information: Array  # (k, k): Information of the trials alone: the inverse covariance without the prior
+    noise: Mapping[str, float] = field(default_factory=dict)  # Standard deviation of the residual by variable
+    cost: tuple[float, ...] = ()  # Minimised function after each iteration
+    # Chosen factor on the prior's standard errors by group (:attr:`Problem.groups`)
     prior_scale: Mapping[str, float] = field(default_factory=dict)
-    notices: tuple[Notice, ...] = ()
-    motion: FittedMotion | None = None
+    notices: tuple[Notice, ...] = ()  # Messages for the user
+    motion: FittedMotion | None = None  # What output error fitted in addition to the parameters
+    # (draws, k): Samples of the posterior, where it was sampled: `values` and `covariance` are then theirs
     samples: Array | None = None
 
     def draw(self, generator: np.random.Generator) -> Array:

@@ -45,37 +45,21 @@ have it: a window of the weak form is 2.33 of them."""
 
 @dataclass(frozen=True, eq=False)
 class MeasuredMotion:
-    """Measured motion of a run.
+    """Measured motion of a run."""
 
-    Parameters
-    ----------
-    velocities : array (n, 3)
-        u, v (m/s), r (rad/s) as measured or derived, nan where they are unknown; straight lines between the samples
-        of a signal that is slower than the run.
-    smooth : array (n, 6)
-        :data:`MEASURED_STATES`, smoothed against noise in the regressors, without gaps.
-    noise : array (3,)
-        Standard deviation of the measurement of u, v, r.
-    remaining_noise : array (3,)
-        The same after smoothing.
-    notices : tuple of Notice
-        One for each derived signal.
-    """
-
+    # (n, 3): u, v (m/s), r (rad/s) as measured or derived, nan where they are unknown; straight lines between
+    # the samples of a signal that is slower than the run
     velocities: Array
-    smooth: Array
-    noise: Array
-    remaining_noise: Array
-    notices: tuple[Notice, ...]
+    smooth: Array  # (n, 6): :data:`MEASURED_STATES`, smoothed against noise in the regressors, without gaps
+    noise: Array  # (3,): Standard deviation of the measurement of u, v, r
+    remaining_noise: Array  # (3,): The same after smoothing
+    notices: tuple[Notice, ...]  # One for each derived signal
 
 
 def measured_motion(problem: Problem, run: SampledRun) -> MeasuredMotion:
     """Velocities and position of a run.
 
-    Raises
-    ------
-    InputError
-        Velocities are neither measured nor determined by heading and positions.
+    Raises InputError: Velocities are neither measured nor determined by heading and positions.
     """
     return _measured_motion(problem.model, _window(problem, run), run)
 

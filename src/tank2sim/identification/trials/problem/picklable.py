@@ -22,17 +22,10 @@ _Result = TypeVar("_Result")
 
 @dataclass(frozen=True)
 class PicklableShip:
-    """The text of a model's card, and the rudder signal that drives the model.
+    """The text of a model's card, and the rudder signal that drives the model."""
 
-    Parameters
-    ----------
-    card : str
-        TOML.
-    driven_by : str
-        ``angle`` or ``order`` (:func:`tank2sim.identification.trials.problem.problem_from_card.driven_model`).
-    """
-
-    card: str
+    card: str  # TOML
+    # ``angle`` or ``order`` (:func:`tank2sim.identification.trials.problem.problem_from_card.driven_model`)
     driven_by: str
 
     def model(self) -> Model:
@@ -79,18 +72,9 @@ class Portable:
 def portable(problem: Problem, card: ManoeuvringCard, driven_by: str) -> Portable:
     """Return a problem in its portable form.
 
-    Parameters
-    ----------
-    problem : Problem
-        Set up by :func:`tank2sim.identification.trials.problem.problem_from_card.problem_from_card`.
-    card : ManoeuvringCard
-    driven_by : str
-        The arguments with which it was set up.
-
-    Raises
-    ------
-    ValueError
-        The problem's model differs from the model of the card.
+    `problem`: Set up by :func:`tank2sim.identification.trials.problem.problem_from_card.problem_from_card`.
+    `driven_by`: The arguments with which it was set up. Raises ValueError: The problem's model differs from the model
+    of the card.
     """
     ship = PicklableShip(card.text, fit_driven_by(card, driven_by))
     if ship.model().parameter_names != problem.model.parameter_names:

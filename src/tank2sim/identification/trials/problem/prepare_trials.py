@@ -47,45 +47,23 @@ class RecordDoubt:
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """Trials at the size of the ship, and captive tests of a model of it where there are any.
-
-    Parameters
-    ----------
-    trials : tuple of Trial
-    driven_by : str
-        ``angle`` if the rudder's angle was measured in all of them, ``order`` if only its order is known.
-    notices : tuple of Notice
-        Repairs and scalings.
-    captive : CaptiveRuns, optional
-        Captive tests, at the size of their model.
-    doubts : tuple of RecordDoubt
-    """
+    """Trials at the size of the ship, and captive tests of a model of it where there are any."""
 
     trials: tuple[Trial, ...]
-    driven_by: str
-    notices: tuple[Notice, ...]
-    captive: CaptiveRuns | None = None
+    driven_by: str  # ``angle`` if the rudder's angle was measured in all of them, ``order`` if only its order is known
+    notices: tuple[Notice, ...]  # Repairs and scalings
+    captive: CaptiveRuns | None = None  # Captive tests, at the size of their model
     doubts: tuple[RecordDoubt, ...] = ()
 
 
 def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unused: bool = True) -> Measured:
     """Read trials, make the audit's safe repairs, and scale them to the card's ship.
 
-    Parameters
-    ----------
-    given : iterable
-        Files, or trials as they were read.
-    card : ManoeuvringCard
-        Card of the ship.
-    report_unused : bool
-        Whether a notice says that a wind or depth was measured which no effect of the card uses.
-
-    Raises
-    ------
-    InputError
-        A file has an error, the audit finds a fault that it cannot repair, two trials share a name or a record, a trial
-        is of another size without stating its scale, its revolutions and the card's are of different units, or the
-        rudder's angle is known in some trials and only its order in others.
+    `given`: Files, or trials as they were read. `card`: Card of the ship. `report_unused`: Whether a notice says that a
+    wind or depth was measured which no effect of the card uses. Raises InputError: A file has an error, the audit finds
+    a fault that it cannot repair, two trials share a name or a record, a trial is of another size without stating its
+    scale, its revolutions and the card's are of different units, or the rudder's angle is known in some trials and only
+    its order in others.
     """
     trials, notices = [], []
     audited: dict[str, list[Finding]] = {}
@@ -197,10 +175,7 @@ def at_size_of(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
     A trial that states its scale may hold numbers of the model or of the ship, and the card may be of either: the
     factor is the scale, one over it, or 1, whichever brings the approach speed nearest to the card's.
 
-    Raises
-    ------
-    InputError
-        No factor brings it near.
+    Raises InputError: No factor brings it near.
     """
     if trial.length_m is not None:
         return _at_length(trial, card)

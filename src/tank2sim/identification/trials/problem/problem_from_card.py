@@ -87,10 +87,7 @@ def with_polynomial_down_to(card: ManoeuvringCard, speed_mps: float) -> Manoeuvr
 def lowered_bound_notice(given: ManoeuvringCard, card: ManoeuvringCard) -> tuple[Notice, ...]:
     """What :func:`polynomial_over_trials` changed of a card, as a notice; empty if nothing.
 
-    Parameters
-    ----------
-    given, card : ManoeuvringCard
-        Before and after.
+    `given`, `card`: Before and after.
     """
     if card is given:
         return ()
@@ -106,11 +103,7 @@ def above_low_speed(card: ManoeuvringCard, group: Measured) -> Measured:
     The forces at low speed are estimates from the ship's particulars: what they leave would be taken for a physical
     effect that is missing. A trial that is left with less than :data:`SHORTEST_AHEAD` remains whole.
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-        ``abkowitz``; trials of others remain as they are.
-    group : Measured
+    `card`: ``abkowitz``; trials of others remain as they are.
     """
     if card.model.kind != "abkowitz":
         return group
@@ -139,11 +132,7 @@ def above_low_speed(card: ManoeuvringCard, group: Measured) -> Measured:
 def slowest_speed(trial: Trial, ship_time: float) -> float:
     """Lowest speed (m/s) of a trial, noise apart; infinite if :func:`speed_history` knows none.
 
-    Parameters
-    ----------
-    trial : Trial
-    ship_time : float
-        L/u0, s.
+    `ship_time`: L/u0, s.
     """
     speed = speed_history(trial, ship_time)[1]
     return float(np.quantile(speed, 0.01)) if len(speed) else np.inf
@@ -153,11 +142,7 @@ def speed_history(trial: Trial, ship_time: float) -> tuple[Array, Array]:
     """Instants (n,), s, and the ship's speed then (n,), m/s: through the water if it is known, else over the ground;
     none if neither was measured.
 
-    Parameters
-    ----------
-    trial : Trial
-    ship_time : float
-        L/u0, s: positions are compared over a quarter of it.
+    `ship_time`: L/u0, s: positions are compared over a quarter of it.
     """
     signals, time = trial.signals, trial.time_s
     if "u_mps" in signals:
@@ -191,11 +176,7 @@ def fit_driven_by(card: ManoeuvringCard, driven_by: str) -> str:
     The ``angle`` of the rudder also where only orders were recorded, which the gear of the card follows
     (:mod:`.sampled_runs`); the ``order`` where more than this gear acts between them.
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-    driven_by : str
-        ``angle`` if the rudder's angle was measured, ``order`` if only its order is known.
+    `driven_by`: ``angle`` if the rudder's angle was measured, ``order`` if only its order is known.
     """
     return "angle" if driven_by == "angle" or ordered_rudder(driven_model(card, "order")) else "order"
 
@@ -280,20 +261,8 @@ def problem_from_card(
 
     Parts of runs at speeds outside the range of the card are omitted, unless `whole` is True.
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-    trials : sequence of Trial
-        At the ship's size.
-    driven_by : str
-        ``angle`` or ``order`` of the rudder.
-    inertia : bool
-        Whether accelerations are free too.
-
-    Raises
-    ------
-    InputError
-        A trial is too short or has nothing to compare, or the card leaves nothing free.
+    `trials`: At the ship's size. `driven_by`: ``angle`` or ``order`` of the rudder. `inertia`: Whether accelerations
+    are free too. Raises InputError: A trial is too short or has nothing to compare, or the card leaves nothing free.
     """
     model = driven_model(card, fit_driven_by(card, driven_by))
     gear = ordered_rudder(driven_model(card, "order")) if driven_by == "order" else None
@@ -326,10 +295,7 @@ def problem_from_card(
 def with_captive(problem: Problem, card: ManoeuvringCard, captive: CaptiveRuns | None) -> Problem:
     """The problem with the equations of captive tests, at their own noise; unchanged without any.
 
-    Raises
-    ------
-    InputError
-        The campaign is of another ship than the card.
+    Raises InputError: The campaign is of another ship than the card.
     """
     if captive is None:
         return problem

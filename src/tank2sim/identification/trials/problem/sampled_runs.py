@@ -44,31 +44,18 @@ LONGEST_GAP = 3
 
 @dataclass(frozen=True, eq=False)
 class SampledRun:
-    """One trial on equal steps.
+    """One trial on equal steps."""
 
-    Parameters
-    ----------
-    name : str
-        Name of the trial.
-    begin_s, step_s : float
-        Time of the first instant in the trial's own time, and the step, s.
-    inputs : array (n, nu)
-        Mean of each of the model's inputs from an instant to the next; the last row repeats the previous row.
-    measured : array (n, ny)
-        In the order of `seen`; nan where not measured.
-    seen : tuple of str
-        Names of the model's variables that are measured.
-    file : str
-        The trial's file, for messages; empty if it has none.
-    """
-
-    name: str
+    name: str  # Name of the trial
+    # `begin_s`, `step_s`: Time of the first instant in the trial's own time, and the step, s
     begin_s: float
     step_s: float
+    # (n, nu): Mean of each of the model's inputs from an instant to the next; the last row repeats the previous
+    # row
     inputs: Array
-    measured: Array
-    seen: tuple[str, ...]
-    file: str = ""
+    measured: Array  # (n, ny): In the order of `seen`; nan where not measured
+    seen: tuple[str, ...]  # Names of the model's variables that are measured
+    file: str = ""  # The trial's file, for messages; empty if it has none
 
     @property
     def origin(self) -> str:
@@ -113,10 +100,7 @@ def prepare(
     With `orders_before` an order was given before the first row that shows it (:attr:`.MotionRecord.given_s`).
     `rudder` are times and angles of the rudder that take the place of the trial's (:class:`.sampled_runs`).
 
-    Raises
-    ------
-    InputError
-        The trial has fewer than ten steps, or none of the signals in `seen`.
+    Raises InputError: The trial has fewer than ten steps, or none of the signals in `seen`.
     """
     record = motion_record(model, trial, seen)
     sampling = float(np.median(np.diff(trial.time_s)))
@@ -224,21 +208,11 @@ _LONGEST_GAP = 20.0
 
 @dataclass(frozen=True, eq=False)
 class OrderedRudder:
-    """A steering gear alone.
+    """A steering gear alone."""
 
-    Parameters
-    ----------
-    chain : Chain
-        Angle (rad) after a step, from the angle before, and the order (rad) and length of the step (s).
-    lag_s : float
-        Time constant of the gear.
-    ship_time : float
-        L/u0, s.
-    """
-
-    chain: Chain
-    lag_s: float
-    ship_time: float
+    chain: Chain  # Angle (rad) after a step, from the angle before, and the order (rad) and length of the step (s)
+    lag_s: float  # Time constant of the gear
+    ship_time: float  # L/u0, s
 
     def angle(self, trial: Trial) -> tuple[Array, Array]:
         """Times (m,), s, and angle (m,), rad, of a trial's rudder by its orders.

@@ -160,13 +160,8 @@ def prior_of_absent(card: ManoeuvringCard, name: str, share: float = SHARE_OF_LI
 def with_terms(card: ManoeuvringCard, names: Sequence[str], share: float = SHARE_OF_LINEAR) -> ManoeuvringCard:
     """The card with terms: a missing one gets its value before the trials, one of asymmetry at least that error.
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-    names : sequence of str
-        Derivatives, as ``Nvvr``.
-    share : float
-        Standard error of a term that the card lacks, as a share of the linear force in a hard turn.
+    `names`: Derivatives, as ``Nvvr``. `share`: Standard error of a term that the card lacks, as a share of the linear
+    force in a hard turn.
     """
     new: dict[str, tuple[float, float]] = {}
     for name in names:
@@ -191,13 +186,8 @@ def _without(card: ManoeuvringCard, names: set[str]) -> ManoeuvringCard:
 def with_effect(card: ManoeuvringCard, name: str, parameters: Terms) -> ManoeuvringCard:
     """The card with an effect; an effect that it already has does not change.
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-    name : str
-        Name of the effect.
-    parameters : mapping
-        Parameter, as spelt in a card, to value and standard error before the trials.
+    `name`: Name of the effect. `parameters`: Parameter, as spelt in a card, to value and standard error before the
+    trials.
     """
     if any(entry.name == name for entry in card.effects):
         return card

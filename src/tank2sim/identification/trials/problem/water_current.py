@@ -37,21 +37,11 @@ _STRONGEST = next(each.maximum for each in CURRENT.parameters if each.name == "s
 
 @dataclass(frozen=True, eq=False)
 class WaterCurrent:
-    """A current.
+    """A current."""
 
-    Parameters
-    ----------
-    velocity : array (2,)
-        To north and east, m/s.
-    covariance : array (2, 2)
-        Covariance of both.
-    ship_speed_mps : float
-        Speed of the card.
-    """
-
-    velocity: Array
-    covariance: Array
-    ship_speed_mps: float
+    velocity: Array  # (2,): To north and east, m/s
+    covariance: Array  # (2, 2): Covariance of both
+    ship_speed_mps: float  # Speed of the card
 
     @property
     def speed_mps(self) -> float:
@@ -136,11 +126,7 @@ def current_alone(problem: Problem) -> Problem:
 def without_current(estimate: Estimate, card: ManoeuvringCard) -> tuple[Estimate, WaterCurrent]:
     """An estimate with a free current as that of the other parameters (current eliminated), and the current.
 
-    Parameters
-    ----------
-    estimate : Estimate
-    card : ManoeuvringCard
-        Card of the problem; its current is added.
+    `card`: Card of the problem; its current is added.
     """
     part = [estimate.free.index(name) for name in CURRENT_PARAMETERS]
     kept = [place for place in range(len(estimate.free)) if place not in part]
