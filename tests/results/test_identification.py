@@ -14,8 +14,8 @@ from tank2sim.answer.parts import Verdict
 from tank2sim.cards import parse_card
 from tank2sim.identification.trials.assessment.evaluation import comparison_windows
 from tank2sim.identification.trials.identify import identify_trials
-from tank2sim.identification.trials.methods.posterior import scaled_prior
 from tank2sim.identification.trials.options import IdentificationOptions
+from tank2sim.identification.trials.problem.estimation_problem import scaled_prior
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 from tank2sim.identification.trials.study import (

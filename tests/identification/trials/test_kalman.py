@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from tank2sim.identification.trials.methods.kalman import KalmanSettings, kalman
-from tank2sim.identification.trials.methods.kalman_gains import (
+from tank2sim.identification.trials.methods.kalman import KalmanSettings, kalman, task_of
+from tank2sim.identification.trials.methods.kalman_pass import (
     Variances,
     gains,
     innovation_tangents,
     smooth_states,
     variant_likelihoods,
 )
-from tank2sim.identification.trials.methods.kalman_search import task_of
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
 from tank2sim.identification.trials.methods.process_noise import Disturbed, Tangents
 from tank2sim.identification.trials.problem.estimation_problem import Problem

@@ -19,7 +19,7 @@ from tank2sim.identification.trials.methods.coloured_noise import white
 from tank2sim.identification.trials.methods.equation_error import EquationErrorSettings, equation_error
 from tank2sim.identification.trials.methods.gauss_newton import StoppedSearchError, is_minimum, refuse_stopped
 from tank2sim.identification.trials.methods.kalman_pass import velocities_of
-from tank2sim.identification.trials.methods.shooting import SENSED_BY, Shooting, Shot, cut
+from tank2sim.identification.trials.methods.output_error import SENSED_BY, Shooting, Shot, cut
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 

@@ -23,16 +23,19 @@ from tank2sim.identification.craft.problem import (
     without_compass,
 )
 from tank2sim.identification.trials.methods.gauss_newton import StoppedSearchError
-from tank2sim.identification.trials.methods.kalman import KalmanEstimate, KalmanSettings, Smoothed, estimate_at, kalman
-from tank2sim.identification.trials.methods.kalman_gains import FilterFault, smooth_states
-from tank2sim.identification.trials.methods.kalman_pass import Levels
-from tank2sim.identification.trials.methods.kalman_search import (
+from tank2sim.identification.trials.methods.kalman import (
+    KalmanEstimate,
+    KalmanSettings,
     SearchPoint,
     SearchTask,
+    Smoothed,
+    estimate_at,
+    kalman,
     normal,
     task_of,
     whitened_innovations,
 )
+from tank2sim.identification.trials.methods.kalman_pass import FilterFault, Levels, smooth_states
 from tank2sim.identification.trials.methods.process_noise import PUSHED
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun

@@ -14,7 +14,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.methods.coloured_noise import white
-from tank2sim.identification.trials.methods.shooting import Shooting, cut
+from tank2sim.identification.trials.methods.output_error import Shooting, cut
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card

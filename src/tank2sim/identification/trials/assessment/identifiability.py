@@ -16,10 +16,8 @@ from tank2sim.cards.terms import Term, parse_term
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import correlation_matrix
 from tank2sim.identification.trials.methods.equation_error import EquationErrorSettings, equation_error, weights_of
-from tank2sim.identification.trials.methods.posterior import scaled_prior
-from tank2sim.identification.trials.methods.weak_form import WeakForm
-from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
-from tank2sim.identification.trials.problem.measured_motion import MEASURED_STATES
+from tank2sim.identification.trials.methods.weak_form import MEASURED_STATES, WeakForm
+from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, scaled_prior
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 from tank2sim.notices import Notice
 

@@ -17,9 +17,8 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.examination import doubts
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.methods.posterior import BLOCK
 from tank2sim.identification.trials.methods.weak_form import WeakForm
-from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
+from tank2sim.identification.trials.problem.estimation_problem import BLOCK, Estimate, Problem
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun

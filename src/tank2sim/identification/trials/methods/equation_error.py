@@ -17,9 +17,17 @@ from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise, estimate_coloured_noise, white
 from tank2sim.identification.trials.methods.gauss_newton import damped_gauss_newton, is_minimum, refuse_stopped
-from tank2sim.identification.trials.methods.posterior import BLOCK, evidence_scale, sandwich, scaled_prior
 from tank2sim.identification.trials.methods.weak_form import WEAK_EQUATIONS, WIDTH, WeakForm, WeakWindows
-from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
+from tank2sim.identification.trials.problem.estimation_problem import (
+    BLOCK,
+    Estimate,
+    Problem,
+    SearchReport,
+    evidence_scale,
+    sandwich,
+    scaled_prior,
+    silent,
+)
 from tank2sim.notices import Notice
 
 REPORTED_NOISE = 0.01

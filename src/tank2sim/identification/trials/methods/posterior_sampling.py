@@ -24,10 +24,9 @@ from scipy.linalg import eigh
 
 from tank2sim.arrays import Array
 from tank2sim.errors import ArgumentError
-from tank2sim.identification.trials.methods.posterior import scaled_prior
-from tank2sim.identification.trials.methods.shooting import Shooting, cut, whitened, whitening_transposed
+from tank2sim.identification.trials.methods.output_error import Shooting, cut, whitened, whitening_transposed
 from tank2sim.identification.trials.options import DRAWS_OF_CHAIN, Sampler
-from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
+from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, scaled_prior
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 from tank2sim.notices import Notice, caution
 from tank2sim.simulation.rows import Chain

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
 
-import casadi as ca
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
@@ -16,18 +14,21 @@ from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.cards.form import Propulsion
 from tank2sim.cards.reading import revised
 from tank2sim.cards.terms import known_term
-from tank2sim.dynamics import build
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
-from tank2sim.dynamics.build import KEPT_MODELS
 from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.mmg.hull import MMG_TERMS
-from tank2sim.dynamics.model import Model, Quantity, same_symbol
+from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.roll import roll_terms
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns, captive_tests
-from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, noise_alone
+from tank2sim.identification.trials.problem.estimation_problem import (
+    DrivenShip,
+    Estimate,
+    Problem,
+    driven_model,
+    noise_alone,
+)
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun, in_range, ordered_rudder, prepare, seen_in
 from tank2sim.notices import Notice
@@ -159,17 +160,6 @@ def speed_history(trial: Trial, ship_time: float) -> tuple[Array, Array]:
     return time[known], speed[known]
 
 
-def driven_model(card: ManoeuvringCard, driven_by: str) -> Model:
-    """The card's model, driven by the measured angle of the rudder (`driven_by` is ``angle``) or by its order."""
-    return _driven(build(card), driven_by)
-
-
-@lru_cache(maxsize=KEPT_MODELS)
-def _driven(ship: Model, driven_by: str) -> Model:
-    model = with_ground_velocities(ship)
-    return driven_by_angle(model) if driven_by == "angle" else model
-
-
 def fit_driven_by(card: ManoeuvringCard, driven_by: str) -> str:
     """Return the signal that drives the model which is fitted to trials.
 
@@ -179,39 +169,6 @@ def fit_driven_by(card: ManoeuvringCard, driven_by: str) -> str:
     `driven_by`: ``angle`` if the rudder's angle was measured, ``order`` if only its order is known.
     """
     return "angle" if driven_by == "angle" or ordered_rudder(driven_model(card, "order")) else "order"
-
-
-def driven_by_angle(model: Model) -> Model:
-    """The model without its steering gear: ``rudder.command`` is the angle of the rudder.
-
-    For trials in which the angle was measured: the record contains the action of the gear.
-    """
-    angle, order = model.symbol("rudder.angle"), model.symbol("rudder.command")
-    removed = {"rudder.rate", "rudder.angle"}
-    quantities = []
-    for quantity in model.quantities:
-        if quantity.name in removed:
-            continue
-        copy = replace(quantity, value=ca.substitute(quantity.value, angle, order))
-        quantities.append(same_symbol(quantity, copy))
-    return replace(
-        model,
-        states=tuple(state for state in model.states if state.name != "rudder.angle"),
-        quantities=tuple(quantities),
-        outputs=tuple(name for name in model.outputs if name not in removed),
-    )
-
-
-def with_ground_velocities(model: Model) -> Model:
-    """The model with ``motion.u_ground`` and ``motion.v_ground``, the velocity over the ground in body axes, m/s."""
-    north, east, psi = (model.symbol(name) for name in ("motion.xdot", "motion.ydot", "motion.psi"))
-    forward, starboard = earth_velocity(north, east, -psi)
-    return model.extend(
-        Quantity(name="motion.u_ground", unit="m/s", description="Velocity ahead over the ground", value=forward),
-        Quantity(
-            name="motion.v_ground", unit="m/s", description="Velocity to starboard over the ground", value=starboard
-        ),
-    )
 
 
 def free_parameters(card: ManoeuvringCard, *, inertia: bool = False) -> dict[str, tuple[float, float]]:
@@ -264,7 +221,8 @@ def problem_from_card(
     `trials`: At the ship's size. `driven_by`: ``angle`` or ``order`` of the rudder. `inertia`: Whether accelerations
     are free too. Raises InputError: A trial is too short or has nothing to compare, or the card leaves nothing free.
     """
-    model = driven_model(card, fit_driven_by(card, driven_by))
+    ship = DrivenShip(card.text, fit_driven_by(card, driven_by))
+    model = driven_model(card, ship.driven_by)
     gear = ordered_rudder(driven_model(card, "order")) if driven_by == "order" else None
     free = free_parameters(card, inertia=inertia)
     if card.propulsion is not None and card.propulsion.Xnn and _revolutions_vary(card.propulsion, trials):
@@ -289,7 +247,7 @@ def problem_from_card(
         problem = f"never goes for long at {low:g} to {high:g} m/s, where the card holds"
         raise InputError(trials[0].path, "", problem, "change model.valid_speed_mps of the card, or leave it out")
     values = np.array(list(free.values()))
-    return Problem(model, tuple(free), values[:, 0], values[:, 1], runs)
+    return Problem(model, tuple(free), values[:, 0], values[:, 1], runs, ship=ship)
 
 
 def with_captive(problem: Problem, card: ManoeuvringCard, captive: CaptiveRuns | None) -> Problem:

@@ -92,7 +92,7 @@ def prepare(
     rudder: tuple[Array, Array] | None = None,
 ) -> SampledRun:
     """A trial on equal steps, for a model driven by the trial's rudder signal
-    (:func:`.problem_from_card.driven_model`).
+    (:func:`.estimation_problem.driven_model`).
 
     The step is a whole number of sampling steps near `step_s` (by default 1.5 times the model's own), or a whole part
     of one where `step_s` is shorter. Signals are averaged over a step, so that no measurement is lost. A rudder order

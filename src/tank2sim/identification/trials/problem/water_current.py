@@ -115,6 +115,7 @@ def with_current(problem: Problem) -> Problem:
         prior_mean=np.append(problem.prior_mean, [0.0, 0.0]),
         prior_error=np.append(problem.prior_error, [CURRENT_ERROR, CURRENT_ERROR]),
         prior_inverse=inverse,
+        ship=None,
     )
 
 
