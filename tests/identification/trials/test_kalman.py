@@ -8,6 +8,8 @@ from scipy.stats import multivariate_normal
 
 from tank2sim.identification.trials.methods.kalman import KalmanSettings, kalman, task_of
 from tank2sim.identification.trials.methods.kalman_pass import (
+    Disturbed,
+    Tangents,
     Variances,
     gains,
     innovation_tangents,
@@ -15,7 +17,6 @@ from tank2sim.identification.trials.methods.kalman_pass import (
     variant_likelihoods,
 )
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
-from tank2sim.identification.trials.methods.process_noise import Disturbed, Tangents
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tests.identification.trials.pushed_ship import NOISE, PUSH, SEEN, TIME, TRUTH, VALUES, model, pushed_problem
 
@@ -88,14 +89,13 @@ def test_runs_of_different_lengths_say_together_what_each_says_alone():
         likelihood = variant_likelihoods(along, noise, innovations[part], after[part], factors[:, runs])
         return found.log_determinant, *likelihood, innovation_tangents(along, found)
 
-    determinant, cost, information, (J, last) = said(slice(None), n, lengths)
+    determinant, cost, information, J = said(slice(None), n, lengths)
     alone = [said(slice(run, run + 1), length, None) for run, length in enumerate(lengths)]
     assert determinant == pytest.approx(sum(one[0] for one in alone))
     np.testing.assert_allclose(cost, sum(one[1] for one in alone))
     np.testing.assert_allclose(information, sum(one[2] for one in alone))
     for run, length in enumerate(lengths):
-        np.testing.assert_allclose(J[run, :length], alone[run][3][0][0])
-        np.testing.assert_allclose(last[run], alone[run][3][1][0])
+        np.testing.assert_allclose(J[run, :length], alone[run][3][0])
     assert (J[0, lengths[0] :] == 0).all()
 
 
@@ -122,7 +122,7 @@ def test_derivatives_of_the_innovations_are_those_of_finite_differences(pushed):
     e = batch.measured[0] - disturbed.seen(states, batch.inputs[0], p)
     after = states + (made.gains.K[0] @ e[..., None])[..., 0]
     there = disturbed.tangents(states, after, batch.inputs[0], (p, *case))
-    J, _ = innovation_tangents(Tangents(*(x[None] for x in (there.A, there.B, there.C, there.D))), made.gains)
+    J = innovation_tangents(Tangents(*(x[None] for x in (there.A, there.B, there.C, there.D))), made.gains)
     for place in range(len(TRUTH)):
         step = np.zeros(len(TRUTH))
         step[place] = 1e-4 * problem.prior_mean[place]

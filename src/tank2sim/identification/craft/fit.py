@@ -16,11 +16,11 @@ from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.identification.craft.first_values import PREDICTED_S, estimate_by_velocities
 from tank2sim.identification.craft.problem import (
+    COMPASS_SPREADS,
     DISTURBANCES,
     FORCE_SPREAD,
     deviates,
     with_disturbances,
-    without_compass,
 )
 from tank2sim.identification.trials.methods.gauss_newton import StoppedSearchError
 from tank2sim.identification.trials.methods.kalman import (
@@ -33,10 +33,8 @@ from tank2sim.identification.trials.methods.kalman import (
     kalman,
     normal,
     task_of,
-    whitened_innovations,
 )
-from tank2sim.identification.trials.methods.kalman_pass import FilterFault, Levels, smooth_states
-from tank2sim.identification.trials.methods.process_noise import PUSHED
+from tank2sim.identification.trials.methods.kalman_pass import PUSHED, FilterFault, Levels, smooth_states
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 from tank2sim.simulation.sensitivity import Sensitivity
@@ -105,7 +103,6 @@ class CraftFit:
 
     problem: Problem
     estimate: KalmanEstimate  # Estimate of the k free parameters
-    levels: Levels  # Noise levels
     by_run: Array  # (runs, k, k): Information of each run
     gust_share: float = 0.0  # Random acceleration in surge that the filter needs, over that by the largest thrust
 
@@ -133,6 +130,12 @@ class CraftFit:
                 found.append(CoefficientVerdict.BOUNDED)
         return tuple(found)
 
+    @property
+    def undetermined(self) -> list[str]:
+        """Free parameters of the craft that the trials do not determine."""
+        pairs = zip(self.problem.free, self.verdicts, strict=True)
+        return [name for name, each in pairs if each is CoefficientVerdict.PRIOR and name not in COMPASS_SPREADS]
+
     def best_run(self, place: int) -> int:
         """The run without which the standard error of a free parameter would grow most."""
         prior = self.problem.prior_precision(self.problem.prior_error)
@@ -153,7 +156,7 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
     """
     found = estimate_by_velocities(problem)
     if found is None or not deviates(found):
-        problem = without_compass(problem)
+        problem = problem.without(COMPASS_SPREADS)  # what the trials do not show only widens the others
         found = estimate_by_velocities(problem)
     steps = KalmanSettings.iterations if found is None else _STEPS_FROM_NEAR
     settings = KalmanSettings(drifting=True, scale_prior=False, iterations=steps)
@@ -165,22 +168,17 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
         return fit
     narrower = with_disturbances(problem, *_disturbances_of(problem, estimate.smoothed))
     try:
-        return _fit_of(narrower, kalman(narrower, estimate.values, settings, progress, fit.levels))
+        return _fit_of(narrower, kalman(narrower, estimate.values, settings, progress, estimate.levels))
     except InputError:  # it stops, or loses a trial: the first estimate stays
         return fit
 
 
 def _fit_of(problem: Problem, estimate: KalmanEstimate) -> CraftFit:
     """The fit of an estimate by the filter."""
-    levels = levels_of(problem, estimate)
-    return CraftFit(problem, estimate, levels, information(problem, estimate.values, levels), _gusts(problem, estimate))
-
-
-def _gusts(problem: Problem, estimate: KalmanEstimate) -> float:
-    """Random acceleration in surge, over that by the largest thrust."""
     thrust = problem.model["disturbance.north"].nominal / FORCE_SPREAD
     mass = problem.parameters(estimate.values)[problem.model.parameter_names.index("ship.mass")]
-    return float(estimate.process_noise["motion.u"].deviation * mass / thrust)
+    gusts = float(estimate.process_noise["motion.u"].deviation * mass / thrust)
+    return CraftFit(problem, estimate, information(problem, estimate.values, estimate.levels), gusts)
 
 
 def _at_velocities(problem: Problem, found: Estimate) -> CraftFit | None:
@@ -217,7 +215,7 @@ def _filtered_with(problem: Problem, found: Estimate) -> dict[float, CraftFit]:
         estimate = replace(
             filtered, method=found.method, covariance=found.covariance, information=found.information, cost=found.cost
         )
-        fits[share] = CraftFit(posed, estimate, point.levels, by_run)
+        fits[share] = CraftFit(posed, estimate, by_run)
     return fits
 
 
@@ -304,19 +302,9 @@ def spread_between(found: Array, errors: Array, before: float) -> tuple[float, f
     return mean, float(np.sqrt(variance))
 
 
-def levels_of(problem: Problem, estimate: KalmanEstimate) -> Levels:
-    """The noise levels of an estimate, as the filter takes them."""
-    correlated = [*estimate.process_noise.values(), *(estimate.drift[name] for name in problem.seen)]
-    return Levels(
-        np.log([noise.deviation for noise in correlated]),
-        np.log([noise.time_s for noise in correlated]),
-        np.log([estimate.measurement_noise[name] for name in problem.seen]),
-    )
-
-
 def information(problem: Problem, values: Array, levels: Levels) -> Array:
     """Information of each run of a problem (runs, k, k) at parameters and noise levels."""
-    J, _ = whitened_innovations(_point(problem, values, levels)[1].filtered)
+    J = _point(problem, values, levels)[1].filtered.slopes
     flat = J.reshape(len(J), -1, J.shape[-1])
     return np.asarray(np.swapaxes(flat, 1, 2) @ flat)
 
@@ -367,7 +355,7 @@ def predict_free(fit: CraftFit, runs: Sequence[SampledRun]) -> list[FreePredicti
     """
     problem = fit.problem.with_runs(tuple(runs))
     names = problem.model.state_names
-    task, point = _point(problem, fit.estimate.values, fit.levels)
+    task, point = _point(problem, fit.estimate.values, fit.estimate.levels)
     filtered, nx = point.filtered, len(names)
     tangents = filtered.tangents
     states, _ = smooth_states(tangents.A, tangents.C, filtered.gains, filtered.before, filtered.innovations)
@@ -412,14 +400,13 @@ def predict_by_card(problem: Problem) -> list[FreePrediction]:
     first, error = problem.prior_mean[:1], 1e-6 * (np.abs(problem.prior_mean[:1]) + 1e-6)
     held = replace(problem, free=problem.free[:1], prior_mean=first, prior_error=error)
     estimate = kalman(held, first, KalmanSettings(drifting=True, scale_prior=False))
-    levels = levels_of(held, estimate)
     found = []
     for number, run in enumerate(problem.runs):
         smoothed = (*estimate.smoothed[:number], *estimate.smoothed[number + 1 :])
         alone = held.with_runs((run,))
         if smoothed:
             alone = with_disturbances(alone, *_disturbances_of(held, smoothed))
-        found += predict_free(CraftFit(alone, estimate, levels, np.zeros((1, 1, 1))), [run])
+        found += predict_free(CraftFit(alone, estimate, np.zeros((1, 1, 1))), [run])
     return found
 
 

@@ -277,13 +277,6 @@ def deviates(estimate: Estimate) -> bool:
     )
 
 
-def without_compass(problem: Problem) -> Problem:
-    """The problem of a compass without deviation: parameters that the trials do not show only widen the others."""
-    kept = np.array([name not in COMPASS_SPREADS for name in problem.free])
-    free = tuple(name for name in problem.free if name not in COMPASS_SPREADS)
-    return replace(problem, free=free, prior_mean=problem.prior_mean[kept], prior_error=problem.prior_error[kept])
-
-
 def craft_driven_by(card: SteeredCard, trials: Sequence[Trial]) -> str:
     """What drives the model in all trials: ``revolutions``, which were measured, or else ``orders``.
 

@@ -8,7 +8,7 @@ Each candidate is simulated with the estimates, and its information added to tha
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -88,11 +88,6 @@ def next_trials(card: SteeredCard, fit: CraftFit) -> list[CandidateTrial]:
     """
     if len(card.thrusters) != 2:
         return []
-    open_places = [
-        place
-        for place, (name, verdict) in enumerate(zip(fit.problem.free, fit.verdicts, strict=True))
-        if verdict is CoefficientVerdict.PRIOR and name not in COMPASS_SPREADS
-    ]
     problem = fit.problem
     # The reported errors allow for residuals unlike the noise model: a candidate narrows both alike.
     so_far = fit.by_run.sum(axis=0) + problem.prior_precision(problem.prior_error)
@@ -104,12 +99,10 @@ def next_trials(card: SteeredCard, fit: CraftFit) -> list[CandidateTrial]:
         errors = now.copy()
         if added is not None:
             errors *= np.sqrt(np.diag(np.linalg.inv(so_far + added)) / np.diag(np.linalg.inv(so_far)))
-        determined = [
-            problem.free[place].removeprefix("derivatives.").removeprefix("thrusters.")
-            for place in open_places
-            if errors[place] <= TRIALS_SHARE * problem.prior_error[place]
-            or errors[place] <= IDENTIFIED_SHARE * abs(fit.estimate.values[place])
-        ]
+        shows = (errors <= TRIALS_SHARE * problem.prior_error) | (
+            errors <= IDENTIFIED_SHARE * np.abs(fit.estimate.values)
+        )
+        determined = [_short(name) for name in fit.undetermined if shows[problem.free.index(name)]]
         times, port, starboard = zip(*orders, strict=True)
         found.append(CandidateTrial(words, times, port, starboard, tuple(determined)))
     return sorted(found, key=lambda candidate: -len(candidate.determines))
@@ -148,7 +141,7 @@ def _added_information(fit: CraftFit, inputs: Array) -> Array | None:
     shown = sensitivity.shown(states, inputs, p)
     made = replace(run, name="candidate", begin_s=0.0, inputs=inputs, measured=shown)
     try:
-        return np.asarray(information(problem.with_runs((made,)), fit.estimate.values, fit.levels)[0])
+        return np.asarray(information(problem.with_runs((made,)), fit.estimate.values, fit.estimate.levels)[0])
     except InputError:  # the filter loses the motion
         return None
 
@@ -273,52 +266,13 @@ def study_craft(
 ) -> CraftIdentificationStudy:
     """Study of the fit of a craft.
 
-    Parameters
-    ----------
-    card, found : SteeredCard
-        Given and found.
-    fit : CraftFit
-    held : mapping
-        Held-out trials by name, each with its predictions; None for one too short.
-    responses : mapping
-        Response to orders by thruster.
-    driven_by : str
-        ``revolutions`` or ``orders``.
+    `card`, `found`: Given and found. `held`: Held-out trials by name, each with its predictions; None for one too
+    short. `responses`: Response to orders by thruster. `driven_by`: ``revolutions`` or ``orders``.
     """
     predictions = [entry for entry in held.values() if entry is not None]
     r_squared = prediction_r_squared(predictions) if predictions else None
-    notices = [*worse_than_a_mean(r_squared or {}), *dict.fromkeys((*doubts(card), *doubts(found)))]
-    if open_thrust := [
-        name
-        for name, verdict in zip(fit.problem.free, fit.verdicts, strict=True)
-        if name.endswith((".ahead", ".astern")) and verdict is CoefficientVerdict.PRIOR
-    ]:
-        notices.append(caution(f"the trials do not determine {', '.join(open_thrust)}: it is that of the card"))
-    if held and not predictions:
-        least = PREDICTION_LEAD_S + SHORTEST_PREDICTION_S
-        notices.append(Notice(f"no held-out trial is longer than {least:g} s: none is predicted"))
-    if driven_by == "orders":
-        notices.append(
-            Notice(
-                "the trials have orders and no revolutions: a full order counts as the largest revolutions of the card"
-            )
-        )
-    if not fit.holds:
-        notices.append(_model_does_not_hold(fit))
-    notices += _dead_band_notices(card, responses, driven_by)
     compass = _compass(fit)
-    if compass is not None:
-        words = (
-            f"the compass of these trials deviates by A {compass.a_deg:+.1f}, B {compass.b_deg:+.1f} sin(heading), "
-            f"C {compass.c_deg:+.1f} cos(heading) deg: the headings were corrected by it; swing the compass"
-        )
-        notices.append(Notice(words))
-    notices.append(
-        Notice(
-            "the mass on the card is taken as exact: motion determines forces over masses, so that an error of the "
-            "mass is one of all forces, in the same share"
-        )
-    )
+    too_short = bool(held) and not predictions
     return CraftIdentificationStudy(
         ship=card.ship.name,
         method=fit.estimate.method,
@@ -331,7 +285,40 @@ def study_craft(
         order_responses={name: _response(response) for name, response in responses.items()},
         held_out=tuple(held),
         next_trials=tuple(next_trials(card, fit)),
-        notices=tuple(notices),
+        notices=(
+            *worse_than_a_mean(r_squared or {}),
+            *dict.fromkeys((*doubts(card), *doubts(found))),
+            *_fit_notices(fit, driven_by, too_short=too_short),
+            *_dead_band_notices(card, responses, driven_by),
+            *_instrument_notices(compass),
+        ),
+    )
+
+
+def _fit_notices(fit: CraftFit, driven_by: str, *, too_short: bool) -> Iterator[Notice]:
+    """Notices of thrust curves, held-out trials, orders, and of a model that does not hold."""
+    thrust = [name for name in fit.undetermined if name.endswith((".ahead", ".astern"))]
+    if thrust:
+        yield caution(f"the trials do not determine {', '.join(thrust)}: it is that of the card")
+    if too_short:
+        least = PREDICTION_LEAD_S + SHORTEST_PREDICTION_S
+        yield Notice(f"no held-out trial is longer than {least:g} s: none is predicted")
+    if driven_by == "orders":
+        words = "the trials have orders and no revolutions: a full order counts as the largest revolutions of the card"
+        yield Notice(words)
+    if not fit.holds:
+        yield _model_does_not_hold(fit)
+
+
+def _instrument_notices(compass: CompassDeviation | None) -> Iterator[Notice]:
+    if compass is not None:
+        yield Notice(
+            f"the compass of these trials deviates by A {compass.a_deg:+.1f}, B {compass.b_deg:+.1f} sin(heading), "
+            f"C {compass.c_deg:+.1f} cos(heading) deg: the headings were corrected by it; swing the compass"
+        )
+    yield Notice(
+        "the mass on the card is taken as exact: motion determines forces over masses, so that an error of the "
+        "mass is one of all forces, in the same share"
     )
 
 
@@ -349,10 +336,7 @@ def _model_does_not_hold(fit: CraftFit) -> Notice:
 def worse_than_a_mean(r_squared: Mapping[str, float]) -> list[Notice]:
     """A caution where predictions of held-out trials are worse than the mean of what was measured.
 
-    Parameters
-    ----------
-    r_squared : mapping
-        R^2 of u, v and r.
+    `r_squared`: R^2 of u, v and r.
     """
     bad = [f"{name} {value:.2g}" for name, value in r_squared.items() if not value > 0]
     if not bad:
@@ -365,12 +349,10 @@ def worse_than_a_mean(r_squared: Mapping[str, float]) -> list[Notice]:
     ]
 
 
-def _dead_band_notices(card: SteeredCard, responses: Mapping[str, OrderResponse], driven_by: str) -> list[Notice]:
+def _dead_band_notices(card: SteeredCard, responses: Mapping[str, OrderResponse], driven_by: str) -> Iterator[Notice]:
     if not responses:
-        words = "orders" if driven_by == "orders" else "revolutions"
-        other = "revolutions" if driven_by == "orders" else "orders"
-        return [Notice(f"dead bands are those of the card: the trials have {words}, and need {other} next to them")]
-    notices = []
+        words = "orders, and need revolutions" if driven_by == "orders" else "revolutions, and need orders"
+        yield Notice(f"dead bands are those of the card: the trials have {words} next to them")
     for thruster in card.thrusters:
         response = responses.get(thruster.name)
         if response is None or response.dead_band is not None:
@@ -378,21 +360,22 @@ def _dead_band_notices(card: SteeredCard, responses: Mapping[str, OrderResponse]
         least = from_si("n_rpm", response.turning_radps)
         text = f"the dead band of thruster {thruster.name} is that of the card: no order left the propeller at rest"
         if thruster.dead_band_radps >= response.turning_radps:
-            notices.append(caution(f"{text}, and one of {least:.3g} rpm, within it, turned it"))
+            yield caution(f"{text}, and one of {least:.3g} rpm, within it, turned it")
         else:
-            notices.append(Notice(f"{text}; one of {least:.3g} rpm turned it"))
-    return notices
+            yield Notice(f"{text}; one of {least:.3g} rpm turned it")
 
 
 def _compass(fit: CraftFit) -> CompassDeviation | None:
-    found = {}
-    if not COMPASS_SPREADS.keys() <= set(fit.problem.free):
+    places = {name[-1].lower(): place for place, name in enumerate(fit.problem.free) if name in COMPASS_SPREADS}
+    if not places:
         return None
-    for name in COMPASS_SPREADS:
-        place, letter = fit.problem.free.index(name), name[-1].lower()
-        found[f"{letter}_deg"] = math.degrees(fit.estimate.values[place])
-        found[f"{letter}_error_deg"] = math.degrees(fit.estimate.standard_errors[place])
-    return CompassDeviation(**found)
+    values, errors = np.degrees(fit.estimate.values), np.degrees(fit.estimate.standard_errors)
+    found = {f"{letter}_deg": float(values[place]) for letter, place in places.items()}
+    return CompassDeviation(**found, **{f"{letter}_error_deg": float(errors[at]) for letter, at in places.items()})
+
+
+def _short(name: str) -> str:
+    return name.removeprefix("derivatives.").removeprefix("thrusters.")
 
 
 def _coefficients(fit: CraftFit) -> dict[str, CraftCoefficient]:
@@ -401,7 +384,7 @@ def _coefficients(fit: CraftFit) -> dict[str, CraftCoefficient]:
         if name in COMPASS_SPREADS:
             continue
         known = verdict is not CoefficientVerdict.PRIOR
-        found[name.removeprefix("derivatives.").removeprefix("thrusters.")] = CraftCoefficient(
+        found[_short(name)] = CraftCoefficient(
             value=float(fit.estimate.values[place]),
             standard_error=float(fit.estimate.standard_errors[place]),
             before=float(fit.problem.prior_mean[place]),
@@ -476,16 +459,8 @@ class PredictionStudy:
 def predict_trials(card: SteeredCard, trials: Sequence[Trial]) -> tuple[PredictionStudy, tuple[Notice, ...]]:
     """Predict trials of a craft by its card and recorded revolutions, from the state of a filter after ten seconds.
 
-    Parameters
-    ----------
-    card : SteeredCard
-    trials : sequence of Trial
-        Trials (:func:`.read_craft_trial`).
-
-    Raises
-    ------
-    InputError
-        A file is at fault, none is long enough, or the card does not move as the trials do.
+    `trials`: Trials (:func:`.read_craft_trial`). Raises InputError: A file is at fault, none is long enough, or the
+    card does not move as the trials do.
     """
     problem = craft_problem(card, trials)
     with np.errstate(all="ignore"), threadpool_limits(limits=1, user_api="blas"):

@@ -483,13 +483,7 @@ def study_identification(
 ) -> IdentificationStudy:
     """Study of an identification.
 
-    Parameters
-    ----------
-    before : ManoeuvringCard
-        The card given.
-    result : Identification
-    fitted, held : Measured
-        Trials that were fitted and held out; they are replayed by both cards.
+    `before`: The card given. `fitted`, `held`: Trials that were fitted and held out; they are replayed by both cards.
     """
     estimate, known = result.estimate, result.identifiability
     parameters = _parameters(result)
@@ -704,11 +698,7 @@ def _columns(time_s: Array, signals: Mapping[str, Array]) -> Columns:
 def pooled_error(trials: Sequence[TrialErrors], card: str) -> float:
     """Error of the yaw rate over windows of all trials together, as a share of it; NaN if no ship yaws.
 
-    Parameters
-    ----------
-    trials : sequence of TrialErrors
-    card : str
-        ``before`` or ``found``.
+    `card`: ``before`` or ``found``.
     """
     every = (getattr(trial, card) for trial in trials)
     errors = [errors["r_degps"] for errors in every if "r_degps" in errors]

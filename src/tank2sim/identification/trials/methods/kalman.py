@@ -24,17 +24,16 @@ from tank2sim.arrays import Array
 from tank2sim.identification.trials.methods.gauss_newton import damped_gauss_newton, is_minimum, refuse_stopped
 from tank2sim.identification.trials.methods.kalman_pass import (
     Batch,
+    Disturbed,
     FilterPass,
     Levels,
     Variances,
     batch_of,
     filter_pass,
-    innovation_tangents,
     measured_trajectory,
     smooth_states,
     variant_likelihoods,
 )
-from tank2sim.identification.trials.methods.process_noise import Disturbed
 from tank2sim.identification.trials.problem.estimation_problem import (
     BLOCK,
     Estimate,
@@ -178,16 +177,15 @@ def _first_levels(problem: Problem, disturbed: Disturbed, batch: Batch, white: b
 
 
 def maximise(
-    task: SearchTask, start: SearchPoint, iterations: int, report: Callable[[SearchPoint], None], *, hold: bool = False
+    task: SearchTask, start: SearchPoint, iterations: int, report: Callable[[SearchPoint], None]
 ) -> tuple[SearchPoint, tuple[float, ...]]:
     """Damped steps of parameters and levels together while the likelihood grows: the best point, and all their costs.
 
-    At most `iterations` steps. With `hold` the parameters do not change, only the levels.
+    At most `iterations` steps.
     """
 
     def linearise(point: SearchPoint) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        k = len(point.values)
-        return (np.eye(k), np.zeros(k)) if hold else normal(task, point), _level_normal(task, point)
+        return normal(task, point), _level_normal(task, point)
 
     def move(
         point: SearchPoint, system: tuple[tuple[Array, Array], tuple[Array, Array]], damping: float
@@ -213,31 +211,23 @@ def maximise(
 
 def normal(task: SearchTask, point: SearchPoint) -> tuple[Array, Array]:
     """Normal equations (k, k), (k,) of the parameters, gains held, with the prior."""
-    J, r = whitened_innovations(point.filtered)
-    problem = task.problem
-    flat = J.reshape(-1, J.shape[-1])
+    problem, filtered = task.problem, point.filtered
+    flat = filtered.slopes.reshape(-1, len(problem.free))
     prior = problem.prior_precision(problem.prior_error)
     H: Array = flat.T @ flat + prior
-    g: Array = flat.T @ r.reshape(-1) + prior @ (point.values - problem.prior_mean)
+    g: Array = flat.T @ filtered.white.reshape(-1) + prior @ (point.values - problem.prior_mean)
     return H, g
 
 
 def scores(task: SearchTask, filtered: FilterPass) -> list[Array]:
     """Contribution (blocks, k) of each run's blocks of time to the gradient."""
-    J, r = whitened_innovations(filtered)
-    pull = (J * r[..., None]).sum(axis=2)
+    pull = (filtered.slopes * filtered.white[..., None]).sum(axis=2)
     found = []
     for run_pull, length, step in zip(pull, task.batch.lengths, task.batch.steps, strict=True):
         blocks = min(length, max(1, round(length * step / (BLOCK * task.problem.ship_time))))
         edges = np.linspace(0, length, blocks + 1).astype(int)[:-1]
         found.append(np.add.reduceat(run_pull[:length], edges, axis=0))
     return found
-
-
-def whitened_innovations(filtered: FilterPass) -> tuple[Array, Array]:
-    """Whitened innovations, after their derivatives (runs, n, ny, k) by the parameters with the gains held."""
-    J, _ = innovation_tangents(filtered.tangents, filtered.gains)
-    return J, filtered.white
 
 
 def _level_normal(task: SearchTask, point: SearchPoint) -> tuple[Array, Array]:
@@ -307,10 +297,11 @@ class Smoothed:
     innovations: Array  # (n, ny): Whitened: independent with unit variance if the model holds; nan where not measured
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class KalmanEstimate(Estimate):
     """An estimate with its noise levels."""
 
+    levels: Levels  # As the filter takes them
     process_noise: Mapping[str, CorrelatedNoise] = field(default_factory=dict)  # By state, as ``motion.u``
     # Standard deviation of the white noise by measured variable (``noise`` holds that of the innovations)
     measurement_noise: Mapping[str, float] = field(default_factory=dict)
@@ -383,6 +374,7 @@ def estimate_at(
         noise=dict(zip(problem.seen, map(float, spread), strict=True)),
         cost=costs,
         prior_scale=dict(scale or {}),
+        levels=best.levels,
         process_noise=dict(zip(task.disturbed.pushed, correlated, strict=False)),
         drift=dict(zip(problem.seen, correlated[len(task.disturbed.pushed) :], strict=False)),
         measurement_noise=dict(zip(problem.seen, map(float, np.exp(best.levels.measurement)), strict=True)),
