@@ -9,6 +9,7 @@ towards zero by the share of the motion that they cause (as in any regression on
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,9 +106,9 @@ def equation_error(
             if settings.scale_prior:
                 scale = evidence_scale(problem, normal.information, values, scale)
     if np.array_equal(values, first):
-        known = problem.prior_precision(prior)
-        H, g = normal.information + known, normal.gradient + known @ (values - problem.prior_mean)
-        refuse_stopped("equation error", is_minimum(H, g, bounded=(values, *problem.bounds)))
+        known, pull, _ = problem.before(values, prior)
+        stays = is_minimum(normal.information + known, normal.gradient + pull, bounded=(values, *problem.bounds))
+        refuse_stopped("equation error", stays)
     deviations = np.sqrt(np.mean(np.concatenate([window.residuals for window in windows]) ** 2, axis=0))
     return Estimate(
         method="equation_error",
@@ -194,11 +195,9 @@ def _minimise(
 ) -> tuple[Array, list[WeakWindows], _Normal]:
     """Damped Gauss-Newton steps; values, windows and normal equations at the best point."""
     problem = form.problem
-    prior = problem.prior_precision(errors)
 
     def point(values: Array, windows: list[WeakWindows]) -> _Point:
-        distance = values - problem.prior_mean
-        cost = float(distance @ prior @ distance)
+        cost = problem.before(values, errors)[2]
         for window, run in zip(windows, form.runs, strict=True):
             cost += float(np.sum(weights.whitened(window.residuals, run.pieces) ** 2))
         return _Point(values, windows, cost)
@@ -207,10 +206,10 @@ def _minimise(
         return normal_equations(form, start.windows, weights)
 
     def move(start: _Point, normal: _Normal, damping: float) -> _Point:
+        prior, pull, _ = problem.before(start.values, errors)
         # In units of the prior's errors the matrix is well scaled.
         scaled = (normal.information + prior) * np.outer(errors, errors)
-        gradient = normal.gradient + prior @ (start.values - problem.prior_mean)
-        step = errors * np.linalg.solve(scaled + damping * np.diag(np.diag(scaled)), gradient * errors)
+        step = errors * np.linalg.solve(scaled + damping * np.diag(np.diag(scaled)), (normal.gradient + pull) * errors)
         values = np.clip(start.values - step, *problem.bounds)
         return point(values, form.at(values))
 
@@ -223,18 +222,14 @@ def _minimise(
     return best.values, best.windows, last or linearise(best)
 
 
-def _form_notices(form: WeakForm) -> list[Notice]:
+def _form_notices(form: WeakForm) -> Iterator[Notice]:
     """Notices of regressors with remaining noise, and of parameters that no acceleration depends on."""
-    messages = []
     spread = np.concatenate([run.motion.smooth[:, :3] for run in form.runs]).std(axis=0)
     noise = np.sqrt(np.mean([run.motion.remaining_noise**2 for run in form.runs], axis=0))
     for name, size, error in zip("uvr", spread, noise, strict=True):
         share = (error / size) ** 2 if size > 0 else 0.0
         if share > REPORTED_NOISE:
-            messages.append(
-                f"{100 * share:.0f} % of the variance of {name} is noise: its coefficients come out too small"
-            )
+            yield Notice(f"{100 * share:.0f} % of the variance of {name} is noise: its coefficients come out too small")
     blind = [name for name, seen in zip(form.problem.free, form.seen, strict=True) if not seen]
     if blind:
-        messages.append(f"equation error does not determine {', '.join(blind)}: no acceleration depends on them")
-    return [Notice(text) for text in messages]
+        yield Notice(f"equation error does not determine {', '.join(blind)}: no acceleration depends on them")

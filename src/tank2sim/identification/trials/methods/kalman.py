@@ -88,8 +88,7 @@ class SearchTask:
     def point(self, values: Array, levels: Levels, along: tuple[Array, Array]) -> SearchPoint:
         """A pass of the filter, linearised along a trajectory (before, after), and -2 log posterior."""
         filtered = filter_pass(self.disturbed, self.batch, self.problem.parameters(values), levels, along)
-        distance = (values - self.problem.prior_mean) / self.problem.prior_error
-        penalty = distance @ self.problem.known @ distance
+        penalty = self.problem.before(values, self.problem.prior_error)[2]
         level_penalty = self.time_precision * (levels.vector - self.first.vector) ** 2
         return SearchPoint(values, levels, filtered, filtered.cost + float(penalty + level_penalty.sum()))
 
@@ -213,10 +212,8 @@ def normal(task: SearchTask, point: SearchPoint) -> tuple[Array, Array]:
     """Normal equations (k, k), (k,) of the parameters, gains held, with the prior."""
     problem, filtered = task.problem, point.filtered
     flat = filtered.slopes.reshape(-1, len(problem.free))
-    prior = problem.prior_precision(problem.prior_error)
-    H: Array = flat.T @ flat + prior
-    g: Array = flat.T @ filtered.white.reshape(-1) + prior @ (point.values - problem.prior_mean)
-    return H, g
+    prior, pull, _ = problem.before(point.values, problem.prior_error)
+    return np.asarray(flat.T @ flat + prior), np.asarray(flat.T @ filtered.white.reshape(-1) + pull)
 
 
 def scores(task: SearchTask, filtered: FilterPass) -> list[Array]:

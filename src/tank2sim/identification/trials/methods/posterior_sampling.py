@@ -127,12 +127,10 @@ class LogPosterior:
         assert estimate.motion is not None
         self.problem, self.estimate = problem, estimate
         self.center = estimate.values
-        self.prior = problem.prior_precision(scaled_prior(problem, estimate.prior_scale))
-        tank = problem.captive.normal(problem.parameters(self.center))[0] if problem.captive else 0 * self.prior
-        self.stretch = np.eye(len(self.center))
-        if robust:
-            self.stretch = _stretch(estimate, self.prior + tank)
-        curvature = self.stretch.T @ estimate.information @ self.stretch + self.prior + tank
+        self.errors = scaled_prior(problem, estimate.prior_scale)  # before the trials
+        known = problem.before(self.center, self.errors)[0]
+        self.stretch = _stretch(estimate, known) if robust else np.eye(len(self.center))
+        curvature = self.stretch.T @ estimate.information @ self.stretch + known
         self.root = np.linalg.cholesky(np.linalg.inv(curvature))  # a first one, for the differences of the exact one
         self.lowest, self.highest = problem.bounds
         shooting = Shooting(problem)
@@ -159,7 +157,8 @@ class LogPosterior:
         away = values - self.center
         at = self.center + self.stretch @ away
         next(self._count)
-        return -0.5 * (self._before(values)[0] + float(self.level @ away) + sum(run.cost(at) for run in self.runs))
+        before = self.problem.before(values, self.errors)[2]
+        return -0.5 * (before + float(self.level @ away) + sum(run.cost(at) for run in self.runs))
 
     def with_gradient(self, z: Array) -> tuple[float, Array]:
         """Log density and its gradient by `z`; where the motion leaves all bounds, very small with gradient 0."""
@@ -167,8 +166,8 @@ class LogPosterior:
         away = values - self.center
         at = self.center + self.stretch @ away
         next(self._count)
-        cost, pull = self._before(values)
-        cost, pull = cost + float(self.level @ away), pull + self.level
+        _, pull, cost = self.problem.before(values, self.errors)
+        cost, pull = cost + float(self.level @ away), 2 * pull + self.level
         for run in self.runs:
             run_cost, by = run.cost_and_gradient(at)
             cost, pull = cost + run_cost, pull + self.stretch.T @ by
@@ -183,15 +182,6 @@ class LogPosterior:
         curvature = -np.array(slopes) / (2 * DIFFERENCE)
         size, vectors = np.linalg.eigh((curvature + curvature.T) / 2)
         return np.asarray((vectors * np.maximum(size, LEAST_CURVATURE)) @ vectors.T)
-
-    def _before(self, values: Array) -> tuple[float, Array]:
-        """Twice the negative log density without the trials, and its gradient (k,)."""
-        distance = values - self.problem.prior_mean
-        cost, pull = float(distance @ self.prior @ distance), 2 * self.prior @ distance
-        if self.problem.captive is None:
-            return cost, pull
-        _, tank, tank_cost = self.problem.captive.normal(self.problem.parameters(values))
-        return cost + tank_cost, pull + 2 * tank
 
     def _reflected(self, values: Array) -> tuple[Array, Array]:
         """Values within the bounds, reflected at them, and the sign of their derivative."""

@@ -146,6 +146,16 @@ class Problem:
         """Information before the trials (k, k), with standard errors `errors` (k,)."""
         return np.asarray(self.known / np.outer(errors, errors), dtype=np.float64)
 
+    def before(self, values: Array, errors: Array) -> tuple[Array, Array, float]:
+        """Information (k, k), half the gradient (k,) and cost at `values` (k,) of what is known before the trials: the
+        prior with standard errors `errors` (k,), and captive tests."""
+        prior, away = self.prior_precision(errors), values - self.prior_mean
+        gradient, cost = prior @ away, float(away @ prior @ away)
+        if self.captive is None:
+            return prior, gradient, cost
+        tank, pull, tank_cost = self.captive.normal(self.parameters(values))
+        return prior + tank, gradient + pull, cost + tank_cost
+
     @property
     def groups(self) -> tuple[str, ...]:
         """Group of each parameter whose error may be too small (k,): its equation, X, Y or N; "" for every other
