@@ -13,6 +13,7 @@ from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.answer.parts import Verdict
 from tank2sim.cards import parse_card
 from tank2sim.identification.trials.assessment.evaluation import comparison_windows
+from tank2sim.identification.trials.assessment.identifiability import share_from_trials
 from tank2sim.identification.trials.identify import identify_trials
 from tank2sim.identification.trials.options import IdentificationOptions
 from tank2sim.identification.trials.problem.estimation_problem import scaled_prior
@@ -215,7 +216,7 @@ def test_parameters_are_in_standard_errors_of_the_prior(found) -> None:
         width = 2 * 1.96 * result.estimate.standard_errors[place] / unit[place]
         assert own["high"] - own["low"] == pytest.approx(width, rel=1e-2, abs=rounding)
         assert (prior["low"], prior["high"]) == pytest.approx((-1.96, 1.96), abs=1e-3)
-        assert own["share"] == pytest.approx(100 * result.identifiability.share[place], 1e-4)
+        assert own["share"] == pytest.approx(100 * share_from_trials(result.problem, result.estimate)[place], 1e-4)
 
 
 def test_figures_stand_with_their_errors_in_percent(found) -> None:

@@ -17,7 +17,11 @@ from tank2sim.cards.examination import doubts
 from tank2sim.dynamics import build
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.identification.trials.assessment.evaluation import Comparison, compare_card, noise_of, replay_error
-from tank2sim.identification.trials.assessment.identifiability import Identifiability, identifiability, refuse_unseen
+from tank2sim.identification.trials.assessment.identifiability import (
+    IdentifiabilityStudy,
+    identifiability,
+    refuse_unseen,
+)
 from tank2sim.identification.trials.assessment.model_selection import (
     Criteria,
     CrossValidation,
@@ -95,7 +99,7 @@ METHOD_WORDS = {"kalman": ("the Kalman filter", "output_error"), "output_error":
 class Identification(Fit):
     """Result of an identification."""
 
-    identifiability: Identifiability
+    identifiability: IdentifiabilityStudy
     # Standard deviation of measurement noise by variable, stated in the files or estimated: the unit of misfit
     noise: Mapping[str, float]
     # Comparison of the new card with the fitted trials, and with the held-out trials (None without any)
