@@ -24,7 +24,8 @@ from tank2sim.records.trials import Trial
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
-from tank2sim.simulation.recorded import recorded, repeat, steerable
+from tank2sim.simulation.recorded import Recorded, recorded, repeat, steerable
+from tank2sim.simulation.run import Run
 from tank2sim.simulation.trajectory import Trajectory
 
 _WINDOW = 5.0
@@ -117,24 +118,27 @@ def predicted_figures(card: ManoeuvringCard, trials: Sequence[Trial]) -> tuple[F
 
     `card`: Card of the ship. `trials`: At the ship's size; trials other than turns and zigzags are ignored.
     """
-    model = build(steerable(card))
-    integrator = Integrator(model)
+    integrator = Integrator(build(steerable(card)))
     figures = []
     for trial in trials:
-        record = recorded(trial, model)
+        record = recorded(trial, integrator.model)
         if record is None:
             continue
-        try:
-            simulated = repeat(record, integrator).figures
-        except InputError:  # the motion left all bounds: none of its figures is reached
-            simulated = {}
-        turn = isinstance(record.manoeuvre, Turn)
-        predicted = select_figures(simulated, turn=turn)
+        turn, run = isinstance(record.manoeuvre, Turn), _repeated(record, integrator)
+        predicted = select_figures(run.figures, turn=turn) if run else {}  # without a run none is reached
         figures += [
             FigureComparison(trial.name, name, value, predicted.get(name))
             for name, value in select_figures(record.figures, turn=turn).items()
         ]
     return tuple(figures)
+
+
+def _repeated(record: Recorded, integrator: Integrator) -> Run | None:
+    """A recorded manoeuvre in closed loop; None where the motion leaves all bounds."""
+    try:
+        return repeat(record, integrator)
+    except InputError:
+        return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,35 +169,24 @@ def comparison_windows(
     One for each run of the problem. `noise`: Standard deviation by variable: weighs signals in the initial state of a
     replayed trial.
     """
-    model = build(steerable(card))
-    integrator, shooting = Integrator(model), None
+    integrator = Integrator(build(steerable(card)))
     found = []
     for trial, run in zip(trials, problem.runs, strict=True):
-        manoeuvre = recorded(trial, model)
-        ground = not {"motion.u", "motion.v"} <= set(_given(run))
-        simulated: Trajectory | None
-        if manoeuvre is None:
-            shooting = shooting or Shooting(problem, starts_alone=True)
-            begin, replayed = run.begin_s, _replayed(shooting, run, noise)
-            simulated = replayed if replayed.is_finite() else None
-        else:
-            try:
-                begin, simulated = manoeuvre.begin_s, repeat(manoeuvre, integrator).trajectory
-            except InputError:  # the motion left all bounds
-                begin, simulated = manoeuvre.begin_s, None
-        columns = {} if simulated is None else _shown_of(simulated, ground=ground)
-        times = np.zeros(0) if simulated is None else begin + simulated.t
-        found.append(Passage(run.name, manoeuvre is not None, run.times, _measured_in(run, problem), times, columns))
+        record = recorded(trial, integrator.model)
+        repeated = _repeated(record, integrator) if record else None
+        replayed = None if record else _replayed(problem, run, noise)
+        simulated = repeated.trajectory if repeated else replayed
+        given = {name: run.column(name) for name in run.seen if not np.isnan(run.column(name)).all()}
+        times, columns = np.zeros(0), {}
+        if simulated is not None:
+            times = simulated.t + (record.begin_s if record else run.begin_s)
+            columns = _shown_of(simulated, ground=not {"motion.u", "motion.v"} <= given.keys())
+        measured = _measured_in(run, given, problem)
+        found.append(Passage(run.name, record is not None, run.times, measured, times, columns))
     return tuple(found)
 
 
-def _given(run: SampledRun) -> dict[str, Array]:
-    """Measured columns of a run, by variable."""
-    return {name: run.column(name) for name in run.seen if not np.isnan(run.column(name)).all()}
-
-
-def _measured_in(run: SampledRun, problem: Problem) -> dict[str, Array]:
-    given = _given(run)
+def _measured_in(run: SampledRun, given: Mapping[str, Array], problem: Problem) -> dict[str, Array]:
     rudder = run.inputs[:, problem.model.input_names.index("rudder.command")]
     columns = {"rudder": rudder, **{name: values for name, values in given.items() if name in _SHOWN}}
     for ahead, side in (("motion.u_ground", "motion.v_ground"), ("motion.u", "motion.v")):
@@ -222,15 +215,15 @@ def _drift(side: Array, speed: Array) -> Array:
     return angle
 
 
-def _replayed(shooting: Shooting, run: SampledRun, noise: Mapping[str, float]) -> Trajectory:
-    """The whole run with its recorded inputs, from the initial state that fits the record best."""
-    problem = shooting.problem
+def _replayed(problem: Problem, run: SampledRun, noise: Mapping[str, float]) -> Trajectory | None:
+    """The whole run with its recorded inputs, from the initial state that fits the record best; None if it diverges."""
     model, values = problem.model, problem.prior_mean
-    pieces = cut(problem, run, None)
+    shooting, pieces = Shooting(problem, starts_alone=True), cut(problem, run, None)
     x = shooting.settled(pieces, values, [white(noise.get(name) or 1.0) for name in problem.seen]).states[0]
     u, p = pieces.inputs[0], problem.parameters(values)
     y = np.array(model.output(x.T, u.T, np.repeat(p[:, None], len(x), axis=1))).T
-    return Trajectory(model, run.step_s * np.arange(len(x), dtype=float), x, u, y)
+    found = Trajectory(model, run.step_s * np.arange(len(x), dtype=float), x, u, y)
+    return found if found.is_finite() else None
 
 
 def select_figures(figures: Mapping[str, object], *, turn: bool) -> dict[str, float]:

@@ -34,7 +34,6 @@ from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.assessment.evaluation import pooled, replay_error
 from tank2sim.identification.trials.assessment.identifiability import refuse_unseen
-from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise
 from tank2sim.identification.trials.methods.equation_error import equation_error
 from tank2sim.identification.trials.methods.weak_form import WeakForm, sensor_noise
 from tank2sim.identification.trials.options import IdentificationOptions
@@ -50,7 +49,7 @@ from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 from tank2sim.identification.trials.problem.structures import STRUCTURES
 from tank2sim.notices import Notice, caution
 from tank2sim.records.signals.columns import SignalName
-from tank2sim.records.trials import RUDDERS, Trial
+from tank2sim.records.trials import RUDDERS
 from tank2sim.simulation.manoeuvres import Turn
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 from tank2sim.simulation.run import simulate
@@ -112,15 +111,13 @@ def effective_samples(series: Sequence[Array]) -> float:
     """
     every = np.concatenate(series)
     size = np.sqrt(np.mean(every**2, axis=0))
-    longest = max(len(piece) for piece in series)
-    sums = np.zeros(longest)
+    sums = np.zeros(max(map(len, series)))
     for piece in series:
         for column in (piece / np.where(size > 0, size, 1.0)).T:
             sums[: len(piece)] += correlate(column, column, method="fft")[len(piece) - 1 :]  # by lag, from 0
     correlations = sums[1:] / sums[0]
-    negative = np.flatnonzero(correlations <= 0)
-    positive = correlations[: negative[0]] if len(negative) else correlations
-    return float(max(1.0, len(every) / (1 + 2 * positive.sum())))
+    positive = np.cumprod(correlations > 0, dtype=bool)
+    return float(max(1.0, len(every) / (1 + 2 * correlations[positive].sum())))
 
 
 @dataclass(frozen=True)
@@ -273,35 +270,34 @@ def structure_by_evidence(
     """
     if card.model.kind != "abkowitz":
         return "card", ()
-    found: list[Criteria] = []
-    cards: list[ManoeuvringCard] = []
-    problems: list[Problem] = []
+    found: list[tuple[Criteria, ManoeuvringCard, Problem]] = []
     try:
         for name in ("card", "cross_flow"):
             started = STRUCTURES[name].start(card)
             posed = posed_in(card, started, trials, options)
             posed = posed.without(refuse_unseen(posed))
             estimate = equation_error(posed)
-            found.append(criteria(posed, estimate, found[0].samples if found else None))
-            cards.append(card_with_estimate(started, estimate))
-            problems.append(posed)
+            criterion = criteria(posed, estimate, found[0][0].samples if found else None)
+            found.append((criterion, card_with_estimate(started, estimate), posed))
     except (InputError, np.linalg.LinAlgError):  # no velocities to compare by, or a card that cannot have the structure
         return "card", ()
-    of_card, drag = found
+    (of_card, drag), cards, problems = zip(*found, strict=True)
     difference = (of_card.bic - drag.bic) / of_card.samples
     if difference < -STRONGLY:
         return "card", ()
     undecided = abs(difference) < STRONGLY
     taken = "card" if undecided and _predicts_better(*problems) else "cross_flow"
-    criterion = f"(BIC {difference:+.2g} for each independent sample, strong below -{STRONGLY:g})"
+    by = f"(BIC {difference:+.2g} for each independent sample, strong below -{STRONGLY:g})"
     chosen = (
         "structure: the card's own third-order terms, which predict trials that were left out better than cross-flow "
-        f"drag {criterion}; structure cross_flow takes that"
+        f"drag {by}; structure cross_flow takes that"
         if taken == "card"
         else "structure: cross-flow drag in place of the card's own third-order terms, which the trials do not prefer "
-        f"strongly {criterion}; structure card keeps them"
+        f"strongly {by}; structure card keeps them"
     )
-    hardest = max((_largest_rudder(trial) for trial in holdout.trials), default=0.0) if holdout else 0.0
+    others = holdout.trials if holdout else ()
+    rudders = [trial.signals[name] for trial in others for name in RUDDERS if name in trial.signals]
+    hardest = max((float(np.nanmax(np.abs(angles))) for angles in rudders), default=0.0)
     in_doubt = undecided and hardest < NEARLY_HARD * HARD_RUDDER
     return taken, (Notice(chosen), *(_turns_in_doubt(cards[0], cards[1], taken) if in_doubt else ()))
 
@@ -316,12 +312,6 @@ def _predicts_better(of_card: Problem, drag: Problem) -> bool:
             name: cross_validate(posed, equation_error, yaw_rate_error, threads) for name, posed in problems.items()
         }
     return simplest(found) == "card"
-
-
-def _largest_rudder(trial: Trial) -> float:
-    """Largest angle of the rudder, or order, in a trial, rad."""
-    known = (trial.signals[name] for name in RUDDERS if name in trial.signals)
-    return max((float(np.nanmax(np.abs(values))) for values in known), default=0.0)
 
 
 def _turns_in_doubt(of_card: ManoeuvringCard, drag: ManoeuvringCard, taken: str) -> Sequence[Notice]:
@@ -413,13 +403,8 @@ def signal_residuals(problem: Problem, estimate: Estimate) -> tuple[SignalResidu
         errors = [run.whole[name] for run in runs if name in run.whole]
         error = float(np.sqrt(np.mean(np.square(errors)))) if errors else 0.0
         above = error / sensor if sensor > 0 else (np.inf if error else 0.0)
-        found.append(SignalResidual(name, float(above), correlated_samples(noise)))
+        found.append(SignalResidual(name, float(above), noise.correlated_samples))
     return tuple(found)
-
-
-def correlated_samples(noise: ColouredNoise) -> float:
-    """Samples after which the autocorrelation of a coloured residual has fallen to 1/e of that at a lag of one."""
-    return float(-1 / np.log(noise.phi)) if noise.phi > 0 else 0.0
 
 
 def choose_method(residuals: Sequence[SignalResidual]) -> MethodChoice:

@@ -32,6 +32,11 @@ class ColouredNoise:
         colour = (1 - 2 * self.phi * self.psi + self.psi**2) / (1 - self.phi**2)
         return self.sigma * float(np.sqrt(colour))
 
+    @property
+    def correlated_samples(self) -> float:
+        """Samples after which the autocorrelation of the residual has fallen to 1/e of that at a lag of one."""
+        return float(-1 / np.log(self.phi)) if self.phi > 0 else 0.0
+
     def whitened(self, residuals: Array) -> Array:
         """``w / sigma`` of residuals or their derivatives, along axis -2 if 3-D (pieces, n, columns), else axis 1.
 
