@@ -119,7 +119,7 @@ def refuse_unseen(problem: Problem) -> tuple[str, ...]:
     form = WeakForm(problem)
     inverse = weights_of(form, form.at(estimate.values)).inverse
     quiet = WeakForm(problem.with_runs(tuple(_quietened(form, place) for place in range(len(problem.runs)))))
-    jacobian = np.concatenate([windows.jacobian for windows in quiet.at(estimate.values)])
+    jacobian = quiet.at(estimate.values).jacobian
     size = _large(problem, estimate.values)
     missing = []
     for place, name in enumerate(problem.free):

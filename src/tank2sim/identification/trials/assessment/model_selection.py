@@ -84,8 +84,8 @@ def criteria(problem: Problem, estimate: Estimate, samples: float | None = None)
     give every model the n of the first, or differences in n exceed those in fit.
     """
     form = WeakForm(problem)
-    windows = form.at(estimate.values)
-    series = [window.residuals[piece] for window, run in zip(windows, form.runs, strict=True) for piece in run.pieces]
+    residuals = form.at(estimate.values).residuals
+    series = [residuals[piece] for piece in form.pieces]
     prior = scaled_prior(problem, estimate.prior_scale)
     scaled = estimate.information * np.outer(prior, prior)
     kept = np.trace(np.linalg.solve(scaled + problem.known, problem.known))

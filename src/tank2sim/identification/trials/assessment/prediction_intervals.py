@@ -81,7 +81,7 @@ def disturbances_of(problem: Problem, values: Array) -> Disturbances:
     return Disturbances(masses @ acceleration @ masses.T, correlation_s)
 
 
-def gauss_markov(form: WeakForm, windows: list[WeakWindows]) -> tuple[Array, float]:
+def gauss_markov(form: WeakForm, windows: WeakWindows) -> tuple[Array, float]:
     """Covariance (3, 3) and correlation time, s, of the random accelerations that fit the residuals best.
 
     Least squares over the covariances at lags 0 to :data:`LAGS`.
@@ -171,9 +171,9 @@ def _parameter(name: str, unit: str) -> Parameter:
     return Parameter(name=name, unit=unit, description="Of a random force", start=0.0)
 
 
-def _lagged(form: WeakForm, windows: list[WeakWindows]) -> Array:
+def _lagged(form: WeakForm, windows: WeakWindows) -> Array:
     """Covariances (lags, 3, 3) of residuals at lags of half windows."""
-    pieces = [window.residuals[part] for window, run in zip(windows, form.runs, strict=True) for part in run.pieces]
+    pieces = [windows.residuals[part] for part in form.pieces]
     lags = min(LAGS + 1, max(len(piece) for piece in pieces))
     sums, counts = np.zeros((lags, 3, 3)), np.zeros(lags)
     for piece in pieces:

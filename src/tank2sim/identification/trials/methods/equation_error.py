@@ -109,7 +109,7 @@ def equation_error(
         known, pull, _ = problem.before(values, prior)
         stays = is_minimum(normal.information + known, normal.gradient + pull, bounded=(values, *problem.bounds))
         refuse_stopped("equation error", stays)
-    deviations = np.sqrt(np.mean(np.concatenate([window.residuals for window in windows]) ** 2, axis=0))
+    deviations = np.sqrt(np.mean(windows.residuals**2, axis=0))
     return Estimate(
         method="equation_error",
         free=problem.free,
@@ -125,7 +125,7 @@ def equation_error(
 
 def refuse_empty(form: WeakForm) -> None:
     """Raise InputError if no run has a window."""
-    if all(run.averaging.shape[0] == 0 for run in form.runs):
+    if not len(form.change):
         names = ", ".join(run.run.name for run in form.runs)
         remedy = (
             f"heading and positions, or u, v and r, are needed without gaps over {2 * form.half:.3g} s at least: add "
@@ -136,44 +136,31 @@ def refuse_empty(form: WeakForm) -> None:
 
 def first_weights(form: WeakForm) -> WhiteningWeights:
     """A tenth of the spread of each acceleration, before any residual is known."""
-    every = np.concatenate([run.change for run in form.runs])
-    spread = 0.1 * np.sqrt(np.mean(every**2, axis=0))
+    spread = 0.1 * np.sqrt(np.mean(form.change**2, axis=0))
     return WhiteningWeights(np.diag(1 / np.where(spread > 0, spread, 1.0)), (white(1.0),) * 3)
 
 
-def weights_of(form: WeakForm, windows: list[WeakWindows]) -> WhiteningWeights:
+def weights_of(form: WeakForm, windows: WeakWindows) -> WhiteningWeights:
     """Covariance and colour of the residuals."""
-    every = np.concatenate([window.residuals for window in windows])
-    covariance = every.T @ every / len(every)
-    smallest = 1e-12 * np.mean(np.concatenate([run.change for run in form.runs]) ** 2, axis=0)
+    covariance = windows.residuals.T @ windows.residuals / len(windows.residuals)
+    smallest = 1e-12 * np.mean(form.change**2, axis=0)
     covariance += np.diag(np.where(smallest > 0, smallest, 1.0))  # an equation without residual would be singular
     inverse = np.linalg.inv(np.linalg.cholesky(covariance))
-    pieces = [
-        inverse @ window.residuals[piece].T
-        for window, run in zip(windows, form.runs, strict=True)
-        for piece in run.pieces
-    ]
+    pieces = [inverse @ windows.residuals[piece].T for piece in form.pieces]
     return WhiteningWeights(
         inverse, tuple(estimate_coloured_noise([piece[place] for piece in pieces], 1e-6) for place in range(3))
     )
 
 
-def normal_equations(form: WeakForm, windows: list[WeakWindows], weights: WhiteningWeights) -> _Normal:
+def normal_equations(form: WeakForm, windows: WeakWindows, weights: WhiteningWeights) -> _Normal:
     """Cost, information, gradient and its shares by blocks of time, of all runs without the prior."""
-    k = len(form.problem.free)
-    information, gradient, cost, scores = np.zeros((k, k)), np.zeros(k), 0.0, []
     per_block = max(1, round(BLOCK * form.problem.ship_time / form.half))
-    for window, run in zip(windows, form.runs, strict=True):
-        if not len(window.residuals):
-            continue
-        r = weights.whitened(window.residuals, run.pieces)
-        J = -weights.whitened(window.jacobian, run.pieces)
-        cost += float(np.sum(r**2))
-        information += np.einsum("wik,wil->kl", J, J, optimize=True)
-        pull = np.einsum("wik,wi->wk", J, r)
-        gradient += pull.sum(axis=0)
-        scores.append(np.add.reduceat(pull, np.arange(0, len(pull), per_block), axis=0))
-    return _Normal(cost, information, gradient, scores)
+    r = weights.whitened(windows.residuals, form.pieces)
+    J = -weights.whitened(windows.jacobian, form.pieces)
+    pull = np.einsum("wik,wi->wk", J, r)
+    of_runs = [pull[span] for span in form.spans if span.stop > span.start]
+    scores = [np.add.reduceat(part, np.arange(0, len(part), per_block), axis=0) for part in of_runs]
+    return _Normal(float(np.sum(r**2)), np.einsum("wik,wil->kl", J, J, optimize=True), pull.sum(axis=0), scores)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,26 +168,24 @@ class _Point:
     """Parameters (k,), the windows with them, and the sum of squares with the prior."""
 
     values: Array
-    windows: list[WeakWindows]
+    windows: WeakWindows
     cost: float
 
 
 def _minimise(
     form: WeakForm,
     values: Array,
-    windows: list[WeakWindows],
+    windows: WeakWindows,
     weights: WhiteningWeights,
     errors: Array,
     progress: SearchReport,
-) -> tuple[Array, list[WeakWindows], _Normal]:
+) -> tuple[Array, WeakWindows, _Normal]:
     """Damped Gauss-Newton steps; values, windows and normal equations at the best point."""
     problem = form.problem
 
-    def point(values: Array, windows: list[WeakWindows]) -> _Point:
-        cost = problem.before(values, errors)[2]
-        for window, run in zip(windows, form.runs, strict=True):
-            cost += float(np.sum(weights.whitened(window.residuals, run.pieces) ** 2))
-        return _Point(values, windows, cost)
+    def point(values: Array, windows: WeakWindows) -> _Point:
+        cost = float(np.sum(weights.whitened(windows.residuals, form.pieces) ** 2))
+        return _Point(values, windows, cost + problem.before(values, errors)[2])
 
     def linearise(start: _Point) -> _Normal:
         return normal_equations(form, start.windows, weights)

@@ -100,12 +100,14 @@ def _measured_motion(model: Model, window: int, run: SampledRun) -> MeasuredMoti
         notices.append(Notice(f"{run.name}: the yaw rate is the slope of the smoothed heading"))
     if "motion.psi" in missing:
         columns["motion.psi"] = cumulative_trapezoid(_filled(columns["motion.r"]), dx=run.step_s, initial=0.0)
-    derived = missing & {"motion.u", "motion.v"}
-    if derived:
-        derived_columns, source = _velocities(model, run, columns, window)
-        columns |= {name: derived_columns[name] for name in derived}
+    if derived := missing & {"motion.u", "motion.v"}:
+        velocities_of_track, source = _velocities(model, run, columns, window)
+        columns |= {name: velocities_of_track[name] for name in derived}
         notices.append(Notice(f"{run.name}: {' and '.join(name[7:] for name in sorted(derived))} {source}"))
-    _complete_positions(columns, missing, run.step_s)
+    if missing & {"motion.x", "motion.y"}:  # by the velocities: wind and banks need only their rough course
+        rates = _turned(*(_filled(columns[name]) for name in ("motion.u", "motion.v", "motion.psi")))
+        for name in missing & {"motion.x", "motion.y"}:
+            columns[name] = cumulative_trapezoid(rates[name == "motion.y"], dx=run.step_s, initial=0.0)
     velocities = np.column_stack([_bridged(columns[name]) for name in VELOCITIES])
     smooth, noise, remaining = zip(*(_smoothed(columns[name], window) for name in VELOCITIES), strict=True)
     position = [_filled(columns[name]) for name in POSITION]
@@ -160,16 +162,6 @@ def _velocities(model: Model, run: SampledRun, columns: dict[str, Array], window
     return {"motion.u": u, "motion.v": v}, source
 
 
-def _complete_positions(columns: dict[str, Array], missing: set[str], step: float) -> None:
-    """Add unmeasured positions from the velocities: wind and banks need only their rough course."""
-    if not missing & {"motion.x", "motion.y"}:
-        return
-    u, v, psi = (_filled(columns[name]) for name in ("motion.u", "motion.v", "motion.psi"))
-    for name, rate in zip(("motion.x", "motion.y"), _turned(u, v, psi), strict=True):
-        if name in missing:
-            columns[name] = cumulative_trapezoid(rate, dx=step, initial=0.0)
-
-
 def _turned(forward: Array, starboard: Array, angle: Array) -> tuple[Array, Array]:
     """Components (n,) each after turning the axes back by `angle` (n,): those of the earth from those of the body."""
     north, east = earth_velocity(*(ca.DM(values) for values in (forward, starboard, angle)))  # type: ignore[arg-type]
@@ -216,9 +208,7 @@ def _smoothed(column: Array, window: int) -> tuple[Array, float, float]:
             return _filled(spread), before, after
     whole = _filled(column)
     smooth: Array = savgol_filter(whole, window, 3)
-    gain = float(
-        savgol_coeffs(window, 3)[window // 2]
-    )  # weight of the sample itself: var(raw - smooth) = (1 - gain) var
+    gain = float(savgol_coeffs(window, 3)[window // 2])  # the sample's own weight: var(raw - smooth) = (1 - gain) var
     noise = float(np.std(whole - smooth)) / np.sqrt(1 - gain)
     if noise**2 < SMALL_NOISE * float(np.var(whole)):
         return whole, noise, noise
@@ -238,7 +228,7 @@ WEAK_EQUATIONS = ("motion.udot", "motion.vdot", "motion.rdot")
 
 @dataclass(frozen=True, eq=False)
 class WeakWindows:
-    """The weak form of one run at given parameters."""
+    """The weak form of all runs, one after the other, at given parameters."""
 
     residuals: Array  # (windows, 3): Measured less modelled mean acceleration, m/s2, m/s2, rad/s2
     jacobian: Array  # (windows, 3, k): Derivative of the *modelled* acceleration by the free parameters
@@ -277,18 +267,29 @@ class WeakForm:
         self._sensitivity = Sensitivity(self._hidden, problem.free, states) if states else None
         self.half = width * problem.ship_time / 2
         self.runs = tuple(self._prepared(run) for run in problem.runs)
+        self.change = np.concatenate([run.change for run in self.runs])
+        ends = np.cumsum([0, *(len(run.change) for run in self.runs)]).tolist()
+        self.spans = tuple(slice(begin, end) for begin, end in pairwise(ends))  # windows of each run
+        # Windows that follow each other without a gap.
+        self.pieces = tuple(
+            slice(begin + piece.start, begin + piece.stop)
+            for begin, run in zip(ends, self.runs, strict=False)
+            for piece in run.pieces
+        )
 
     @property
     def notices(self) -> tuple[Notice, ...]:
         """Notices of derived signals."""
         return tuple(notice for run in self.runs for notice in run.motion.notices)
 
-    def at(self, values: Array) -> list[WeakWindows]:
-        """The windows of each run at the free parameters `values` (k,)."""
+    def at(self, values: Array) -> WeakWindows:
+        """The windows at the free parameters `values` (k,)."""
         p = self.problem.parameters(values)
-        return [self._windows(run, p) for run in self.runs]
+        modelled, jacobian = map(np.concatenate, zip(*(self._windows(run, p) for run in self.runs), strict=True))
+        return WeakWindows(self.change - modelled, jacobian)
 
-    def _windows(self, run: _Prepared, p: Array) -> WeakWindows:
+    def _windows(self, run: _Prepared, p: Array) -> tuple[Array, Array]:
+        """Modelled accelerations (windows, 3) of a run, and their derivatives (windows, 3, k)."""
         k = len(self.problem.free)
         hidden, by_theta = (run.hidden, None) if run.hidden is not None else self._hidden_states(run.run, run.inputs, p)
         values, by_parameters, by_hidden = self._accelerations(hidden, run.inputs, p)
@@ -296,10 +297,7 @@ class WeakForm:
         if by_theta is not None:
             jacobian = jacobian + by_theta.transpose(0, 2, 1) @ by_hidden.reshape(len(by_parameters), -1, 3)
         mean = run.averaging @ jacobian.reshape(len(jacobian), -1)
-        return WeakWindows(
-            residuals=run.change - run.averaging @ values,
-            jacobian=mean.reshape(-1, k, 3).transpose(0, 2, 1),
-        )
+        return run.averaging @ values, mean.reshape(-1, k, 3).transpose(0, 2, 1)
 
     def _hidden_states(self, run: SampledRun, inputs: Array, p: Array) -> tuple[Array, Array | None]:
         """Simulated unmeasured states in the middle of steps (n, nz), and slopes by the parameters (n, nz, k)."""
