@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -236,6 +237,14 @@ def craft_prior(card: SteeredCard, model: Model) -> dict[str, tuple[float, float
     return found | {name: (0.0, spread) for name, spread in COMPASS_SPREADS.items()}
 
 
+_SEEN = {"psi_rad": "motion.psi", "x_m": "motion.x", "y_m": "motion.y", "u_mps": "motion.u", "v_mps": "motion.v"}
+_SEEN |= {"r_radps": "motion.r"}
+"""Signal of a trial to the state that it measures."""
+
+_SENSORS = {"motion.psi": "compass.heading", "motion.r": "gyro.rate"}
+"""State to what a sensor with errors of its own shows of it."""
+
+
 def craft_problem(card: SteeredCard, trials: Sequence[Trial]) -> Problem:
     """The problem of a card and trials.
 
@@ -244,22 +253,18 @@ def craft_problem(card: SteeredCard, trials: Sequence[Trial]) -> Problem:
     """
     by = craft_driven_by(card, trials)
     turned = not any(name.startswith("azimuth_order_") for trial in trials for name in trial.signals)
-    model = _bounded(craft_fit_model(card, by, turned=turned))
+    model = craft_fit_model(card, by, turned=turned)
+    model = replace(model, parameters=tuple(map(_bounded, model.parameters)))
     unused = "order_" if by == "revolutions" else "n_"
     trials = [
         replace(trial, signals={key: values for key, values in trial.signals.items() if not key.startswith(unused)})
         for trial in trials
     ]
     prior = craft_prior(card, model)
-    names = {"psi_rad": "motion.psi", "x_m": "motion.x", "y_m": "motion.y", "u_mps": "motion.u", "v_mps": "motion.v"}
     signals = {signal for trial in trials for signal in trial.signals}
-    seen = [variable for signal, variable in names.items() if signal in signals]
-    rated = "r_radps" in signals
-    runs = []
-    for trial in trials:
-        run = prepare(model, trial, [*seen, *(["motion.r"] if rated else [])], step_s=OBSERVED_STEP_S)
-        shown = ["compass.heading" if name == "motion.psi" else name for name in seen]
-        runs.append(replace(run, seen=(*shown, *(["gyro.rate"] if rated else []))))
+    seen = [variable for signal, variable in _SEEN.items() if signal in signals]
+    shown = tuple(_SENSORS.get(name, name) for name in seen)
+    runs = [replace(prepare(model, trial, seen, step_s=OBSERVED_STEP_S), seen=shown) for trial in trials]
     means, errors = (np.array(column) for column in zip(*prior.values(), strict=True))
     return Problem(model, tuple(prior), means, errors, tuple(runs))
 
@@ -307,18 +312,16 @@ def with_disturbances(problem: Problem, means: Array, spreads: Array) -> Problem
     return replace(problem, model=replace(problem.model, states=tuple(map(with_prior, problem.model.states))))
 
 
-def _bounded(model: Model) -> Model:
-    """The model with the bounds of physics, and none on the loss of thrust, whose error may have either sign."""
+_BOUNDS: dict[str, dict[str, Any]] = {
+    ".speed_loss": {"minimum": None},  # its error may have either sign
+    ".time_constant": {"minimum": OBSERVED_STEP_S / 2},  # less does not show
+    ".order_exponent": {"minimum": _EXPONENTS[0], "maximum": _EXPONENTS[1]},
+    **{f"derivatives.{name}": {"maximum": 0.0} for name in NEVER_POSITIVE},
+}
+"""End of a parameter's name to its bounds."""
 
-    def bounded(parameter: Parameter) -> Parameter:
-        if parameter.name.endswith(".speed_loss"):
-            return same_symbol(parameter, replace(parameter, minimum=None))
-        if parameter.name.startswith("thrusters.") and parameter.name.endswith(".time_constant"):
-            return same_symbol(parameter, replace(parameter, minimum=OBSERVED_STEP_S / 2))  # less does not show
-        if parameter.name.endswith(".order_exponent"):
-            return same_symbol(parameter, replace(parameter, minimum=_EXPONENTS[0], maximum=_EXPONENTS[1]))
-        if parameter.name.removeprefix("derivatives.") in NEVER_POSITIVE:
-            return same_symbol(parameter, replace(parameter, maximum=0.0))
-        return parameter
 
-    return replace(model, parameters=tuple(map(bounded, model.parameters)))
+def _bounded(parameter: Parameter) -> Parameter:
+    """A parameter with the bounds of physics."""
+    bounds = next((bounds for end, bounds in _BOUNDS.items() if parameter.name.endswith(end)), None)
+    return parameter if bounds is None else same_symbol(parameter, replace(parameter, **bounds))

@@ -104,10 +104,7 @@ def _measured_motion(model: Model, window: int, run: SampledRun) -> MeasuredMoti
         velocities_of_track, source = _velocities(model, run, columns, window)
         columns |= {name: velocities_of_track[name] for name in derived}
         notices.append(Notice(f"{run.name}: {' and '.join(name[7:] for name in sorted(derived))} {source}"))
-    if missing & {"motion.x", "motion.y"}:  # by the velocities: wind and banks need only their rough course
-        rates = _turned(*(_filled(columns[name]) for name in ("motion.u", "motion.v", "motion.psi")))
-        for name in missing & {"motion.x", "motion.y"}:
-            columns[name] = cumulative_trapezoid(rates[name == "motion.y"], dx=run.step_s, initial=0.0)
+    _complete_positions(columns, missing, run.step_s)
     velocities = np.column_stack([_bridged(columns[name]) for name in VELOCITIES])
     smooth, noise, remaining = zip(*(_smoothed(columns[name], window) for name in VELOCITIES), strict=True)
     position = [_filled(columns[name]) for name in POSITION]
@@ -160,6 +157,14 @@ def _velocities(model: Model, run: SampledRun, columns: dict[str, Array], window
     drift = drift_over_ground(model, run.inputs, _filled(psi))
     u, v = _turned(north - drift[:, 0], east - drift[:, 1], -psi)
     return {"motion.u": u, "motion.v": v}, source
+
+
+def _complete_positions(columns: dict[str, Array], missing: set[str], step: float) -> None:
+    """Add unmeasured positions from the velocities: wind and banks need only their rough course."""
+    if missing & {"motion.x", "motion.y"}:
+        rates = _turned(*(_filled(columns[name]) for name in ("motion.u", "motion.v", "motion.psi")))
+        for name in missing & {"motion.x", "motion.y"}:
+            columns[name] = cumulative_trapezoid(rates[name == "motion.y"], dx=step, initial=0.0)
 
 
 def _turned(forward: Array, starboard: Array, angle: Array) -> tuple[Array, Array]:

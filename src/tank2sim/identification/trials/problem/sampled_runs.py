@@ -75,11 +75,8 @@ class SampledRun:
 
     def part(self, begin: int, end: int) -> SampledRun:
         """The instants `begin` to `end` - 1."""
-        where = slice(begin, end)
-        begin_s = self.begin_s + begin * self.step_s
-        return SampledRun(
-            self.name, begin_s, self.step_s, self.inputs[where], self.measured[where], self.seen, self.file
-        )
+        inputs, measured = self.inputs[begin:end], self.measured[begin:end]
+        return replace(self, begin_s=self.begin_s + begin * self.step_s, inputs=inputs, measured=measured)
 
 
 def prepare(
@@ -146,12 +143,13 @@ def in_range(run: SampledRun, model: Model, speeds: tuple[float, float], least_s
 
     Speed is its mean over half of L/u0, because single readings jump. Without a measured speed the run is kept.
     """
-    speed = _speed(run)
+    columns = [run.column(name) for name in ("motion.u", "motion.u_ground", "motion.sog")]
+    speed = next((column for column in columns if np.count_nonzero(~np.isnan(column)) > 1), None)
     if speed is None:
         return (run,)
     p = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
     width = max(1, round(0.5 * p["ship.length"] / p["ship.speed"] / run.step_s))
-    smooth = uniform_filter1d(speed, width)
+    smooth = uniform_filter1d(straight_over_gaps(run.times, speed), width)
     inside = (smooth >= speeds[0]) & (smooth <= speeds[1])
     edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
     pairs = [(begin, end) for begin, end in zip(edges[::2], edges[1::2], strict=True) if end - begin > 1]
@@ -159,15 +157,6 @@ def in_range(run: SampledRun, model: Model, speeds: tuple[float, float], least_s
     if len(parts) == 1 and len(parts[0].measured) == len(run.measured):
         return (run,)
     return tuple(replace(part, name=f"{run.name} at {part.begin_s:.0f} s") for part in parts)
-
-
-def _speed(run: SampledRun) -> Array | None:
-    for name in ("motion.u", "motion.u_ground", "motion.sog"):
-        speed = run.column(name)
-        known = ~np.isnan(speed)
-        if np.count_nonzero(known) > 1:
-            return np.interp(run.times, run.times[known], speed[known])
-    return None
 
 
 def seen_in(model: Model, trials: Sequence[Trial]) -> tuple[str, ...]:
@@ -192,9 +181,7 @@ def _averaged(time: Array, values: Array, grid: Array, step: float, stride: int)
     mean: Array = interpolated.reshape(len(grid), stride).mean(axis=1)
     if signal_step > _SLOWER * step:
         nearest = np.rint((time[known] - grid[0]) / step).astype(int)
-        rare = np.ones(len(grid), dtype=bool)
-        rare[nearest[(nearest >= 0) & (nearest < len(grid))]] = False
-        mean[rare] = np.nan
+        mean[~np.isin(np.arange(len(grid)), nearest)] = np.nan
     return mean
 
 
