@@ -11,14 +11,12 @@ from scipy.ndimage import uniform_filter1d
 from tank2sim.arrays import Array
 from tank2sim.cards.card import TORQUE_COEFFICIENTS, ManoeuvringCard, MmgCard
 from tank2sim.cards.covariance_reading import read_covariance
-from tank2sim.cards.form import Propulsion
 from tank2sim.cards.reading import revised
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
 from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.mmg.hull import MMG_TERMS
-from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.roll import roll_terms
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns, captive_tests
@@ -30,7 +28,7 @@ from tank2sim.identification.trials.problem.estimation_problem import (
     noise_alone,
 )
 from tank2sim.identification.trials.problem.prepare_trials import Measured
-from tank2sim.identification.trials.problem.sampled_runs import SampledRun, in_range, ordered_rudder, prepare, seen_in
+from tank2sim.identification.trials.problem.sampled_runs import in_range, ordered_rudder, prepare, seen_in
 from tank2sim.notices import Notice
 from tank2sim.records.trials import Trial, window
 from tank2sim.units import from_si
@@ -225,14 +223,16 @@ def problem_from_card(
     model = driven_model(card, ship.driven_by)
     gear = ordered_rudder(driven_model(card, "order")) if driven_by == "order" else None
     free = free_parameters(card, inertia=inertia)
-    if card.propulsion is not None and card.propulsion.Xnn and _revolutions_vary(card.propulsion, trials):
-        free[REVOLUTIONS] = card.propulsion.Xnn, REVOLUTIONS_ERROR * abs(card.propulsion.Xnn)
+    turned = [trial.signals["n_radps"] for trial in trials if "n_radps" in trial.signals]
+    spread = float(np.nanstd(np.concatenate(turned))) if turned else 0.0
+    if (known := card.propulsion) is not None and known.Xnn and spread > REVOLUTIONS_VARY * known.nominal_radps:
+        free[REVOLUTIONS] = known.Xnn, REVOLUTIONS_ERROR * abs(known.Xnn)
     for name in hold:
-        known = next((known for known in (name, f"mmg.{name}") if known in free), f"derivatives.{name}")
-        if known not in free:
+        held = next((key for key in (name, f"mmg.{name}") if key in free), f"derivatives.{name}")
+        if held not in free:
             text = " ".join(parameter.removeprefix("derivatives.") for parameter in free)
             raise ArgumentError("hold", "", f"{name} is not an estimated parameter", f"estimated are {text}")
-        del free[known]
+        del free[held]
     if not free:
         raise InputError(card.source, "derivatives", "nothing is left to estimate", "give derivatives with a value")
     seen = seen_in(model, trials)
@@ -241,7 +241,10 @@ def problem_from_card(
     prepared = [
         prepare(model, trial, seen, orders_before=True, rudder=gear.angle(trial) if gear else None) for trial in trials
     ]
-    runs = tuple(prepared) if whole else tuple(part for run in prepared for part in _parts(card, model, run))
+    runs, speeds = tuple(prepared), card.model.valid_speed_mps
+    if speeds is not None and not whole:
+        least_s = LEAST_PART * card.ship.length_m / card.model.speed_mps
+        runs = tuple(part for run in runs for part in in_range(run, model, speeds, least_s))
     if not runs:
         low, high = card.model.speed_range_mps
         problem = f"never goes for long at {low:g} to {high:g} m/s, where the card holds"
@@ -275,18 +278,6 @@ def with_correlations(problem: Problem, card: ManoeuvringCard) -> Problem:
     correlation[np.ix_(rows, rows)] = block / np.outer(sizes, sizes)
     inverse = np.linalg.inv(correlation + NEARLY_SINGULAR * np.eye(len(problem.free)))
     return replace(problem, prior_inverse=np.asarray(inverse, dtype=np.float64))
-
-
-def _revolutions_vary(propulsion: Propulsion, trials: Sequence[Trial]) -> bool:
-    known = [trial.signals["n_radps"] for trial in trials if "n_radps" in trial.signals]
-    return bool(known) and float(np.nanstd(np.concatenate(known))) > REVOLUTIONS_VARY * propulsion.nominal_radps
-
-
-def _parts(card: ManoeuvringCard, model: Model, run: SampledRun) -> tuple[SampledRun, ...]:
-    """The parts of a run within the card's range of speeds; the whole run if the card states none."""
-    if card.model.valid_speed_mps is None:
-        return (run,)
-    return in_range(run, model, card.model.valid_speed_mps, LEAST_PART * card.ship.length_m / card.model.speed_mps)
 
 
 def card_with_estimate(
