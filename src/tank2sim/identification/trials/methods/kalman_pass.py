@@ -112,8 +112,6 @@ class Disturbed:
         """
         p, phi, h = case
         columns = gains[:-1].transpose(0, 2, 1).reshape(len(gains) - 1, -1)
-        if parts == 1:
-            return self._observer.run(start, inputs[:-1], p, measured[:-1], columns, phi, h)
         # A measurement corrects the first part, and accelerations decay after the last.
         corrected = np.zeros((len(columns) * parts, columns.shape[1]))
         corrected[::parts] = columns
@@ -129,13 +127,14 @@ class Disturbed:
     def tangents(self, before: Array, after: Array, inputs: Array, case: tuple[Array, ...], parts: int = 1) -> Tangents:
         """Derivatives at the states before and after each measurement (n, nz), over `parts` integration steps."""
         p, phi, h = case
-        n, nz = before.shape
-        A, B = self._step_slopes(after, inputs, (p, phi if parts == 1 else np.ones(len(phi)), h / parts))
-        for part in range(2, parts + 1):
-            after = self._moved(after, inputs, p, np.ones(len(phi)), h / parts)[0]
-            by_state, by_theta = self._step_slopes(
-                after, inputs, (p, phi if part == parts else np.ones(len(phi)), h / parts)
-            )
+        (n, nz), undecayed, slopes = before.shape, np.ones(len(phi)), []
+        for part in range(1, parts + 1):
+            of_part = self._tangents(after, inputs, p, phi if part == parts else undecayed, h / parts)
+            slopes.append([each.reshape(n, -1, nz).transpose(0, 2, 1) for each in of_part])
+            if part < parts:
+                after = self._moved(after, inputs, p, undecayed, h / parts)[0]
+        A, B = slopes[0]
+        for by_state, by_theta in slopes[1:]:
             A, B = by_state @ A, by_state @ B + by_theta
         seen, C, D = self._shown(before, inputs, p)
         ny = seen.shape[1]
@@ -145,12 +144,6 @@ class Disturbed:
             C=C.reshape(n, nz, ny).transpose(0, 2, 1),
             D=D.reshape(n, -1, ny).transpose(0, 2, 1),
         )
-
-    def _step_slopes(self, after: Array, inputs: Array, case: tuple[Array, ...]) -> tuple[Array, Array]:
-        """Slopes (n, nz, nz) and (n, nz, k) of one integration step."""
-        n, nz = after.shape
-        by_state, by_theta = self._tangents(after, inputs, *case)
-        return by_state.reshape(n, nz, nz).transpose(0, 2, 1), by_theta.reshape(n, -1, nz).transpose(0, 2, 1)
 
 
 def _pushed(model: Model, rates: Sequence[str]) -> tuple[Model, ca.SX]:
