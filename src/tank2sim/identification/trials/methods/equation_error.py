@@ -10,7 +10,7 @@ towards zero by the share of the motion that they cause (as in any regression on
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -90,6 +90,7 @@ def equation_error(
     for it (:class:`.StoppedSearchError`).
     """
     settings = settings or EquationErrorSettings()
+    problem = replace(problem, captive=None)  # by the trials alone
     form = WeakForm(problem, settings.width)
     refuse_empty(form)
     first = values = (problem.prior_mean if start is None else start).astype(float)
