@@ -66,12 +66,12 @@ def test_forces_of_trials_are_found(correlation_s):
     ]
     found = disturbances_of(problem(trials), EXACT)
     assert found.correlation_s == pytest.approx(correlation_s, rel=0.6)  # 800 s tell no better
-    np.testing.assert_allclose(found.deviations / UNITS, deviations, rtol=0.3)
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)) / UNITS, deviations, rtol=0.3)
 
 
 def test_sensor_noise_is_not_taken_for_forces():
     trials = [trial(rudder, seed=k) for k, rudder in enumerate([zigzag(20), turn(-30)])]
-    found = disturbances_of(problem(trials), EXACT).deviations / UNITS
+    found = np.sqrt(np.diag(disturbances_of(problem(trials), EXACT).covariance)) / UNITS
     assert np.all(found < [2e-5, 8e-5, 2e-5])
 
 

@@ -270,7 +270,7 @@ def _disturbances_of(problem: Problem, runs: Sequence[Smoothed]) -> tuple[Array,
     if len(runs) < FEWEST_TRIALS:
         return np.zeros(len(wide)), wide
     found = np.stack([smoothed.states[0, places] for smoothed in runs])
-    errors = np.stack([smoothed.state_errors[0, places] for smoothed in runs])
+    errors = np.stack([smoothed.errors[0, places] for smoothed in runs])
     pairs = [spread_between(*columns) for columns in zip(found.T, errors.T, wide, strict=True)]
     means, spreads = map(np.array, zip(*pairs, strict=True))
     return means, np.clip(spreads, LEAST_SPREAD * wide, wide)
@@ -357,8 +357,7 @@ def predict_free(fit: CraftFit, runs: Sequence[SampledRun]) -> list[FreePredicti
     names = problem.model.state_names
     task, point = _point(problem, fit.estimate.values, fit.estimate.levels)
     filtered, nx = point.filtered, len(names)
-    tangents = filtered.tangents
-    states, _ = smooth_states(tangents.A, tangents.C, filtered.gains, filtered.before, filtered.innovations)
+    states, _ = smooth_states(filtered)
     motion = [names.index(f"motion.{letter}") for letter in "uvr"]
     pose = ("motion.x", "motion.y", "motion.psi")
     placed = [names.index(name) for name in pose]

@@ -63,11 +63,6 @@ class Disturbances:
     covariance: Array  # (3, 3): Covariance of X, Y (N) and N (N m)
     correlation_s: float  # Time in which their correlation falls to 1/e, s
 
-    @property
-    def deviations(self) -> Array:
-        """Standard deviations of X, Y, N (3,)."""
-        return np.sqrt(np.diag(self.covariance))
-
 
 def disturbances_of(problem: Problem, values: Array) -> Disturbances:
     """Forces in the trials beyond the model with its free parameters at `values` (k,).

@@ -92,10 +92,18 @@ def equation_error(
     settings = settings or EquationErrorSettings()
     problem = replace(problem, captive=None)  # by the trials alone
     form = WeakForm(problem, settings.width)
-    refuse_empty(form)
+    if not len(form.change):
+        names = ", ".join(run.run.name for run in form.runs)
+        remedy = (
+            f"heading and positions, or u, v and r, are needed without gaps over {2 * form.half:.3g} s at least: add "
+            "the rows that are missing, with straight lines where a gap is short, or the readings of another sensor"
+        )
+        raise InputError(names, "", "has no stretch long enough", remedy)
     first = values = (problem.prior_mean if start is None else start).astype(float)
     windows = form.at(values)
-    weights = first_weights(form)
+    # A tenth of the spread of each acceleration, before any residual is known.
+    spread = 0.1 * np.sqrt(np.mean(form.change**2, axis=0))
+    weights = WhiteningWeights(np.diag(1 / np.where(spread > 0, spread, 1.0)), (white(1.0),) * 3)
     scale: dict[str, float] = {}
     costs = []
     for number in range(settings.rounds):
@@ -122,23 +130,6 @@ def equation_error(
         prior_scale=scale,
         notices=(*form.notices, *_form_notices(form)),
     )
-
-
-def refuse_empty(form: WeakForm) -> None:
-    """Raise InputError if no run has a window."""
-    if not len(form.change):
-        names = ", ".join(run.run.name for run in form.runs)
-        remedy = (
-            f"heading and positions, or u, v and r, are needed without gaps over {2 * form.half:.3g} s at least: add "
-            "the rows that are missing, with straight lines where a gap is short, or the readings of another sensor"
-        )
-        raise InputError(names, "", "has no stretch long enough", remedy)
-
-
-def first_weights(form: WeakForm) -> WhiteningWeights:
-    """A tenth of the spread of each acceleration, before any residual is known."""
-    spread = 0.1 * np.sqrt(np.mean(form.change**2, axis=0))
-    return WhiteningWeights(np.diag(1 / np.where(spread > 0, spread, 1.0)), (white(1.0),) * 3)
 
 
 def weights_of(form: WeakForm, windows: WeakWindows) -> WhiteningWeights:

@@ -278,19 +278,11 @@ class CorrelatedNoise:
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """Smoothed run."""
+    """Smoothed run: the nx states of the model; the random accelerations, unexplained by it, over the step after each
+    instant, m/s2 or rad/s2 (times the mass matrix they are unexplained forces); the drifts of the sensors, if any."""
 
-    name: str  # Name of the run
-    # `states`, `state_errors`: (n, nx): The model's states and their standard errors (parameters taken as
-    # exact)
-    states: Array
-    state_errors: Array
-    # `accelerations`, `acceleration_errors`: (n, m): Random accelerations, unexplained by the model, over the
-    # step after each instant, in the order of :attr:`KalmanEstimate.process_noise`, m/s2 or rad/s2. Times the
-    # mass matrix they are unexplained forces.
-    accelerations: Array
-    acceleration_errors: Array
-    drifts: Array  # (n, ny): Drifts of the sensors, in the signals' units; (n, 0) without drift
+    states: Array  # (n, nz)
+    errors: Array  # (n, nz): Standard errors of the states, parameters taken as exact
     innovations: Array  # (n, ny): Whitened: independent with unit variance if the model holds; nan where not measured
 
 
@@ -359,14 +351,18 @@ def estimate_at(
     problem, batch = task.problem, task.batch
     information = _information(task, best)
     before = problem.prior_precision(problem.prior_error)
-    spread = np.sqrt((best.filtered.innovations**2).sum(axis=(0, 1)) / np.maximum(batch.known.sum(axis=(0, 1)), 1))
+    filtered, known = best.filtered, batch.known
+    spread = np.sqrt((filtered.innovations**2).sum(axis=(0, 1)) / np.maximum(known.sum(axis=(0, 1)), 1))
+    states, errors = smooth_states(filtered)
+    white = np.where(known, filtered.white, np.nan)
+    lengths = enumerate(batch.lengths)
     each = zip(np.exp(best.levels.process), np.exp(best.levels.time), strict=True)
     correlated = [CorrelatedNoise(float(deviation), float(time)) for deviation, time in each]
     return KalmanEstimate(
         method="kalman",
         free=problem.free,
         values=best.values,
-        covariance=sandwich(information, problem.prior_error, scores(task, best.filtered), before),
+        covariance=sandwich(information, problem.prior_error, scores(task, filtered), before),
         information=information,
         noise=dict(zip(problem.seen, map(float, spread), strict=True)),
         cost=costs,
@@ -375,25 +371,5 @@ def estimate_at(
         process_noise=dict(zip(task.disturbed.pushed, correlated, strict=False)),
         drift=dict(zip(problem.seen, correlated[len(task.disturbed.pushed) :], strict=False)),
         measurement_noise=dict(zip(problem.seen, map(float, np.exp(best.levels.measurement)), strict=True)),
-        smoothed=_smoothed_runs(task, best.filtered),
-    )
-
-
-def _smoothed_runs(task: SearchTask, filtered: FilterPass) -> tuple[Smoothed, ...]:
-    nx, nxm = len(task.disturbed.nominal), len(task.disturbed.nominal) + len(task.disturbed.pushed)
-    states, errors = smooth_states(
-        filtered.tangents.A, filtered.tangents.C, filtered.gains, filtered.before, filtered.innovations
-    )
-    white = np.where(task.batch.known, filtered.white, np.nan)
-    return tuple(
-        Smoothed(
-            run.name,
-            states[number, :n, :nx],
-            errors[number, :n, :nx],
-            states[number, :n, nx:nxm],
-            errors[number, :n, nx:nxm],
-            states[number, :n, nxm:],
-            white[number, :n],
-        )
-        for number, (run, n) in enumerate(zip(task.problem.runs, task.batch.lengths, strict=True))
+        smoothed=tuple(Smoothed(states[run, :n], errors[run, :n], white[run, :n]) for run, n in lengths),
     )

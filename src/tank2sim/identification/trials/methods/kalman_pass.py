@@ -312,18 +312,19 @@ def _following(P: Array, M: Array, A: Array, process: Array) -> Array:
     return following
 
 
-def smooth_states(A: Array, C: Array, found: Gains, before: Array, innovations: Array) -> tuple[Array, Array]:
+def smooth_states(filtered: FilterPass) -> tuple[Array, Array]:
     """States (runs, n, nz) from all measurements, before and after each instant, and their standard errors.
 
     The smoother of Rauch, Tung and Striebel (1965, AIAA J. 3) in the form of Bierman (1973, Automatica 9), which needs
     no inverse of the state's covariance, nearly singular where process noise is small.
     """
+    A, C, found, before = filtered.tangents.A, filtered.tangents.C, filtered.gains, filtered.before
     runs, n, nz = before.shape
     states, errors = np.empty_like(before), np.empty_like(before)
     adjoint, spread = np.zeros((runs, nz, 1)), np.zeros((runs, nz, nz))
     for k in range(n - 1, -1, -1):
         WC = found.whitener[:, k] @ C[:, k]
-        white = found.whitener[:, k] @ innovations[:, k, :, None]
+        white = found.whitener[:, k] @ filtered.innovations[:, k, :, None]
         kept = np.eye(nz) - found.K[:, k] @ C[:, k]
         back = np.swapaxes(A[:, k] @ kept, -1, -2)
         turned = np.swapaxes(WC, -1, -2)
