@@ -118,17 +118,12 @@ class CraftFit:
         Identified: the error is at most :data:`IDENTIFIED_SHARE` of the value. Bounded: the trials have narrowed it to
         :data:`TRIALS_SHARE` of what was known before. Else it is not determined.
         """
-        found = []
-        for value, error, before in zip(
-            self.estimate.values, self.estimate.standard_errors, self.problem.prior_error, strict=True
-        ):
-            if error > TRIALS_SHARE * before:
-                found.append(CoefficientVerdict.PRIOR)
-            elif error <= IDENTIFIED_SHARE * abs(value):
-                found.append(CoefficientVerdict.IDENTIFIED)
-            else:
-                found.append(CoefficientVerdict.BOUNDED)
-        return tuple(found)
+        values, errors = np.abs(self.estimate.values), self.estimate.standard_errors
+        certain = np.where(
+            errors <= IDENTIFIED_SHARE * values, CoefficientVerdict.IDENTIFIED, CoefficientVerdict.BOUNDED
+        )
+        unknown = errors > TRIALS_SHARE * self.problem.prior_error
+        return tuple(map(CoefficientVerdict, np.where(unknown, CoefficientVerdict.PRIOR, certain).tolist()))
 
     @property
     def undetermined(self) -> list[str]:

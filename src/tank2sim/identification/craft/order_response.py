@@ -117,7 +117,8 @@ def _response(runs: Sequence[_Run], largest: float) -> OrderResponse | None:
     above = levels[levels > edges[possible[-1]] + _LEVEL * largest / 2]
     if not len(above):
         return None
-    curvature = _curvature(runs, lag, bands[best], 0.05 * lag)
+    low, middle, high = (_cost(runs, factor * lag, bands[best]) for factor in (0.95, 1.0, 1.05))
+    curvature = (low - 2 * middle + high) / (0.05 * lag) ** 2
     error = np.sqrt(2 * variance / max(curvature, 1e-12) / independent)
     # A change of order is known to a part of a step.
     return OrderResponse(lag, float(np.hypot(error, step / np.sqrt(12))), float(edges[possible[0]]), float(above[0]))
@@ -127,11 +128,6 @@ def _best_lag(runs: Sequence[_Run], band: float) -> float:
     step = min(each for each, _, _ in runs)
     bounds = np.log(0.1 * step), np.log(LONGEST_LAG_S)
     return float(np.exp(minimize_scalar(lambda z: _cost(runs, float(np.exp(z)), band), bounds=bounds).x))
-
-
-def _curvature(runs: Sequence[_Run], lag: float, band: float, by: float) -> float:
-    low, middle, high = (_cost(runs, lag + way * by, band) for way in (-1, 0, 1))
-    return (low - 2 * middle + high) / by**2
 
 
 def _cost(runs: Sequence[_Run], lag: float, band: float) -> float:

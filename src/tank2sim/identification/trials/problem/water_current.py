@@ -150,12 +150,10 @@ def without_current(estimate: Estimate, card: ManoeuvringCard) -> tuple[Estimate
 
 def current_of(card: ManoeuvringCard) -> Array:
     """Velocity of the current of a card to north and east (2,), m/s; 0 without one."""
-    for entry in card.effects:
-        if entry.name == CURRENT.name:
-            given = entry.parameters
-            speed, direction = given["speed_mps"], given["direction_rad"]
-            return speed * np.array([math.cos(direction), math.sin(direction)])
-    return np.zeros(2)
+    still = {"speed_mps": 0.0, "direction_rad": 0.0}
+    given = next((entry.parameters for entry in card.effects if entry.name == CURRENT.name), still)
+    direction = given["direction_rad"]
+    return given["speed_mps"] * np.array([math.cos(direction), math.sin(direction)])
 
 
 def card_in(card: ManoeuvringCard, current: WaterCurrent) -> ManoeuvringCard:
