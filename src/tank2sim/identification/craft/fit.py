@@ -52,7 +52,6 @@ standard errors)."""
 TRIALS_SHARE = 0.5
 """Largest standard error after the trials over that before of a coefficient that they determine (project choice)."""
 
-
 STABILISING = ("derivatives.Yv", "derivatives.Yvabsv", "derivatives.Nr", "derivatives.Nrabsr")
 """Coefficients whose damping holds a craft on its course."""
 
@@ -82,7 +81,6 @@ _EXPECTATIONS = 1000
 
 _LINEARISATIONS = 5
 """Passes of the filter, each linearised along the one before: the trajectory of the last no longer moves."""
-
 
 AXES = {f"motion.{key}": words for key, words in (("u", "surge"), ("v", "sway"), ("r", "yaw"), ("psi", "heading"))}
 AXES |= {"motion.x": "position to north", "motion.y": "position to east"}

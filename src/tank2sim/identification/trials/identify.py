@@ -37,20 +37,11 @@ from tank2sim.identification.trials.assessment.model_selection import (
     yaw_rate_error,
 )
 from tank2sim.identification.trials.assessment.other_ship import far_from_card, not_of_ship, other_ship
-from tank2sim.identification.trials.assessment.prediction_intervals import (
-    Fit,
-    bootstrap,
-    compare_held_out,
-    generators,
-)
+from tank2sim.identification.trials.assessment.prediction_intervals import Fit, bootstrap, compare_held_out, generators
 from tank2sim.identification.trials.methods.equation_error import equation_error
 from tank2sim.identification.trials.methods.kalman import KalmanSettings, kalman
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
-from tank2sim.identification.trials.methods.posterior_sampling import (
-    PosteriorSamples,
-    check_sampler,
-    sample_posterior,
-)
+from tank2sim.identification.trials.methods.posterior_sampling import PosteriorSamples, check_sampler, sample_posterior
 from tank2sim.identification.trials.options import (
     AUTO,
     AVERAGE,

@@ -45,7 +45,6 @@ STOPPED = 0.15
 WORSE = 1.05
 """An error that grew by less than this factor counts as unchanged (project choice)."""
 
-
 LACKING = 3.0
 """Factor on the card's standard errors from which a missing effect is the likelier reason (project choice: three
 standard errors are rare by chance)."""

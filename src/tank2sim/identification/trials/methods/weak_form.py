@@ -51,7 +51,6 @@ _SPARSE = 0.5
 """Share of known samples below which a signal is smoothed by its samples alone: straight lines between them would hide
 their noise (project choice)."""
 
-
 _LEAST_STRETCH = 2.4
 """Stretch without gaps, in smoothing windows, below which a velocity is derived from heading and positions, if these
 have it: a window of the weak form is 2.33 of them."""

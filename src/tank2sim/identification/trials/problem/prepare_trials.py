@@ -30,7 +30,6 @@ SAME_LENGTH = 0.03
 FARTHEST_FROUDE = 2.5
 """A trial whose approach speed differs from the card's speed by more than this factor is at another scale."""
 
-
 FARTHEST_REVOLUTIONS = 10.0
 """A trial whose largest revolutions differ from the card's nominal ones by more than this factor, although the ship is
 near the card's speed, has them in another unit (project choice; of revolutions a second and a minute it is 60)."""

@@ -50,7 +50,6 @@ REVOLUTIONS_VARY = 0.01
 ASSUMED_EFFECT_ERROR = 0.25
 """Standard error of an effect's parameter without one, as a share of its bounds' distance (project choice)."""
 
-
 SLOWEST_OF_TURNS = 0.2
 """Speed over the speed of expansion below which a trial is taken for a stop and not for a manoeuvre: a tanker at full
 rudder keeps 0.3 to 0.4 of its speed (project choice)."""

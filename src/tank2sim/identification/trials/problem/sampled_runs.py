@@ -188,7 +188,6 @@ def _averaged(time: Array, values: Array, grid: Array, step: float, stride: int)
 _PARTS_OF_LAG = 4.0
 """Steps in a time constant of the gear: Runge and Kutta's error is then below 1e-4 of a movement (project choice)."""
 
-
 _LONGEST_GAP = 20.0
 """Rows that may be missing between two, over which the gear is still followed in such steps (project choice)."""
 
