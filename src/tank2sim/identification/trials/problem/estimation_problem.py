@@ -27,14 +27,6 @@ from tank2sim.notices import Notice
 LITTLE_KNOWN = 0.25
 """A standard error of at least this share of the value is not widened (project choice)."""
 
-LOOSE = 30.0
-"""Factor on the standard errors before the trials in the fit of the captive tests alone, from which their noise comes:
-the tests then determine all that they show (project choice)."""
-
-ROUNDS, STEPS = 6, 6
-"""Rounds of noise, and Gauss-Newton steps in each, of the fit of the captive tests alone: the noise of the KVLCC2's
-changes by less than 1 % in the last (project choice)."""
-
 
 def driven_model(card: ManoeuvringCard, driven_by: str) -> Model:
     """The card's model, driven by the measured angle of the rudder (`driven_by` is ``angle``) or by its order."""
@@ -252,25 +244,6 @@ SearchReport = Callable[[str, Array, float], None]
 
 def silent(stage: str, values: Array, cost: float) -> None:
     """Ignore progress."""
-
-
-def noise_alone(tests: CaptiveTests, problem: Problem) -> CaptiveTests:
-    """The equations with the noise that they have at the best fit of the captive tests alone.
-
-    Fitted together with trials, the noise must not grow until tank and trials agree: it is what the tank's own scatter
-    and the structure of the model leave, with standard errors before the trials :data:`LOOSE` times those of `problem`.
-    Within one tank the uncertain parameters between tank and ship are none.
-    """
-    values, prior = problem.prior_mean.copy(), problem.prior_precision(LOOSE * problem.prior_error)
-    for _ in range(ROUNDS):
-        for _ in range(STEPS):
-            residual, slopes = tests.residuals(problem.parameters(values))
-            weighted = slopes / tests.noise[tests.force][:, None] ** 2
-            gradient = weighted.T @ residual + prior @ (values - problem.prior_mean)
-            step = np.linalg.solve(weighted.T @ slopes + prior, gradient)
-            values = np.clip(values - step, *problem.bounds)
-        tests = tests.with_noise_at(problem.parameters(values))
-    return tests
 
 
 BLOCK = 5.0
