@@ -45,8 +45,8 @@ class OrderResponse:
     # `lag_s`, `lag_error_s`: T and its standard error
     lag_s: float
     lag_error_s: float
-    # `rest_radps`, `turning_radps`: Largest order at which the propeller rested, 0 without any, and least one
-    # at which it turned, rad/s
+    # `rest_radps`, `turning_radps`: Largest order at which the propeller rested, 0 without any, and least one at which
+    # it turned, rad/s
     rest_radps: float
     turning_radps: float
 

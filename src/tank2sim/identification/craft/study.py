@@ -48,8 +48,7 @@ class CandidateTrial:
 
     words: str  # Orders in words, revolutions in % of the largest: port/starboard
     t_s: tuple[float, ...]
-    # `order_port`, `order_starboard`: Orders of the thrusters at these times, shares of their largest
-    # revolutions
+    # `order_port`, `order_starboard`: Orders of the thrusters at these times, shares of their largest revolutions
     order_port: tuple[float, ...]
     order_starboard: tuple[float, ...]
     determines: tuple[str, ...]  # Coefficients that the trials so far do not determine and that it would

@@ -44,8 +44,8 @@ class Following:
     """Errors of a model on one run."""
 
     name: str
-    # Signal to (root mean square of the error, of the measurement less its mean) over windows of
-    # :data:`_WINDOW`, each with its own initial state; SI
+    # Signal to (root mean square of the error, of the measurement less its mean) over windows of :data:`_WINDOW`, each
+    # with its own initial state; SI
     windows: Mapping[str, tuple[float, float]]
     # Signal to root mean square error over the whole run from one initial state; inf where the motion diverged
     whole: Mapping[str, float]
@@ -146,8 +146,8 @@ class Passage:
     """One trial and its simulation by a model."""
 
     name: str  # Name of the trial
-    # True for a turn or zigzag: the model was steered as in the manoeuvre, from the measured start. False: it
-    # was driven by the recorded rudder, from the initial state that fits the record best.
+    # True for a turn or zigzag: the model was steered as in the manoeuvre, from the measured start. False: it was
+    # driven by the recorded rudder, from the initial state that fits the record best.
     closed_loop: bool
     time_s: Array  # (n,): In the trial's own time
     measured: Mapping[str, Array]  # Measured signals among :data:`_SHOWN` (n,), nan where not measured

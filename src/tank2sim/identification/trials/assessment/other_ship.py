@@ -153,8 +153,8 @@ def _mean(values_and_errors: list[tuple[float, float]]) -> tuple[float, float]:
 class RudderEffect:
     """Yaw acceleration by the rudder in one trial: regression coefficients over the card's own derivative."""
 
-    # `measured`, `modelled`: Coefficients of the measured accelerations and of the accelerations of the card
-    # along the same motion
+    # `measured`, `modelled`: Coefficients of the measured accelerations and of the accelerations of the card along the
+    # same motion
     measured: float
     modelled: float
     covariance: Array  # (2, 2): Covariance of the two coefficients

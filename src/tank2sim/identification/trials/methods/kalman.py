@@ -259,8 +259,7 @@ class KalmanSettings:
     """Settings of the Kalman smoother."""
 
     white: bool = False  # Random accelerations are independent from step to step; else their time constant is estimated
-    # Each sensor has a drift next to its white noise, also first-order Gauss-Markov (three to six times as
-    # slow)
+    # Each sensor has a drift next to its white noise, also first-order Gauss-Markov (three to six times as slow)
     drifting: bool = False
     # Multiply the prior's standard errors, by groups, by the factor of largest evidence, at least 1
     scale_prior: bool = True

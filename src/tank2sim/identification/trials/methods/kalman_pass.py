@@ -49,12 +49,12 @@ _PROBED_S = 1e-3
 class Tangents:
     """Derivatives along a run of n instants."""
 
-    # `A`, `B`: (n, nz, nz), (n, nz, k): Slopes of the next state by the state (after the measurement) and by
-    # the free parameters
+    # `A`, `B`: (n, nz, nz), (n, nz, k): Slopes of the next state by the state (after the measurement) and by the free
+    # parameters
     A: Array
     B: Array
-    # `C`, `D`: (n, ny, nz), (n, ny, k): Slopes of the observed values by the state (before the measurement) and
-    # by the free parameters
+    # `C`, `D`: (n, ny, nz), (n, ny, k): Slopes of the observed values by the state (before the measurement) and by the
+    # free parameters
     C: Array
     D: Array
 
@@ -174,8 +174,8 @@ class Gains:
     """Gains and covariances of a pass of the filter."""
 
     K: Array  # (runs, n, nz, ny): Gains; 0 in the padding
-    # (runs, n, ny, ny): W, the inverse of the Cholesky factor of the innovation's covariance S: ``W S W' = 1``;
-    # 1 in the padding
+    # (runs, n, ny, ny): W, the inverse of the Cholesky factor of the innovation's covariance S: ``W S W' = 1``; 1 in
+    # the padding
     whitener: Array
     P: Array  # (runs, n, nz, nz): Covariance of the state before each measurement; 0 in the padding
     lengths: Sequence[int] | None = None  # As those of :class:`Variances`
@@ -368,8 +368,7 @@ class Batch:
     known: NDArray[np.bool_]  # (runs, n, ny): True where measured; False in the padding
     lengths: tuple[int, ...]  # Instants of each run
     steps: Array  # (runs,): s
-    # (runs, nz): First guess of the first states, from the nearby measurements; without random acceleration or
-    # drift
+    # (runs, nz): First guess of the first states, from the nearby measurements; without random acceleration or drift
     starts: Array
 
 

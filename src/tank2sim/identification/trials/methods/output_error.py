@@ -127,8 +127,8 @@ class Normal:
     vector: Array  # (k,): ``matrix @ step = -vector`` for the parameters alone
     states: Array  # (unknown, k): Change of the initial states: ``-(step + states @ parameter step)``
     step: Array
-    # `white`, `white_by`: (pieces, samples) and (pieces, samples, nx + k): Whitened residuals, and their
-    # derivatives by the initial state of the piece and by the parameters
+    # `white`, `white_by`: (pieces, samples) and (pieces, samples, nx + k): Whitened residuals, and their derivatives by
+    # the initial state of the piece and by the parameters
     white: Array
     white_by: Array
 

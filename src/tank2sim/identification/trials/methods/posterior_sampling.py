@@ -64,8 +64,7 @@ class PosteriorSamples:
 
     free: tuple[str, ...]  # The k parameters
     values: Array  # (chains, draws, k): In the units of the model's parameters
-    # `r_hat`, `effective`: (k,): Rank-normalised split R-hat, and bulk effective sample size (Vehtari et al.
-    # 2021).
+    # `r_hat`, `effective`: (k,): Rank-normalised split R-hat, and bulk effective sample size (Vehtari et al. 2021).
     r_hat: Array
     effective: Array
     sampler: Sampler  # One of :data:`.options.Sampler`

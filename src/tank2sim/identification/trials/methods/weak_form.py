@@ -60,8 +60,8 @@ have it: a window of the weak form is 2.33 of them."""
 class MeasuredMotion:
     """Measured motion of a run."""
 
-    # (n, 3): u, v (m/s), r (rad/s) as measured or derived, nan where they are unknown; straight lines between
-    # the samples of a signal that is slower than the run
+    # (n, 3): u, v (m/s), r (rad/s) as measured or derived, nan where they are unknown; straight lines between the
+    # samples of a signal that is slower than the run
     velocities: Array
     smooth: Array  # (n, 6): :data:`MEASURED_STATES`, smoothed against noise in the regressors, without gaps
     noise: Array  # (3,): Standard deviation of the measurement of u, v, r

@@ -67,11 +67,11 @@ class CaptiveRuns:
 class CaptiveTests:
     """Equations of a campaign in the k free parameters of a model."""
 
-    # ``forces(motion, p) -> (F, J, R)``: the water's X', Y', N' at one instant, their slopes by the free
-    # parameters, and the rudder's part of them
+    # ``forces(motion, p) -> (F, J, R)``: the water's X', Y', N' at one instant, their slopes by the free parameters,
+    # and the rudder's part of them
     forces: ca.Function
-    # (9, instants): u, v, r, rudder angle, dv/dt, dr/dt, propeller speed over its nominal one, and the run's
-    # scales of force and moment (N, N m); ship size, SI
+    # (9, instants): u, v, r, rudder angle, dv/dt, dr/dt, propeller speed over its nominal one, and the run's scales of
+    # force and moment (N, N m); ship size, SI
     motion: Array
     projection: sparse.csr_matrix  # (m/3, instants): Histories of a force to means and harmonics, run by run
     measured: Array  # (m,): Coefficients of all runs, of X', then of Y' and N'

@@ -107,8 +107,8 @@ class Problem:
 
     model: Model  # Driven by the input that the runs recorded (:func:`driven_model`)
     free: tuple[str, ...]  # Names of the k parameters to estimate
-    # `prior_mean`, `prior_error`: (k,): Value and standard error before the trials, in the parameter's own
-    # unit; the error is positive
+    # `prior_mean`, `prior_error`: (k,): Value and standard error before the trials, in the parameter's own unit; the
+    # error is positive
     prior_mean: Array
     prior_error: Array
     runs: tuple[SampledRun, ...]  # Each with the same `seen`
@@ -213,8 +213,8 @@ class Estimate:
     method: str  # Name of the method
     free: tuple[str, ...]  # The k parameters
     values: Array  # (k,): Estimates
-    # (k, k): Covariance of the estimates, for the residuals as they are (coloured, with model error), not as
-    # white noise
+    # (k, k): Covariance of the estimates, for the residuals as they are (coloured, with model error), not as white
+    # noise
     covariance: Array
     information: Array  # (k, k): Information of the trials alone: the inverse covariance without the prior
     noise: Mapping[str, float] = field(default_factory=dict)  # Standard deviation of the residual by variable

@@ -50,8 +50,7 @@ class SampledRun:
     # `begin_s`, `step_s`: Time of the first instant in the trial's own time, and the step, s
     begin_s: float
     step_s: float
-    # (n, nu): Mean of each of the model's inputs from an instant to the next; the last row repeats the previous
-    # row
+    # (n, nu): Mean of each of the model's inputs from an instant to the next; the last row repeats the previous row
     inputs: Array
     measured: Array  # (n, ny): In the order of `seen`; nan where not measured
     seen: tuple[str, ...]  # Names of the model's variables that are measured
