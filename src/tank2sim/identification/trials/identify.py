@@ -16,7 +16,13 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.examination import doubts
 from tank2sim.dynamics import build
 from tank2sim.errors import ArgumentError, InputError
-from tank2sim.identification.trials.assessment.evaluation import Comparison, compare_card, noise_of, replay_error
+from tank2sim.identification.trials.assessment.evaluation import (
+    Comparison,
+    compare_card,
+    noise_of,
+    or_none,
+    replay_error,
+)
 from tank2sim.identification.trials.assessment.identifiability import (
     IdentifiabilityStudy,
     identifiability,
@@ -204,7 +210,7 @@ def _identified(
         structure=structure,
         structures=structures,
         weights=weights,
-        criteria=_criteria_or_none(fit),
+        criteria=or_none(criteria, fit.problem, fit.estimate),
         posterior=samples,
         bootstrap=bootstrap(*again, disturbances, generators(options.bootstrap), executor) if disturbances else None,
         forced=evidence,
@@ -219,14 +225,6 @@ def _identified(
             *fit.estimate.notices,
         ),
     )
-
-
-def _criteria_or_none(fit: Fit) -> Criteria | None:
-    """Information criteria of the fit; None where the velocities were not measured."""
-    try:
-        return criteria(fit.problem, fit.estimate)
-    except InputError:
-        return None
 
 
 def _refuse_options(card: ManoeuvringCard, trials: Measured, options: IdentificationOptions) -> None:
@@ -356,10 +354,8 @@ def _in_pieces(problem: Problem, options: IdentificationOptions) -> Estimate:
 
 def _start(problem: Problem) -> Array | None:
     """Start values of output error: those of the weak form, which needs none itself; None without velocities."""
-    try:
-        return equation_error(problem).values
-    except InputError:
-        return None
+    found = or_none(equation_error, problem)
+    return None if found is None else found.values
 
 
 def _follows_whole_runs(problem: Problem, estimate: Estimate) -> bool:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import ParamSpec, TypeVar
 
 import numpy as np
 
@@ -24,9 +25,11 @@ from tank2sim.records.trials import Trial
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
-from tank2sim.simulation.recorded import Recorded, recorded, repeat, steerable
-from tank2sim.simulation.run import Run
+from tank2sim.simulation.recorded import recorded, repeat, steerable
 from tank2sim.simulation.trajectory import Trajectory
+
+_Given = ParamSpec("_Given")
+_Found = TypeVar("_Found")
 
 _WINDOW = 5.0
 """Length of the windows of a free-running comparison, in L/u0 (30 s of a 7 m model at 1.18 m/s)."""
@@ -113,6 +116,14 @@ class FigureComparison:
         return difference / self.measured if self.name.endswith("_m") else difference
 
 
+def or_none(function: Callable[_Given, _Found], *given: _Given.args, **named: _Given.kwargs) -> _Found | None:
+    """The result of a `function`; None where the records do not allow it, or a motion leaves all bounds."""
+    try:
+        return function(*given, **named)
+    except InputError:
+        return None
+
+
 def predicted_figures(card: ManoeuvringCard, trials: Sequence[Trial]) -> tuple[FigureComparison, ...]:
     """Figures of the turns and zigzags among trials, measured and simulated in closed loop from the measured start.
 
@@ -124,21 +135,13 @@ def predicted_figures(card: ManoeuvringCard, trials: Sequence[Trial]) -> tuple[F
         record = recorded(trial, integrator.model)
         if record is None:
             continue
-        turn, run = isinstance(record.manoeuvre, Turn), _repeated(record, integrator)
+        turn, run = isinstance(record.manoeuvre, Turn), or_none(repeat, record, integrator)
         predicted = select_figures(run.figures, turn=turn) if run else {}  # without a run none is reached
         figures += [
             FigureComparison(trial.name, name, value, predicted.get(name))
             for name, value in select_figures(record.figures, turn=turn).items()
         ]
     return tuple(figures)
-
-
-def _repeated(record: Recorded, integrator: Integrator) -> Run | None:
-    """A recorded manoeuvre in closed loop; None where the motion leaves all bounds."""
-    try:
-        return repeat(record, integrator)
-    except InputError:
-        return None
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +176,7 @@ def comparison_windows(
     found = []
     for trial, run in zip(trials, problem.runs, strict=True):
         record = recorded(trial, integrator.model)
-        repeated = _repeated(record, integrator) if record else None
+        repeated = or_none(repeat, record, integrator) if record else None
         replayed = None if record else _replayed(problem, run, noise)
         simulated = repeated.trajectory if repeated else replayed
         given = {name: run.column(name) for name in run.seen if not np.isnan(run.column(name)).all()}

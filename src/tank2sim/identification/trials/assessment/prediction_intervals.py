@@ -31,7 +31,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model, Parameter, Quantity, State
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.assessment.evaluation import Comparison, compare_card
+from tank2sim.identification.trials.assessment.evaluation import Comparison, compare_card, or_none
 from tank2sim.identification.trials.assessment.model_selection import MethodChoice
 from tank2sim.identification.trials.methods.output_error import cut
 from tank2sim.identification.trials.methods.weak_form import WeakForm, WeakWindows, sensor_noise
@@ -219,10 +219,7 @@ class Fit:
     @property
     def disturbances(self) -> Disturbances | None:
         """Random forces that the fit does not explain; None where the velocities were not measured."""
-        try:
-            return disturbances_of(self.problem, self.estimate.values)
-        except InputError:
-            return None
+        return or_none(disturbances_of, self.problem, self.estimate.values)
 
 
 def generators(members: int, seed: int = 0) -> list[np.random.Generator]:
