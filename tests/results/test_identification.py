@@ -124,9 +124,7 @@ def test_histories_are_in_degrees_and_thinned(found, trials) -> None:
     )
     assert max(row["s0"] for row in measured) == pytest.approx(20, 1e-3)
     assert len(measured) < 60 and len(rows_of(chart, AFTER)) < 160
-    titles = [
-        one["layer"][0]["encoding"]["y"]["axis"]["title"] for one in chart_specification(chart)["concat"][0]["vconcat"]
-    ]
+    titles = [one["layer"][0]["encoding"]["y"]["title"] for one in chart_specification(chart)["concat"][0]["vconcat"]]
     assert titles == ["rudder (deg)", "heading (deg)", "yaw rate (deg/s)", "speed (m/s)", "drift angle (deg)"]
 
 
