@@ -28,13 +28,12 @@ from tank2sim.answer.result import Result
 from tank2sim.arrays import Array
 from tank2sim.cards import Card
 from tank2sim.identification.trials.assessment.evaluation import TURN_FIGURE_NAMES
-from tank2sim.identification.trials.assessment.identifiability import CLOSE_CORRELATION
+from tank2sim.identification.trials.assessment.identifiability import CLOSE_CORRELATION, IdentifiabilityStudy
 from tank2sim.identification.trials.identify import Identification
 from tank2sim.identification.trials.study import (
     SET_KEYS,
     BootstrapStudy,
     CardReplay,
-    IdentifiabilityStudy,
     IdentificationStudy,
     ParameterEstimate,
     PosteriorStudy,
