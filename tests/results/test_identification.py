@@ -244,6 +244,16 @@ def test_the_key_figures_tell_the_errors_of_the_trials_held_out(found) -> None:
     assert "mended" in shown.notices and shown.notices == shown.study.notices
 
 
+def test_a_card_without_a_yaw_rate_to_compare_still_has_a_first_line(found) -> None:
+    shown = found[1]
+    windows = {
+        key: tuple(replace(trial, before={}, found={}) for trial in trials)
+        for key, trials in shown.study.errors_over_windows.items()
+    }
+    (line,) = replace(shown, study=replace(shown.study, errors_over_windows=windows)).headline
+    assert line.startswith(f"{len(OFF)} coefficients") and "yaw rate" in line
+
+
 def test_the_estimates_are_a_table_and_a_data_frame(found) -> None:
     result, shown, _ = found
     assert shown.estimates["value"].to_numpy() == pytest.approx(result.estimate.values)
