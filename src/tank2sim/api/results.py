@@ -18,12 +18,11 @@ def result_classes(command: str) -> list[type[Result[Any]]]:
     """Return the classes of the results of a command, those of its variants last; empty if it writes none."""
     if (verb := VERBS.get(command)) is None:
         return []
-    places = [place for each in (verb, *variants_of(verb).values()) for place in each.results]
-    found = []
-    for place in places:
+    found: dict[type[Result[Any]], None] = {}
+    for place in (place for each in (verb, *variants_of(verb).values()) for place in each.results):
         module, _, name = place.partition(":")
-        found.append(getattr(importlib.import_module(module), name))
-    return found
+        found[getattr(importlib.import_module(module), name)] = None
+    return list(found)
 
 
 def commands_with_results() -> list[str]:
