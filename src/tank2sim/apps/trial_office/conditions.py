@@ -64,6 +64,8 @@ class TrialState:
         The trim is by the stern.
     length_m : float
     largest_rudder_rad : float
+    draughts_recorded : bool
+        False where the draughts of the trial are not known: they are then taken to be those of full load.
     wind_speed_mps, wind_from_rad : float or None
         By the records, else by the notes.
     """
@@ -73,6 +75,7 @@ class TrialState:
     full_load_draught_m: float
     length_m: float
     largest_rudder_rad: float
+    draughts_recorded: bool
     wind_speed_mps: float | None
     wind_from_rad: float | None
 
@@ -91,7 +94,7 @@ def trial_conditions(state: TrialState, notes: TrialNotes, trials: Sequence[Trie
     state : TrialState
     notes : TrialNotes
     trials : sequence of Tried
-        As run.
+        Without the current: the test speed is a speed through the water.
     """
     turns = [one for one in trials if isinstance(one.manoeuvre, Turn) and one.record is not None]
     speeds = [one.speed_mps for one in trials if one.trial is not None]
@@ -99,11 +102,12 @@ def trial_conditions(state: TrialState, notes: TrialNotes, trials: Sequence[Trie
     stated = notes.speed_85_mcr_mps
     test = stated and slowest and slowest / stated
     depth = notes.depth_m and notes.depth_m / state.draught_m
-    turned = min((one.drift.turned_deg if one.drift else 0.0 for one in turns), default=None)
+    turned = min((angle for one in turns if (angle := one.turned_deg) is not None), default=None)
     rudder = min((abs(one.manoeuvre.rudder) for one in turns if not isinstance(one.manoeuvre, Stop)), default=None)
     kinds = {type(one.manoeuvre) for one in trials} - {Stop}
     both = [{one.side for one in trials if type(one.manoeuvre) is kind} == {"port", "starboard"} for kind in kinds]
     away = state.draught_m / state.full_load_draught_m - 1
+    recorded = state.draughts_recorded
     circular, standards, iso = "MSC/Circ.1053", "MSC.137(76)", "ISO 13643-2"
     approaches = [_approach(one) for one in trials]
     known = [one for one in approaches if one is not None]
@@ -121,8 +125,10 @@ def trial_conditions(state: TrialState, notes: TrialNotes, trials: Sequence[Trie
         _judged("sea state", f"up to sea state {HIGHEST_SEA_STATE}", notes.sea_state, "sea state {:d}", circular).when(
             notes.sea_state is not None and notes.sea_state <= HIGHEST_SEA_STATE
         ),
-        _judged("draught", "full load within 5 %", 100 * away, "{:+.1f} %", circular).when(abs(away) <= DRAUGHT_SHARE),
-        _judged("trim by the stern", "even keel", state.trim_m, "{:+.2f} m", standards).when(
+        _judged("draught", "full load within 5 %", 100 * away if recorded else None, "{:+.1f} %", circular).when(
+            abs(away) <= DRAUGHT_SHARE
+        ),
+        _judged("trim by the stern", "even keel", state.trim_m if recorded else None, "{:+.2f} m", standards).when(
             abs(state.trim_m) <= DRAUGHT_SHARE * state.draught_m
         ),
         _judged("test speed", "at least 90 % of that at 85 % MCR", test and 100 * test, "{:.0f} %", standards).when(

@@ -53,16 +53,14 @@ class TrialOfficeResult(Result[TrialOffice]):
     def headline(self) -> tuple[str, ...]:
         """Verdicts at full load, and the corrections."""
         study = self.study
-        tried = [one for one in study.criteria if one.as_run is not None]
-        passed = sum(one.verdict == "pass" for one in tried)
-        failed = [one for one in tried if one.verdict.startswith("fail")]
-        open_ones = [one for one in tried if one.verdict.startswith("undecided")]
-        lines = [
-            f"At full load in calm water, {passed} of {len(tried)} criteria of MSC.137(76) that were tried are met."
-        ]
+        failed = [one for one in study.tried if one.verdict.startswith("fail")]
+        open_ones = [one for one in study.tried if one.verdict.startswith("undecided")]
+        lines = [self._first_line]
         for words, ones in (("Not met", failed), ("Undecided", open_ones)):
             if ones:
                 lines.append(f"{words}: {'; '.join(_named(one) for one in ones)}.")
+        if study.conditions_not_met:
+            lines.append(f"Conditions not met: {study.conditions_not_met}.")
         if (current := study.current) is not None:
             how = f"separated from the wind {current.separated}" if current.separated else "together with any wind"
             lines.append(f"Current {current.speed_mps:.2f} m/s towards {current.towards_deg:.0f} deg, {how}.")
@@ -72,6 +70,21 @@ class TrialOfficeResult(Result[TrialOffice]):
         if not study.applies:
             lines.append("The ship is shorter than 100 m: the standards do not bind it.")
         return tuple(lines)
+
+    @property
+    def _first_line(self) -> str:
+        """How many criteria are met, or that they are not certified."""
+        study = self.study
+        if not study.tried:
+            return "No criterion of MSC.137(76) was tried."
+        if study.not_certified == study.tried:
+            return "No criterion is certified: full load is EXTRAPOLATED from the condition of the trial."
+        passed = sum(one.verdict == "pass" for one in study.tried)
+        share = f"{passed} of {len(study.tried)}"
+        text = f"At full load in calm water, {share} criteria of MSC.137(76) that were tried are met"
+        if study.not_certified:
+            text += f", and {len(study.not_certified)} not certified (EXTRAPOLATED)"
+        return f"{text}."
 
     @property
     def key_figures(self) -> Sequence[KeyFigure]:
@@ -85,8 +98,7 @@ class TrialOfficeResult(Result[TrialOffice]):
                 verdict=_VERDICTS.get(one.verdict, Verdict.CAUTION),
                 note=_chance(one),
             )
-            for one in self.study.criteria
-            if one.as_run is not None
+            for one in self.study.tried
         ]
 
     @property
@@ -123,7 +135,7 @@ class TrialOfficeResult(Result[TrialOffice]):
         heads = ("condition", "required", "found", "met", "source")
         return Section(
             heading="Conditions of the trial",
-            text="A condition that is not met refuses nothing. It belongs in the report.",
+            text="A trial is reported whether or not its conditions were met.",
             tables=[table("Conditions", heads, rows)],
         )
 
@@ -268,7 +280,9 @@ def _share(probability: float | None) -> float | None:
 
 
 def _named(one: CriterionVerdict) -> str:
-    return f"{one.name} ({_chance(one)})"
+    """A criterion with its chance, and the reason why it is not certified."""
+    _, _, reason = _chance(one).partition(", ")
+    return f"{one.name} ({reason or 'no figure at full load'})"
 
 
 def _chance(one: CriterionVerdict) -> str:
