@@ -512,3 +512,21 @@ def test_long_words_of_the_poster_break_within_their_box(tmp_path: Path) -> None
     poster = str(found.files(tmp_path)[tmp_path / "poster.html"])
     assert re.search(r'<td class="long">estimated; \d of \d agree with the trial</td>', poster)
     assert "td.long { white-space: normal; }" in poster
+
+
+@pytest.mark.parametrize(("factor", "filled"), [(1.0, True), (0.6, False)])
+def test_the_poster_shows_the_ballast_in_which_the_trial_confirmed_the_model(
+    factor: float, filled: bool, tmp_path: Path
+) -> None:
+    """At 0.74 draughts ``validity`` is 0.67: the trial decides, or the panel is left to be filled in by hand."""
+    card = CARD.read_text(encoding="utf-8")
+    loaded = '\n[[effects]]\nname = "loading"\nparameters = { mean_draught_m = 5.5, trim_m = 0.8 }\n'
+    (tmp_path / "light.toml").write_text(card + loaded, encoding="utf-8")
+    own = t2s.load(tmp_path / "light.toml").turn(35).figures
+    figures = "\n".join(f"{name} = {factor * own[name]}" for name in ("advance_m", "tactical_diameter_m"))
+    notes = tmp_path / "notes.toml"
+    notes.write_text(f'[figures."turn:35"]\n{figures}\n', encoding="utf-8")
+    found = t2s.trial_office((), ship="mariner", notes=notes, members=8, draught_fore_m=5.1, draught_aft_m=5.9)
+    assert 0.5 < found.study.loading_validity < 0.8
+    poster = str(found.files(tmp_path)[tmp_path / "poster.html"])
+    assert ("range of the card ends" not in poster) is filled

@@ -11,12 +11,17 @@ from tank2sim.answer.charts.motion import TrackData, track_chart
 from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.trial_office.study import TrialOffice
-from tank2sim.apps.trial_office.verdict import CriterionVerdict
+from tank2sim.apps.trial_office.verdict import LOADING_HOLDS, CriterionVerdict
+from tank2sim.dynamics.effects.loading import LOADING
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
     from tank2sim.apps.bridge.study import DataBasis
     from tank2sim.cards.card import ManoeuvringCard
+
+MODEL_AGREES = 0.8
+"""Share of the figures of the trial that the model follows within its errors, from which the sheets of the bridge may
+use it in that loading condition. Project choice: intervals of 95 % of a right model leave out a few of twenty."""
 
 _VERDICTS = {"pass": Verdict.PASSED, "fail": Verdict.FAILED}
 
@@ -265,9 +270,11 @@ class TrialOfficeResult(Result[TrialOffice]):
         checked = f"estimated; {sum(known)} of {len(known)} agree with the trial" if known else "estimated"
         full = checked if self.study.tested_at_full_load else "estimated"
         half_trim = state.trim_m / 2
+        agrees = bool(known) and sum(known) >= MODEL_AGREES * len(known)
+        holds = (LOADING.name,) if agrees and self.study.loading_validity >= LOADING_HOLDS else ()
         return (
             DataBasis(state.full_load_draught_m, state.full_load_draught_m, full),
-            DataBasis(state.draught_m - half_trim, state.draught_m + half_trim, checked),
+            DataBasis(state.draught_m - half_trim, state.draught_m + half_trim, checked, holds),
         )
 
     @property
