@@ -49,6 +49,7 @@ def test_a_current_is_found_and_taken_off(tmp_path: Path) -> None:
         assert _figures(found, "advance_m")[side] == pytest.approx(advance, abs=4.0)
         assert abs(_figures(found, "tactical_diameter_m", "as_run")[side] - tactical) > 100.0
     overshoots = [one for one in found.study.figures if one.name.startswith("overshoot")]
+    assert not any("WIND" in notice for notice in found.cautions)
     assert overshoots and all(one.as_run == pytest.approx(one.without_current, abs=1e-9) for one in overshoots)
 
 
@@ -57,6 +58,7 @@ def test_a_record_of_one_turn_uses_the_moving_circle_and_says_so(tmp_path: Path)
     assert {one.measured.method for one in found.study.drifts} == {"circle in a moving frame"}
     assert found.study.current.speed_mps == pytest.approx(0.5, abs=0.02)
     assert found.study.current.spread_mps is None
+    assert any("circle in a moving frame" in line for line in found.headline)
 
 
 @pytest.mark.slow
@@ -68,6 +70,7 @@ def test_a_tide_that_falls_shows_in_the_spread_and_widens_the_errors(tmp_path: P
     constant = t2s.trial_office(turns(steady, ship), ship="mariner", members=0)
     tide = t2s.trial_office(turns(falling, ship, tide=0.2), ship="mariner", members=0)
     assert tide.study.current.spread_mps > 0.01 > constant.study.current.spread_mps
+    assert ["changes during a turn" in "".join(found.headline) for found in (tide, constant)] == [True, False]
     errors = [_figures(found, "tactical_diameter_m", "error")["port"] for found in (tide, constant)]
     assert errors[0] > errors[1]
 
@@ -91,6 +94,7 @@ def test_without_an_anemometer_both_sides_separate_the_wind(tmp_path: Path) -> N
     found = t2s.trial_office(turns(tmp_path, ship, with_wind=False), ship="mariner", members=0)
     assert found.study.current.speed_mps < 0.04
     assert found.study.current.separated == "by both sides"
+    assert any(notice.startswith("WIND IS NOT TAKEN OFF") for notice in found.cautions)
     one_side = t2s.trial_office(tmp_path / "turn_starboard.csv", ship="mariner", members=0)
     assert one_side.study.current.speed_mps > 0.1
     assert one_side.study.current.separated == ""
@@ -394,6 +398,15 @@ def test_without_a_trial_of_a_criterion_none_is_said_to_be_met(tmp_path: Path) -
     notes.write_text('[figures."turn:15"]\nadvance_m = 900\n', encoding="utf-8")
     found = t2s.trial_office((), ship="mariner", notes=notes, members=0)
     assert found.headline[0] == "No criterion of MSC.137(76) was tried."
+
+
+@pytest.mark.parametrize(("port", "met"), [("zigzag:-20/20", Met.NOT_MET), ("zigzag:-10/10", Met.MET)])
+def test_both_sides_are_of_the_same_manoeuvre(port: str, met: Met, tmp_path: Path) -> None:
+    notes = tmp_path / "notes.toml"
+    figures = "".join(f'[figures."{name}"]\novershoot_1_deg = 5\n' for name in ("zigzag:10/10", port))
+    notes.write_text(figures, encoding="utf-8")
+    found = t2s.trial_office((), ship="mariner", notes=notes, members=0)
+    assert {one.name: one.met for one in found.study.conditions}["both sides"] is met
 
 
 def test_assumed_errors_of_the_card_are_said(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 from tank2sim.answer.charts.motion import TrackData, track_chart
 from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
-from tank2sim.apps.trial_office.study import TrialOffice
+from tank2sim.apps.trial_office.study import CURRENT_CHANGES, TrialOffice
 from tank2sim.apps.trial_office.verdict import LOADING_HOLDS, CriterionVerdict
 from tank2sim.dynamics.effects.loading import LOADING
 from tank2sim.units import in_words
@@ -68,6 +68,10 @@ class TrialOfficeResult(Result[TrialOffice]):
             lines.append(f"Conditions not met: {study.conditions_not_met}.")
         if (current := study.current) is not None:
             how = f"separated from the wind {current.separated}" if current.separated else "together with any wind"
+            if any(one.measured.spread_mps is None for one in study.drifts):
+                how += ", by a circle in a moving frame (a turn of less than 540 deg)"
+            if (spread := current.spread_mps or 0.0) > CURRENT_CHANGES:
+                how += f"; it changes during a turn (spread {spread:.3f} m/s)"
             lines.append(f"Current {current.speed_mps:.2f} m/s towards {current.towards_deg:.0f} deg, {how}.")
         known = self._agreements
         if known and not study.tested_at_full_load:
@@ -150,9 +154,10 @@ class TrialOfficeResult(Result[TrialOffice]):
         for one in study.drifts:
             spread, residual = one.measured.spread_mps, one.measured.residual_m
             wind = one.by_wind_north_mps, one.by_wind_east_mps
-            rows.append([one.trial, one.measured.north_mps, one.measured.east_mps, spread, residual, *wind])
+            drift = one.measured.north_mps, one.measured.east_mps
+            rows.append([one.trial, one.measured.method, *drift, spread, residual, *wind])
         heads = [
-            *("turn", "north (m/s)", "east (m/s)", "spread (m/s)", "residual of the circle (m)"),
+            *("turn", "method", "north (m/s)", "east (m/s)", "spread (m/s)", "residual of the circle (m)"),
             *("by wind, north (m/s)", "by wind, east (m/s)"),
         ]
         charts = []

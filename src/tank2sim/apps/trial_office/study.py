@@ -19,6 +19,7 @@ from tank2sim.apps.trial_office.drift import LEAST_ARC, STEADY_FROM, CircleDrift
 from tank2sim.apps.trial_office.full_load import (
     SMALLEST,
     Prediction,
+    TriedShips,
     loading_validity,
     model_agrees,
     prediction,
@@ -42,6 +43,13 @@ from tank2sim.records.trials import Trial
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag, parse_manoeuvre
 from tank2sim.simulation.recorded import repeat, steerable
+
+WIND_SHOWS = 0.04
+"""Half the difference of the drifts of both sides, m/s, from which a wind must have acted; 10 m/s of wind give 0.18 for
+a Mariner. Project choice: above the error of the drift of two turns."""
+
+CURRENT_CHANGES = 0.01
+"""Spread of the pairs of a turn, m/s, from which the first lines say it. Project choice: noise gives 0.004."""
 
 _TRACK_POINTS = 400
 """Points of a track in the JSON."""
@@ -241,13 +249,7 @@ def study_trials(
         There is nothing to report, or the card lacks something that a loading condition needs.
     """
     plain = build(steerable(card))
-    given = measured(trials, card, report_unused=False) if trials else Measured((), "angle", ())
-    as_run, unknown = _recognised(given.trials, notes, plain)
-    if not as_run:
-        remedy = "give records of turns, zigzags or stops with heading and positions, or their figures in the notes"
-        problem = ": ".join(["holds no manoeuvre of a sea trial", *list(unknown.values())[:1]])
-        raise InputError(trials[0].path if trials else "trials", "", problem, remedy)
-    messages = [caution(f"left out, for it holds no turn, zigzag or stop: {why}").of(n) for n, why in unknown.items()]
+    given, as_run, messages = _manoeuvres(card, trials, notes, plain)
     state = _state(card, given.trials, notes)
     ships, more = tried_ships(card, state, count)
     winds = [_wind(one, state, ships.tried) for one in as_run]
@@ -265,8 +267,7 @@ def study_trials(
     validity = 1.0 if state.at_full_load else loading_validity(ships)
     stable = [stability_chance(one, count) for one in (ships.as_tried, ships.full_load)]
     unstable = _of_stability(*stable)
-    if given.trials and (evidence := evidence_of_other_ship(ships.as_tried, given)):
-        messages.append(caution(f"these look like trials of another ship: {'; '.join(evidence)}"))
+    messages += _of_other_ship(ships, given)
     doubts = [*_of_records(given), *messages, *more, *_cautions(state, current, as_run, validity, count), *unstable]
     study = TrialOffice(
         ship=card.ship.name,
@@ -293,6 +294,26 @@ def study_trials(
         notices=tuple(dict.fromkeys(doubts)),
     )
     return study, ships.as_tried, ships.full_load
+
+
+def _manoeuvres(
+    card: ManoeuvringCard, trials: Sequence[Trial], notes: TrialNotes, plain: Model
+) -> tuple[Measured, list[Tried], list[Notice]]:
+    """Audited records at the size of the ship, manoeuvres of these and of the notes, and notices on other records."""
+    given = measured(trials, card, report_unused=False) if trials else Measured((), "angle", ())
+    as_run, unknown = _recognised(given.trials, notes, plain)
+    if not as_run:
+        remedy = "give records of turns, zigzags or stops with heading and positions, or their figures in the notes"
+        problem = ": ".join(["holds no manoeuvre of a sea trial", *list(unknown.values())[:1]])
+        raise InputError(trials[0].path if trials else "trials", "", problem, remedy)
+    messages = [caution(f"left out, for it holds no turn, zigzag or stop: {why}").of(n) for n, why in unknown.items()]
+    return given, as_run, messages
+
+
+def _of_other_ship(ships: TriedShips, given: Measured) -> list[Notice]:
+    """A caution where the records are not of the ship as tried."""
+    evidence = evidence_of_other_ship(ships.as_tried, given) if given.trials else ()
+    return [caution(f"these look like trials of another ship: {'; '.join(evidence)}")] if evidence else []
 
 
 def _recognised(trials: Sequence[Trial], notes: TrialNotes, model: Model) -> tuple[list[Tried], dict[str, str]]:
@@ -544,6 +565,17 @@ def _cautions(
             caution(
                 "CURRENT AND WIND ARE NOT SEPARATED: the turns go to one side and no wind is known; the drift that is "
                 "taken off holds both"
+            )
+        )
+    if (
+        current is not None
+        and (apart := current.wind_share_mps or 0.0) > WIND_SHOWS
+        and "model" not in current.separated
+    ):
+        found.append(
+            caution(
+                f"WIND IS NOT TAKEN OFF: turns to port and starboard drift apart by {2 * apart:.2f} m/s, which a wind "
+                "does that nobody recorded; figures hold its effect: give wind_speed_mps and wind_from_deg"
             )
         )
     if current is None and any(one.trial is not None for one in trials):
