@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import zlib
@@ -467,6 +468,18 @@ def test_short_turns_say_how_far_they_turned_and_that_no_current_is_taken_off(
     turned = next(one for one in found.study.conditions if one.name == "turns")
     assert float(turned.found.removesuffix(" deg")) == pytest.approx(250.0, abs=1.5)
     assert any(notice.startswith("NO CURRENT IS TAKEN OFF") for notice in found.cautions)
+
+
+def test_records_with_long_names_differ_in_the_legend(both_turns: list[Path], tmp_path: Path) -> None:
+    records = []
+    for path in both_turns:
+        records.append(tmp_path / f"2026-05-04 sea trial of hull 1234 off the coast, run 7, {path.name}")
+        records[-1].write_bytes(path.read_bytes())
+    found = t2s.trial_office(records, ship="mariner", members=0)
+    (illustration,) = (one for section in found.sections for one in section.charts)
+    text = json.dumps(illustration.chart, ensure_ascii=False)
+    labels = set(re.findall(r'"([^"]*, (?:as run|without current))"', text))
+    assert len(labels) == 4 and all(len(label) <= 45 for label in labels)
 
 
 def test_trials_of_another_ship_are_said(tmp_path: Path) -> None:

@@ -82,6 +82,7 @@ def _section(pdf: FPDF, section: Section) -> None:
         ]
         _table(pdf, one.heads, rows)
     for illustration in section.charts:
+        pdf.ln(1.5)  # the picture is white, and would cover the last line of a table
         pdf.image(io.BytesIO(chart_picture(illustration.chart, ".png")), w=0.8 * _WIDTH_MM)
 
 

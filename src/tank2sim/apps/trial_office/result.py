@@ -23,6 +23,9 @@ MODEL_AGREES = 0.8
 """Share of the figures of the trial that the model follows within its errors, from which the sheets of the bridge may
 use it in that loading condition. Project choice: intervals of 95 % of a right model leave out a few of twenty."""
 
+_LONGEST = 24
+"""Letters of the name of a record in the legend; of a longer one the last, by which records mostly differ."""
+
 _VERDICTS = {"pass": Verdict.PASSED, "fail": Verdict.FAILED}
 
 
@@ -165,10 +168,11 @@ class TrialOfficeResult(Result[TrialOffice]):
             tracks = [
                 data
                 for one in study.tracks
+                for name in [one.trial if len(one.trial) <= _LONGEST else f"…{one.trial[1 - _LONGEST :]}"]
                 for data in (
-                    TrackData(label=f"{one.trial}, as run", x_m=one.x_m, y_m=one.y_m, measured=True),
+                    TrackData(label=f"{name}, as run", x_m=one.x_m, y_m=one.y_m, measured=True),
                     TrackData(
-                        label=f"{one.trial}, without current", x_m=one.x_without_current_m, y_m=one.y_without_current_m
+                        label=f"{name}, without current", x_m=one.x_without_current_m, y_m=one.y_without_current_m
                     ),
                 )
             ]
