@@ -65,7 +65,7 @@ class TrialState:
     length_m : float
     largest_rudder_rad : float
     draughts_recorded : bool
-        False where the draughts of the trial are not known: they are then taken to be those of full load.
+        False where the draughts of the trial are not known: they are then taken to be those of the card.
     wind_speed_mps, wind_from_rad : float or None
         By the records, else by the notes.
     """

@@ -556,7 +556,7 @@ def _cautions(
 ) -> list[Notice]:
     found = []
     if not state.draughts_recorded:
-        taken = f"the trial is taken to be at full load, {state.draught_m:.3g} m on even keel"
+        taken = f"the trial is taken to be at the draught of the card, {state.draught_m:.3g} m on even keel"
         found.append(caution(f"DRAUGHTS ARE NOT RECORDED: {taken}; give draught_fore_m and draught_aft_m"))
     if not count and not state.at_full_load:
         found.append(caution("without members, intervals and probabilities hold the errors of reading alone"))
