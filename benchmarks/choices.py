@@ -55,7 +55,6 @@ COMMANDS = {
     "identification.captive": ["reduce campaign/campaign.toml"],
     "identification.trials.methods.kalman": [f"{IDENTIFY} --method kalman"],
     "identification.trials.methods.weak_form": [f"{IDENTIFY} --method equation_error"],
-    "identification.trials.problem.measured_motion": [f"{IDENTIFY} --method equation_error"],
     "identification.trials": [IDENTIFY],
     "records.signals": [f"signals {ZIGZAG}"],
     "records.audit": ["audit faulty.csv", f"audit {ZIGZAG}"],

@@ -12,9 +12,7 @@ import time
 from paper_numbers import PaperNumbers
 
 from tank2sim.apps.rigs.glider.card import GliderCard
-from tank2sim.apps.rigs.glider.path import GlidePath, fly
-from tank2sim.apps.rigs.glider.programme import read_programme
-from tank2sim.apps.rigs.glider.quasi_steady_error import swing_errors
+from tank2sim.apps.rigs.glider.path import GlidePath, fly, read_programme
 from tank2sim.apps.rigs.glider.steady import (
     SteadyGlide,
     force_residual,
@@ -24,7 +22,7 @@ from tank2sim.apps.rigs.glider.steady import (
     steady_glide,
 )
 from tank2sim.apps.rigs.glider.study import best_glide, fastest_glide
-from tank2sim.apps.rigs.glider.transient import compare_with_steady, equilibrium, quasi_steady_error
+from tank2sim.apps.rigs.glider.transient import compare_with_steady, equilibrium, quasi_steady_error, swing_errors
 from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build

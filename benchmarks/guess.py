@@ -17,15 +17,15 @@ import sys
 import numpy as np
 
 from tank2sim.analysis.ensemble.draws import draws_of
-from tank2sim.apps.guess.conditioning import (
+from tank2sim.apps.guess.prior import ShipDimensions, prior_card
+from tank2sim.apps.guess.study import (
     FIGURE_KEYS,
     POSTER_MANOEUVRES,
     GivenFigure,
     PosterFigures,
     conditioned,
+    default_error,
 )
-from tank2sim.apps.guess.prior import ShipDimensions, prior_card
-from tank2sim.apps.guess.study import default_error
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError

@@ -27,8 +27,8 @@ from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.identification.trials.assessment.evaluation import replay_error
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
-from tank2sim.identification.trials.problem.estimation_problem import Problem
-from tank2sim.identification.trials.problem.problem_from_card import driven_model, free_parameters
+from tank2sim.identification.trials.problem.estimation_problem import Problem, driven_model
+from tank2sim.identification.trials.problem.problem_from_card import free_parameters
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun, prepare
 from tank2sim.identification.trials.problem.structures import STRUCTURES
 from tank2sim.records.audit import repair_trial

@@ -66,7 +66,7 @@ def _speed(card: ManoeuvringCard, files: list[Path]) -> None:
     names = tuple(problem.free[place] for place in places)
     fewer = replace(problem, free=names, prior_mean=problem.prior_mean[places], prior_error=problem.prior_error[places])
     begin = time.perf_counter()
-    found = estimate_parameters(fewer, IdentificationOptions())
+    found = estimate_parameters(fewer, IdentificationOptions())[0]
     samples = sum(len(run.measured) for run in problem.runs)
     print(
         f"output error, {len(problem.runs)} runs, {samples} samples, {FREE} coefficients: "

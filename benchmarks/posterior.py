@@ -81,7 +81,7 @@ def samplers() -> None:
     card = load("kvlcc2-captive").manoeuvring()
     trials = measured(sorted((DATA / "kvlcc2_hsva").glob("*.dat")), card)
     posed = problem_from_card(STRUCTURES["cross_flow"].start(card), trials.trials, trials.driven_by)
-    estimate = estimate_parameters(posed, IdentificationOptions())
+    estimate = estimate_parameters(posed, IdentificationOptions())[0]
     print(f"{len(posed.free)} coefficients, {sum(len(run.measured) for run in posed.runs)} samples of 6 signals")
     for name in get_args(Sampler):
         begin = time.perf_counter()

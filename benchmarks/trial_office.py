@@ -183,7 +183,7 @@ def main() -> None:
             for key, values in rows:
                 groups[key].append(values)
         print(f"{name}: current, error in the median {np.median(currents):.4f} m/s, at most {np.max(currents):.4f}")
-        every = []
+        every, pooled = [], []
         print("  median errors as run, by plain T F/B, and of the report:")
         for key, values in groups.items():
             true, *others = (
@@ -192,10 +192,16 @@ def main() -> None:
             inside = [one["low"] <= one["true"] <= one["high"] for one in values]
             every += inside
             unit = 1.0 if key.endswith("deg") else 100 / true
-            errors = " ".join(f"{np.median(np.abs(other - true) * unit):7.2f}" for other in others)
             kind = "deg" if key.endswith("deg") else "%"
+            away = [np.abs(other - true) * unit for other in others]
+            pooled += [(kind, row) for row in zip(*away, strict=True)]
+            errors = " ".join(f"{np.median(one):7.2f}" for one in away)
             print(f"  {key:34} {errors} {kind}; in the interval {100 * np.mean(inside):.0f} %")
         print(f"  all: in the interval {100 * np.mean(every):.0f} %")
+        for kind in ("%", "deg"):
+            chosen = np.array([row for unit, row in pooled if unit == kind])
+            medians = " ".join(f"{value:7.2f}" for value in np.median(chosen, axis=0))
+            print(f"  all in {kind:31} {medians} {kind}")
     published_ship()
     data = Path(os.environ.get("TANK2SIM_DATA", "../shared")) / "data" / "esso_osaka" / "turning"
     if data.is_dir():

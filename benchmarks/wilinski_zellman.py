@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import printed_tows
 from numpy.polynomial import Polynomial
 from paper_numbers import PaperNumbers
 
@@ -94,22 +95,22 @@ def polynomials(tows: Tows) -> None:
     ):
         beside(f"true means, degree 2, alpha{power}", value, found, 1e-3 * abs(value))
     sign = "(2.1) has lost the minus sign, which its inner products have"
-    beside("(2.1), alpha0 as its text prints it", 0.00493, paper.SPEED.coef[0], None, sign)
+    beside("(2.1), alpha0 as its text prints it", 0.00493, printed_tows.SPEED.coef[0], None, sign)
     for power, value in enumerate((0.0043, -0.000034)):
-        beside(f"(2.2), t^{power} of a*", value, paper.SPEED.deriv().coef[power], 1e-12)
+        beside(f"(2.2), t^{power} of a*", value, printed_tows.SPEED.deriv().coef[power], 1e-12)
     cubic = Polynomial(paper.TABLE_2[3][0])(paper.TIMES_S) - paper.MEANS_MPS
     beside("rms of the cubic as printed", 0.020, float(np.sqrt(np.mean(cubic**2))), 6e-4)
 
 
 def solution() -> None:
     """Inner products, (2.3), J."""
-    problem = discretise(paper.SPEED, paper.TIMES_S, TERMS, paper.FORCE_N)
+    problem = discretise(printed_tows.SPEED, paper.TIMES_S, TERMS, printed_tows.FORCE_N)
     for i in range(4):
         for j in range(i, 4):
             name = f"b{i + 1}{j + 1}"
-            beside(name, paper.INNER_PRODUCTS[i, j], problem.inner_products[i, j], 2e-7)
+            beside(name, printed_tows.INNER_PRODUCTS[i, j], problem.inner_products[i, j], 2e-7)
     for i in range(4):
-        value = paper.FORCE_PRODUCTS[i]
+        value = printed_tows.FORCE_PRODUCTS[i]
         beside(f"b{i + 1}0", value, problem.force_products[i], 2e-5 * value + 5e-6)
     exact = solve_normal_equations(problem)
     printed = np.array(list(vars(paper.SOLUTION).values()))
@@ -118,15 +119,15 @@ def solution() -> None:
         beside(f"{name}, solution of (1.12) by others", right, found, 3e-6 * abs(right))
     beside("J of the printed solution", 4.464, problem.J(printed), 5e-4)
     beside("J of the solution", 0.5150, problem.J(exact), 5e-5)
-    rounded = np.linalg.solve(paper.INNER_PRODUCTS, paper.FORCE_PRODUCTS)
+    rounded = np.linalg.solve(printed_tows.INNER_PRODUCTS, printed_tows.FORCE_PRODUCTS)
     for name, value, found in zip(("M", *TERMS), (2817.9, -2907, -265, 270), rounded, strict=True):
         beside(f"{name} from the products as printed", value, found, 0.05 if name == "M" else 0.5)
     rows = np.abs(problem.inner_products @ printed - problem.force_products)
     share = float(np.max(rows / (np.abs(problem.inner_products) @ np.abs(printed))))
     beside("(1.12) with (2.4), largest error over the sum of terms", 1.4e-4, share, 5e-6)
     beside("J of (2.4) over the least", 8.7, problem.J(printed) / problem.J(exact), 0.05)
-    wrong = discretise(Polynomial([0.00493, 0.0043, -0.000017]), paper.TIMES_S, TERMS, paper.FORCE_N)
-    most = float(np.max(wrong.inner_products / paper.INNER_PRODUCTS)) - 1
+    wrong = discretise(Polynomial([0.00493, 0.0043, -0.000017]), paper.TIMES_S, TERMS, printed_tows.FORCE_N)
+    most = float(np.max(wrong.inner_products / printed_tows.INNER_PRODUCTS)) - 1
     beside("b_ij of (2.1) with +0.00493, too large by up to", 0.70, most, 0.05)
     rounding(problem.inner_products, problem.force_products)
     beside("B2 as (2.3) prints it", 26096, paper.SOLUTION.B2_kgspm2, None, "(2.3) has lost the minus sign of (2.4)")
@@ -155,11 +156,11 @@ def deviation(exact: np.ndarray) -> None:
         ("the same of the solution", SurgeCoefficients(**dict(zip(vars(paper.SOLUTION), exact, strict=True))), 0.0128),
         ("the same with B2 positive, as (2.3)", replace(paper.SOLUTION, B2_kgspm2=26096.0), 0.113),
     ):
-        speeds = simulated_speeds(coefficients, paper.FORCE_N, paper.TIMES_S)
+        speeds = simulated_speeds(coefficients, printed_tows.FORCE_N, paper.TIMES_S)
         apart = np.abs(speeds - paper.MEANS_MPS)
         beside(words, expected, float(np.max(apart)), 5e-4 if expected > 0.1 else 5e-5)
         if coefficients is paper.SOLUTION:
-            beside("the same as printed, m/s", paper.LARGEST_DEVIATION_MPS, float(np.max(apart)), 5e-4)
+            beside("the same as printed, m/s", printed_tows.LARGEST_DEVIATION_MPS, float(np.max(apart)), 5e-4)
             beside("its time, s", 10, float(paper.TIMES_S[np.argmax(apart)]), 0)
 
 
@@ -176,12 +177,12 @@ def body_of_the_paper() -> None:
     triaxial, spheroid, printed = masses_by_theory(body)
     beside("k11, triaxial", 0.0946, triaxial.k11, 5e-5)
     beside("k11, spheroid", 0.0755, spheroid.k11, 5e-5)
-    beside("M_s with k11 = 0.156, kg", paper.MASS_BY_THEORY_KG, printed.near_surface_kg, 0.5)
+    beside("M_s with k11 = 0.156, kg", printed_tows.MASS_BY_THEORY_KG, printed.near_surface_kg, 0.5)
     beside("V, m3", 2243, body.volume_m3, None, "printed as 2243 m3; 2243 kg of water are 2.243 m3")
     slip = "a slip after (2.5): the M of (2.4) is meant"
     beside("M_0 in the text, kg", 2520, paper.SOLUTION.total_mass_kg, None, slip)
     beside("M_s with k11 = 0.16, kg", 2497.8, mass_by_theory(body, 0.16, "").near_surface_kg, 0.05)
-    apart = 100 * (paper.SOLUTION.total_mass_kg / paper.MASS_BY_THEORY_KG - 1)
+    apart = 100 * (paper.SOLUTION.total_mass_kg / printed_tows.MASS_BY_THEORY_KG - 1)
     beside("M of (2.4) above M_s, %", 2.45, apart, 0.005)
     beside("the same as printed, about, %", 3, apart, 0.6)
     beside("lambda11 = M - m of (2.4), kg", 307, paper.SOLUTION.total_mass_kg - 2243, 0.5)
@@ -197,7 +198,7 @@ def algorithm(tows: Tows, study: TowStudy) -> None:
     """
 
     def mass(speed: Polynomial) -> float:
-        return float(solve_normal_equations(discretise(speed, paper.TIMES_S, TERMS, paper.FORCE_N))[0])
+        return float(solve_normal_equations(discretise(speed, paper.TIMES_S, TERMS, printed_tows.FORCE_N))[0])
 
     by_tow = list(study.tow_by_tow.values())
     for number, expected in enumerate(PER_TOW):

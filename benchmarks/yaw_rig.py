@@ -10,21 +10,20 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import get_args
 
 import numpy as np
+from alyshev_rigs import ELLIPSOID_AIR, ELLIPSOID_T1, SHIP_AIR, SHIP_T1, SHIP_T2
 from paper_numbers import PaperNumbers
 
 from tank2sim.apps.rigs.yaw import theory
 from tank2sim.apps.rigs.yaw.card import YawRig, YawRigCard
-from tank2sim.apps.rigs.yaw.control import AdaptiveController, Controller, TunedController
-from tank2sim.apps.rigs.yaw.energy import energy_balance, fit_energy
+from tank2sim.apps.rigs.yaw.energy import Speeds, YawMethodEstimate, energy_balance, fit_energy, intervals
 from tank2sim.apps.rigs.yaw.identify import GRAVITY, WATER_TERMS, YawIdentification, YawOptions, identify_yaw
-from tank2sim.apps.rigs.yaw.intervals import Speeds, intervals
-from tank2sim.apps.rigs.yaw.model import ELLIPSOID_AIR, ELLIPSOID_T1, SHIP_AIR, SHIP_T1, SHIP_T2
 from tank2sim.apps.rigs.yaw.programme import (
     PAPER_PROGRAMME,
     Similarity,
@@ -34,7 +33,16 @@ from tank2sim.apps.rigs.yaw.programme import (
     inertia_from_work,
 )
 from tank2sim.apps.rigs.yaw.records import Medium, YawRecord, read_yaw_record, yaw_record_text
-from tank2sim.apps.rigs.yaw.simulation import Measuring, YawRun, run_yaw_rig, simulated_record, yaw_record
+from tank2sim.apps.rigs.yaw.simulation import (
+    AdaptiveController,
+    Controller,
+    Measuring,
+    TunedController,
+    YawRun,
+    run_yaw_rig,
+    simulated_record,
+    yaw_record,
+)
 from tank2sim.cards import read_card
 
 TOP = PAPER_PROGRAMME.max_rate_radps
@@ -191,16 +199,16 @@ def print_methods() -> None:
                 run, result = identified(rig, controller, measuring)
                 settled = run.time_s > 4 * PAPER_PROGRAMME.period_s
                 worst = np.abs(run.error_rad[settled]).max()
+                mirror = max(result.estimates.mirror_difference)
                 full = f", saturated from {run.saturation.first_s:.2f} s" if run.saturation else ""
-                print(
-                    f"  {control} {condition}: |e| up to {worst:.4f} rad{full}; mirror {100 * max(result.mirror):.0f} %"
-                )
-                print_estimates(result, true)
+                print(f"  {control} {condition}: |e| up to {worst:.4f} rad{full}; mirror {100 * mirror:.0f} %")
+                print_estimates(result.methods, true)
 
 
-def print_estimates(result: YawIdentification, true: float) -> None:
-    for method, estimate in result.estimates.items():
-        value, error = result.added_inertia(method) or (math.nan, None)
+def print_estimates(methods: Mapping[str, YawMethodEstimate], true: float) -> None:
+    for method, estimate in methods.items():
+        value, error = estimate.added_inertia_kgm2, estimate.added_inertia_standard_error_kgm2
+        value = math.nan if value is None else value
         spread = "" if error is None else f" ± {1e4 * error:.2g}"
         print(
             f"    {method:31s} {1e4 * value:7.1f}{spread:9s} ({100 * (1e4 * value / true - 1):+6.2f} %)"
@@ -264,7 +272,7 @@ def print_air() -> None:
         )
         result = identify_yaw([recorded(run, rig, "air")], YawOptions(mirror_limit=10.0))
         found = [
-            1e4 * result.estimates[method].total_inertia_kgm2 for method in ("energy_least_squares", "two_intervals")
+            1e4 * result.methods[method].total_inertia_kgm2 for method in ("energy_least_squares", "two_intervals")
         ]
         print(f"  {name:10s} {1e4 * rig.inertia_kgm2:6.1f} {printed:6.1f}   {found[0]:6.1f} {found[1]:6.1f}")
 
@@ -282,11 +290,11 @@ def print_programmes() -> None:
         unaware = YawOptions(inertia_kgm2=rig.inertia_kgm2, terms=WATER_TERMS, mirror_limit=10.0)
         result = identify_yaw([recorded(run, rig)], unaware)
         print(f"  {name}: {programme.turn_per_interval_rad:.3g} rad an interval")
-        print_estimates(result, PRINTED["ship T1"][2])
+        print_estimates(result.methods, PRINTED["ship T1"][2])
         options = replace(unaware, terms=(*WATER_TERMS, *GRAVITY))
         aware = identify_yaw([recorded(run, rig)], options)
         print("    and with gravity among the terms:")
-        print_estimates(replace(aware, estimates={"energy_least_squares": next(iter(aware.estimates.values()))}), 302.0)
+        print_estimates({"energy_least_squares": aware.methods["energy_least_squares"]}, 302.0)
 
 
 def print_readme() -> None:
@@ -301,7 +309,7 @@ def print_readme() -> None:
             path.write_text(yaw_record_text(simulated_record(card, path, 0.003, medium=medium)))
             read[medium] = read_yaw_record(path)
     for records in ([read["water"]], [read["water"], read["air"]]):
-        print_estimates(identify_yaw(records), 302.0)
+        print_estimates(identify_yaw(records).methods, 302.0)
 
 
 def numbers(number: PaperNumbers) -> None:

@@ -22,10 +22,12 @@ from tank2sim.executors import executing, processes_to_begin
 from tank2sim.gap.inference.fit_all import Fitting, HypothesisCache, Proposal
 from tank2sim.gap.inference.prior import likelihood_from_card
 from tank2sim.identification.trials.assessment.model_selection import cross_validate, yaw_rate_error
-from tank2sim.identification.trials.assessment.prediction_intervals import PredictionSettings, bootstrap
-from tank2sim.identification.trials.assessment.residual_forces import disturbances_of
+from tank2sim.identification.trials.assessment.prediction_intervals import (
+    bootstrap,
+    disturbances_of,
+    generators,
+)
 from tank2sim.identification.trials.methods.equation_error import equation_error
-from tank2sim.identification.trials.problem.picklable import portable
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card as pose_problem
 from tank2sim.simulation.ensemble import ensemble
@@ -99,11 +101,11 @@ def test_tasks_of_thousands_of_ships_at_the_fastest_pace_are_the_local_ones_to_t
 def test_an_identification_is_the_local_one_to_the_bit_when_a_worker_is_lost(card, trials, two) -> None:
     """The folds of its cross-validation, and its bootstrap."""
     problem = pose_problem(card, trials.trials, "angle", hold=HELD)
-    asked, estimate = portable(problem, card, "angle"), equation_error(problem)
-    work = asked, estimate, equation_error, disturbances_of(problem, estimate.values), PredictionSettings(members=8)
-    folds, members = cross_validate(asked, equation_error, yaw_rate_error), bootstrap(*work)
+    estimate = equation_error(problem)
+    work = problem, estimate, equation_error, disturbances_of(problem, estimate.values), generators(8)
+    folds, members = cross_validate(problem, equation_error, yaw_rate_error), bootstrap(*work)
     with executing(two.option) as executor:
-        folds_there = cross_validate(asked, equation_error, yaw_rate_error, executor)
+        folds_there = cross_validate(problem, equation_error, yaw_rate_error, executor)
         members_there = bootstrap(*work, Killing(executor, two.workers[0], after=3))
     assert two.workers[0].wait(10) != 0, "the worker was killed"
     assert len(members) > 1 and members.std(axis=0).all()

@@ -8,7 +8,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from tank2sim.apps.rigs.yaw import found_card as yaw_card
+from tank2sim.apps.rigs.yaw.found_card import with_nrdot
 from tank2sim.bundled import bundled_cards
 from tank2sim.cards import parse_card, revised
 from tank2sim.cards.card import MmgCard
@@ -73,10 +73,8 @@ def test_fujiis_slope_is_that_of_the_kvlcc2() -> None:
     assert mmg_of(TEXT.replace("f_alpha = 2.747", "aspect_ratio = 1.827")).rudder.f_alpha == pytest.approx(fujii(1.827))
 
 
-def test_a_yaw_rig_writes_the_added_inertia_of_the_method(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(yaw_card, "nrdot_prime", lambda *_: (-8e-4, 1e-4))
-    monkeypatch.setattr(yaw_card, "tank_density", lambda _: 1000.0)
-    new = yaw_card.with_nrdot(mmg_of(TEXT), None, "output_error", 7.0)  # type: ignore[arg-type]
+def test_a_yaw_rig_writes_the_added_inertia_of_the_method() -> None:
+    new = with_nrdot(mmg_of(TEXT), -8e-4, 1e-4, "output_error")
     assert tomllib.loads(new.text)["derivatives"]["Jz"] == pytest.approx(8e-4 * 7 / 0.46, rel=1e-5)
     assert new.derivatives["Nrdot"] == pytest.approx(-8e-4, rel=1e-5)
     assert new.uncertainty["Nrdot"] == pytest.approx(1e-4, rel=1e-5)

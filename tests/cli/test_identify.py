@@ -327,9 +327,11 @@ def test_a_renamed_copy_of_a_trial_that_made_the_card_is_never_held_out(folder: 
 
 @pytest.mark.slow
 def test_a_card_of_another_ship_is_refused_unless_forced(folder: Path) -> None:
-    """The same card twice as long: its rudder would have to turn four times the inertia as fast."""
+    """The same card of a ship twice the size: its rudder would have to turn four times the inertia as fast."""
     text = (folder / "off.toml").read_text()
-    (folder / "longer.toml").write_text(text.replace(f"length_m = {LENGTH}", f"length_m = {2 * LENGTH}"))
+    for key, size in (("length_m", LENGTH), ("beam_m", 16.0), ("draught_m", 6.0)):
+        text = text.replace(f"{key} = {size}", f"{key} = {2 * size}")
+    (folder / "longer.toml").write_text(text)
     asked = ("identify", "longer.toml", *FITTED, *SHORT, "-o", "o.toml", "--json", "o.json")
     result = tank2sim(*asked, cwd=folder)
     refused(result, "zigzag20", "longer.toml", "force the fit")
@@ -349,7 +351,7 @@ def test_a_card_of_another_ship_is_refused_unless_forced(folder: Path) -> None:
 def test_a_trial_of_another_ship_among_the_trials_is_refused(folder: Path) -> None:
     write(folder, "stranger", zigzag(20), seed=8, truth={**TRUTH, "Nd": 5 * TRUTH["Nd"], "Nr": 3 * TRUTH["Nr"]})
     result = tank2sim("identify", "off.toml", *FITTED, "stranger.csv", "-o", "two.toml", cwd=folder)
-    refused(result, "stranger shows", "force the fit")
+    refused(result, "by stranger the rudder gives more", "force the fit")
     assert not (folder / "two.toml").exists()
 
 
@@ -362,7 +364,7 @@ from tank2sim.identification.trials.methods import output_error
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a process in the background begins with it ignored
 # As Ctrl-C does, in the middle of the search: a first round is done, others would follow.
-output_error._new_noise = lambda *arguments: signal.raise_signal(signal.SIGINT)
+output_error._Search.widen = lambda *arguments: signal.raise_signal(signal.SIGINT)
 main()
 """
     command = [sys.executable, "-c", program, "identify", "off.toml", *FITTED, "-o", "stopped.toml", "--json", "s.json"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import math
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -62,12 +63,15 @@ def simman(rows: int = 200) -> bytes:
 
 
 def craft_trial() -> bytes:
-    """A trial of the Otter: revolutions of both thrusters, position and heading."""
+    """A trial of the Otter: revolutions of both thrusters, position and heading; ahead, then a circle to starboard."""
     rows = ["t_s,x_m,y_m,psi_deg,n_port_rpm,n_starboard_rpm"]
+    step, speed, rate = 0.5, 1.3, math.radians(6.6)
     for k in range(60):
-        turn = 3.0 * k * (k > 20)
+        turned = max(0.0, step * (k - 20)) * rate
+        north = speed * step * min(k, 20) + speed / rate * math.sin(turned)
+        east = speed / rate * (1 - math.cos(turned))
         rows.append(
-            f"{0.5 * k},{0.4 * k:.3f},{0.002 * turn:.3f},{turn:.2f},{600 + 100 * (k > 20)},{600 - 100 * (k > 20)}"
+            f"{step * k},{north:.3f},{east:.3f},{math.degrees(turned):.2f},{600 + 50 * (k > 20)},{600 - 50 * (k > 20)}"
         )
     return ("\n".join(rows) + "\n").encode()
 

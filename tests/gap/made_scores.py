@@ -14,7 +14,7 @@ CALM = SimpleNamespace(belief=SimpleNamespace(waves=None))
 IN_A_SEA = SimpleNamespace(belief=SimpleNamespace(waves="a band"))
 """Likelihoods of which a verdict reads no more."""
 
-FORCE, DRAG, BIAS, LAG, LATE = range(2, 7)
+FORCE, DRAG, BIAS, LAG, LATE, PLAY, BAND = range(2, 9)
 FOUR = (0, FORCE, DRAG, LAG)
 """Places of effects in :data:`.toy.NAMES`: two of forces, and of the steering gear."""
 

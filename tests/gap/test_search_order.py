@@ -8,7 +8,7 @@ import pytest
 
 from tank2sim.gap.search import explanations
 from tank2sim.gap.search.screening import Screened
-from tests.gap.made_scores import DRAG, fit
+from tests.gap.made_scores import BAND, BIAS, DRAG, PLAY, fit
 from tests.gap.toy import NAMES
 
 
@@ -60,3 +60,16 @@ def test_more_is_sought_next_to_a_single_effect_that_takes_the_place_of_the_best
     explanations._explore(fitting, (), 4)
     assert asked[-1] == (NAMES[0],)
     assert ((NAMES[DRAG],) in asked) == (first == (DRAG,))
+
+
+@pytest.mark.parametrize(("best", "other"), [(PLAY, BAND), (BAND, PLAY)])
+def test_play_and_dead_band_are_each_tried_in_place_of_the_other(best: int, other: int) -> None:
+    scores = {(): 0.0, (best, BIAS): -500.0, (BIAS,): -300.0, (other, BIAS): -498.0}
+    fitting = Fitting(scores | {key[::-1]: value for key, value in scores.items()}, ((), (best, BIAS), (BIAS,)))
+    card = SimpleNamespace(ship=SimpleNamespace(length_m=100.0), model=SimpleNamespace(speed_mps=5.0))
+    size = SimpleNamespace(parameter=SimpleNamespace(typical_values=lambda card: (0.03,)))
+    fitting.hypotheses = lambda name: SimpleNamespace(card=card, estimated=(size,))
+    explanations._fit_nearly_alike(fitting, NAMES)
+    assert {frozenset(effects) for effects in fitting.found} >= {frozenset({NAMES[other], NAMES[BIAS]})}
+    explanations._fit_nearly_alike(fitting, (NAMES[best], NAMES[BIAS]))  # the other is not sought
+    assert len(fitting.found) == 4

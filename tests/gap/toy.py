@@ -21,7 +21,10 @@ SHAPES = (
     lambda t: np.stack([0.1 * np.sin(t / 3), 0 * t, 0 * t, 0 * t, 0 * t, 0 * t], axis=-1),
     lambda t: np.stack([0 * t, 0.1 * np.cos(t / 7), 0 * t, 0 * t, 0 * t, 0 * t], axis=-1),
 )
-NAMES = ("gyro_bias", "current", "hull_fouling", "cross_flow_drag", "rudder_bias", "rudder_lag", "rudder_time_offset")
+NAMES = (
+    *("gyro_bias", "current", "hull_fouling", "cross_flow_drag", "rudder_bias", "rudder_lag", "rudder_time_offset"),
+    *("rudder_backlash", "rudder_dead_band"),
+)
 """Of the forces of :data:`SHAPES`: effects of three kinds, whatever these do; the others are for scores alone."""
 
 TERMS = (

@@ -225,6 +225,6 @@ def test_trials_of_one_file_name_in_two_folders_are_two_trials(deviating) -> Non
 @pytest.mark.parametrize(("method", "level"), [("kalman", Level.CAUTION), ("output_error", Level.INFO)])
 def test_a_model_that_does_not_hold_is_said_as_far_as_the_estimate_suffers(method, level) -> None:
     estimate = SimpleNamespace(method=method)
-    fit = CraftFit(None, estimate, None, np.zeros((1, 1, 1)), gust_share=0.2)  # type: ignore[arg-type]
+    fit = CraftFit(None, estimate, np.zeros((1, 1, 1)), gust_share=0.2)  # type: ignore[arg-type]
     assert not fit.holds and _model_does_not_hold(fit).level is level
     assert replace(fit, gust_share=0.04).holds

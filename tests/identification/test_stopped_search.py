@@ -10,6 +10,7 @@ import pytest
 from scipy.optimize import OptimizeResult
 
 import tank2sim as t2s
+from tank2sim.apps.rigs import search
 from tank2sim.apps.rigs.tow import output_error as tow
 from tank2sim.apps.rigs.tow.records import Tows
 from tank2sim.apps.rigs.yaw import output_error as yaw
@@ -70,7 +71,7 @@ def test_a_stopped_search_of_tows_gives_no_fit(monkeypatch) -> None:
     readings = (0.2 * np.tanh(times / 20))[:, None]
     tows = Tows(Path("made.csv"), ("speed_1_mps",), times, readings)
     assert tow.fit_speeds(tows, 11.6, ("B3",)) is not None
-    monkeypatch.setattr(tow, "least_squares", _stays)
+    monkeypatch.setattr(search, "least_squares", _stays)
     assert tow.fit_speeds(tows, 11.6, ("B3",)) is None
 
 
@@ -81,6 +82,6 @@ def test_a_stopped_search_of_a_yaw_rig_gives_no_fit(monkeypatch) -> None:
         return design @ (unknown - 1.0), design
 
     assert yaw._search(evaluate, np.zeros(3), 1) is not None
-    monkeypatch.setattr(yaw, "least_squares", _stays)
+    monkeypatch.setattr(search, "least_squares", _stays)
     assert yaw._search(evaluate, np.zeros(3), 1) is None
     assert yaw._search(evaluate, np.ones(3), 1) is not None  # a minimum from the beginning

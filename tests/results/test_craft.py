@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from tank2sim.cards import SteeredBy
 from tank2sim.identification.craft.fit import CoefficientVerdict
-from tank2sim.identification.craft.next_trial import CandidateTrial
 from tank2sim.identification.craft.study import (
+    CandidateTrial,
     CompassDeviation,
     CraftCoefficient,
     CraftIdentificationStudy,

@@ -13,9 +13,10 @@ from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.answer.parts import Verdict
 from tank2sim.cards import parse_card
 from tank2sim.identification.trials.assessment.evaluation import comparison_windows
+from tank2sim.identification.trials.assessment.identifiability import share_from_trials
 from tank2sim.identification.trials.identify import identify_trials
-from tank2sim.identification.trials.methods.posterior import scaled_prior
 from tank2sim.identification.trials.options import IdentificationOptions
+from tank2sim.identification.trials.problem.estimation_problem import scaled_prior
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 from tank2sim.identification.trials.study import (
@@ -123,9 +124,7 @@ def test_histories_are_in_degrees_and_thinned(found, trials) -> None:
     )
     assert max(row["s0"] for row in measured) == pytest.approx(20, 1e-3)
     assert len(measured) < 60 and len(rows_of(chart, AFTER)) < 160
-    titles = [
-        one["layer"][0]["encoding"]["y"]["axis"]["title"] for one in chart_specification(chart)["concat"][0]["vconcat"]
-    ]
+    titles = [one["layer"][0]["encoding"]["y"]["title"] for one in chart_specification(chart)["concat"][0]["vconcat"]]
     assert titles == ["rudder (deg)", "heading (deg)", "yaw rate (deg/s)", "speed (m/s)", "drift angle (deg)"]
 
 
@@ -215,7 +214,7 @@ def test_parameters_are_in_standard_errors_of_the_prior(found) -> None:
         width = 2 * 1.96 * result.estimate.standard_errors[place] / unit[place]
         assert own["high"] - own["low"] == pytest.approx(width, rel=1e-2, abs=rounding)
         assert (prior["low"], prior["high"]) == pytest.approx((-1.96, 1.96), abs=1e-3)
-        assert own["share"] == pytest.approx(100 * result.identifiability.share[place], 1e-4)
+        assert own["share"] == pytest.approx(100 * share_from_trials(result.problem, result.estimate)[place], 1e-4)
 
 
 def test_figures_stand_with_their_errors_in_percent(found) -> None:
@@ -243,6 +242,16 @@ def test_the_key_figures_tell_the_errors_of_the_trials_held_out(found) -> None:
     assert "Advance error, held out" in figures
     assert list(charts)[:2] == ["tracks_held_out", "histories_held_out"] and "singular_values" in charts
     assert "mended" in shown.notices and shown.notices == shown.study.notices
+
+
+def test_a_card_without_a_yaw_rate_to_compare_still_has_a_first_line(found) -> None:
+    shown = found[1]
+    windows = {
+        key: tuple(replace(trial, before={}, found={}) for trial in trials)
+        for key, trials in shown.study.errors_over_windows.items()
+    }
+    (line,) = replace(shown, study=replace(shown.study, errors_over_windows=windows)).headline
+    assert line.startswith(f"{len(OFF)} coefficients") and "yaw rate" in line
 
 
 def test_the_estimates_are_a_table_and_a_data_frame(found) -> None:

@@ -10,8 +10,7 @@ from tank2sim.answer.parts import Cell, Column, KeyFigure, Section, records_tabl
 from tank2sim.answer.result import Result
 from tank2sim.cards import SteeredCard
 from tank2sim.identification.craft.fit import CoefficientVerdict, CraftFit, FreePrediction
-from tank2sim.identification.craft.next_trial import CandidateTrial
-from tank2sim.identification.craft.study import CraftIdentificationStudy
+from tank2sim.identification.craft.study import CandidateTrial, CraftIdentificationStudy
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -28,13 +28,12 @@ from tank2sim.answer.result import Result
 from tank2sim.arrays import Array
 from tank2sim.cards import Card
 from tank2sim.identification.trials.assessment.evaluation import TURN_FIGURE_NAMES
-from tank2sim.identification.trials.assessment.identifiability import CLOSE_CORRELATION
+from tank2sim.identification.trials.assessment.identifiability import CLOSE_CORRELATION, IdentifiabilityStudy
 from tank2sim.identification.trials.identify import Identification
 from tank2sim.identification.trials.study import (
     SET_KEYS,
     BootstrapStudy,
     CardReplay,
-    IdentifiabilityStudy,
     IdentificationStudy,
     ParameterEstimate,
     PosteriorStudy,
@@ -177,13 +176,14 @@ class IdentificationResult(Result[IdentificationStudy]):
         """How well the card found follows trials."""
         word, trials = self._judged
         before, after = (100 * pooled_error(trials, key) for key in ("before", "found"))
+        untested = "" if word == HELD_OUT else " None was held out, so this card is untested."
         if not np.isfinite(after):
-            return ()
+            count = len(self.study.parameters)
+            return (f"{count} coefficients were fitted. The trials {word} have no yaw rate to compare.{untested}",)
         better = "better than" if after < before else "no better than"
         given = f"before ({before:.3g} %)" if np.isfinite(before) else "before"
         followed = f"The card found follows the yaw rate of the trials {word} within {after:.3g} % (rms)"
-        text = f"{followed}, {better} the card {given}."
-        return (text if word == HELD_OUT else f"{text} None was held out, so this card is untested.",)
+        return (f"{followed}, {better} the card {given}.{untested}",)
 
     @property
     def key_figures(self) -> Sequence[KeyFigure]:

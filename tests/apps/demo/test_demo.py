@@ -11,7 +11,7 @@ import pytest
 
 import tank2sim as t2s
 from tank2sim.apps.demo import DEMO_STEPS, PAGE
-from tank2sim.apps.demo.result import DemoResult
+from tank2sim.apps.demo.result import DemoResult, DemoStudy
 from tank2sim.apps.demo.run import write_demo
 
 pytestmark = pytest.mark.slow  # the whole way, which the README's first command goes too
@@ -57,8 +57,12 @@ def test_the_fmu_follows_the_measured_tows(demo) -> None:
     assert all(tow["rms_mps"] < 0.008 and tow["largest_mps"] < 0.015 for tow in tows)
 
 
+def as_result(folder: Path, values: dict) -> DemoResult:
+    return DemoResult(DemoStudy(values["towed_vehicle"], values["mariner"], tuple(values["files"])), folder)
+
+
 def test_the_result_follows_its_schema(demo) -> None:
-    jsonschema.validate(json.loads(DemoResult(demo[0], demo[1]).to_json()), t2s.json_schema("demo"))
+    jsonschema.validate(json.loads(as_result(demo[0], demo[1]).to_json()), t2s.json_schema("demo"))
 
 
 def test_the_result_is_json_and_the_page_is_there(demo) -> None:
@@ -70,9 +74,9 @@ def test_the_result_is_json_and_the_page_is_there(demo) -> None:
 
 def test_the_result_has_the_page_and_fits_a_screen(demo) -> None:
     folder, values, _ = demo
-    found = DemoResult(folder, values)
+    found = as_result(folder, values)
     assert found.page() == (folder / PAGE).read_text(encoding="utf-8") and len(repr(found).splitlines()) <= 24
-    assert values["schema"] == "tank2sim/apps/demo/1" and found.path == folder / PAGE
+    assert values["schema"] == "tank2sim/demo/1" and found.path == folder / PAGE
 
 
 @pytest.mark.long

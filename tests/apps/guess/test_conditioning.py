@@ -9,10 +9,17 @@ import numpy as np
 import pytest
 
 from tank2sim.analysis.ensemble.draws import draws_of
-from tank2sim.apps.guess import conditioning
-from tank2sim.apps.guess.conditioning import FIGURE_KEYS, GivenFigure, GuessMembers, PosterFigures, conditioned
+from tank2sim.apps.guess import study
 from tank2sim.apps.guess.prior import ShipDimensions, prior_card, rudder_by_rules
-from tank2sim.apps.guess.study import guess_ship, study_members
+from tank2sim.apps.guess.study import (
+    FIGURE_KEYS,
+    GivenFigure,
+    GuessMembers,
+    PosterFigures,
+    conditioned,
+    guess_ship,
+    study_members,
+)
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.errors import InputError
 
@@ -45,7 +52,7 @@ def linear(monkeypatch):
             z = (values - DRAWS.mean) / SPREAD
             return {key: 1000.0 * np.exp(0.2 * z[:, place]) for key, place in places.items()}
 
-    monkeypatch.setattr(conditioning, "PosterFigures", Linear)
+    monkeypatch.setattr(study, "PosterFigures", Linear)
     return places
 
 
@@ -73,7 +80,7 @@ def test_a_step_takes_each_member_by_the_covariances_of_the_members() -> None:
     stream = np.random.default_rng(5)
     values, shown = stream.normal(size=(5, 3)), stream.normal(size=(5, 2))
     target, errors = np.array([0.5, -0.2]), np.array([0.3, 0.6])
-    moved = conditioning._moved(values, shown, (target, errors), Silent())
+    moved = study._moved(values, shown, (target, errors), Silent())
     both = np.cov(np.hstack([values, shown]).T)
     gain = both[:3, 3:] @ np.linalg.inv(both[3:, 3:] + 4 * np.diag(errors**2))
     np.testing.assert_allclose(moved, values + (target - shown) @ gain.T, rtol=1e-12)
@@ -161,7 +168,7 @@ def test_a_figure_outside_nine_of_ten_ships_by_more_than_its_error_is_marked(val
 
 
 def test_members_that_show_no_figure_are_left_out_and_too_few_are_refused(linear, monkeypatch) -> None:
-    whole = conditioning.PosterFigures
+    whole = study.PosterFigures
 
     class Some(whole):
         shown = 0.5
@@ -171,7 +178,7 @@ def test_members_that_show_no_figure_are_left_out_and_too_few_are_refused(linear
             hidden = np.arange(len(values)) >= self.shown * len(values)
             return {key: np.where(hidden, np.nan, v) for key, v in found.items()}
 
-    monkeypatch.setattr(conditioning, "PosterFigures", Some)
+    monkeypatch.setattr(study, "PosterFigures", Some)
     assert len(conditioned(CARD, [], 400, 1).prior) == 200
     Some.shown = 0.2
     with pytest.raises(InputError, match="only 80 of 400"):

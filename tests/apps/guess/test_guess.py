@@ -8,10 +8,17 @@ import numpy as np
 import pytest
 
 from tank2sim.analysis.ensemble.draws import draws_of
-from tank2sim.apps.guess import conditioning
-from tank2sim.apps.guess.conditioning import FIGURE_KEYS, POSTER_MANOEUVRES, GivenFigure, PosterFigures, conditioned
+from tank2sim.apps.guess import study
 from tank2sim.apps.guess.prior import ShipDimensions, prior_card
-from tank2sim.apps.guess.study import guess_ship, parse_figures
+from tank2sim.apps.guess.study import (
+    FIGURE_KEYS,
+    POSTER_MANOEUVRES,
+    GivenFigure,
+    PosterFigures,
+    conditioned,
+    guess_ship,
+    parse_figures,
+)
 from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.cards.estimates import Particulars, estimate
 from tank2sim.cards.reading import read_card
@@ -69,8 +76,8 @@ def test_the_smoother_is_exact_estimation_where_all_is_linear_and_normal() -> No
     members = stream.multivariate_normal([1.0, 0.0, -1.0], covariance, 40_000)
     wanted, errors = np.array([2.5, -2.0]), np.array([0.3, 0.6])
     moved = members
-    for _ in range(conditioning.STEPS):
-        moved = conditioning._moved(moved, moved @ slope.T, (wanted, errors), stream)
+    for _ in range(study.STEPS):
+        moved = study._moved(moved, moved @ slope.T, (wanted, errors), stream)
     gain = covariance @ slope.T @ np.linalg.inv(slope @ covariance @ slope.T + np.diag(errors**2))
     mean = np.array([1.0, 0.0, -1.0]) + gain @ (wanted - slope @ [1.0, 0.0, -1.0])
     np.testing.assert_allclose(moved.mean(axis=0), mean, atol=0.03)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from tank2sim.answer.charts.picture import chart_specification
-from tank2sim.apps.signals.charts import (
+from tank2sim.apps.signals.result import (
     autocorrelation_chart,
     cross_correlation_chart,
     density_chart,
@@ -74,7 +74,7 @@ def test_the_correlation_time_and_the_lag_of_the_largest_are_marked(rate, column
     assert f"'x': {autocorrelation(rate).correlation_time_s:.6g}" in text
     later = series(np.roll(rate.values, 30))
     crossed = cross_correlation(rate, later)
-    text = str(chart_specification(cross_correlation_chart(RUDDER, YAW, crossed, title="")))
+    text = str(chart_specification(cross_correlation_chart(RUDDER, YAW, crossed)))
     assert "'x': 3.0}" in text
     assert f"'v': {crossed.bound_if_independent:.6g}" in text
 

@@ -16,8 +16,7 @@ from scipy.signal import lfilter
 from tank2sim.cards import parse_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
-from tank2sim.identification.trials.problem.estimation_problem import Problem
-from tank2sim.identification.trials.problem.problem_from_card import driven_by_angle
+from tank2sim.identification.trials.problem.estimation_problem import Problem, driven_by_angle
 from tank2sim.identification.trials.problem.sampled_runs import prepare
 from tank2sim.records.trials import Trial
 

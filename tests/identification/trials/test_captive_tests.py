@@ -10,7 +10,7 @@ from tank2sim.errors import InputError
 from tank2sim.identification.captive.reduction import reduce_campaign
 from tank2sim.identification.captive.result_card import card_contents, reduced_card_text
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns, captive_tests
-from tank2sim.identification.trials.problem.problem_from_card import driven_model
+from tank2sim.identification.trials.problem.estimation_problem import driven_model
 from tank2sim.records.campaigns import read_campaign
 from tests.identification.captive.generator import Campaign, write
 

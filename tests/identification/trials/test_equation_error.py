@@ -40,20 +40,19 @@ def noisy():
 
 def test_the_true_coefficients_leave_no_residual(quiet):
     asked = problem(quiet)
-    windows = WeakForm(asked).at(EXACT)
-    residuals = np.concatenate([one.residuals for one in windows])
-    change = np.concatenate([run.change for run in WeakForm(asked).runs])
+    residuals = WeakForm(asked).at(EXACT).residuals
+    change = WeakForm(asked).change
     assert np.all(np.abs(residuals).max(axis=0) < 2e-3 * np.abs(change).max(axis=0))
 
 
 def test_the_jacobian_is_that_of_differences(noisy):
     asked = problem(noisy[:1])
     form = WeakForm(asked)
-    jacobian = form.at(EXACT)[0].jacobian
+    jacobian = form.at(EXACT).jacobian
     for place in range(len(EXACT)):
         change = np.zeros(len(EXACT))
         change[place] = 0.01 * EXACT[place]
-        after, before = form.at(EXACT + change)[0].residuals, form.at(EXACT - change)[0].residuals
+        after, before = form.at(EXACT + change).residuals, form.at(EXACT - change).residuals
         expected = -(after - before) / (2 * change[place])
         np.testing.assert_allclose(jacobian[:, :, place], expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max())
 
@@ -64,8 +63,8 @@ def test_the_jacobian_goes_through_what_is_simulated(noisy):
     asked = replace(asked, free=(*asked.free, "steering.time_constant"), prior_mean=np.array([0.0015, 2.0]))
     asked = replace(asked, prior_error=np.array([1e-4, 1.0]))
     form, point = WeakForm(asked), np.array([0.0015, 2.0])
-    jacobian = form.at(point)[0].jacobian[:, :, 1]
-    after, before = (form.at(point + np.array([0, change]))[0].residuals for change in (1e-3, -1e-3))
+    jacobian = form.at(point).jacobian[:, :, 1]
+    after, before = (form.at(point + np.array([0, change])).residuals for change in (1e-3, -1e-3))
     expected = -(after - before) / 2e-3
     assert np.abs(expected[:, 2]).max() > 0
     np.testing.assert_allclose(jacobian, expected, rtol=1e-3, atol=1e-5 * np.abs(expected).max())
@@ -166,7 +165,7 @@ def test_a_gap_takes_its_windows_only(noisy):
     holed[500:600] = np.nan
     gapped = replace(noisy[0], signals={**noisy[0].signals, "r_radps": holed})
     form = WeakForm(problem([gapped]))
-    assert len(form.runs[0].pieces) == 2
+    assert len(form.pieces) == 2
     found = equation_error(problem([gapped, *noisy[1:]]))
     assert np.all(np.abs(found.values - EXACT) < 4 * found.standard_errors)
 

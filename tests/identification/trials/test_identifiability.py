@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.assessment.identifiability import identifiability, refuse_unseen
+from tank2sim.identification.trials.assessment.identifiability import (
+    identifiability,
+    refuse_unseen,
+    share_from_trials,
+)
 from tank2sim.identification.trials.methods.equation_error import equation_error
 from tank2sim.identification.trials.problem.estimation_problem import Estimate
 from tests.identification.trials.made_up_ship import NOISE, TRUTH, problem, trial, turn, zigzag
@@ -25,11 +29,12 @@ def asked():
 
 def test_information_in_units_of_the_prior(asked):
     unit = 2 * asked.prior_error
-    known = identifiability(asked, answer(asked, np.diag([100.0, 9.0, 1.0]) / unit**2, scale=2.0))
+    found = answer(asked, np.diag([100.0, 9.0, 1.0]) / unit**2, scale=2.0)
+    known = identifiability(asked, found)
     np.testing.assert_allclose(known.singular_values, [10, 3, 1])
     assert known.condition == pytest.approx(10)
-    np.testing.assert_allclose(known.share, [100 / 101, 9 / 10, 1 / 2])
-    assert known.pairs == known.unseen == known.notices == ()
+    np.testing.assert_allclose(share_from_trials(asked, found), [100 / 101, 9 / 10, 1 / 2])
+    assert known.correlated_pairs == known.unseen == known.notices == ()
 
 
 def test_two_that_drift_are_reported_by_name(asked):
@@ -37,7 +42,7 @@ def test_two_that_drift_are_reported_by_name(asked):
     covariance = np.eye(3)
     covariance[0, 1] = covariance[1, 0] = -rho
     known = identifiability(asked, answer(asked, 1e4 * np.linalg.inv(covariance) / np.outer(*2 * [asked.prior_error])))
-    ((one, other, value),) = known.pairs
+    ((one, other, value),) = known.correlated_pairs
     assert (one, other) == ("Nv", "Nr")
     assert value == pytest.approx(-rho, abs=1e-4)
     assert "Nv and Nr" in known.notices[0] and "drift" in known.notices[0]
@@ -46,18 +51,20 @@ def test_two_that_drift_are_reported_by_name(asked):
 def test_an_unseen_sum_is_reported_as_one_and_an_unseen_term_alone(asked):
     difference = np.array([1.0, -1.0, 0.0]) / np.sqrt(2)
     information = 1e4 * np.outer(difference, difference)
-    known = identifiability(asked, answer(asked, information / np.outer(asked.prior_error, asked.prior_error)))
+    found = answer(asked, information / np.outer(asked.prior_error, asked.prior_error))
+    known = identifiability(asked, found)
     assert {frozenset(direction) for direction in known.unseen} == {frozenset({"Nv", "Nr"}), frozenset({"Nd"})}
-    np.testing.assert_allclose(known.share, [0.5, 0.5, 0.0], atol=1e-3)
+    np.testing.assert_allclose(share_from_trials(asked, found), [0.5, 0.5, 0.0], atol=1e-3)
     assert any("nothing of Nd" in notice for notice in known.notices)
     assert any("Nv and Nr" in notice or "Nr and Nv" in notice for notice in known.notices)
 
 
 def test_a_zigzag_shows_the_yaw_terms_and_their_drift():
     asked = problem([trial(zigzag(15), duration=300.0)], free=("Yv", "Yr", "Yd", *YAW))
-    known = identifiability(asked, equation_error(asked))
-    assert known.share.min() > 0.9
-    correlation = known.correlation[known.free.index("derivatives.Nv"), known.free.index("derivatives.Nr")]
+    found = equation_error(asked)
+    known = identifiability(asked, found)
+    assert share_from_trials(asked, found).min() > 0.9
+    correlation = known.correlation[known.parameters.index("Nv"), known.parameters.index("Nr")]
     assert abs(correlation) > 0.8
 
 

@@ -6,21 +6,24 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from tank2sim.identification.trials.methods.kalman import KalmanSettings, kalman
-from tank2sim.identification.trials.methods.kalman_gains import (
+from tank2sim.identification.trials.methods.kalman import KalmanSettings, kalman, task_of
+from tank2sim.identification.trials.methods.kalman_pass import (
+    Disturbed,
+    FilterPass,
+    Tangents,
     Variances,
     gains,
     innovation_tangents,
     smooth_states,
     variant_likelihoods,
 )
-from tank2sim.identification.trials.methods.kalman_search import task_of
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
-from tank2sim.identification.trials.methods.process_noise import Disturbed, Tangents
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tests.identification.trials.pushed_ship import NOISE, PUSH, SEEN, TIME, TRUTH, VALUES, model, pushed_problem
 
 SEEDS = range(5)
+NX = 6
+"""States of the ship: the random accelerations follow them, then the drifts."""
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +64,8 @@ def test_filter_and_smoother_are_those_of_dense_gaussian_algebra():
     white = (found.whitener[0] @ e[..., None])[..., 0]
     density = multivariate_normal(np.zeros(n * ny), S).logpdf(y.ravel()) * -2 - n * ny * np.log(2 * np.pi)
     assert (white**2).sum() + found.log_determinant == pytest.approx(density, rel=1e-9)
-    states, errors = smooth_states(A[None], C[None], found, before[None], e[None])
+    passed = FilterPass(before[None], before[None], e[None], Tangents(A[None], A[None], C[None], C[None]), found, 0.0)
+    states, errors = smooth_states(passed)
     np.testing.assert_allclose(states.ravel(), mean, atol=1e-9)
     np.testing.assert_allclose(errors.ravel(), spread, atol=1e-9)
 
@@ -89,14 +93,13 @@ def test_runs_of_different_lengths_say_together_what_each_says_alone():
         likelihood = variant_likelihoods(along, noise, innovations[part], after[part], factors[:, runs])
         return found.log_determinant, *likelihood, innovation_tangents(along, found)
 
-    determinant, cost, information, (J, last) = said(slice(None), n, lengths)
+    determinant, cost, information, J = said(slice(None), n, lengths)
     alone = [said(slice(run, run + 1), length, None) for run, length in enumerate(lengths)]
     assert determinant == pytest.approx(sum(one[0] for one in alone))
     np.testing.assert_allclose(cost, sum(one[1] for one in alone))
     np.testing.assert_allclose(information, sum(one[2] for one in alone))
     for run, length in enumerate(lengths):
-        np.testing.assert_allclose(J[run, :length], alone[run][3][0][0])
-        np.testing.assert_allclose(last[run], alone[run][3][1][0])
+        np.testing.assert_allclose(J[run, :length], alone[run][3][0])
     assert (J[0, lengths[0] :] == 0).all()
 
 
@@ -123,7 +126,7 @@ def test_derivatives_of_the_innovations_are_those_of_finite_differences(pushed):
     e = batch.measured[0] - disturbed.seen(states, batch.inputs[0], p)
     after = states + (made.gains.K[0] @ e[..., None])[..., 0]
     there = disturbed.tangents(states, after, batch.inputs[0], (p, *case))
-    J, _ = innovation_tangents(Tangents(*(x[None] for x in (there.A, there.B, there.C, there.D))), made.gains)
+    J = innovation_tangents(Tangents(*(x[None] for x in (there.A, there.B, there.C, there.D))), made.gains)
     for place in range(len(TRUTH)):
         step = np.zeros(len(TRUTH))
         step[place] = 1e-4 * problem.prior_mean[place]
@@ -173,8 +176,8 @@ def test_smoothed_accelerations_are_those_that_pushed_the_ship(pushed):
     _, forces, found = pushed[0]
     for true, one in zip(forces, found.smoothed, strict=True):
         for place in range(3):
-            assert np.corrcoef(true[:, place], one.accelerations[:, place])[0, 1] > 0.6
-        scaled = (one.accelerations - true)[:-1] / one.acceleration_errors[:-1]
+            assert np.corrcoef(true[:, place], one.states[:, NX + place])[0, 1] > 0.6
+        scaled = (one.states[:, NX : NX + 3] - true)[:-1] / one.errors[:-1, NX : NX + 3]
         assert np.all(np.abs(np.sqrt(np.mean(scaled**2, axis=0)) - 1) < 0.35)
 
 
@@ -250,7 +253,7 @@ def test_the_drift_of_a_sensor_is_found():
     assert found.drift["motion.psi"].time_s == pytest.approx(time_s, rel=0.6)
     for name in ("motion.u", "motion.v", "motion.r", "motion.x", "motion.y"):
         assert found.drift[name].deviation < 0.5 * NOISE[SEEN.index(name)]
-    assert np.corrcoef(found.smoothed[2].drifts[:, SEEN.index("motion.psi")], drift)[0, 1] > 0.9
+    assert np.corrcoef(found.smoothed[2].states[:, NX + 3 + SEEN.index("motion.psi")], drift)[0, 1] > 0.9
     assert np.all(np.abs(found.values - VALUES) < 3.5 * found.standard_errors)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tank2sim.identification.trials.problem.measured_motion import _complete_positions
+from tank2sim.identification.trials.methods.weak_form import _complete_positions
 
 T = np.arange(0.0, 20.0, 0.1)
 KNOWN = 1000.0 + 0 * T

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card
-from tank2sim.identification.trials.assessment.structure_choice import choose_method, signal_residuals
+from tank2sim.identification.trials.assessment.model_selection import choose_method, signal_residuals
 from tank2sim.identification.trials.identify import identify_trials
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
 from tank2sim.identification.trials.options import IdentificationOptions

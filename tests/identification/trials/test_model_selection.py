@@ -24,7 +24,6 @@ from tank2sim.identification.trials.assessment.model_selection import (
     yaw_rate_error,
 )
 from tank2sim.identification.trials.methods.equation_error import EquationErrorSettings, equation_error
-from tank2sim.identification.trials.problem.picklable import portable
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 from tests.identification.trials.made_up_ship import CARD, problem, trial, turn, zigzag
 
@@ -100,11 +99,11 @@ def test_a_fold_is_fitted_without_what_is_left_out(asked):
     assert result.single[0].error == distance_of_Nd(asked.with_runs(asked.runs[:1]), alone)
 
 
-def test_a_portable_problem_is_the_same_problem(asked):
+def test_a_problem_of_another_process_is_the_same_problem(asked):
     card = parse_card(CARD, "made_up.toml")
     trials = [trial(rudder, name=str(k), duration=100.0, seed=k) for k, rudder in enumerate([zigzag(15), turn(20)])]
     posed = problem_from_card(card, trials, "angle")
-    sent = pickle.loads(pickle.dumps(portable(posed, card, "angle")))
+    sent = pickle.loads(pickle.dumps(posed))
     here = cross_validate(posed, ESTIMATOR, distance_of_Nd)
     with ThreadPoolExecutor(2) as executor:
         there = cross_validate(sent, ESTIMATOR, distance_of_Nd, executor)
@@ -122,10 +121,9 @@ def test_the_yaw_rate_is_followed_by_the_true_ship_and_less_by_another(asked):
     assert wrong > 1.4 * right
 
 
-def test_a_problem_of_another_card_is_not_taken(asked):
-    other = parse_card(CARD.replace('kind = "abkowitz"', 'kind = "linear"'), "made_up.toml")
-    with pytest.raises(ValueError, match="another card"):
-        portable(asked, other, "angle")
+def test_a_problem_without_its_ship_is_not_sent(asked):
+    with pytest.raises(TypeError, match="without its ship"):
+        pickle.dumps(asked)
 
 
 def test_a_fold_that_fails_is_infinitely_bad(asked):

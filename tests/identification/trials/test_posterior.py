@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tank2sim.identification.trials.methods.posterior import evidence_scale, sandwich, scaled_prior
-from tank2sim.identification.trials.problem.estimation_problem import Problem
+from tank2sim.identification.trials.problem.estimation_problem import Problem, evidence_scale, sandwich, scaled_prior
 from tests.marks import first_fast
 
 STATED = 0.05

@@ -10,18 +10,21 @@ import pytest
 
 from tank2sim.cards import parse_card
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.assessment.prediction_intervals import PredictionSettings, bands, bootstrap, flat
-from tank2sim.identification.trials.assessment.residual_forces import (
+from tank2sim.identification.trials.assessment.prediction_intervals import (
     HARMONICS,
+    LEVELS,
     Disturbances,
+    bands,
+    bootstrap,
     disturbances_of,
     disturbed,
     draw_disturbances,
+    flat,
+    generators,
 )
 from tank2sim.identification.trials.methods.equation_error import EquationErrorSettings as Equations
 from tank2sim.identification.trials.methods.equation_error import equation_error
-from tank2sim.identification.trials.problem.estimation_problem import Estimate
-from tank2sim.identification.trials.problem.picklable import PicklableShip, portable
+from tank2sim.identification.trials.problem.estimation_problem import DrivenShip, Estimate
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.run import simulate
@@ -43,7 +46,7 @@ from tests.marks import first_fast
 
 EXACT = np.array([TRUTH[name] for name in ESTIMATED])
 UNITS = 0.5 * DENSITY * LENGTH**2 * SPEED**2 * np.array([1, 1, LENGTH])
-SHIP = PicklableShip(CARD, "order")
+SHIP = DrivenShip(CARD, "order")
 FORCES = Disturbances(np.diag(([2e-5, 8e-5, 2e-5] * UNITS) ** 2), 15.0)
 
 
@@ -63,12 +66,12 @@ def test_forces_of_trials_are_found(correlation_s):
     ]
     found = disturbances_of(problem(trials), EXACT)
     assert found.correlation_s == pytest.approx(correlation_s, rel=0.6)  # 800 s tell no better
-    np.testing.assert_allclose(found.deviations / UNITS, deviations, rtol=0.3)
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)) / UNITS, deviations, rtol=0.3)
 
 
 def test_sensor_noise_is_not_taken_for_forces():
     trials = [trial(rudder, seed=k) for k, rudder in enumerate([zigzag(20), turn(-30)])]
-    found = disturbances_of(problem(trials), EXACT).deviations / UNITS
+    found = np.sqrt(np.diag(disturbances_of(problem(trials), EXACT).covariance)) / UNITS
     assert np.all(found < [2e-5, 8e-5, 2e-5])
 
 
@@ -104,16 +107,16 @@ def test_a_force_accelerates_the_mass_and_time_moves_it():
 
 
 def test_without_forces_and_scatter_all_members_are_the_manoeuvre_itself():
-    found = bands(SHIP, known(), Turn(0.35), settings=PredictionSettings(members=3))
+    found = bands(SHIP, known(), Turn(0.35), generators(3))
     plain = flat(simulate(model(by_angle=False), Turn(0.35)).figures)
-    for name, values in found.members.items():
+    for name, values in found.items():
         np.testing.assert_allclose(values, plain[name], rtol=1e-9)
 
 
 @pytest.mark.slow
 def test_small_scatter_of_a_coefficient_goes_through_linearly():
     error = 0.01
-    found = bands(SHIP, known(error), Turn(0.35), settings=PredictionSettings(members=80))
+    found = bands(SHIP, known(error), Turn(0.35), generators(80))
     ship = model(by_angle=False)
     after, before = (
         flat(simulate(ship, Turn(0.35), parameters={"derivatives.Nd": TRUTH["Nd"] * (1 + side * error)}).figures)
@@ -121,37 +124,34 @@ def test_small_scatter_of_a_coefficient_goes_through_linearly():
     )
     for name in ("advance_m", "tactical_diameter_m", "time_90_s"):
         expected = abs(after[name] - before[name]) / 2
-        assert found.members[name].std() == pytest.approx(expected, rel=0.25)
-        low, middle, high = found.quantiles[name]
+        assert found[name].std() == pytest.approx(expected, rel=0.25)
+        low, middle, high = np.nanquantile(found[name], LEVELS)
         assert high - low == pytest.approx(2 * 1.96 * expected, rel=0.35)
         assert low < middle < high
 
 
 def test_port_and_starboard_have_the_same_bands():
-    port, starboard = (
-        bands(SHIP, known(0.05, ("Nr", "Nd")), Turn(angle), settings=PredictionSettings(members=10))
-        for angle in (-0.4, 0.4)
-    )
-    np.testing.assert_allclose(port.members["advance_m"], starboard.members["advance_m"], rtol=1e-9)
+    port, starboard = (bands(SHIP, known(0.05, ("Nr", "Nd")), Turn(angle), generators(10)) for angle in (-0.4, 0.4))
+    np.testing.assert_allclose(port["advance_m"], starboard["advance_m"], rtol=1e-9)
 
 
 def test_members_hang_on_the_seed_and_not_on_the_executor():
-    manoeuvre, settings = Zigzag(0.35, 0.35), PredictionSettings(members=6, seed=4)
-    here = bands(SHIP, known(0.05), manoeuvre, FORCES, settings)
+    asked = SHIP, known(0.05), Zigzag(0.35, 0.35)
+    here = bands(*asked, generators(6, 4), FORCES)
     with ThreadPoolExecutor(3) as executor:
-        there = bands(SHIP, known(0.05), manoeuvre, FORCES, settings, executor)
-    for name, values in here.members.items():
-        np.testing.assert_array_equal(values, there.members[name])
-    other = bands(SHIP, known(0.05), manoeuvre, FORCES, replace(settings, seed=5))
-    assert not np.allclose(other.members["overshoots_deg.1"], here.members["overshoots_deg.1"])
-    assert here.members["overshoots_deg.1"].std() > 0.05
-    pickle.loads(pickle.dumps((SHIP, known(), manoeuvre, FORCES, settings)))
+        there = bands(*asked, generators(6, 4), FORCES, executor)
+    for name, values in here.items():
+        np.testing.assert_array_equal(values, there[name])
+    other = bands(*asked, generators(6, 5), FORCES)
+    assert not np.allclose(other["overshoots_deg.1"], here["overshoots_deg.1"])
+    assert here["overshoots_deg.1"].std() > 0.05
+    pickle.loads(pickle.dumps((asked, FORCES, generators(6))))
 
 
 def test_a_ship_that_always_runs_away_is_reported():
     wild = replace(known(), free=("derivatives.Yvvv",), values=np.array([1e6]))
     with pytest.raises(InputError, match="every member"):
-        bands(SHIP, wild, Turn(0.35), settings=PredictionSettings(members=2))
+        bands(SHIP, wild, Turn(0.35), generators(2))
 
 
 @pytest.mark.slow
@@ -169,7 +169,7 @@ def test_bootstrap_scatters_as_the_standard_errors_say():
     estimator = partial(equation_error, settings=Equations(rounds=2, scale_prior=False))
     found = estimator(few)
     quiet = Disturbances(np.zeros((3, 3)), 10.0)
-    again = bootstrap(portable(few, card, "angle"), found, estimator, quiet, PredictionSettings(members=16))
+    again = bootstrap(few, found, estimator, quiet, generators(16))
     assert again.shape == (16, 3)
     ratio = again.std(axis=0, ddof=1) / found.standard_errors
     assert np.all((ratio > 0.35) & (ratio < 1.5))  # few blocks of time: the standard errors are on the safe side
@@ -178,8 +178,7 @@ def test_bootstrap_scatters_as_the_standard_errors_say():
 @pytest.mark.long
 def test_bands_hold_what_happens():
     """Manoeuvres of the made-up ship in gusts of an exact recursion, integrated by scipy: 95 % of them in the band."""
-    settings = PredictionSettings(members=200, seed=1)
-    found = bands(SHIP, known(), Turn(0.35), FORCES, settings)
+    found = bands(SHIP, known(), Turn(0.35), generators(200, 1), FORCES)
     inside = []
     for seed in range(60):
         force = gusts(601, 0.5, [2e-5, 8e-5, 2e-5], 15.0, seed)
@@ -187,6 +186,6 @@ def test_bands_hold_what_happens():
         psi, x, y = (run.signals[name] for name in ("psi_rad", "x_m", "y_m"))
         at = float(np.interp(np.pi / 2, psi - psi[0], run.time_s))
         along = np.interp(at, run.time_s, x * np.cos(psi[0]) + y * np.sin(psi[0]))
-        low, _, high = found.quantiles["advance_m"]
+        low, _, high = np.nanquantile(found["advance_m"], LEVELS)
         inside.append(low < along < high)
     assert 0.85 <= np.mean(inside) <= 1.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tank2sim.identification.trials.methods.shooting import _start
+from tank2sim.identification.trials.methods.output_error import _start
 from tests.identification.trials.made_up_ship import problem, trial, zigzag
 
 

@@ -12,9 +12,8 @@ import tank2sim as t2s
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.cards.covariance import Covariance
 from tank2sim.dynamics import build
-from tank2sim.identification.trials.assessment import structure_choice
-from tank2sim.identification.trials.assessment.model_selection import Criteria
-from tank2sim.identification.trials.assessment.structure_choice import structure_by_evidence
+from tank2sim.identification.trials.assessment import model_selection
+from tank2sim.identification.trials.assessment.model_selection import Criteria, structure_by_evidence
 from tank2sim.identification.trials.options import IdentificationOptions
 from tank2sim.identification.trials.problem.estimation_problem import Estimate
 from tank2sim.identification.trials.problem.prepare_trials import measured
@@ -162,7 +161,7 @@ def test_where_the_criterion_decides_nothing_the_predictions_of_trials_left_out_
     ship: str, start: str, expected: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     alike = Criteria(aic=0.0, bic=0.0, samples=100.0, parameters=10.0)
-    monkeypatch.setattr(structure_choice, "criteria", lambda *_: alike)
+    monkeypatch.setattr(model_selection, "criteria", lambda *_: alike)
     for angle in (10, 20):
         t2s.load(ship).zigzag(angle, angle).df[::10].to_csv(tmp_path / f"{angle}.csv", index=False)
     card = read_card(start)

@@ -11,7 +11,7 @@ from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics import build
 from tank2sim.identification.trials.identify import undetermined_notice
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
-from tank2sim.identification.trials.problem.problem_from_card import driven_by_angle, with_ground_velocities
+from tank2sim.identification.trials.problem.estimation_problem import driven_by_angle, with_ground_velocities
 from tank2sim.identification.trials.problem.sampled_runs import prepare
 from tank2sim.identification.trials.problem.water_current import (
     CURRENT_PARAMETERS,

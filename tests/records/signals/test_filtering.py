@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from tank2sim.apps.signals.requests import parse_filter
+from tank2sim.apps.signals.study import parse_filter
 from tank2sim.errors import InputError
 from tank2sim.records.signals.filtering import (
     FilterType,

@@ -143,15 +143,8 @@ class ShipDimensions:
 
 
 def rudder_by_rules(length_m: float, beam_m: float, draught_m: float, area_m2: float | None = None) -> float:
-    """-Y_d' of a rudder of the area that rules of classification require, in the slipstream of its propeller.
-
-    Parameters
-    ----------
-    length_m, beam_m, draught_m : float
-        Dimensions of the ship.
-    area_m2 : float, optional
-        Area of the rudder, if known.
-    """
+    """-Y_d' of a rudder of the area that rules of classification require, or of `area_m2`, in its propeller's
+    slipstream."""
     # Rules of Det Norske Veritas: A = L T/100 (1 + 25 (B/L)^2), as in Molland and Turnock (2007), Marine Rudders.
     area = length_m * draught_m / 100 * (1 + 25 * (beam_m / length_m) ** 2) if area_m2 is None else area_m2
     return _HULL_FORCE * _RUDDER_SLOPE * _SLIPSTREAM * area / length_m**2

@@ -11,13 +11,7 @@ from pydantic import Field
 from tank2sim.apps.rigs.glider.card import GliderCard, GliderForm
 from tank2sim.apps.rigs.yaw.card import YawRigCard, YawRigForm
 from tank2sim.cards.card import Card
-from tank2sim.cards.form import (
-    BodyModel,
-    BodySection,
-    CardSection,
-    Environment,
-    Mass,
-)
+from tank2sim.cards.form import BodyModel, BodySection, CardSection, Environment, Mass
 from tank2sim.cards.kinds import CardKind, si_card
 
 if TYPE_CHECKING:
@@ -65,14 +59,8 @@ def _tow_model(card: SurgeBodyCard) -> Model:
     """Surge under the force of the card."""
     from tank2sim.apps.rigs.tow.surge import SurgeCoefficients, surge_model
 
-    surge = card.surge
-    coefficients = SurgeCoefficients(
-        total_mass_kg=surge.total_mass_kg,
-        B1_kgs2pm3=surge.B1_kgs2pm3,
-        B2_kgspm2=surge.B2_kgspm2,
-        B3_kgpm=surge.B3_kgpm,
-    )
-    return surge_model(card.ship.name, coefficients, surge.force_N, valid_speed_mps=card.model.valid_speed_mps)
+    coefficients = SurgeCoefficients(**card.surge.model_dump(exclude={"force_N", "dry_mass_kg"}))
+    return surge_model(card.ship.name, coefficients, card.surge.force_N, valid_speed_mps=card.model.valid_speed_mps)
 
 
 SURGE = CardKind(

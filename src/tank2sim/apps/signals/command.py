@@ -15,9 +15,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tank2sim.api.trial import TrialRecord
-    from tank2sim.apps.signals.requests import FilterRequest
     from tank2sim.apps.signals.result import SignalsResult
-    from tank2sim.apps.signals.study import FilterStudy, SignalSettings
+    from tank2sim.apps.signals.study import FilterRequest, FilterStudy, SignalSettings
     from tank2sim.records.trials import Trial
 
 
@@ -74,9 +73,8 @@ def signals(
     True
     """
     from tank2sim.api.trial import TrialRecord, trials_of
-    from tank2sim.apps.signals.requests import parse_filter
     from tank2sim.apps.signals.result import SignalsResult
-    from tank2sim.apps.signals.study import SignalSettings, SignalsStudy, analyse
+    from tank2sim.apps.signals.study import SignalSettings, SignalsStudy, analyse, parse_filter
 
     settings = SignalSettings(tuple([columns] if isinstance(columns, str) else columns), max_gap_s, segment_s)
     request = parse_filter(filter) if filter else None

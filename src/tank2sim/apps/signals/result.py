@@ -7,25 +7,27 @@ from dataclasses import dataclass, replace
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_panels
 from tank2sim.answer.charts.motion import columns_chart, measured_histories
+from tank2sim.answer.charts.parts import LINE_SAMPLES, POINT_SAMPLES, with_unit
+from tank2sim.answer.charts.vega import ChartSpec, PlotAxis, Rule
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, table
 from tank2sim.answer.result import Result
-from tank2sim.apps.signals.charts import (
-    autocorrelation_chart,
-    cross_correlation_chart,
-    density_chart,
-    effect_chart,
-    spectrum_chart,
-    transfer_chart,
-)
 from tank2sim.apps.signals.study import FilterStudy, SignalsStudy, SignalStudy, Steering, TrialSignals
+from tank2sim.arrays import Array
 from tank2sim.notices import Notice
 from tank2sim.records.signals.columns import SignalName
-from tank2sim.records.signals.statistics import Stationary
+from tank2sim.records.signals.filtering import FilterEffect
+from tank2sim.records.signals.spectra import Spectrum, Transfer
+from tank2sim.records.signals.statistics import Autocorrelation, Correlation, Density, Stationary
+from tank2sim.records.thinning import thin_line, thin_points
 from tank2sim.units import to_si
 
 if TYPE_CHECKING:
     import pandas as pd
+
 
 _HOW = (
     "Mean and standard deviation of directions are those on the circle. Stationarity: augmented Dickey-Fuller and "
@@ -118,8 +120,7 @@ class SignalsResult(Result[SignalsStudy]):
     def headline(self) -> tuple[str, ...]:
         """The filter, if there is one, and how many signals are stationary."""
         filtered = (self.study.filter.sentence,) if self.study.filter else ()
-        varying = self._varying_signals
-        steady = sum(map(_is_stationary, varying))
+        steady, varying = self._steady, self._varying_signals
         if not varying:
             return (*filtered, "No signal varies.")
         if steady == len(varying):
@@ -144,8 +145,7 @@ class SignalsResult(Result[SignalsStudy]):
     def key_figures(self) -> Sequence[KeyFigure]:
         """Stationary signals, the slowest of them, and the lag of the yaw rate."""
         varying = self._varying_signals
-        steady = sum(map(_is_stationary, varying))
-        figures = [KeyFigure(label="Stationary signals", value=f"{steady} of {len(varying)}")]
+        figures = [KeyFigure(label="Stationary signals", value=f"{self._steady} of {len(varying)}")]
         correlations = [signal.autocorrelation for signal in varying if signal.autocorrelation]
         if correlations:
             time_s = max(one.correlation_time_s for one in correlations)
@@ -183,13 +183,15 @@ class SignalsResult(Result[SignalsStudy]):
     def _varying_signals(self) -> list[SignalStudy]:
         return [signal for trial in self.study.trials for _, signal in _varying(trial)]
 
+    @property
+    def _steady(self) -> int:
+        """Number of stationary signals."""
+        tests = [signal.stationarity for signal in self._varying_signals if signal.stationarity]
+        return sum(test.verdict is Stationary.YES for test in tests)
+
 
 def _varying(trial: TrialSignals) -> list[tuple[str, SignalStudy]]:
     return [(name, signal) for name, signal in trial.columns.items() if not signal.constant]
-
-
-def _is_stationary(signal: SignalStudy) -> bool:
-    return signal.stationarity is not None and signal.stationarity.verdict is Stationary.YES
 
 
 def _signal(column: str) -> SignalName:
@@ -200,7 +202,7 @@ def _signal(column: str) -> SignalName:
 def _filter_section(applied: FilterStudy) -> Section:
     runs = {"as measured": applied.before, applied.name: applied.after}
     title = f"{_signal(applied.column).words} before and after"
-    response = effect_chart(applied.name, applied.effect, title=f"Effect of {applied.name}")
+    response = effect_chart(applied.name, applied.effect)
     drawn = [Illustration(chart=response, name="filter_response")]
     if chart := columns_chart(runs, title, measured=("as measured",), height_px=300):
         drawn.append(Illustration(chart=chart, name="filter_signal"))
@@ -218,9 +220,8 @@ def _trial_section(label: str, trial: TrialSignals) -> Section:
 
 def _steering_charts(label: str, steering: Steering) -> list[Illustration]:
     rudder, rate = _signal(steering.rudder), _signal("r_degps")
-    transfer = transfer_chart(rudder, rate, steering.transfer, title=f"From {rudder.words} to {rate.words}")
-    title = f"Cross-correlation of {rudder.words} and {rate.words}"
-    correlation = cross_correlation_chart(rudder, rate, steering.cross_correlation, title=title)
+    transfer = transfer_chart(rudder, rate, steering.transfer)
+    correlation = cross_correlation_chart(rudder, rate, steering.cross_correlation)
     return [
         Illustration(
             chart=transfer,
@@ -245,28 +246,19 @@ def _signals_section(label: str, trial: TrialSignals) -> Section:
 
 def _signal_charts(label: str, name: SignalName, signal: SignalStudy) -> Iterator[Illustration]:
     """Density, autocorrelation and spectrum of a signal, side by side."""
-    stem, subject = f"{label}_{name.stem}", name.words[:1].upper() + name.words[1:]
-    if signal.probability_density:
-        yield Illustration(
-            chart=density_chart(name, signal.probability_density, title=f"{subject}: probability density"),
-            caption="Kernel estimate next to the normal density of the same mean and standard deviation.",
-            half=True,
-            name=f"{stem}_density",
-        )
-    if signal.autocorrelation:
-        yield Illustration(
-            chart=autocorrelation_chart(name, signal.autocorrelation, title=f"{subject}: autocorrelation"),
-            caption="Red: the correlation time.",
-            half=True,
-            name=f"{stem}_autocorrelation",
-        )
-    if signal.spectrum:
-        yield Illustration(
-            chart=spectrum_chart(name, signal.spectrum, title=f"{subject}: spectrum"),
-            caption="The band is the 95 % confidence interval at each frequency.",
-            half=True,
-            name=f"{stem}_spectrum",
-        )
+    described = {
+        "density": "Kernel estimate next to the normal density of the same mean and standard deviation.",
+        "autocorrelation": "Red: the correlation time.",
+        "spectrum": "The band is the 95 % confidence interval at each frequency.",
+    }
+    charts = {
+        "density": signal.probability_density and density_chart(name, signal.probability_density),
+        "autocorrelation": signal.autocorrelation and autocorrelation_chart(name, signal.autocorrelation),
+        "spectrum": signal.spectrum and spectrum_chart(name, signal.spectrum),
+    }
+    for kind, chart in charts.items():
+        if chart:
+            yield Illustration(chart=chart, caption=described[kind], half=True, name=f"{label}_{name.stem}_{kind}")
 
 
 def _statistics(label: str, trial: TrialSignals) -> Table:
@@ -311,3 +303,125 @@ def _tests(label: str, trial: TrialSignals) -> Table:
             shape: list[Cell] = [min(normal.p_values.values(), default=None), normal.skewness, normal.excess_kurtosis]
             rows.append([_signal(name).words, signal.autocorrelation.effective_count, *tests, *shape])
     return table(f"Tests of {label}", heads, rows, digits=2, on_screen=False)
+
+
+_LEAST_DECIBEL = -120.0
+_PHASE = "phase (deg), below zero: later"
+_DOTTED = (2, 3)
+
+
+def _subject(name: SignalName) -> str:
+    return name.words[:1].upper() + name.words[1:]
+
+
+def density_chart(name: SignalName, density: Density) -> ChartSpec:
+    """Probability density of a signal next to the normal one."""
+    curves = {"estimated": density.density, "normal": density.normal}
+    series = [PlotSeries(label=label, x=density.values, y=curve) for label, curve in curves.items()]
+    up = PlotAxis(title=with_unit("probability density", f"1/({name.unit})"), zero=True)
+    across = PlotAxis(title=with_unit(name.words, name.unit), nice=False)
+    return curve_chart(Plot(series=series, up=up), across, title=f"{_subject(name)}: probability density")
+
+
+def autocorrelation_chart(name: SignalName, found: Autocorrelation) -> ChartSpec:
+    """Autocorrelation against the lag, the correlation time marked."""
+    title, label = f"{_subject(name)}: autocorrelation", f"{name.words} with itself"
+    described = f"Autocorrelation of {name.words}; the upright line is the correlation time."
+    return _correlation(found, label, ([0.0], found.correlation_time_s), title, described)
+
+
+def cross_correlation_chart(first: SignalName, second: SignalName, found: Correlation) -> ChartSpec:
+    """Cross-correlation against the lag, with its largest value and the bound of two independent signals."""
+    bound, title = found.bound_if_independent, f"Cross-correlation of {first.words} and {second.words}"
+    described = f"Correlation of {second.words} with {first.words} against the lag."
+    label = f"{second.words} after {first.words}"
+    return _correlation(found, label, ([-bound, 0.0, bound], found.lag_of_largest_s), title, described)
+
+
+def _correlation(
+    found: Autocorrelation | Correlation, label: str, marks: tuple[Sequence[float], float], title: str, described: str
+) -> ChartSpec:
+    """Coefficients against the lag, with levels and a lag (s) that are marked."""
+    levels, lag_s = marks
+    rules = [Rule(at=levels, dash=_DOTTED), Rule(at=[lag_s], upright=True, style="limit", dash=_DOTTED)]
+    series = [PlotSeries(label=label, x=found.lag_s, y=found.coefficient)]
+    up = PlotAxis(title="correlation coefficient", domain=(-1.0, 1.0))
+    across = PlotAxis(title="lag (s)", nice=False)
+    return curve_chart(Plot(series=series, up=up, rules=rules), across, title=title, described=described)
+
+
+def spectrum_chart(name: SignalName, spectrum: Spectrum) -> ChartSpec:
+    """Power spectral density with its 95 % confidence band, both axes logarithmic."""
+    kept = thin_line([np.log10(np.maximum(spectrum.density, np.finfo(float).tiny))], LINE_SAMPLES)
+    kept = kept[spectrum.low[kept] > 0]  # what is exactly zero has no place on a logarithmic scale
+    series = PlotSeries(
+        label=name.words,
+        x=spectrum.frequency_hz[kept],
+        y=spectrum.density[kept],
+        low=spectrum.low[kept],
+        high=spectrum.high[kept],
+    )
+    up = PlotAxis(title=f"power density (({name.unit})²/Hz)", log=True, form=".0e", ticks=8)
+    return curve_chart(
+        Plot(series=[series], up=up),
+        PlotAxis(title="frequency (Hz)", log=True, nice=False, form="~g"),
+        title=f"{_subject(name)}: spectrum",
+        described=f"Power spectral density of {name.words} with its 95 % confidence band.",
+    )
+
+
+def transfer_chart(source: SignalName, result: SignalName, transfer: Transfer) -> ChartSpec:
+    """Gain (1/s), phase and coherence against frequency; gain and phase with 95 % intervals, where coherence is
+    above chance."""
+    frequency, gain, phase, coherence = transfer.frequency_hz, transfer.gain, transfer.phase_rad, transfer.coherence
+    sure = np.flatnonzero(transfer.sure)
+    kept = sure[thin_points([np.log10(gain[sure]), phase[sure]], POINT_SAMPLES)]
+    # A wider interval than a whole gain only stretches the axis.
+    error = np.minimum(transfer.half_width_95[kept], 1.0)
+    gain, phase, half = gain[kept], np.rad2deg(phase[kept]), np.rad2deg(error)
+    label = f"{source.words} to {result.words}"
+
+    def points(values: Array, low: Array, high: Array) -> list[PlotSeries]:
+        return [PlotSeries(label=label, x=frequency[kept], y=values, low=low, high=high, points=True)]
+
+    plots = [
+        Plot(
+            series=points(gain, gain * np.exp(-error), gain * np.exp(error)),
+            up=PlotAxis(title=with_unit("gain", "1/s"), log=True, form="~g"),
+            height_px=150,
+        ),
+        Plot(
+            series=points(phase, phase - half, phase + half),
+            up=PlotAxis(title=_PHASE, domain=(-180.0, 180.0), ticks=[-180, -90, 0, 90, 180]),
+            height_px=150,
+        ),
+        Plot(
+            series=[PlotSeries(label=label, x=frequency, y=coherence)],
+            up=PlotAxis(title="coherence; dotted: by chance", domain=(0.0, 1.0)),
+            height_px=150,
+            rules=[Rule(at=[transfer.coherence_by_chance], style="limit", dash=_DOTTED)],
+        ),
+    ]
+    described = f"Transfer function from {label}: gain and phase with 95 % intervals, and coherence."
+    return curve_panels(
+        plots, _frequency(frequency), title=f"From {source.words} to {result.words}", described=described
+    )
+
+
+def effect_chart(label: str, effect: FilterEffect) -> ChartSpec:
+    """Gain (dB), phase (deg) and group delay (s) of the filter `label` against frequency."""
+    frequency, gain, phase, delay = effect.frequency_hz, effect.gain, effect.phase_rad, effect.group_delay_s
+    decibel = np.maximum(20.0 * np.log10(np.maximum(gain, 1e-30)), _LEAST_DECIBEL)
+    # Where nothing passes, the phase is that of rounding.
+    phase = np.where(decibel > _LEAST_DECIBEL, np.rad2deg(phase), np.nan)
+    plots = [
+        Plot(series=[PlotSeries(label=label, x=frequency, y=curve)], up=PlotAxis(title=up), height_px=130)
+        for up, curve in {"gain (dB)": decibel, _PHASE: phase, "group delay (s)": delay}.items()
+    ]
+    described = f"Gain, phase and group delay of {label}."
+    return curve_panels(plots, _frequency(frequency), title=f"Effect of {label}", described=described)
+
+
+def _frequency(values: Array) -> PlotAxis:
+    span = float(values[0]), float(values[-1])
+    return PlotAxis(title="frequency (Hz)", log=True, domain=span, nice=False, form="~g")

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tank2sim.arrays import Columns, Number
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.notices import Notice
 from tank2sim.records.signals.columns import DIRECTION_COLUMNS, SignalName, file_columns, find_signal
-from tank2sim.records.signals.filtering import Filtered, FilterEffect
+from tank2sim.records.signals.filtering import (
+    Filtered,
+    FilterEffect,
+    FilterType,
+    butterworth,
+    decimate,
+    detrend,
+    savitzky_golay,
+    smoothing_spline,
+)
 from tank2sim.records.signals.sampling import Series, even_series
 from tank2sim.records.signals.spectra import Spectrum, Transfer, spectrum, transfer_function
 from tank2sim.records.signals.statistics import (
@@ -39,19 +48,12 @@ class SignalStudy:
 
     Parameters
     ----------
-    unit : str
-    samples : int
-    step_s : float
     mean, standard_deviation : float
         Of directions on the circle.
     on_circle : bool
         Whether it is a direction.
     constant : bool
         A constant signal has none of the following.
-    autocorrelation : Autocorrelation, optional
-    stationarity : Stationarity, optional
-    normality : Normality, optional
-    probability_density : Density, optional
     spectrum : Spectrum, optional
         In the square of the unit over Hz.
     """
@@ -78,10 +80,8 @@ class Steering:
     ----------
     rudder : str
         Column taken for the rudder, angle before order.
-    cross_correlation : Correlation
     transfer : Transfer
         Yaw rate over rudder angle, 1/s.
-    notices : tuple of Notice
     """
 
     rudder: str
@@ -102,7 +102,6 @@ class TrialSignals:
         Signals by their columns in the trial format.
     rudder_to_yaw_rate : Steering or None
         None where one of both is missing or does not move.
-    notices : tuple of Notice
     histories : dict
         The signals over time, thinned to draw.
     """
@@ -126,7 +125,6 @@ class FilterStudy:
         The (first) signal filtered.
     sentence : str
         The signal, the filter and its effect in words.
-    effect : FilterEffect
     before, after : dict
         The signal over time in the unit of its column, thinned to draw.
     """
@@ -159,11 +157,8 @@ class SignalSettings:
 def analyse(trial: Trial, settings: SignalSettings) -> TrialSignals:
     """Analyse the signals of a trial.
 
-    Raises
-    ------
-    InputError
-        A signal asked for by name cannot be analysed; of all signals, those that cannot are left out with a notice,
-        and it is raised if none is left.
+    InputError if a signal asked for by name cannot be analysed; of all signals, those that cannot are left out with a
+    notice, and it is raised if none is left.
     """
     notices = list(trial.notices)
     series: dict[str, Series] = {}
@@ -180,19 +175,17 @@ def analyse(trial: Trial, settings: SignalSettings) -> TrialSignals:
         if not series:
             raise InputError(trial.path, "", "no signal of it can be analysed", notices[-1])
     notices += [notice for item in series.values() for notice in item.notices]
+    whole = file_columns(trial)
     columns = {SignalName(name).file: _analysed(item, settings.segment_s) for name, item in series.items()}
     return TrialSignals(
         trial=str(trial.path),
         columns=columns,
         rudder_to_yaw_rate=_steering(series, settings.segment_s),
         notices=tuple(notices),
-        histories=_histories(trial, columns),
+        histories=drawn_columns(
+            {"t_s": whole["t_s"], **{name: whole[name] for name in columns}}, MEASURED_SAMPLES, peaks=True
+        ),
     )
-
-
-def _histories(trial: Trial, names: Collection[str]) -> Columns:
-    whole = file_columns(trial)
-    return drawn_columns({"t_s": whole["t_s"], **{name: whole[name] for name in names}}, MEASURED_SAMPLES, peaks=True)
 
 
 def filtered(text: str, sentence: str, before: Series, after: Filtered) -> FilterStudy:
@@ -248,19 +241,64 @@ def _steering(series: dict[str, Series], segment_s: float | None) -> Steering | 
         rudder=SignalName(rudder).file,
         cross_correlation=correlation,
         transfer=transfer,
-        notices=_cautions(correlation, transfer, source.step_s),
+        notices=tuple(_cautions(correlation, transfer, source.step_s)),
     )
 
 
-def _cautions(correlation: Correlation, transfer: Transfer, step_s: float) -> tuple[Notice, ...]:
-    messages = []
+def _cautions(correlation: Correlation, transfer: Transfer, step_s: float) -> Iterator[Notice]:
     segment = transfer.averaging.samples_in_segment * step_s
     lag = correlation.lag_of_largest_s
     if abs(lag) > 0.1 * segment:
-        messages.append(
+        yield Notice(
             f"the yaw rate is most like the rudder of {lag:.3g} s before, which is long for spectral segments of "
             f"{segment:.3g} s: gain and coherence come out low; a longer --segment helps"
         )
     if not np.any(transfer.sure):
-        messages.append("no coherence of rudder and yaw rate is above chance: the transfer function says nothing")
-    return tuple(map(Notice, messages))
+        yield Notice("no coherence of rudder and yaw rate is above chance: the transfer function says nothing")
+
+
+REQUEST_FORMS = (
+    "lowpass:HZ, highpass:HZ, bandpass:HZ,HZ (each also with ,causal), savgol:SAMPLES,DEGREE, spline:HZ, "
+    "detrend:DEGREE, decimate:FACTOR"
+)
+"""What may be asked for."""
+
+
+@dataclass(frozen=True)
+class FilterRequest:
+    """A filter asked for by name, as it was written; `thins` is True if it changes the times of the samples."""
+
+    text: str
+    apply: Callable[[Series], Filtered]
+    thins: bool = False
+
+
+def parse_filter(text: str) -> FilterRequest:
+    """Read a filter's name and its numbers.
+
+    InputError if the filter does not exist, or its numbers are not as many and of the kind that it takes.
+    """
+    kind, _, parameters = text.strip().partition(":")
+    words = [word.strip() for word in parameters.split(",") if word.strip()]
+    causal = bool(words) and words[-1] == "causal" and kind in set(FilterType)
+    try:
+        numbers = [float(word) for word in (words[:-1] if causal else words)]
+        whole = [int(number) for number in numbers if number == int(number)]
+    except (ValueError, OverflowError):
+        raise _refusal(text) from None
+    match kind, len(numbers), len(whole) == len(numbers):
+        case ("lowpass" | "highpass", 1, _) | ("bandpass", 2, _):
+            return FilterRequest(text, lambda series: butterworth(series, FilterType(kind), numbers, causal=causal))
+        case "savgol", 2, True:
+            return FilterRequest(text, lambda series: savitzky_golay(series, whole[0], whole[1]))
+        case "spline", 1, _:
+            return FilterRequest(text, lambda series: smoothing_spline(series, numbers[0]))
+        case "detrend", 1, True:
+            return FilterRequest(text, lambda series: detrend(series, whole[0]))
+        case "decimate", 1, True:
+            return FilterRequest(text, lambda series: decimate(series, whole[0]), thins=True)
+    raise _refusal(text)
+
+
+def _refusal(text: str) -> InputError:
+    return ArgumentError("filter", "", f"{text!r} is not a filter", f"write one of {REQUEST_FORMS}")

@@ -34,8 +34,8 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.effects.particulars import model_particular
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
+from tank2sim.identification.trials.assessment.model_selection import hard_rudder
 from tank2sim.identification.trials.assessment.other_ship import evidence_of_other_ship
-from tank2sim.identification.trials.assessment.structure_choice import hard_rudder
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
 from tank2sim.notices import Notice, caution
 from tank2sim.records.signals.statistics import mean_and_deviation

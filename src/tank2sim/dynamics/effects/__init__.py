@@ -111,6 +111,19 @@ def acting_variable(model: Model, name: str) -> str:
     return name
 
 
+def nearly_like(name: str) -> str:
+    """The effect that shows in nearly the same way as this one; empty without one.
+
+    Parameters
+    ----------
+    name : str
+        Name of an effect.
+    """
+    return EFFECTS[name].nearly_like or next(
+        (other.name for other in EFFECTS.values() if other.nearly_like == name), ""
+    )
+
+
 def undisturbed_inputs(model: Model) -> dict[str, float]:
     """Inputs that effects add to a model, at the values (SI) at which the effects vanish: no current, no wind."""
     parameters = [parameter for effect in EFFECTS.values() for parameter in effect.parameters]
@@ -118,4 +131,4 @@ def undisturbed_inputs(model: Model) -> dict[str, float]:
     return {name: value for name, value in absent.items() if value is not None and name in model.input_names}
 
 
-__all__ = ["EFFECTS", "Effect", "EffectParameter", "acting_variable", "undisturbed_inputs"]
+__all__ = ["EFFECTS", "Effect", "EffectParameter", "acting_variable", "nearly_like", "undisturbed_inputs"]

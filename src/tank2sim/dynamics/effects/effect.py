@@ -206,6 +206,9 @@ class Effect:
         True if a card with ``[roll]`` has it already: it is not for such a card.
     includes : tuple of str
         Effects that are a simpler form of this one: they are not sought together with it.
+    nearly_like : str
+        Effect that shows nearly in the same way (where the rudder is put over and held): where one explains trials
+        best, the other is tried in its place.
     sought : bool
         False if it is not to be tried on trials: what it describes is given, not found, or another effect is sought in
         its place.
@@ -240,6 +243,7 @@ class Effect:
     in_mmg: bool = False
     in_roll: bool = False
     includes: tuple[str, ...] = ()
+    nearly_like: str = ""
     sought: bool = True
     last: bool = False
     resonant: bool = False

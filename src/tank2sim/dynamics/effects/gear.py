@@ -166,6 +166,7 @@ RUDDER_DEAD_BAND = Effect(
         ),
     ),
     equations=_with_dead_band,
+    nearly_like=RUDDER_BACKLASH.name,
 )
 
 

@@ -19,8 +19,8 @@ from scipy.signal import savgol_filter
 from tank2sim.arrays import Array
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
+from tank2sim.identification.trials.methods.weak_form import MEASURED_STATES, measured_motion, sensor_noise
 from tank2sim.identification.trials.problem.estimation_problem import Problem
-from tank2sim.identification.trials.problem.measured_motion import MEASURED_STATES, measured_motion, sensor_noise
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun, prepare, seen_in
 from tank2sim.records.signals.columns import DIRECTION_COLUMNS
 from tank2sim.records.trials import Trial, sampling_step

@@ -18,7 +18,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS, EffectParameter
 from tank2sim.dynamics.model import Model
 from tank2sim.gap.inference.batch import MEASURED_STATES, MeasuredBatch
-from tank2sim.identification.trials.problem.problem_from_card import driven_model
+from tank2sim.identification.trials.problem.estimation_problem import driven_model
 from tank2sim.records.trials import ROWS_TO_SHOW_AN_ORDER
 from tank2sim.simulation.rows import ArrayFunction, Chain
 

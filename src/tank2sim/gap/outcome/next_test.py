@@ -27,7 +27,7 @@ from tank2sim.gap.outcome.next_test_candidates import (
 )
 from tank2sim.gap.proof.open_loop import COARSEST, INSTANTS, delays_of, shown_by
 from tank2sim.gap.result import NextTest
-from tank2sim.identification.trials.problem.problem_from_card import driven_model
+from tank2sim.identification.trials.problem.estimation_problem import driven_model
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS, means_of_held
 from tank2sim.simulation.rows import RowFunction
 from tank2sim.simulation.scheme import runge_kutta_step

@@ -13,7 +13,7 @@ from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.errors import InputError
 from tank2sim.gap.proof.cross_check import REMAINS, worse_trials
 from tank2sim.gap.result import Passed
-from tank2sim.identification.trials.assessment.structure_choice import hard_rudder
+from tank2sim.identification.trials.assessment.model_selection import hard_rudder
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.run import Run, simulate

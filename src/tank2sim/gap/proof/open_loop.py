@@ -17,7 +17,7 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.methods.gauss_newton import least_squares_steps
-from tank2sim.identification.trials.problem.problem_from_card import driven_model
+from tank2sim.identification.trials.problem.estimation_problem import driven_model
 from tank2sim.records.trials import Trial, sampling_step
 from tank2sim.simulation.motion_record import motion_record
 from tank2sim.simulation.rows import Chain, RowFunction

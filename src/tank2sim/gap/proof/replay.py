@@ -13,8 +13,8 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.gap.proof.open_loop import InputRecord, Replayer, input_record
 from tank2sim.gap.result import Passed
+from tank2sim.identification.trials.problem.estimation_problem import driven_model
 from tank2sim.identification.trials.problem.prepare_trials import Measured
-from tank2sim.identification.trials.problem.problem_from_card import driven_model
 from tank2sim.records.audit.noise import record_noise
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS

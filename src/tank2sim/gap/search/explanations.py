@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
-from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.effects import EFFECTS, nearly_like
 from tank2sim.errors import InputError
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.fit_all import Fitting, HypothesisCache, Proposal, StageReport, refit, thetas_of
@@ -147,6 +147,7 @@ def search(
         if fitting.best().score < reached - MUCH_BETTER:
             fitting = _about_best(fitting)
     _polish(fitting)
+    _fit_nearly_alike(fitting, chosen)
     fits = sorted(fitting.found.values(), key=lambda fit: fit.score)
     return Search(fitting.likelihood, tuple(fits), every)
 
@@ -316,6 +317,23 @@ def _polish(fitting: Fitting) -> None:
         if fit is not converged and (fit.score < best.score + CLOSE or fit is fitting.best(len(effects)))
     ]
     fitting.fit([refit(fit, [fit.logs, best.logs], LAST_ROUNDS) for fit in close])
+
+
+def _fit_nearly_alike(fitting: Fitting, chosen: Sequence[str]) -> None:
+    """The best with the effect that shows nearly as one of its own, in the place of that one: the screen is linear, and
+    may have proposed either alone."""
+    best = fitting.best()
+    thetas = thetas_of(best)
+    proposals = []
+    for name in thetas:
+        other = nearly_like(name)
+        if other not in chosen or other in thetas:
+            continue
+        hypothesis = fitting.hypotheses(other)
+        sizes = [estimate.parameter.typical_values(hypothesis.card)[0] for estimate in hypothesis.estimated]
+        swapped = {effect: theta for effect, theta in thetas.items() if effect != name} | {other: np.array(sizes)}
+        proposals.append(Proposal(swapped, [best.logs], ROUNDS, each=best.hypothesis.each))
+    fitting.fit(proposals)
 
 
 def _shapes(fit: ExplanationFit) -> NDArray[np.bool_]:

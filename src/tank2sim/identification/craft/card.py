@@ -21,45 +21,35 @@ def identified_craft(
 ) -> SteeredCard:
     """The card with the estimates and their standard errors, in the scaling of its own text.
 
-    Parameters
-    ----------
-    card : SteeredCard
-        The card of the problem; numbers that were not estimated stay.
-    fit : CraftFit
-    responses : mapping, optional
-        Thruster to its response to orders: lag, and dead band where it is determined.
-
-    Raises
-    ------
-    InputError
-        With the estimates the damping of the craft would drive it on.
+    `card`: The card of the problem; numbers that were not estimated stay. `responses`: Thruster to its response to
+    orders: lag, and dead band where it is determined. Raises InputError: With the estimates the damping of the craft
+    would drive it on.
     """
     changes: dict[str, object] = {}
+
+    def write(section: str, key: str, value: float, error: float) -> None:
+        changes[f"{section}.{key}"] = float(value)
+        changes[f"{section}.uncertainty.{key}"] = float(error)
+
     for number, thruster in enumerate(card.thrusters):
-        response = (responses or {}).get(thruster.name)
-        if response is None:
-            continue
-        place = f"thrusters.{number}"
-        changes[f"{place}.time_constant_s"] = float(response.lag_s)
-        changes[f"{place}.uncertainty.time_constant_s"] = float(response.lag_error_s)
-        if response.dead_band is None:
-            continue
-        in_rpm = card.spelt.get(f"{place}.dead_band_radps", "").endswith("_rpm")
-        key, unit = ("dead_band_rpm", from_si("n_rpm", 1.0)) if in_rpm else ("dead_band_radps", 1.0)
-        value, error = response.dead_band
-        changes[f"{place}.{key}"] = float(value * unit)
-        changes[f"{place}.uncertainty.{key}"] = float(error * unit)
+        response, place = (responses or {}).get(thruster.name), f"thrusters.{number}"
+        if response is not None:
+            write(place, "time_constant_s", response.lag_s, response.lag_error_s)
+        if response is not None and response.dead_band is not None:
+            in_rpm = card.spelt.get(f"{place}.dead_band_radps", "").endswith("_rpm")
+            key, unit = ("dead_band_rpm", from_si("n_rpm", 1.0)) if in_rpm else ("dead_band_radps", 1.0)
+            value, error = response.dead_band
+            write(place, key, value * unit, error * unit)
     values, errors = fit.estimate.values.tolist(), fit.estimate.standard_errors.tolist()
+    numbers = {thruster.name: number for number, thruster in enumerate(card.thrusters)}
     for name, at in estimated_numbers(card, fit).items():
         section, *rest = name.split(".")
         if section == "derivatives":
             factor = card.file_factor(rest[0])
             changes[name] = values[at] * factor
             changes[f"uncertainty.{rest[0]}"] = errors[at] * abs(factor)
-            continue
-        number = [thruster.name for thruster in card.thrusters].index(rest[0])
-        changes[f"thrusters.{number}.{_KEYS[rest[1]]}"] = max(0.0, values[at])
-        changes[f"thrusters.{number}.uncertainty.{_KEYS[rest[1]]}"] = errors[at]
+        else:
+            write(f"thrusters.{numbers[rest[0]]}", _KEYS[rest[1]], max(0.0, values[at]), errors[at])
     try:
         return parse_card(changed_text(card.text, card.source, changes, comment="identified"), card.source).steered()
     except InputError as error:
@@ -73,11 +63,7 @@ def identified_craft(
 def estimated_numbers(card: SteeredCard, fit: CraftFit) -> dict[str, int]:
     """Parameter of the model to the place of its estimate; twins of an estimated number have its place.
 
-    Parameters
-    ----------
-    card : SteeredCard
-        The card of the problem.
-    fit : CraftFit
+    `card`: The card of the problem.
     """
     found, free = {}, fit.problem.free
     for place, name in enumerate(free):

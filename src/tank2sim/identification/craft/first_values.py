@@ -19,9 +19,10 @@ from tank2sim.identification.trials.methods.coloured_noise import white
 from tank2sim.identification.trials.methods.equation_error import EquationErrorSettings, equation_error
 from tank2sim.identification.trials.methods.gauss_newton import StoppedSearchError, is_minimum, refuse_stopped
 from tank2sim.identification.trials.methods.kalman_pass import velocities_of
-from tank2sim.identification.trials.methods.shooting import SENSED_BY, Shooting, Shot, cut
+from tank2sim.identification.trials.methods.output_error import SENSED_BY, Shooting, Shot, cut
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
+from tank2sim.simulation.recorded import straight_over_gaps
 
 PREDICTED_S = 30.0
 """Length of a free-running prediction, s, as in the published comparisons on small craft."""
@@ -51,10 +52,7 @@ def estimate_by_velocities(problem: Problem) -> Estimate | None:
     The sum is over sqrt(1 + e^2) - 1 of the errors e in standard deviations (``soft_l1``), so that the stretches that
     the model does not hold do not decide. Neighbouring errors are alike: standard errors count independent ones.
 
-    Parameters
-    ----------
-    problem : Problem
-        By :func:`.craft_problem`.
+    `problem`: By :func:`.craft_problem`.
     """
     runs = tuple(_by_velocities(run) for run in problem.runs)
     try:
@@ -62,12 +60,13 @@ def estimate_by_velocities(problem: Problem) -> Estimate | None:
         search = _Search(problem.with_runs(tuple(replace(run, seen=_SHOWN) for run in runs)))
         noise = _FIRST_NOISE * np.nanstd(np.concatenate([run.measured for run in runs]), axis=0)
         starts = [np.clip(each, *problem.bounds) for each in (first.values, problem.prior_mean)]
-        values = search.best_of(starts, noise)
+        values = _best_of(search, starts, noise)
         for _ in range(_ROUNDS - 1):
             found = search.least(values, noise)
-            values, errors = found.x, search.errors(found.x)
+            values, errors = found.x, [shot.residuals for shot in search.shots(found.x)]
             noise = np.sqrt(np.nanmean(np.concatenate([of_run.reshape(-1, 4) for of_run in errors]) ** 2, axis=0))
-        information = search.information(values, noise * np.sqrt(_alike(errors)))
+        J = search.slopes(values, noise * np.sqrt(_alike(errors)))
+        information = np.asarray(J.T @ J)
         covariance = np.linalg.inv(information + problem.prior_precision(problem.prior_error))
     except (InputError, np.linalg.LinAlgError, ValueError):
         return None
@@ -79,8 +78,6 @@ def estimate_by_velocities(problem: Problem) -> Estimate | None:
         information=information,
         noise=dict(zip(_SHOWN, noise.tolist(), strict=True)),
         cost=(2 * float(found.cost),),
-        prior_scale={},
-        notices=(),
     )
 
 
@@ -92,7 +89,7 @@ class _Search:
         self.pieces = [cut(problem, run, PREDICTED_S) for run in problem.runs]
         self._last: tuple[Array, list[Shot]] | None = None
 
-    def _shots(self, values: Array) -> list[Shot]:
+    def shots(self, values: Array) -> list[Shot]:
         """Motion of all runs; the last one is kept, since slopes are asked for where errors were."""
         if self._last is None or not np.array_equal(self._last[0], values):
             unit = (white(1.0),) * len(_SHOWN)
@@ -100,66 +97,49 @@ class _Search:
             self._last = values.copy(), shots
         return self._last[1]
 
-    def errors(self, values: Array) -> list[Array]:
-        """Simulated less measured of each run (pieces, n, 4)."""
-        return [shot.residuals for shot in self._shots(values)]
-
     def slopes(self, values: Array, noise: Array) -> Array:
         """Derivatives of all errors in standard deviations (errors, k)."""
         known, slopes = tuple(white(float(size)) for size in noise), []
-        for pieces, shot in zip(self.pieces, self._shots(values), strict=True):
+        for pieces, shot in zip(self.pieces, self.shots(values), strict=True):
             by = self.shooting.linearised(pieces, shot, values, known)[1][:, :, pieces.starts.shape[1] :]
             slopes.append(np.nan_to_num(by, posinf=0.0, neginf=0.0).reshape(-1, len(values)))
         return np.concatenate(slopes)
 
-    def information(self, values: Array, noise: Array) -> Array:
-        """Information of the runs (k, k)."""
-        J = self.slopes(values, noise)
-        return np.asarray(J.T @ J)
-
-    def weighted(self, values: Array, noise: Array) -> Array:
-        """Errors in standard deviations, and the distance from what was known before as the loss makes it a square."""
-        errors = np.concatenate([(of_run / noise).ravel() for of_run in self.errors(values)])
-        held = np.clip(np.nan_to_num(errors, nan=0.0, posinf=_WILD, neginf=-_WILD), -_WILD, _WILD)
-        away = (values - self.problem.prior_mean) / self.problem.prior_error
-        return np.concatenate([held, away * np.sqrt(1 + away**2 / 4)])
-
-    def best_of(self, starts: Sequence[Array], noise: Array) -> Array:
-        """The best values of the searches from several starts; raises StoppedSearchError if all stop at theirs."""
-        found, stopped = [], None
-        for start in starts:
-            try:
-                found.append(self.least(start, noise))
-            except StoppedSearchError as error:
-                stopped = error
-        if not found:
-            raise stopped or ValueError("no start")
-        return np.asarray(min(found, key=lambda each: each.cost).x)
-
     def least(self, start: Array, noise: Array) -> OptimizeResult:
         """Values with the least robust sum of errors and of the distance from what was known before."""
-        mean, error = self.problem.prior_mean, self.problem.prior_error
+        mean, error, (low, high) = self.problem.prior_mean, self.problem.prior_error, self.problem.bounds
+
+        def weighted(values: Array) -> Array:
+            """Errors in standard deviations, and the distance from before as the loss makes it a square."""
+            errors = np.concatenate([(shot.residuals / noise).ravel() for shot in self.shots(values)])
+            held = np.clip(np.nan_to_num(errors, nan=0.0, posinf=_WILD, neginf=-_WILD), -_WILD, _WILD)
+            away = (values - mean) / error
+            return np.concatenate([held, away * np.sqrt(1 + away**2 / 4)])
 
         def slopes(values: Array) -> Array:
             away = (values - mean) / error
             by = (1 + away**2 / 2) / np.sqrt(1 + away**2 / 4)
             return np.concatenate([self.slopes(values, noise), np.diag(by / error)])
 
-        low, high = self.problem.bounds
-        inside = np.clip(start, low + 1e-9, high - 1e-9)
-        found = least_squares(
-            lambda values: self.weighted(values, noise),
-            inside,
-            slopes,
-            (low, high),
-            x_scale=error,
-            loss="soft_l1",
-            max_nfev=_EVALUATIONS,
-        )
+        inside, most = np.clip(start, low + 1e-9, high - 1e-9), _EVALUATIONS
+        found = least_squares(weighted, inside, slopes, (low, high), x_scale=error, loss="soft_l1", max_nfev=most)
         if np.array_equal(found.x, inside):
             J = found.jac
             refuse_stopped("output error", is_minimum(J.T @ J, found.grad, bounded=(inside, low, high)))
         return found
+
+
+def _best_of(search: _Search, starts: Sequence[Array], noise: Array) -> Array:
+    """The best values of the searches from several starts; raises StoppedSearchError if all stop at theirs."""
+    found, stopped = [], None
+    for start in starts:
+        try:
+            found.append(search.least(start, noise))
+        except StoppedSearchError as error:
+            stopped = error
+    if not found:
+        raise stopped or ValueError("no start")
+    return np.asarray(min(found, key=lambda each: each.cost).x)
 
 
 def _alike(errors: Sequence[Array]) -> Array:
@@ -172,12 +152,8 @@ def _alike(errors: Sequence[Array]) -> Array:
 
 def _by_velocities(run: SampledRun) -> SampledRun:
     """The run with velocities over the ground in place of positions."""
-    instants = np.arange(len(run.measured))
-    columns = {}
-    for name in ("motion.x", "motion.y", "motion.psi"):
-        column = run.column(SENSED_BY.get(name, name))
-        known = np.isfinite(column)
-        columns[name] = np.interp(instants, instants[known], column[known])
+    track = {name: run.column(SENSED_BY.get(name, name)) for name in ("motion.x", "motion.y", "motion.psi")}
+    columns = {name: straight_over_gaps(run.times, column) for name, column in track.items()}
     derived = velocities_of(columns, run.step_s)
     gyro = run.column("gyro.rate")
     derived["motion.r"] = np.where(np.isfinite(gyro), gyro, derived["motion.r"])

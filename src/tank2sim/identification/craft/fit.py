@@ -16,24 +16,25 @@ from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.identification.craft.first_values import PREDICTED_S, estimate_by_velocities
 from tank2sim.identification.craft.problem import (
+    COMPASS_SPREADS,
     DISTURBANCES,
     FORCE_SPREAD,
     deviates,
     with_disturbances,
-    without_compass,
 )
 from tank2sim.identification.trials.methods.gauss_newton import StoppedSearchError
-from tank2sim.identification.trials.methods.kalman import KalmanEstimate, KalmanSettings, Smoothed, estimate_at, kalman
-from tank2sim.identification.trials.methods.kalman_gains import FilterFault, smooth_states
-from tank2sim.identification.trials.methods.kalman_pass import Levels
-from tank2sim.identification.trials.methods.kalman_search import (
+from tank2sim.identification.trials.methods.kalman import (
+    KalmanEstimate,
+    KalmanSettings,
     SearchPoint,
     SearchTask,
+    Smoothed,
+    estimate_at,
+    kalman,
     normal,
     task_of,
-    whitened_innovations,
 )
-from tank2sim.identification.trials.methods.process_noise import PUSHED
+from tank2sim.identification.trials.methods.kalman_pass import PUSHED, FilterFault, Levels, smooth_states
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 from tank2sim.simulation.sensitivity import Sensitivity
@@ -50,7 +51,6 @@ standard errors)."""
 
 TRIALS_SHARE = 0.5
 """Largest standard error after the trials over that before of a coefficient that they determine (project choice)."""
-
 
 STABILISING = ("derivatives.Yv", "derivatives.Yvabsv", "derivatives.Nr", "derivatives.Nrabsr")
 """Coefficients whose damping holds a craft on its course."""
@@ -82,7 +82,6 @@ _EXPECTATIONS = 1000
 _LINEARISATIONS = 5
 """Passes of the filter, each linearised along the one before: the trajectory of the last no longer moves."""
 
-
 AXES = {f"motion.{key}": words for key, words in (("u", "surge"), ("v", "sway"), ("r", "yaw"), ("psi", "heading"))}
 AXES |= {"motion.x": "position to north", "motion.y": "position to east"}
 """Names of the motion's states in messages."""
@@ -98,26 +97,12 @@ class CoefficientVerdict(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class CraftFit:
-    """Fit of a craft.
-
-    Parameters
-    ----------
-    problem : Problem
-    estimate : KalmanEstimate
-        Estimate of the k free parameters.
-    levels : Levels
-        Noise levels.
-    by_run : array (runs, k, k)
-        Information of each run.
-    gust_share : float
-        Random acceleration in surge that the filter needs, over that by the largest thrust.
-    """
+    """Fit of a craft."""
 
     problem: Problem
-    estimate: KalmanEstimate
-    levels: Levels
-    by_run: Array
-    gust_share: float = 0.0
+    estimate: KalmanEstimate  # Estimate of the k free parameters
+    by_run: Array  # (runs, k, k): Information of each run
+    gust_share: float = 0.0  # Random acceleration in surge that the filter needs, over that by the largest thrust
 
     @property
     def holds(self) -> bool:
@@ -131,17 +116,18 @@ class CraftFit:
         Identified: the error is at most :data:`IDENTIFIED_SHARE` of the value. Bounded: the trials have narrowed it to
         :data:`TRIALS_SHARE` of what was known before. Else it is not determined.
         """
-        found = []
-        for value, error, before in zip(
-            self.estimate.values, self.estimate.standard_errors, self.problem.prior_error, strict=True
-        ):
-            if error > TRIALS_SHARE * before:
-                found.append(CoefficientVerdict.PRIOR)
-            elif error <= IDENTIFIED_SHARE * abs(value):
-                found.append(CoefficientVerdict.IDENTIFIED)
-            else:
-                found.append(CoefficientVerdict.BOUNDED)
-        return tuple(found)
+        values, errors = np.abs(self.estimate.values), self.estimate.standard_errors
+        certain = np.where(
+            errors <= IDENTIFIED_SHARE * values, CoefficientVerdict.IDENTIFIED, CoefficientVerdict.BOUNDED
+        )
+        unknown = errors > TRIALS_SHARE * self.problem.prior_error
+        return tuple(map(CoefficientVerdict, np.where(unknown, CoefficientVerdict.PRIOR, certain).tolist()))
+
+    @property
+    def undetermined(self) -> list[str]:
+        """Free parameters of the craft that the trials do not determine."""
+        pairs = zip(self.problem.free, self.verdicts, strict=True)
+        return [name for name, each in pairs if each is CoefficientVerdict.PRIOR and name not in COMPASS_SPREADS]
 
     def best_run(self, place: int) -> int:
         """The run without which the standard error of a free parameter would grow most."""
@@ -159,16 +145,11 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
     twice: the second time current, wind and bias of each trial are known beforehand as well as they agreed between
     trials the first time (empirical Bayes), for they change slowly.
 
-    Parameters
-    ----------
-    problem : Problem
-        By :func:`.craft_problem`.
-    progress : callable
-        Called with each better estimate.
+    `problem`: By :func:`.craft_problem`. `progress`: Called with each better estimate.
     """
     found = estimate_by_velocities(problem)
     if found is None or not deviates(found):
-        problem = without_compass(problem)
+        problem = problem.without(COMPASS_SPREADS)  # what the trials do not show only widens the others
         found = estimate_by_velocities(problem)
     steps = KalmanSettings.iterations if found is None else _STEPS_FROM_NEAR
     settings = KalmanSettings(drifting=True, scale_prior=False, iterations=steps)
@@ -180,22 +161,17 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
         return fit
     narrower = with_disturbances(problem, *_disturbances_of(problem, estimate.smoothed))
     try:
-        return _fit_of(narrower, kalman(narrower, estimate.values, settings, progress, fit.levels))
+        return _fit_of(narrower, kalman(narrower, estimate.values, settings, progress, estimate.levels))
     except InputError:  # it stops, or loses a trial: the first estimate stays
         return fit
 
 
 def _fit_of(problem: Problem, estimate: KalmanEstimate) -> CraftFit:
     """The fit of an estimate by the filter."""
-    levels = levels_of(problem, estimate)
-    return CraftFit(problem, estimate, levels, information(problem, estimate.values, levels), _gusts(problem, estimate))
-
-
-def _gusts(problem: Problem, estimate: KalmanEstimate) -> float:
-    """Random acceleration in surge, over that by the largest thrust."""
     thrust = problem.model["disturbance.north"].nominal / FORCE_SPREAD
     mass = problem.parameters(estimate.values)[problem.model.parameter_names.index("ship.mass")]
-    return float(estimate.process_noise["motion.u"].deviation * mass / thrust)
+    gusts = float(estimate.process_noise["motion.u"].deviation * mass / thrust)
+    return CraftFit(problem, estimate, information(problem, estimate.values, estimate.levels), gusts)
 
 
 def _at_velocities(problem: Problem, found: Estimate) -> CraftFit | None:
@@ -232,7 +208,7 @@ def _filtered_with(problem: Problem, found: Estimate) -> dict[float, CraftFit]:
         estimate = replace(
             filtered, method=found.method, covariance=found.covariance, information=found.information, cost=found.cost
         )
-        fits[share] = CraftFit(posed, estimate, point.levels, by_run)
+        fits[share] = CraftFit(posed, estimate, by_run)
     return fits
 
 
@@ -287,7 +263,7 @@ def _disturbances_of(problem: Problem, runs: Sequence[Smoothed]) -> tuple[Array,
     if len(runs) < FEWEST_TRIALS:
         return np.zeros(len(wide)), wide
     found = np.stack([smoothed.states[0, places] for smoothed in runs])
-    errors = np.stack([smoothed.state_errors[0, places] for smoothed in runs])
+    errors = np.stack([smoothed.errors[0, places] for smoothed in runs])
     pairs = [spread_between(*columns) for columns in zip(found.T, errors.T, wide, strict=True)]
     means, spreads = map(np.array, zip(*pairs, strict=True))
     return means, np.clip(spreads, LEAST_SPREAD * wide, wide)
@@ -299,11 +275,7 @@ def spread_between(found: Array, errors: Array, before: float) -> tuple[float, f
     Normal in the trials and between them; the greatest likelihood, by expectation and maximisation (Dempster, Laird
     and Rubin 1977, J. R. Stat. Soc. B 39).
 
-    Parameters
-    ----------
-    found, errors : array (n,)
-        Value of each trial and its standard error, known beforehand to be 0 within `before`.
-    before : float
+    `found`, `errors` (n,): Value of each trial and its standard error, known beforehand to be 0 within `before`.
 
     Examples
     --------
@@ -323,19 +295,9 @@ def spread_between(found: Array, errors: Array, before: float) -> tuple[float, f
     return mean, float(np.sqrt(variance))
 
 
-def levels_of(problem: Problem, estimate: KalmanEstimate) -> Levels:
-    """The noise levels of an estimate, as the filter takes them."""
-    correlated = [*estimate.process_noise.values(), *(estimate.drift[name] for name in problem.seen)]
-    return Levels(
-        np.log([noise.deviation for noise in correlated]),
-        np.log([noise.time_s for noise in correlated]),
-        np.log([estimate.measurement_noise[name] for name in problem.seen]),
-    )
-
-
 def information(problem: Problem, values: Array, levels: Levels) -> Array:
     """Information of each run of a problem (runs, k, k) at parameters and noise levels."""
-    J, _ = whitened_innovations(_point(problem, values, levels)[1].filtered)
+    J = _point(problem, values, levels)[1].filtered.slopes
     flat = J.reshape(len(J), -1, J.shape[-1])
     return np.asarray(np.swapaxes(flat, 1, 2) @ flat)
 
@@ -343,10 +305,7 @@ def information(problem: Problem, values: Array, levels: Levels) -> Array:
 def _point(problem: Problem, values: Array, levels: Levels) -> tuple[SearchTask, SearchPoint]:
     """A pass of the filter over the runs; a linearisation that fails is left out.
 
-    Raises
-    ------
-    InputError
-        The filter loses the motion of a trial; the message names trial, time and axis.
+    Raises InputError: The filter loses the motion of a trial; the message names trial, time and axis.
     """
     task = task_of(problem, drifting=True)
     try:
@@ -368,23 +327,15 @@ def _point(problem: Problem, values: Array, levels: Levels) -> tuple[SearchTask,
 
 @dataclass(frozen=True, eq=False)
 class FreePrediction:
-    """Free-running predictions of a held-out run, and the motion that the smoother gives.
-
-    Parameters
-    ----------
-    run : SampledRun
-    rows : sequence of int (m,)
-        Instants predicted.
-    predicted, smoothed : array (m, 3)
-        u, v (m/s through the water) and r (rad/s).
-    ends : array (p, 3)
-        Error of x, y (m) and psi (rad) at the end of each prediction: predicted less measured, nan if not measured.
-    """
+    """Free-running predictions of a held-out run, and the motion that the smoother gives."""
 
     run: SampledRun
-    rows: Sequence[int]
+    rows: Sequence[int]  # Instants predicted
+    # `predicted`, `smoothed`: (m, 3): u, v (m/s through the water) and r (rad/s)
     predicted: Array
     smoothed: Array
+    # (p, 3): Error of x, y (m) and psi (rad) at the end of each prediction: predicted less measured, nan if not
+    # measured
     ends: Array
 
 
@@ -393,18 +344,13 @@ def predict_free(fit: CraftFit, runs: Sequence[SampledRun]) -> list[FreePredicti
 
     Nothing measured after its beginning enters a prediction; current and wind stay as they were found until then.
 
-    Parameters
-    ----------
-    fit : CraftFit
-    runs : sequence of SampledRun
-        Held-out trials, of the same problem.
+    `runs`: Held-out trials, of the same problem.
     """
     problem = fit.problem.with_runs(tuple(runs))
     names = problem.model.state_names
-    task, point = _point(problem, fit.estimate.values, fit.levels)
+    task, point = _point(problem, fit.estimate.values, fit.estimate.levels)
     filtered, nx = point.filtered, len(names)
-    tangents = filtered.tangents
-    states, _ = smooth_states(tangents.A, tangents.C, filtered.gains, filtered.before, filtered.innovations)
+    states, _ = smooth_states(filtered)
     motion = [names.index(f"motion.{letter}") for letter in "uvr"]
     pose = ("motion.x", "motion.y", "motion.psi")
     placed = [names.index(name) for name in pose]
@@ -440,32 +386,26 @@ def predict_by_card(problem: Problem) -> list[FreePrediction]:
 
     Current and wind of a run are known beforehand by those of the other runs, if there are enough of them.
 
-    Parameters
-    ----------
-    problem : Problem
-        By :func:`.craft_problem`.
+    `problem`: By :func:`.craft_problem`.
     """
     # The filter estimates something: one number of the card, within a millionth.
     first, error = problem.prior_mean[:1], 1e-6 * (np.abs(problem.prior_mean[:1]) + 1e-6)
     held = replace(problem, free=problem.free[:1], prior_mean=first, prior_error=error)
     estimate = kalman(held, first, KalmanSettings(drifting=True, scale_prior=False))
-    levels = levels_of(held, estimate)
     found = []
     for number, run in enumerate(problem.runs):
         smoothed = (*estimate.smoothed[:number], *estimate.smoothed[number + 1 :])
         alone = held.with_runs((run,))
         if smoothed:
             alone = with_disturbances(alone, *_disturbances_of(held, smoothed))
-        found += predict_free(CraftFit(alone, estimate, levels, np.zeros((1, 1, 1))), [run])
+        found += predict_free(CraftFit(alone, estimate, np.zeros((1, 1, 1))), [run])
     return found
 
 
 def determination(predicted: Array, truth: Array) -> Array:
     """R^2 of each column (n, m): 1 less the sum of squared errors over that about the mean.
 
-    Parameters
-    ----------
-    predicted, truth : array (n, m)
+    `predicted`, `truth` (n, m).
 
     Examples
     --------

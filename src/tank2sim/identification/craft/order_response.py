@@ -40,18 +40,13 @@ _LEVEL = 1e-3
 
 @dataclass(frozen=True)
 class OrderResponse:
-    """How a thruster follows its orders.
+    """How a thruster follows its orders."""
 
-    Parameters
-    ----------
-    lag_s, lag_error_s : float
-        T and its standard error.
-    rest_radps, turning_radps : float
-        Largest order at which the propeller rested, 0 without any, and least one at which it turned, rad/s.
-    """
-
+    # `lag_s`, `lag_error_s`: T and its standard error
     lag_s: float
     lag_error_s: float
+    # `rest_radps`, `turning_radps`: Largest order at which the propeller rested, 0 without any, and least one at which
+    # it turned, rad/s
     rest_radps: float
     turning_radps: float
 
@@ -70,11 +65,7 @@ class OrderResponse:
 def order_responses(card: SteeredCard, trials: Sequence[Trial]) -> dict[str, OrderResponse]:
     """The response of each thruster whose orders and revolutions are in the trials; those that share numbers have one.
 
-    Parameters
-    ----------
-    card : SteeredCard
-    trials : sequence of Trial
-        By :func:`tank2sim.records.craft_trials.read_craft_trial`.
+    `trials`: By :func:`tank2sim.records.craft_trials.read_craft_trial`.
     """
     first, shared = card.thrusters[0].name, twins(card)
     found: dict[str, OrderResponse] = {}
@@ -126,7 +117,8 @@ def _response(runs: Sequence[_Run], largest: float) -> OrderResponse | None:
     above = levels[levels > edges[possible[-1]] + _LEVEL * largest / 2]
     if not len(above):
         return None
-    curvature = _curvature(runs, lag, bands[best], 0.05 * lag)
+    low, middle, high = (_cost(runs, factor * lag, bands[best]) for factor in (0.95, 1.0, 1.05))
+    curvature = (low - 2 * middle + high) / (0.05 * lag) ** 2
     error = np.sqrt(2 * variance / max(curvature, 1e-12) / independent)
     # A change of order is known to a part of a step.
     return OrderResponse(lag, float(np.hypot(error, step / np.sqrt(12))), float(edges[possible[0]]), float(above[0]))
@@ -136,11 +128,6 @@ def _best_lag(runs: Sequence[_Run], band: float) -> float:
     step = min(each for each, _, _ in runs)
     bounds = np.log(0.1 * step), np.log(LONGEST_LAG_S)
     return float(np.exp(minimize_scalar(lambda z: _cost(runs, float(np.exp(z)), band), bounds=bounds).x))
-
-
-def _curvature(runs: Sequence[_Run], lag: float, band: float, by: float) -> float:
-    low, middle, high = (_cost(runs, lag + way * by, band) for way in (-1, 0, 1))
-    return (low - 2 * middle + high) / by**2
 
 
 def _cost(runs: Sequence[_Run], lag: float, band: float) -> float:

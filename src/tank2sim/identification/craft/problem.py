@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -91,14 +92,9 @@ apart it is a whole part, and the motion is measured at the rows alone."""
 def craft_fit_model(card: SteeredCard, driven_by: str = "revolutions", *, turned: bool = False) -> Model:
     """The model of a card driven by measured or ordered revolutions, with disturbances as constant states.
 
-    Parameters
-    ----------
-    card : SteeredCard
-    driven_by : str
-        ``revolutions``: lag, dead band and exponent of the card are left out, for they lie before the revolutions;
-        ``orders``: they are in, except a lag shorter than a step.
-    turned : bool
-        The directions of thrusters that turn were measured: their lag is left out.
+    `driven_by`: ``revolutions``: lag, dead band and exponent of the card are left out, for they lie before the
+    revolutions; ``orders``: they are in, except a lag shorter than a step. `turned`: The directions of thrusters that
+    turn were measured: their lag is left out.
     """
     thrusters = tuple(
         thruster.model_copy(update={"time_constant_s": None, "dead_band_radps": 0.0, "order_exponent": None})
@@ -241,38 +237,34 @@ def craft_prior(card: SteeredCard, model: Model) -> dict[str, tuple[float, float
     return found | {name: (0.0, spread) for name, spread in COMPASS_SPREADS.items()}
 
 
+_SEEN = {"psi_rad": "motion.psi", "x_m": "motion.x", "y_m": "motion.y", "u_mps": "motion.u", "v_mps": "motion.v"}
+_SEEN |= {"r_radps": "motion.r"}
+"""Signal of a trial to the state that it measures."""
+
+_SENSORS = {"motion.psi": "compass.heading", "motion.r": "gyro.rate"}
+"""State to what a sensor with errors of its own shows of it."""
+
+
 def craft_problem(card: SteeredCard, trials: Sequence[Trial]) -> Problem:
     """The problem of a card and trials.
 
-    Parameters
-    ----------
-    card : SteeredCard
-    trials : sequence of Trial
-        By :func:`tank2sim.records.craft_trials.read_craft_trial`.
-
-    Raises
-    ------
-    InputError
-        A trial is too short, or some trials have revolutions and others orders alone.
+    `trials`: By :func:`tank2sim.records.craft_trials.read_craft_trial`. Raises InputError: A trial is too short, or
+    some trials have revolutions and others orders alone.
     """
     by = craft_driven_by(card, trials)
     turned = not any(name.startswith("azimuth_order_") for trial in trials for name in trial.signals)
-    model = _bounded(craft_fit_model(card, by, turned=turned))
+    model = craft_fit_model(card, by, turned=turned)
+    model = replace(model, parameters=tuple(map(_bounded, model.parameters)))
     unused = "order_" if by == "revolutions" else "n_"
     trials = [
         replace(trial, signals={key: values for key, values in trial.signals.items() if not key.startswith(unused)})
         for trial in trials
     ]
     prior = craft_prior(card, model)
-    names = {"psi_rad": "motion.psi", "x_m": "motion.x", "y_m": "motion.y", "u_mps": "motion.u", "v_mps": "motion.v"}
     signals = {signal for trial in trials for signal in trial.signals}
-    seen = [variable for signal, variable in names.items() if signal in signals]
-    rated = "r_radps" in signals
-    runs = []
-    for trial in trials:
-        run = prepare(model, trial, [*seen, *(["motion.r"] if rated else [])], step_s=OBSERVED_STEP_S)
-        shown = ["compass.heading" if name == "motion.psi" else name for name in seen]
-        runs.append(replace(run, seen=(*shown, *(["gyro.rate"] if rated else []))))
+    seen = [variable for signal, variable in _SEEN.items() if signal in signals]
+    shown = tuple(_SENSORS.get(name, name) for name in seen)
+    runs = [replace(prepare(model, trial, seen, step_s=OBSERVED_STEP_S), seen=shown) for trial in trials]
     means, errors = (np.array(column) for column in zip(*prior.values(), strict=True))
     return Problem(model, tuple(prior), means, errors, tuple(runs))
 
@@ -290,20 +282,10 @@ def deviates(estimate: Estimate) -> bool:
     )
 
 
-def without_compass(problem: Problem) -> Problem:
-    """The problem of a compass without deviation: parameters that the trials do not show only widen the others."""
-    kept = np.array([name not in COMPASS_SPREADS for name in problem.free])
-    free = tuple(name for name in problem.free if name not in COMPASS_SPREADS)
-    return replace(problem, free=free, prior_mean=problem.prior_mean[kept], prior_error=problem.prior_error[kept])
-
-
 def craft_driven_by(card: SteeredCard, trials: Sequence[Trial]) -> str:
     """What drives the model in all trials: ``revolutions``, which were measured, or else ``orders``.
 
-    Raises
-    ------
-    InputError
-        Some trials have revolutions and no orders, others orders alone.
+    Raises InputError: Some trials have revolutions and no orders, others orders alone.
     """
     if all(f"n_{thruster.name}_radps" in trial.signals for trial in trials for thruster in card.thrusters):
         return "revolutions"
@@ -317,12 +299,7 @@ def craft_driven_by(card: SteeredCard, trials: Sequence[Trial]) -> str:
 def with_disturbances(problem: Problem, means: Array, spreads: Array) -> Problem:
     """The problem in which the disturbances of a trial are `means` within `spreads` (5,) before it is looked at.
 
-    Parameters
-    ----------
-    problem : Problem
-        By :func:`craft_problem`.
-    means, spreads : array (5,)
-        Means and spreads of the :data:`DISTURBANCES`.
+    `problem`: By :func:`craft_problem`. `means`, `spreads` (5,): Means and spreads of the :data:`DISTURBANCES`.
     """
     known = dict(zip(DISTURBANCES, zip(means.tolist(), spreads.tolist(), strict=True), strict=True))
 
@@ -335,18 +312,16 @@ def with_disturbances(problem: Problem, means: Array, spreads: Array) -> Problem
     return replace(problem, model=replace(problem.model, states=tuple(map(with_prior, problem.model.states))))
 
 
-def _bounded(model: Model) -> Model:
-    """The model with the bounds of physics, and none on the loss of thrust, whose error may have either sign."""
+_BOUNDS: dict[str, dict[str, Any]] = {
+    ".speed_loss": {"minimum": None},  # its error may have either sign
+    ".time_constant": {"minimum": OBSERVED_STEP_S / 2},  # less does not show
+    ".order_exponent": {"minimum": _EXPONENTS[0], "maximum": _EXPONENTS[1]},
+    **{f"derivatives.{name}": {"maximum": 0.0} for name in NEVER_POSITIVE},
+}
+"""End of a parameter's name to its bounds."""
 
-    def bounded(parameter: Parameter) -> Parameter:
-        if parameter.name.endswith(".speed_loss"):
-            return same_symbol(parameter, replace(parameter, minimum=None))
-        if parameter.name.startswith("thrusters.") and parameter.name.endswith(".time_constant"):
-            return same_symbol(parameter, replace(parameter, minimum=OBSERVED_STEP_S / 2))  # less does not show
-        if parameter.name.endswith(".order_exponent"):
-            return same_symbol(parameter, replace(parameter, minimum=_EXPONENTS[0], maximum=_EXPONENTS[1]))
-        if parameter.name.removeprefix("derivatives.") in NEVER_POSITIVE:
-            return same_symbol(parameter, replace(parameter, maximum=0.0))
-        return parameter
 
-    return replace(model, parameters=tuple(map(bounded, model.parameters)))
+def _bounded(parameter: Parameter) -> Parameter:
+    """A parameter with the bounds of physics."""
+    bounds = next((bounds for end, bounds in _BOUNDS.items() if parameter.name.endswith(end)), None)
+    return parameter if bounds is None else same_symbol(parameter, replace(parameter, **bounds))

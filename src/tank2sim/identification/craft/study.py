@@ -1,10 +1,15 @@
-"""Studies of a craft's trials: coefficients with their verdicts, and free-running predictions."""
+"""Studies of a craft's trials: coefficients with their verdicts, and free-running predictions.
+
+Which manoeuvre of five minutes would determine what the trials of a craft do not.
+
+Each candidate is simulated with the estimates, and its information added to that of the trials, at their noise levels.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -15,20 +20,130 @@ from tank2sim.cards.examination import doubts
 from tank2sim.errors import InputError
 from tank2sim.identification.craft.first_values import PREDICTED_S
 from tank2sim.identification.craft.fit import (
+    IDENTIFIED_SHARE,
     PREDICTION_LEAD_S,
     SHORTEST_PREDICTION_S,
+    TRIALS_SHARE,
     CoefficientVerdict,
     CraftFit,
     FreePrediction,
     determination,
+    information,
     predict_by_card,
 )
-from tank2sim.identification.craft.next_trial import CandidateTrial, next_trials
 from tank2sim.identification.craft.order_response import OrderResponse
 from tank2sim.identification.craft.problem import COMPASS_SPREADS, craft_problem
 from tank2sim.notices import Notice, caution
 from tank2sim.records.trials import Trial
+from tank2sim.simulation.sensitivity import Sensitivity
 from tank2sim.units import from_si
+
+TRIAL_S = 300.0
+"""Length of a candidate, s: five minutes."""
+
+
+@dataclass(frozen=True, eq=False)
+class CandidateTrial:
+    """A manoeuvre of five minutes."""
+
+    words: str  # Orders in words, revolutions in % of the largest: port/starboard
+    t_s: tuple[float, ...]
+    # `order_port`, `order_starboard`: Orders of the thrusters at these times, shares of their largest revolutions
+    order_port: tuple[float, ...]
+    order_starboard: tuple[float, ...]
+    determines: tuple[str, ...]  # Coefficients that the trials so far do not determine and that it would
+
+
+def _patterns() -> dict[str, list[tuple[float, float, float]]]:
+    """Candidate in words to (seconds, port, starboard) of its steps, which are repeated. Project choices."""
+    return {
+        "straight runs and coasting: 25 s each of 40/40, 0/0, 80/80, 0/0, 100/100, 0/0": [
+            (25.0, level, level) for level in (0.4, 0.0, 0.8, 0.0, 1.0, 0.0)
+        ],
+        "going astern and ahead: 20 s each of -40/-40, 40/40, -80/-80, 80/80": [
+            (20.0, level, level) for level in (-0.4, 0.4, -0.8, 0.8)
+        ],
+        "spins: 25 s each of 30/-30, -30/30, 60/-60, -60/60": [
+            (25.0, level, -level) for level in (0.3, -0.3, 0.6, -0.6)
+        ],
+        "turns out of speed: 20 s each of 70/70, 90/50, 70/70, 40/80, 100/20, 20/100": [
+            (20.0, port, starboard)
+            for port, starboard in ((0.7, 0.7), (0.9, 0.5), (0.7, 0.7), (0.4, 0.8), (1.0, 0.2), (0.2, 1.0))
+        ],
+        "random steps: 6 s each of 80/20, -30/40, 60/60, 100/-50, 0/70, 30/90, -60/-20, 90/0": [
+            (6.0, port, starboard)
+            for port, starboard in (
+                *((0.8, 0.2), (-0.3, 0.4), (0.6, 0.6), (1.0, -0.5)),
+                *((0.0, 0.7), (0.3, 0.9), (-0.6, -0.2), (0.9, 0.0)),
+            )
+        ],
+    }
+
+
+def next_trials(card: SteeredCard, fit: CraftFit) -> list[CandidateTrial]:
+    """The candidates, the one first that determines most of the coefficients that the trials do not.
+
+    Empty for a craft whose thrusters are not two.
+    """
+    if len(card.thrusters) != 2:
+        return []
+    problem = fit.problem
+    # The reported errors allow for residuals unlike the noise model: a candidate narrows both alike.
+    so_far = fit.by_run.sum(axis=0) + problem.prior_precision(problem.prior_error)
+    now = np.minimum(fit.estimate.standard_errors, problem.prior_error)
+    found = []
+    for words, steps in _patterns().items():
+        orders, inputs = _orders(card, fit, steps)
+        added = _added_information(fit, inputs)
+        errors = now.copy()
+        if added is not None:
+            errors *= np.sqrt(np.diag(np.linalg.inv(so_far + added)) / np.diag(np.linalg.inv(so_far)))
+        shows = (errors <= TRIALS_SHARE * problem.prior_error) | (
+            errors <= IDENTIFIED_SHARE * np.abs(fit.estimate.values)
+        )
+        determined = [_short(name) for name in fit.undetermined if shows[problem.free.index(name)]]
+        times, port, starboard = zip(*orders, strict=True)
+        found.append(CandidateTrial(words, times, port, starboard, tuple(determined)))
+    return sorted(found, key=lambda candidate: -len(candidate.determines))
+
+
+def _orders(
+    card: SteeredCard, fit: CraftFit, steps: list[tuple[float, float, float]]
+) -> tuple[tuple[tuple[float, float, float], ...], Array]:
+    """Orders over five minutes, and the inputs of the model (n, nu)."""
+    model, step = fit.problem.model, fit.problem.runs[0].step_s
+    left, right = sorted(card.thrusters, key=lambda thruster: thruster.y_m)
+    places = [model.input_names.index(f"thrusters.{thruster.name}.command") for thruster in (left, right)]
+    inputs = np.tile(model.input_values(), (round(TRIAL_S / step), 1))
+    orders, begin, number = [], 0.0, 0
+    while begin < TRIAL_S:
+        length, port, starboard = steps[number % len(steps)]
+        orders.append((begin, port, starboard))
+        rows = slice(round(begin / step), round((begin + length) / step))
+        for place, share, thruster in ((places[0], port, left), (places[1], starboard, right)):
+            inputs[rows, place] = share * (thruster.max_radps if share >= 0 else -thruster.lowest_radps)
+        begin, number = begin + length, number + 1
+    return tuple(orders), inputs
+
+
+def _added_information(fit: CraftFit, inputs: Array) -> Array | None:
+    """Information of a simulated trial (k, k); None if the motion or the covariance of its filter leaves all bounds."""
+    problem = fit.problem
+    run = problem.runs[0]
+    model = problem.model
+    sensitivity = Sensitivity(model, problem.free, problem.seen)
+    p = problem.parameters(fit.estimate.values)
+    start = np.zeros(len(model.state_names))
+    states = sensitivity.motion(start, inputs[:-1], p, run.step_s)
+    if not np.isfinite(states).all() or np.abs(states).max() > 1e6:
+        return None
+    shown = sensitivity.shown(states, inputs, p)
+    made = replace(run, name="candidate", begin_s=0.0, inputs=inputs, measured=shown)
+    try:
+        return np.asarray(information(problem.with_runs((made,)), fit.estimate.values, fit.estimate.levels)[0])
+    except InputError:  # the filter loses the motion
+        return None
+
 
 NOT_ITS_OWN = (
     "a trial that the card was identified from shows how well it was fitted, and not how well the card predicts"
@@ -150,52 +265,13 @@ def study_craft(
 ) -> CraftIdentificationStudy:
     """Study of the fit of a craft.
 
-    Parameters
-    ----------
-    card, found : SteeredCard
-        Given and found.
-    fit : CraftFit
-    held : mapping
-        Held-out trials by name, each with its predictions; None for one too short.
-    responses : mapping
-        Response to orders by thruster.
-    driven_by : str
-        ``revolutions`` or ``orders``.
+    `card`, `found`: Given and found. `held`: Held-out trials by name, each with its predictions; None for one too
+    short. `responses`: Response to orders by thruster. `driven_by`: ``revolutions`` or ``orders``.
     """
     predictions = [entry for entry in held.values() if entry is not None]
     r_squared = prediction_r_squared(predictions) if predictions else None
-    notices = [*worse_than_a_mean(r_squared or {}), *dict.fromkeys((*doubts(card), *doubts(found)))]
-    if open_thrust := [
-        name
-        for name, verdict in zip(fit.problem.free, fit.verdicts, strict=True)
-        if name.endswith((".ahead", ".astern")) and verdict is CoefficientVerdict.PRIOR
-    ]:
-        notices.append(caution(f"the trials do not determine {', '.join(open_thrust)}: it is that of the card"))
-    if held and not predictions:
-        least = PREDICTION_LEAD_S + SHORTEST_PREDICTION_S
-        notices.append(Notice(f"no held-out trial is longer than {least:g} s: none is predicted"))
-    if driven_by == "orders":
-        notices.append(
-            Notice(
-                "the trials have orders and no revolutions: a full order counts as the largest revolutions of the card"
-            )
-        )
-    if not fit.holds:
-        notices.append(_model_does_not_hold(fit))
-    notices += _dead_band_notices(card, responses, driven_by)
     compass = _compass(fit)
-    if compass is not None:
-        words = (
-            f"the compass of these trials deviates by A {compass.a_deg:+.1f}, B {compass.b_deg:+.1f} sin(heading), "
-            f"C {compass.c_deg:+.1f} cos(heading) deg: the headings were corrected by it; swing the compass"
-        )
-        notices.append(Notice(words))
-    notices.append(
-        Notice(
-            "the mass on the card is taken as exact: motion determines forces over masses, so that an error of the "
-            "mass is one of all forces, in the same share"
-        )
-    )
+    too_short = bool(held) and not predictions
     return CraftIdentificationStudy(
         ship=card.ship.name,
         method=fit.estimate.method,
@@ -208,7 +284,40 @@ def study_craft(
         order_responses={name: _response(response) for name, response in responses.items()},
         held_out=tuple(held),
         next_trials=tuple(next_trials(card, fit)),
-        notices=tuple(notices),
+        notices=(
+            *worse_than_a_mean(r_squared or {}),
+            *dict.fromkeys((*doubts(card), *doubts(found))),
+            *_fit_notices(fit, driven_by, too_short=too_short),
+            *_dead_band_notices(card, responses, driven_by),
+            *_instrument_notices(compass),
+        ),
+    )
+
+
+def _fit_notices(fit: CraftFit, driven_by: str, *, too_short: bool) -> Iterator[Notice]:
+    """Notices of thrust curves, held-out trials, orders, and of a model that does not hold."""
+    thrust = [name for name in fit.undetermined if name.endswith((".ahead", ".astern"))]
+    if thrust:
+        yield caution(f"the trials do not determine {', '.join(thrust)}: it is that of the card")
+    if too_short:
+        least = PREDICTION_LEAD_S + SHORTEST_PREDICTION_S
+        yield Notice(f"no held-out trial is longer than {least:g} s: none is predicted")
+    if driven_by == "orders":
+        words = "the trials have orders and no revolutions: a full order counts as the largest revolutions of the card"
+        yield Notice(words)
+    if not fit.holds:
+        yield _model_does_not_hold(fit)
+
+
+def _instrument_notices(compass: CompassDeviation | None) -> Iterator[Notice]:
+    if compass is not None:
+        yield Notice(
+            f"the compass of these trials deviates by A {compass.a_deg:+.1f}, B {compass.b_deg:+.1f} sin(heading), "
+            f"C {compass.c_deg:+.1f} cos(heading) deg: the headings were corrected by it; swing the compass"
+        )
+    yield Notice(
+        "the mass on the card is taken as exact: motion determines forces over masses, so that an error of the "
+        "mass is one of all forces, in the same share"
     )
 
 
@@ -226,10 +335,7 @@ def _model_does_not_hold(fit: CraftFit) -> Notice:
 def worse_than_a_mean(r_squared: Mapping[str, float]) -> list[Notice]:
     """A caution where predictions of held-out trials are worse than the mean of what was measured.
 
-    Parameters
-    ----------
-    r_squared : mapping
-        R^2 of u, v and r.
+    `r_squared`: R^2 of u, v and r.
     """
     bad = [f"{name} {value:.2g}" for name, value in r_squared.items() if not value > 0]
     if not bad:
@@ -242,12 +348,10 @@ def worse_than_a_mean(r_squared: Mapping[str, float]) -> list[Notice]:
     ]
 
 
-def _dead_band_notices(card: SteeredCard, responses: Mapping[str, OrderResponse], driven_by: str) -> list[Notice]:
+def _dead_band_notices(card: SteeredCard, responses: Mapping[str, OrderResponse], driven_by: str) -> Iterator[Notice]:
     if not responses:
-        words = "orders" if driven_by == "orders" else "revolutions"
-        other = "revolutions" if driven_by == "orders" else "orders"
-        return [Notice(f"dead bands are those of the card: the trials have {words}, and need {other} next to them")]
-    notices = []
+        words = "orders, and need revolutions" if driven_by == "orders" else "revolutions, and need orders"
+        yield Notice(f"dead bands are those of the card: the trials have {words} next to them")
     for thruster in card.thrusters:
         response = responses.get(thruster.name)
         if response is None or response.dead_band is not None:
@@ -255,21 +359,22 @@ def _dead_band_notices(card: SteeredCard, responses: Mapping[str, OrderResponse]
         least = from_si("n_rpm", response.turning_radps)
         text = f"the dead band of thruster {thruster.name} is that of the card: no order left the propeller at rest"
         if thruster.dead_band_radps >= response.turning_radps:
-            notices.append(caution(f"{text}, and one of {least:.3g} rpm, within it, turned it"))
+            yield caution(f"{text}, and one of {least:.3g} rpm, within it, turned it")
         else:
-            notices.append(Notice(f"{text}; one of {least:.3g} rpm turned it"))
-    return notices
+            yield Notice(f"{text}; one of {least:.3g} rpm turned it")
 
 
 def _compass(fit: CraftFit) -> CompassDeviation | None:
-    found = {}
-    if not COMPASS_SPREADS.keys() <= set(fit.problem.free):
+    places = {name[-1].lower(): place for place, name in enumerate(fit.problem.free) if name in COMPASS_SPREADS}
+    if not places:
         return None
-    for name in COMPASS_SPREADS:
-        place, letter = fit.problem.free.index(name), name[-1].lower()
-        found[f"{letter}_deg"] = math.degrees(fit.estimate.values[place])
-        found[f"{letter}_error_deg"] = math.degrees(fit.estimate.standard_errors[place])
-    return CompassDeviation(**found)
+    values, errors = np.degrees(fit.estimate.values), np.degrees(fit.estimate.standard_errors)
+    found = {f"{letter}_deg": float(values[place]) for letter, place in places.items()}
+    return CompassDeviation(**found, **{f"{letter}_error_deg": float(errors[at]) for letter, at in places.items()})
+
+
+def _short(name: str) -> str:
+    return name.removeprefix("derivatives.").removeprefix("thrusters.")
 
 
 def _coefficients(fit: CraftFit) -> dict[str, CraftCoefficient]:
@@ -278,7 +383,7 @@ def _coefficients(fit: CraftFit) -> dict[str, CraftCoefficient]:
         if name in COMPASS_SPREADS:
             continue
         known = verdict is not CoefficientVerdict.PRIOR
-        found[name.removeprefix("derivatives.").removeprefix("thrusters.")] = CraftCoefficient(
+        found[_short(name)] = CraftCoefficient(
             value=float(fit.estimate.values[place]),
             standard_error=float(fit.estimate.standard_errors[place]),
             before=float(fit.problem.prior_mean[place]),
@@ -353,16 +458,8 @@ class PredictionStudy:
 def predict_trials(card: SteeredCard, trials: Sequence[Trial]) -> tuple[PredictionStudy, tuple[Notice, ...]]:
     """Predict trials of a craft by its card and recorded revolutions, from the state of a filter after ten seconds.
 
-    Parameters
-    ----------
-    card : SteeredCard
-    trials : sequence of Trial
-        Trials (:func:`.read_craft_trial`).
-
-    Raises
-    ------
-    InputError
-        A file is at fault, none is long enough, or the card does not move as the trials do.
+    `trials`: Trials (:func:`.read_craft_trial`). Raises InputError: A file is at fault, none is long enough, or the
+    card does not move as the trials do.
     """
     problem = craft_problem(card, trials)
     with np.errstate(all="ignore"), threadpool_limits(limits=1, user_api="blas"):

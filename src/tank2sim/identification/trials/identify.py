@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -16,39 +16,38 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.examination import doubts
 from tank2sim.dynamics import build
 from tank2sim.errors import ArgumentError, InputError
-from tank2sim.identification.trials.assessment.evaluation import Comparison, compare_card, noise_of, replay_error
-from tank2sim.identification.trials.assessment.identifiability import Identifiability, identifiability, refuse_unseen
+from tank2sim.identification.trials.assessment.evaluation import (
+    Comparison,
+    compare_card,
+    noise_of,
+    or_none,
+    replay_error,
+)
+from tank2sim.identification.trials.assessment.identifiability import (
+    IdentifiabilityStudy,
+    identifiability,
+    refuse_unseen,
+)
 from tank2sim.identification.trials.assessment.model_selection import (
     Criteria,
     CrossValidation,
+    MethodChoice,
+    choose_method,
+    criteria,
     cross_validate,
+    posed_in,
     predictive_weights,
+    signal_residuals,
     simplest,
+    structure_by_evidence,
     yaw_rate_error,
 )
 from tank2sim.identification.trials.assessment.other_ship import far_from_card, not_of_ship, other_ship
-from tank2sim.identification.trials.assessment.prediction_intervals import (
-    FittedProblem,
-    WeightedFit,
-    bootstrap_estimates,
-    compare_held_out,
-    criteria_or_none,
-)
-from tank2sim.identification.trials.assessment.structure_choice import (
-    MethodChoice,
-    choose_method,
-    posed_in,
-    signal_residuals,
-    structure_by_evidence,
-)
+from tank2sim.identification.trials.assessment.prediction_intervals import Fit, bootstrap, compare_held_out, generators
 from tank2sim.identification.trials.methods.equation_error import equation_error
 from tank2sim.identification.trials.methods.kalman import KalmanSettings, kalman
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
-from tank2sim.identification.trials.methods.posterior_sampling import (
-    PosteriorSamples,
-    check_sampler,
-    sample_posterior,
-)
+from tank2sim.identification.trials.methods.posterior_sampling import PosteriorSamples, check_sampler, sample_posterior
 from tank2sim.identification.trials.options import (
     AUTO,
     AVERAGE,
@@ -59,7 +58,6 @@ from tank2sim.identification.trials.options import (
 )
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
-from tank2sim.identification.trials.problem.picklable import portable
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import (
     card_with_estimate,
@@ -79,7 +77,6 @@ from tank2sim.identification.trials.problem.water_current import (
     without_current,
 )
 from tank2sim.notices import Notice, caution
-from tank2sim.records.trials import Trial
 from tank2sim.simulation.recorded import recorded
 
 LEAST_PIECE = 0.5
@@ -91,80 +88,35 @@ LEAST_WEIGHT = 0.02
 WHOLE_RUN_MISFIT = 3.0
 """Largest error, over the noise of every signal, of a model that is fitted to whole runs, too (project choice)."""
 
-_NO_UNCERTAINTY = Notice(
-    "the card states no uncertainty: 2 % of each derivative is taken, and widened as the trials demand"
-)
-
 METHOD_WORDS = {"kalman": ("the Kalman filter", "output_error"), "output_error": ("output error", "kalman")}
 """Method that a choice takes, to its name in words and the other method."""
 
 
-@dataclass(frozen=True, eq=False)
-class Identification:
-    """Result of an identification.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Identification(Fit):
+    """Result of an identification."""
 
-    Parameters
-    ----------
-    started : ManoeuvringCard
-        The start card of the estimate: the given card in the requested structure.
-    card : ManoeuvringCard
-        With the estimates and their standard errors.
-    problem : Problem
-        The problem of the fitted trials.
-    estimate : Estimate
-    identifiability : Identifiability
-    noise : mapping
-        Standard deviation of measurement noise by variable, stated in the files or estimated: the unit of misfit.
-    fit, holdout : Comparison
-        Comparison of the new card with the fitted trials, and with the held-out trials (None without any).
-    before, before_holdout : Comparison
-        The same for the given card.
-    structure : str
-        Structure of the model, as requested or chosen.
-    manoeuvres : mapping
-        Trial to a description of the recognised manoeuvre.
-    forced : tuple of str
-        Evidence that the trials are not of the card's ship, where the fit was forced.
-    structures : mapping
-        Cross-validation of each structure; empty unless the structure is :data:`.options.AUTO` or
-        :data:`.options.AVERAGE`.
-    weights : mapping
-        Weight of each structure in the intervals of held-out trials; empty unless it is :data:`.options.AVERAGE`.
-    criteria : Criteria or None
-        Information criteria of the fit, for comparison with another model of the same trials; None where the
-        velocities were not measured.
-    posterior : PosteriorSamples or None
-        On request; values and covariance of the estimate are then its means and covariance.
-    bootstrap : array (members, k) or None
-        Estimates from trials simulated with the estimate (:mod:`.prediction_intervals`), on request.
-    notices : tuple of Notice
-    current : WaterCurrent or None
-        Estimated with the coefficients; None where the card or a sensor states it, and in a basin. All cards have it.
-    choice : MethodChoice or None
-        Choice of the method, and its reason; None where the options name the method.
-    """
-
-    started: ManoeuvringCard
-    card: ManoeuvringCard
-    problem: Problem
-    estimate: Estimate
-    identifiability: Identifiability
+    identifiability: IdentifiabilityStudy
+    # Standard deviation of measurement noise by variable, stated in the files or estimated: the unit of misfit
     noise: Mapping[str, float]
+    # Comparison of the new card with the fitted trials, and with the held-out trials (None without any)
     fit: Comparison
     holdout: Comparison | None
+    # The same for the given card
     before: Comparison
     before_holdout: Comparison | None
-    structure: str
+    structure: str  # Structure of the model, as requested or chosen
+    # Cross-validation of each structure; empty unless it is :data:`.options.AUTO` or :data:`.options.AVERAGE`
     structures: Mapping[str, CrossValidation]
+    # Weight of each structure in the intervals of held-out trials; empty unless it is :data:`.options.AVERAGE`
     weights: Mapping[str, float]
+    # For comparison with another model of the same trials; None where the velocities were not measured
     criteria: Criteria | None
-    posterior: PosteriorSamples | None
-    bootstrap: Array | None
-    manoeuvres: Mapping[str, str]
-    forced: tuple[str, ...]
+    posterior: PosteriorSamples | None  # On request; values and covariance of the estimate are then those of it
+    bootstrap: Array | None  # (members, k): Estimates from trials simulated with the estimate, on request
+    manoeuvres: Mapping[str, str]  # Trial to a description of the recognised manoeuvre
+    forced: tuple[str, ...]  # Evidence that the trials are not of the card's ship, where the fit was forced
     notices: tuple[Notice, ...]
-    current: WaterCurrent | None = None
-    choice: MethodChoice | None = None
 
     @property
     def comparisons(self) -> tuple[tuple[str, Comparison, Comparison], ...]:
@@ -173,9 +125,6 @@ class Identification:
         if self.holdout is None or self.before_holdout is None:
             return (fitted,)
         return fitted, ("held out", self.before_holdout, self.holdout)
-
-
-_OF_ONE_SHIP = "give the card and the trials of one ship, in the same units and signs, or force the fit"
 
 
 def identify_trials(
@@ -188,122 +137,93 @@ def identify_trials(
 ) -> Identification:
     """Estimate the coefficients of a card from free-running trials, alone or together with captive tests.
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-        Prior of the ship: values and standard errors.
-    trials, holdout : Measured
-        Trials to fit, and trials for comparison only.
-    options : IdentificationOptions, optional
-    progress : callable
-        Called with each better estimate. A KeyboardInterrupt ends the search with the best estimate so far.
-    executor : concurrent.futures.Executor, optional
-        For the fits of cross-validation and bootstrap, and the simulations behind intervals.
-
-    Raises
-    ------
-    InputError
-        The captive tests are of another ship, or the method is not output error; the trials look like those of another
-        ship than the card's, or of two ships, do not excite the estimated parameters, lack necessary signals, or are
-        driven by another rudder signal than the held-out trials.
+    `card`: Prior of the ship: values and standard errors. `trials`, `holdout`: Trials to fit, and trials for comparison
+    only. `progress`: Called with each better estimate. A KeyboardInterrupt ends the search with the best estimate so
+    far. `executor`: For the fits of cross-validation and bootstrap, and the simulations behind intervals. Raises
+    InputError: The captive tests are of another ship, or the method is not output error; the trials look like those of
+    another ship than the card's, or of two ships, do not excite the estimated parameters, lack necessary signals, or
+    are driven by another rudder signal than the held-out trials.
     """
     options = options or IdentificationOptions()
+    held = holdout if holdout is not None and holdout.trials else None
     try:
         # Small matrices: threads of the linear algebra library wait for each other, and runs have their own threads.
         with threadpool_limits(limits=1, user_api="blas"):
-            return _identified(card, trials, holdout, options, progress, executor)
+            return _identified(card, _Asked(trials, options, progress), held, executor)
     except np.linalg.LinAlgError:
         names = ", ".join(trial.name for trial in trials.trials)
         remedy = "add runs in which rudder, yaw, sway and speed change, or hold terms"
         raise InputError(names, "", "excites too little to estimate anything", remedy) from None
 
 
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """What is fitted, and how."""
+
+    trials: Measured
+    options: IdentificationOptions
+    progress: SearchReport = silent
+    drifts: bool = False  # Whether the trials are in a current that is not known
+
+
 def _identified(
-    card: ManoeuvringCard,
-    trials: Measured,
-    holdout: Measured | None,
-    options: IdentificationOptions,
-    progress: SearchReport,
-    executor: Executor | None,
+    card: ManoeuvringCard, asked: _Asked, held: Measured | None, executor: Executor | None
 ) -> Identification:
+    trials, options = asked.trials, asked.options
     _refuse_options(card, trials, options)
     given, card = card, polynomial_over_trials(card, trials.trials)
-    drifts = of_unknown_current(card, trials.trials)
-    if drifts:
-        card = card_in(card, _first_current(card, trials))
-    chosen = _choose_structure(card, trials, options, holdout, executor)
-    structure = chosen.name
+    asked = replace(asked, drifts=of_unknown_current(card, trials.trials))
+    if asked.drifts:  # by the card's own coefficients first; what they do not explain counts as random accelerations
+        problem = current_alone(problem_from_card(card, trials.trials, trials.driven_by))
+        still = kalman(problem, settings=KalmanSettings(scale_prior=False))
+        card = card_in(card, without_current(still, card)[1])
+    structure, structures, weights, chosen = _choose_structure(card, asked, held, executor)
     evidence = other_ship(problem_from_card(card, trials.trials, trials.driven_by))  # in the structure of the card
-    if evidence and not options.force:
-        raise not_of_ship(card, trials, evidence, _OF_ONE_SHIP)
-    fit = _fitted(card, structure, trials, options, progress, drifts=drifts)
-    evidence += far_from_card(fit.fitted.problem, fit.fitted.estimate)
-    if evidence and not options.force:
-        raise not_of_ship(card, trials, evidence, _OF_ONE_SHIP)
-    started, fitted, current = fit.started, fit.fitted, fit.current
-    card = card if current is None else card_in(card, current)
+    fit = None
+    if not evidence or options.force:
+        fit = _fitted(card, structure, asked)
+        evidence += far_from_card(fit.problem, fit.estimate)
+    if fit is None or (evidence and not options.force):
+        remedy = "give the card and the trials of one ship, in the same units and signs, or force the fit"
+        raise not_of_ship(card, trials, evidence, remedy)
+    card = card if fit.current is None else card_in(card, fit.current)
     samples = None
     if options.posterior:
-        samples = sample_posterior(fitted.problem, fitted.estimate, options.posterior, options.draws)
-        fitted = _with_samples(fitted, started, samples)
-    problem, estimate, improved = fitted.problem, fitted.estimate, fitted.card
-    noise = noise_of(trials, problem)
-    result = identifiability(problem, estimate)
-    held = holdout if holdout is not None and holdout.trials else None
+        samples = sample_posterior(fit.problem, fit.estimate, options.posterior, options.draws)
+        fit = _with_samples(fit, samples)
+    silently = replace(asked, progress=silent)
     average = [
-        WeightedFit(fitted if name == structure else _fitted(card, name, trials, options, drifts=drifts).fitted, weight)
-        for name, weight in chosen.weights.items()
+        (fit if name == structure else _fitted(card, name, silently), weight) for name, weight in weights.items()
     ]
+    disturbances = fit.disturbances if options.bootstrap else None  # unknown without velocities
+    again = fit.problem, fit.estimate, partial(_in_pieces, options=options)
+    every = [*trials.trials, *(held.trials if held else ())]
+    recognised = ((trial.name, recorded(trial, build(fit.card))) for trial in every)
     return Identification(
-        started=started,
-        card=improved,
-        problem=problem,
-        estimate=estimate,
-        identifiability=result,
-        noise=noise,
-        fit=compare_card(improved, trials, estimate.noise, whole=fitted.whole),
-        holdout=compare_held_out(fitted, held, options.members, executor, average) if held else None,
-        before=compare_card(card, trials, estimate.noise),
-        before_holdout=compare_card(card, held, estimate.noise) if held else None,
+        **vars(fit),
+        identifiability=identifiability(fit.problem, fit.estimate),
+        noise=noise_of(trials, fit.problem),
+        fit=compare_card(fit.card, trials, fit.estimate.noise, whole=fit.whole),
+        holdout=compare_held_out(fit, held, options.members, executor, average) if held else None,
+        before=compare_card(card, trials, fit.estimate.noise),
+        before_holdout=compare_card(card, held, fit.estimate.noise) if held else None,
         structure=structure,
-        structures=chosen.structures,
-        weights=chosen.weights,
-        criteria=criteria_or_none(fitted),
+        structures=structures,
+        weights=weights,
+        criteria=or_none(criteria, fit.problem, fit.estimate),
         posterior=samples,
-        bootstrap=bootstrap_estimates(
-            fitted, trials.driven_by, partial(_in_pieces, options=options), options.bootstrap, executor
-        ),
+        bootstrap=bootstrap(*again, disturbances, generators(options.bootstrap), executor) if disturbances else None,
         forced=evidence,
-        manoeuvres=_manoeuvres(improved, (*trials.trials, *(held.trials if held else ()))),
-        current=current,
-        choice=fit.choice,
-        notices=_notices((given, card, improved), trials, held, chosen, fit, samples),
-    )
-
-
-def _notices(
-    cards: tuple[ManoeuvringCard, ManoeuvringCard, ManoeuvringCard],
-    trials: Measured,
-    held: Measured | None,
-    chosen: _ChosenStructure,
-    fit: _Fit,
-    samples: PosteriorSamples | None,
-) -> tuple[Notice, ...]:
-    """All notices of an identification; `cards` are the given card, the card of the fit and the card found."""
-    given, card, improved = cards
-    return (
-        *dict.fromkeys((*doubts(given), *doubts(improved))),
-        *trials.notices,
-        *(held.notices if held else ()),
-        *lowered_bound_notice(given, card),
-        *(() if card.uncertainty else (_NO_UNCERTAINTY,)),
-        *_captive_notice(card, trials.captive),
-        *chosen.notices,
-        *_unseen_notice(fit.unseen),
-        *_current_notice(fit.current),
-        *_choice_notice(fit.choice),
-        *(samples.notices if samples is not None and samples.converged else ()),
-        *fit.fitted.estimate.notices,
+        manoeuvres={name: manoeuvre.words for name, manoeuvre in recognised if manoeuvre is not None},
+        notices=(
+            *dict.fromkeys((*doubts(given), *doubts(fit.card))),
+            *trials.notices,
+            *(held.notices if held else ()),
+            *lowered_bound_notice(given, card),
+            *_fit_notices(card, trials.captive, chosen, fit),
+            *(samples.notices if samples is not None and samples.converged else ()),
+            *fit.estimate.notices,
+        ),
     )
 
 
@@ -322,102 +242,76 @@ def _refuse_options(card: ManoeuvringCard, trials: Measured, options: Identifica
         raise ArgumentError("structure", "", problem_text, remedy)
 
 
-@dataclass(frozen=True, eq=False)
-class _ChosenStructure:
-    """Structure of the fit, cross-validation and weights of all where asked for, and notices of the choice."""
-
-    name: str
-    structures: Mapping[str, CrossValidation] = field(default_factory=dict)
-    weights: Mapping[str, float] = field(default_factory=dict)
-    notices: tuple[Notice, ...] = ()
-
-
 def _choose_structure(
-    card: ManoeuvringCard,
-    trials: Measured,
-    options: IdentificationOptions,
-    holdout: Measured | None,
-    executor: Executor | None,
-) -> _ChosenStructure:
+    card: ManoeuvringCard, asked: _Asked, held: Measured | None, executor: Executor | None
+) -> tuple[str, dict[str, CrossValidation], dict[str, float], tuple[Notice, ...]]:
+    """Structure of the fit, cross-validation and weights of all where asked for, and notices of the choice."""
+    trials, options = asked.trials, asked.options
     if options.structure == BY_EVIDENCE:
-        name, notices = structure_by_evidence(card, trials, options, holdout)
-        return _ChosenStructure(name, notices=notices)
+        name, notices = structure_by_evidence(card, trials, options, held)
+        return name, {}, {}, notices
     if options.structure not in (AUTO, AVERAGE):
-        return _ChosenStructure(options.structure)
-    structures = cross_validate_structures(card, trials, options, executor)
+        return options.structure, {}, {}, ()
+    estimator, found = partial(_in_pieces, options=options), {}
+    for name, structure in STRUCTURES.items():
+        problem = posed_in(card, structure.start(card), trials, options)
+        found[name] = cross_validate(problem, estimator, yaw_rate_error, executor)
     if options.structure == AUTO:
-        return _ChosenStructure(simplest(structures), structures)
-    weights = _kept_weights(card, trials, options, structures)
-    heaviest = max(weights, key=weights.__getitem__)
-    return _ChosenStructure(heaviest, structures, weights, (Notice(_average_in_words(weights)),))
-
-
-def _manoeuvres(card: ManoeuvringCard, trials: Sequence[Trial]) -> dict[str, str]:
-    model = build(card)
-    known = {trial.name: recorded(trial, model) for trial in trials}
-    return {name: manoeuvre.words for name, manoeuvre in known.items() if manoeuvre is not None}
+        return simplest(found), found, {}, ()
+    problem = posed_in(card, card, trials, options)
+    # A window of a run counts as a sample.
+    samples = [max(1.0, (run.times[-1] - run.times[0]) / (PIECE * problem.ship_time)) for run in problem.runs]
+    kept = {name: each for name, each in predictive_weights(found, samples).items() if each >= LEAST_WEIGHT}
+    weights = {name: weight / sum(kept.values()) for name, weight in kept.items()}
+    falling = sorted(weights, key=weights.__getitem__)[::-1]
+    shares = ", ".join(f"{name} {100 * weights[name]:.0f} %" for name in falling)
+    words = "intervals are of all, the card is that of the first"
+    notice = Notice(f"average over structures by their predictions: {shares}; {words}")
+    return max(weights, key=weights.__getitem__), found, weights, (notice,)
 
 
 def _by_output_error(options: IdentificationOptions) -> bool:
     return options.method in (BY_RESIDUALS, "output_error")
 
 
-def estimate_parameters(problem: Problem, options: IdentificationOptions, progress: SearchReport = silent) -> Estimate:
-    """The estimate by the method of the options, output error for :data:`BY_RESIDUALS`."""
-    if options.method == "kalman":
-        return _filtered(problem, options, progress)
-    if options.method == "equation_error":
-        return equation_error(problem, progress=progress)
-    return _over_whole_runs(problem, _over_pieces(problem, options, progress), options, progress)
-
-
-def _filtered(problem: Problem, options: IdentificationOptions, progress: SearchReport) -> Estimate:
-    return kalman(problem, settings=KalmanSettings(scale_prior=options.scale_prior), progress=progress)
-
-
-def _over_pieces(problem: Problem, options: IdentificationOptions, progress: SearchReport) -> Estimate:
-    """Output error in pieces, which starts at the estimate of equation error."""
-    length = options.piece_s or PIECE * problem.ship_time
-    if length < LEAST_PIECE * problem.ship_time:
-        least = LEAST_PIECE * problem.ship_time
-        raise ArgumentError("piece_s", "", f"is {length:g} s", f"give {least:.3g} s or more ({LEAST_PIECE:g} L/u0)")
-    settings = OutputErrorSettings(piece_s=length, scale_prior=options.scale_prior)
-    return output_error(problem, _start(problem), settings, progress)
-
-
-def _over_whole_runs(
-    problem: Problem, in_pieces: Estimate, options: IdentificationOptions, progress: SearchReport
-) -> Estimate:
-    """Output error over whole runs where the estimate in pieces follows them; else that estimate."""
-    if in_pieces.notices or not _follows_whole_runs(problem, in_pieces):
-        return in_pieces
-    settings = OutputErrorSettings(scale_prior=options.scale_prior)
-    return output_error(problem, in_pieces.values, settings, progress)
-
-
-def _estimate_and_choice(
-    problem: Problem, trials: Measured, options: IdentificationOptions, progress: SearchReport
+def estimate_parameters(
+    problem: Problem, options: IdentificationOptions, progress: SearchReport = silent, trials: Measured | None = None
 ) -> tuple[Estimate, MethodChoice | None]:
-    """The estimate, and the choice of its method where the options leave it open."""
-    if options.method != BY_RESIDUALS:
-        return estimate_parameters(problem, options, progress), None
-    in_pieces = _over_pieces(problem, options, progress)
-    choice = _choice(problem, in_pieces, trials, options)
-    if choice.method == "kalman" and not in_pieces.notices:
-        filtered = _filtered(problem, options, progress)
-        if np.isfinite([*filtered.cost[-1:], *filtered.values, *filtered.standard_errors]).all():
-            return filtered, choice
-        choice = MethodChoice("output_error", "the Kalman filter diverged on these trials")
-    return _over_whole_runs(problem, in_pieces, options, progress), choice
+    """The estimate, and the choice of its method where `options` leave it open and `trials` show which is right."""
+    choice = None
+    if options.method == "equation_error":
+        return equation_error(problem, progress=progress), None
+    filtering = KalmanSettings(scale_prior=options.scale_prior)
+    if options.method == "kalman":
+        return kalman(problem, settings=filtering, progress=progress), None
+    settings = _pieces(problem, options)
+    found = output_error(problem, _start(problem), settings, progress)
+    if options.method == BY_RESIDUALS and trials is not None:
+        choice = _choose_method(problem, found, options, trials)
+        if choice.method == "kalman" and not found.notices:
+            filtered = kalman(problem, settings=filtering, progress=progress)
+            if np.isfinite([*filtered.cost[-1:], *filtered.values, *filtered.standard_errors]).all():
+                return filtered, choice
+            choice = MethodChoice("output_error", "the Kalman filter diverged on these trials")
+    if not found.notices and _follows_whole_runs(problem, found):
+        found = output_error(problem, found.values, OutputErrorSettings(scale_prior=options.scale_prior), progress)
+    return found, choice
 
 
-def _choice(problem: Problem, in_pieces: Estimate, trials: Measured, options: IdentificationOptions) -> MethodChoice:
-    if not at_sea(trials.trials):
-        reason = (
-            "no trial has a geographic position or a velocity over the ground, by which it would be known to be at sea"
-        )
-        return MethodChoice("output_error", reason)
+def _pieces(problem: Problem, options: IdentificationOptions) -> OutputErrorSettings:
+    """Settings of output error in pieces."""
+    length, least = options.piece_s or PIECE * problem.ship_time, LEAST_PIECE * problem.ship_time
+    if length < least:
+        raise ArgumentError("piece_s", "", f"is {length:g} s", f"give {least:.3g} s or more ({LEAST_PIECE:g} L/u0)")
+    return OutputErrorSettings(piece_s=length, scale_prior=options.scale_prior)
+
+
+def _choose_method(
+    problem: Problem, in_pieces: Estimate, options: IdentificationOptions, trials: Measured
+) -> MethodChoice:
+    basin = "no trial has a geographic position or a velocity over the ground, by which it would be known to be at sea"
     for given, words in (
+        (not at_sea(trials.trials), basin),
         (trials.captive is not None, "captive tests are fitted together with the trials"),
         (bool(options.posterior), "the posterior is sampled from its density"),
         (options.piece_s is not None, "the length of its pieces was given"),
@@ -427,104 +321,41 @@ def _choice(problem: Problem, in_pieces: Estimate, trials: Measured, options: Id
     return choose_method(signal_residuals(problem, in_pieces))
 
 
-def cross_validate_structures(
-    card: ManoeuvringCard, trials: Measured, options: IdentificationOptions, executor: Executor | None = None
-) -> dict[str, CrossValidation]:
-    """Cross-validation of each structure by its yaw-rate error on held-out trials."""
-    results = {}
-    for name, structure in STRUCTURES.items():
-        started = structure.start(card)
-        problem = posed_in(card, started, trials, options)
-        posed = portable(problem, started, trials.driven_by)
-        results[name] = cross_validate(posed, partial(_in_pieces, options=options), yaw_rate_error, executor)
-    return results
-
-
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """The start card, parameters that the trials do not show, the fit, the current and the choice of the method."""
-
-    started: ManoeuvringCard
-    unseen: tuple[str, ...]
-    fitted: FittedProblem
-    current: WaterCurrent | None
-    choice: MethodChoice | None
-
-
-def _fitted(
-    card: ManoeuvringCard,
-    structure: str,
-    trials: Measured,
-    options: IdentificationOptions,
-    progress: SearchReport = silent,
-    *,
-    drifts: bool,
-) -> _Fit:
-    """A fit in a structure, with a current of its own if the water `drifts` and the method can estimate it."""
+def _fitted(card: ManoeuvringCard, structure: str, asked: _Asked) -> Fit:
+    """A fit in a structure, with a current of its own if the water drifts and the method can estimate it."""
+    trials, options = asked.trials, asked.options
     started = STRUCTURES[structure].start(card)
     problem = posed_in(card, started, trials, options)
     unseen = refuse_unseen(problem) if trials.captive is None else ()  # what trials do not show, the tank may
-    problem = problem.without(unseen)
-    current = None
-    if drifts and options.method != "equation_error":
-        joint, choice = _estimate_and_choice(with_current(problem), trials, options, progress)
+    problem, current = problem.without(unseen), None
+    if asked.drifts and options.method != "equation_error":
+        joint, choice = estimate_parameters(with_current(problem), options, asked.progress, trials)
         estimate, current = without_current(joint, started)
         started = card_in(started, current)
         problem = posed_in(card, started, trials, options).without(unseen)
     else:
-        estimate, choice = _estimate_and_choice(problem, trials, options, progress)
+        estimate, choice = estimate_parameters(problem, options, asked.progress, trials)
     improved = with_range(card_with_estimate(started, estimate), problem)
-    fitted = FittedProblem(problem, estimate, improved, started.model.valid_speed_mps is None)
-    return _Fit(started, unseen, fitted, current, choice)
+    return Fit(started, unseen, problem, estimate, improved, current, choice)
 
 
-def _first_current(card: ManoeuvringCard, trials: Measured) -> WaterCurrent:
-    """The current by the card's own coefficients; what they do not explain counts as random accelerations."""
-    problem = current_alone(problem_from_card(card, trials.trials, trials.driven_by))
-    return without_current(kalman(problem, settings=KalmanSettings(scale_prior=False)), card)[1]
-
-
-def _with_samples(fitted: FittedProblem, started: ManoeuvringCard, samples: PosteriorSamples) -> FittedProblem:
+def _with_samples(fit: Fit, samples: PosteriorSamples) -> Fit:
     """The fit with means, covariance and samples of the posterior in place of the estimate and its covariance."""
-    mean, covariance = samples.mean, samples.covariance
-    estimate = replace(fitted.estimate, values=mean, covariance=covariance, samples=samples.flat)
-    card = with_range(card_with_estimate(started, estimate), fitted.problem)
-    return replace(fitted, estimate=estimate, card=card)
-
-
-def _kept_weights(
-    card: ManoeuvringCard, trials: Measured, options: IdentificationOptions, structures: Mapping[str, CrossValidation]
-) -> dict[str, float]:
-    """Weights of the structures, those below :data:`LEAST_WEIGHT` left out; a window of a run counts as a sample."""
-    problem = posed_in(card, card, trials, options)
-    samples = [max(1.0, (run.times[-1] - run.times[0]) / (PIECE * problem.ship_time)) for run in problem.runs]
-    weights = predictive_weights(structures, samples)
-    kept = {name: weight for name, weight in weights.items() if weight >= LEAST_WEIGHT}
-    return {name: weight / sum(kept.values()) for name, weight in kept.items()}
-
-
-def _average_in_words(weights: Mapping[str, float]) -> str:
-    shares = ", ".join(f"{name} {100 * weights[name]:.0f} %" for name in sorted(weights, key=weights.__getitem__)[::-1])
-    words = "intervals are of all, the card is that of the first"
-    return f"average over structures by their predictions: {shares}; {words}"
+    estimate = replace(fit.estimate, values=samples.mean, covariance=samples.covariance, samples=samples.flat)
+    return replace(fit, estimate=estimate, card=with_range(card_with_estimate(fit.started, estimate), fit.problem))
 
 
 def _in_pieces(problem: Problem, options: IdentificationOptions) -> Estimate:
     """The estimate of a fold: pieces only and fewer rounds, which is enough for a comparison of folds."""
     if not _by_output_error(options):
-        return estimate_parameters(problem, options)
-    length = options.piece_s or PIECE * problem.ship_time
-    return output_error(
-        problem, _start(problem), OutputErrorSettings(length, scale_prior=options.scale_prior, rounds=3)
-    )
+        return estimate_parameters(problem, options)[0]
+    return output_error(problem, _start(problem), replace(_pieces(problem, options), rounds=3))
 
 
 def _start(problem: Problem) -> Array | None:
     """Start values of output error: those of the weak form, which needs none itself; None without velocities."""
-    try:
-        return equation_error(problem).values
-    except InputError:
-        return None
+    found = or_none(equation_error, problem)
+    return None if found is None else found.values
 
 
 def _follows_whole_runs(problem: Problem, estimate: Estimate) -> bool:
@@ -533,25 +364,33 @@ def _follows_whole_runs(problem: Problem, estimate: Estimate) -> bool:
     return all(error <= limits[name] for result in results for name, error in result.whole.items())
 
 
-def _captive_notice(card: ManoeuvringCard, captive: CaptiveRuns | None) -> Sequence[Notice]:
-    if captive is None:
-        return ()
-    times = card.ship.length_m / captive.campaign.model.length_m
-    words = f"{captive.campaign.path}: {len(captive.runs)} captive tests are fitted together with the trials"
-    return (Notice(f"{words}, scaled by Froude's law to a ship {times:.4g} times as long"),)
-
-
-def _current_notice(current: WaterCurrent | None) -> Sequence[Notice]:
-    if current is None:
-        return ()
-    speed_error, direction_error = current.errors
-    words = f"a current of {current.speed_mps:.2f} ± {speed_error:.2g} m/s towards "
-    words += (
-        f"{math.degrees(current.direction_rad):.0f} ± {math.degrees(direction_error):.2g} deg was estimated with the "
-    )
-    words += "coefficients: the card has it as its effect current; leave that out for still water"
-    notice = Notice(words)
-    return (notice,) if current.determined else (undetermined_notice(current), notice)
+def _fit_notices(
+    card: ManoeuvringCard, captive: CaptiveRuns | None, chosen: Sequence[Notice], fit: Fit
+) -> Iterator[Notice]:
+    """Notices of the prior, the captive tests, the structure, the current and the method."""
+    if not card.uncertainty:
+        words = "the card states no uncertainty: 2 % of each derivative is taken, and widened as the trials demand"
+        yield Notice(words)
+    if captive is not None:
+        times = card.ship.length_m / captive.campaign.model.length_m
+        words = f"{captive.campaign.path}: {len(captive.runs)} captive tests are fitted together with the trials"
+        yield Notice(f"{words}, scaled by Froude's law to a ship {times:.4g} times as long")
+    yield from chosen
+    if fit.unseen:
+        text = ", ".join(name.removeprefix("derivatives.") for name in fit.unseen)
+        yield Notice(f"the trials show nothing of {text}: held as the card has them")
+    if fit.current is not None:
+        speed_error, direction_error = fit.current.errors
+        if not fit.current.determined:
+            yield undetermined_notice(fit.current)
+        yield Notice(
+            f"a current of {fit.current.speed_mps:.2f} ± {speed_error:.2g} m/s towards "
+            f"{math.degrees(fit.current.direction_rad):.0f} ± {math.degrees(direction_error):.2g} deg was estimated "
+            "with the coefficients: the card has it as its effect current; leave that out for still water"
+        )
+    if fit.choice is not None:
+        name, other = METHOD_WORDS[fit.choice.method]
+        yield Notice(f"method: {name}, because {fit.choice.reason}; method {other} takes the other")
 
 
 def undetermined_notice(current: WaterCurrent) -> Notice:
@@ -561,17 +400,3 @@ def undetermined_notice(current: WaterCurrent) -> Notice:
         "coefficients and figures may hold a part of it; add speed through the water or a full turn, or give the card "
         "its effect current"
     )
-
-
-def _choice_notice(choice: MethodChoice | None) -> Sequence[Notice]:
-    if choice is None:
-        return ()
-    name, other = METHOD_WORDS[choice.method]
-    return (Notice(f"method: {name}, because {choice.reason}; method {other} takes the other"),)
-
-
-def _unseen_notice(names: Sequence[str]) -> Sequence[Notice]:
-    if not names:
-        return ()
-    text = ", ".join(name.removeprefix("derivatives.") for name in names)
-    return (Notice(f"the trials show nothing of {text}: held as the card has them"),)

@@ -45,7 +45,7 @@ class IdentificationOptions:
     ----------
     method : str
         One of :data:`TrialMethod`; :data:`BY_RESIDUALS` fits trials at sea with the Kalman filter if they show gusts
-        or waves, and all others by output error (:mod:`.structure_choice`).
+        or waves, and all others by output error (:mod:`.model_selection`).
     structure : str
         One of :data:`STRUCTURE_WORDS` or of an installed package.
     inertia : bool

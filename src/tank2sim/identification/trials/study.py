@@ -1,8 +1,9 @@
-"""Study of an identification from trials, and the text of the card found."""
+"""Study of an identification from trials with what is remarkable of it, and the text of the card found."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -10,6 +11,8 @@ import numpy as np
 from tank2sim.arrays import Array, Columns, Number, Unbounded
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.reading import changed_text
+from tank2sim.dynamics import build
+from tank2sim.errors import InputError
 from tank2sim.escaping import one_line
 from tank2sim.files import BYTE_ORDER_MARK
 from tank2sim.identification.trials.assessment.evaluation import (
@@ -20,18 +23,89 @@ from tank2sim.identification.trials.assessment.evaluation import (
     misfit,
     pooled,
 )
-from tank2sim.identification.trials.assessment.notices import remarks
+from tank2sim.identification.trials.assessment.identifiability import IdentifiabilityStudy, share_from_trials
+from tank2sim.identification.trials.assessment.model_selection import hard_rudder
 from tank2sim.identification.trials.identify import Identification
-from tank2sim.identification.trials.methods.posterior import scaled_prior
 from tank2sim.identification.trials.methods.posterior_sampling import PosteriorSamples
+from tank2sim.identification.trials.problem.estimation_problem import scaled_prior
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 from tank2sim.identification.trials.problem.water_current import WaterCurrent, card_in
-from tank2sim.notices import Notice, caution
+from tank2sim.notices import Level, Notice, caution
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.thinning import drawn_columns
+from tank2sim.simulation.manoeuvres import Turn
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
+from tank2sim.simulation.run import simulate
 from tank2sim.units import from_si
+
+STOPPED = 0.15
+"""Share of its speed below which a ship in a turn has stopped: full hulls keep a third (project choice)."""
+
+WORSE = 1.05
+"""An error that grew by less than this factor counts as unchanged (project choice)."""
+
+LACKING = 3.0
+"""Factor on the card's standard errors from which a missing effect is the likelier reason (project choice: three
+standard errors are rare by chance)."""
+
+
+def remarks(result: Identification) -> Iterator[Notice]:
+    """What the result shows: manoeuvres, the structure, errors that grew, and the limits of the card."""
+    if result.manoeuvres:
+        text = "; ".join(f"{name}: {words}" for name, words in result.manoeuvres.items())
+        yield Notice(f"recognised, to starboard positive: {text}")
+    if result.structures:
+        words = "the simplest of those within one standard error of the best"
+        yield Notice(f"cross-validation chose the structure {result.structure}: {words}")
+    elif result.structure == "card" and result.card.model.kind != "mmg":  # which has one structure
+        words = "structure auto cross-validates them, cross_flow extrapolates to turns"
+        yield Notice(f"other structures were not tried: {words}")
+    yield from _widened(result)
+    for words, before, after in result.comparisons:
+        old, new = pooled(before.following, "motion.r"), pooled(after.following, "motion.r")
+        if new > WORSE * old:
+            errors = f"yaw-rate error {100 * old:.3g} % before, {100 * new:.3g} %"
+            yield caution(f"WORSE than the card before on the trials {words}: {errors}")
+    missed = [
+        f"{figure.trial} {figure.name}"
+        for figure in (result.holdout.figures if result.holdout else ())
+        if figure.interval and not figure.interval[0] <= figure.measured <= figure.interval[1]
+    ]
+    if missed:
+        yield Notice(f"measured outside the 95 % interval: {', '.join(missed)}")
+    yield from _stops(result.card)
+
+
+def _widened(result: Identification) -> Iterator[Notice]:
+    scale = result.estimate.prior_scale
+    wide = [f"{group} {factor:.3g} times" for group, factor in sorted(scale.items()) if factor > 1.05]
+    if not wide:
+        return
+    far = max(scale.values()) > LACKING
+    doubtful = far and result.started.uncertainty  # assumed errors may be too small
+    text = f"the card's standard errors were widened as the trials demand: {', '.join(wide)}; trust_card keeps them"
+    yield Notice(text, Level.CAUTION if doubtful else Level.INFO)
+    if far:
+        yield Notice(
+            "coefficients so far from the card may be due to an effect that it lacks: tank2sim gap, with these "
+            "trials and the given card, finds which"
+        )
+
+
+def _stops(card: ManoeuvringCard) -> Iterator[Notice]:
+    """Trials seldom hold a full turn: simulate a turn to each side with the card."""
+    largest, near = hard_rudder(card), "it holds only near the trials"
+    for side, word in ((1, "starboard"), (-1, "port")):
+        words = caution(f"in a {math.degrees(largest):.0f} deg turn to {word} the model found")
+        try:
+            speed = simulate(build(card), Turn(side * largest)).trajectory["motion.speed"]
+        except InputError:
+            yield Notice(f"{words} leaves all bounds: {near}")
+            continue
+        if speed[-1] < STOPPED * speed[0]:
+            yield Notice(f"{words} loses {100 * (1 - speed[-1] / speed[0]):.0f} % of its speed: {near}")
+
 
 SET_KEYS = {"fitted": "fit", "held out": "holdout"}
 """Words for a set of trials to its key in the JSON."""
@@ -235,35 +309,6 @@ class BootstrapStudy:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class IdentifiabilityStudy:
-    """How well the trials determine the parameters (k), in units of the prior's standard errors.
-
-    Parameters
-    ----------
-    parameters : tuple of str
-    condition : float
-        Largest over smallest singular value.
-    singular_values : array (k,)
-        Of the weighted sensitivities, falling; below 1 the prior has more information than the trials.
-    correlation : array (k, k)
-        By the trials alone.
-    correlated_pairs : tuple of (str, str, float)
-        The closest first.
-    unseen : tuple of tuple of str
-        Combinations of parameters that the trials do not determine.
-    notices : tuple of Notice
-    """
-
-    parameters: tuple[str, ...]
-    condition: Unbounded
-    singular_values: Array
-    correlation: Array
-    correlated_pairs: tuple[tuple[str, str, float], ...]
-    unseen: tuple[tuple[str, ...], ...]
-    notices: tuple[Notice, ...]
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
 class TrialMotions:
     """Columns of a trial as measured, and as simulated by the card given (`before`) and by the card found.
 
@@ -366,13 +411,7 @@ def study_identification(
 ) -> IdentificationStudy:
     """Study of an identification.
 
-    Parameters
-    ----------
-    before : ManoeuvringCard
-        The card given.
-    result : Identification
-    fitted, held : Measured
-        Trials that were fitted and held out; they are replayed by both cards.
+    `before`: The card given. `fitted`, `held`: Trials that were fitted and held out; they are replayed by both cards.
     """
     estimate, known = result.estimate, result.identifiability
     parameters = _parameters(result)
@@ -402,22 +441,21 @@ def study_identification(
         },
         figures_are=FIGURES_ARE,
         figures={key: _figures(*comparisons[key]) if key in comparisons else () for key in SET_KEYS.values()},
-        structures=_structures(result),
+        structures={
+            name: StructureErrors(
+                errors=tuple(structure.errors.tolist()),
+                left_out=tuple(tuple(fold.held_out) for fold in (*structure.single, structure.extrapolation)),
+                weight=result.weights.get(name, 0.0) if result.weights else None,
+            )
+            for name, structure in result.structures.items()
+        },
         criteria=None if result.criteria is None else asdict(result.criteria),
         posterior=None if result.posterior is None else _posterior(result.posterior),
         bootstrap=_bootstrap(result),
         residual_noise=dict(estimate.noise),
         prior_scale=dict(estimate.prior_scale),
         cost=tuple(map(float, estimate.cost)),
-        identifiability=IdentifiabilityStudy(
-            parameters=tuple(name.removeprefix("derivatives.") for name in known.free),
-            condition=float(known.condition),
-            singular_values=known.singular_values,
-            correlation=np.round(known.correlation, 7),
-            correlated_pairs=tuple((first, second, float(value)) for first, second, value in known.pairs),
-            unseen=tuple(map(tuple, known.unseen)),
-            notices=tuple(known.notices),
-        ),
+        identifiability=known,
         notices=tuple(dict.fromkeys((*unfinished, *forced, *result.notices, *known.notices, *remarks(result)))),
         replays=_replays(before, result, fitted, held),
     )
@@ -436,42 +474,27 @@ def _current(current: WaterCurrent) -> EstimatedCurrent:
 
 
 def _parameters(result: Identification) -> dict[str, ParameterEstimate]:
-    columns = np.stack(
-        [
-            result.estimate.values,
-            result.estimate.standard_errors,
-            result.problem.prior_mean,
-            result.problem.prior_error,
-            scaled_prior(result.problem, result.estimate.prior_scale),
-            result.identifiability.share,
-        ],
-        axis=1,
-    ).tolist()
+    problem, estimate = result.problem, result.estimate
+    columns = {
+        "value": estimate.values,
+        "standard_error": estimate.standard_errors,
+        "before": problem.prior_mean,
+        "before_standard_error": problem.prior_error,
+        "prior_standard_error": scaled_prior(problem, estimate.prior_scale),
+        "share_from_trials": share_from_trials(problem, estimate),
+    }
     return {
-        name: ParameterEstimate(
-            value=value,
-            standard_error=error,
-            before=before,
-            before_standard_error=before_error,
-            prior_standard_error=prior_error,
-            share_from_trials=share,
-        )
-        for name, (value, error, before, before_error, prior_error, share) in zip(
-            result.estimate.free, columns, strict=True
-        )
+        name: ParameterEstimate(**{key: float(column[place]) for key, column in columns.items()})
+        for place, name in enumerate(estimate.free)
     }
 
 
 def _misfit(result: Identification) -> IdentificationMisfit:
-    def held_out(comparison: Comparison | None) -> float | None:
-        return misfit(comparison, result.noise) if comparison else None
-
-    return IdentificationMisfit(
-        fit=misfit(result.fit, result.noise),
-        holdout=held_out(result.holdout),
-        noise=dict(result.noise),
-        before=CardMisfit(fit=misfit(result.before, result.noise), holdout=held_out(result.before_holdout)),
-    )
+    pairs = (result.fit, result.before), (result.holdout, result.before_holdout)
+    fit, holdout = ([misfit(each, result.noise) if each else None for each in pair] for pair in pairs)
+    assert fit[0] is not None and fit[1] is not None
+    before = CardMisfit(fit=fit[1], holdout=holdout[1])
+    return IdentificationMisfit(fit=fit[0], holdout=holdout[0], noise=dict(result.noise), before=before)
 
 
 def _yaw_rate_errors(comparison: Comparison) -> dict[str, Number]:
@@ -480,17 +503,15 @@ def _yaw_rate_errors(comparison: Comparison) -> dict[str, Number]:
 
 
 def _errors_over_windows(before: Comparison, found: Comparison) -> tuple[TrialErrors, ...]:
-    return tuple(
-        TrialErrors(trial=new.name, before=_window_errors(old), found=_window_errors(new))
-        for old, new in zip(before.following, found.following, strict=True)
-    )
+    def errors(following: Following) -> dict[str, WindowError]:
+        pairs = {_OBSERVED[name]: pair for name, pair in following.windows.items()}
+        return {
+            column: WindowError(rms_error=float(from_si(column, error)), rms_signal=float(from_si(column, size)))
+            for column, (error, size) in pairs.items()
+        }
 
-
-def _window_errors(following: Following) -> dict[str, WindowError]:
-    return {
-        column: WindowError(rms_error=float(from_si(column, error)), rms_signal=float(from_si(column, size)))
-        for column, (error, size) in ((_OBSERVED[name], errors) for name, errors in following.windows.items())
-    }
+    pairs = zip(before.following, found.following, strict=True)
+    return tuple(TrialErrors(trial=new.name, before=errors(old), found=errors(new)) for old, new in pairs)
 
 
 def _figures(before: Comparison, found: Comparison) -> tuple[PredictedFigure, ...]:
@@ -507,17 +528,6 @@ def _figures(before: Comparison, found: Comparison) -> tuple[PredictedFigure, ..
         )
         for figure in found.figures
     )
-
-
-def _structures(result: Identification) -> dict[str, StructureErrors]:
-    return {
-        name: StructureErrors(
-            errors=tuple(structure.errors.tolist()),
-            left_out=tuple(tuple(fold.held_out) for fold in (*structure.single, structure.extrapolation)),
-            weight=result.weights.get(name, 0.0) if result.weights else None,
-        )
-        for name, structure in result.structures.items()
-    }
 
 
 def _posterior(samples: PosteriorSamples) -> PosteriorStudy:
@@ -587,11 +597,7 @@ def _columns(time_s: Array, signals: Mapping[str, Array]) -> Columns:
 def pooled_error(trials: Sequence[TrialErrors], card: str) -> float:
     """Error of the yaw rate over windows of all trials together, as a share of it; NaN if no ship yaws.
 
-    Parameters
-    ----------
-    trials : sequence of TrialErrors
-    card : str
-        ``before`` or ``found``.
+    `card`: ``before`` or ``found``.
     """
     every = (getattr(trial, card) for trial in trials)
     errors = [errors["r_degps"] for errors in every if "r_degps" in errors]

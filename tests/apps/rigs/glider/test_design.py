@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+import tank2sim as t2s
 from tank2sim.apps.rigs.glider.steady import smallest_angle, steady_glide
 from tank2sim.apps.rigs.glider.study import best_glide, fastest_glide, glide_polar, glide_range
 from tank2sim.cards import read_card
@@ -21,7 +22,8 @@ def test_the_fastest_glide_is_the_fastest_of_all_angles() -> None:
     fastest = fastest_glide(PROBE)
     assert fastest.horizontal_speed_mps >= speeds.max()
     assert -fastest.path_angle_rad == pytest.approx(angles[speeds.argmax()], abs=1e-4)
-    assert fastest_glide(PROBE, buoyancy_kg=1.0).path_angle_rad == pytest.approx(fastest.path_angle_rad)
+    heavier = t2s.load("kulikovsky-velikanov").replace({"glider.buoyancy_kg": 1.0}).card
+    assert fastest_glide(heavier).path_angle_rad == pytest.approx(fastest.path_angle_rad)
 
 
 def test_the_best_glide_goes_farthest_for_its_depth() -> None:

@@ -52,7 +52,12 @@ def test_a_result_fits_a_screen_and_has_a_picture(glider: t2s.Ship) -> None:
     found = glider.glide([25, 30])
     assert len(repr(found).splitlines()) <= 24
     assert "data:image/png;base64," in found._repr_html_()
-    assert found.to_dict()["schema"] == "tank2sim/glide/1" and list(found.charts()) == ["glide_polar"]
+    assert found.to_dict()["schema"] == "tank2sim/glide/1"
+    assert list(found.charts()) == [
+        "glide_polar",
+        "error_of_the_quasi_steady_motion_swings",
+        "error_of_the_quasi_steady_path_steps",
+    ]
     assert found.smallest_angle_deg == pytest.approx(abs(float(str(found.best["path_angle_deg"]))))
 
 

@@ -6,7 +6,8 @@ import math
 
 import pytest
 
-from tank2sim.apps.rigs.glider.programme import follow_programme, read_programme
+from tank2sim.apps.rigs.glider.path import read_programme
+from tank2sim.apps.rigs.glider.transient import follow_programme
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError

@@ -10,11 +10,10 @@ import pytest
 
 from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.apps.rigs.glider import study
-from tank2sim.apps.rigs.glider.charts import SpacePath, elevation_chart, isometric_chart, plan_chart, polar_chart
-from tank2sim.apps.rigs.glider.programme import read_programme
-from tank2sim.apps.rigs.glider.quasi_steady_error import swing_errors
-from tank2sim.apps.rigs.glider.result import GlideResult
+from tank2sim.apps.rigs.glider.path import read_programme
+from tank2sim.apps.rigs.glider.result import GlideResult, elevation_chart, isometric_chart, plan_chart, polar_chart
 from tank2sim.apps.rigs.glider.study import GlideQuestion
+from tank2sim.apps.rigs.glider.transient import swing_errors
 from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
 from tests.answer.drawn import line
@@ -87,10 +86,11 @@ def test_the_error_sweep_is_in_a_study_with_views(result) -> None:
 
 
 def test_a_climb_to_the_east_is_drawn_where_it_goes() -> None:
-    path = SpacePath(label="p", north_m=[0, 0], east_m=[0, 40], height_m=[0, 30])
-    (_, plan), (_, side) = lines(plan_chart([path])), lines(elevation_chart([path]))
+    path = {"x_m": np.zeros(2), "y_m": np.array([0.0, 40.0]), "height_m": np.array([0.0, 30.0])}
+    corners = [study.PathPlace(t_s=t, x_m=0.0, y_m=40 * t, height_m=30 * t, heading_deg=90.0) for t in (0.0, 1.0)]
+    (_, plan), (_, side) = lines(plan_chart({"p": path})), lines(elevation_chart({"p": path}))
     assert (plan["x"], plan["v"]) == (40, 0) and (side["x"], side["v"]) == (40, 30)
-    rows = lines(isometric_chart(path, path))
+    rows = lines(isometric_chart("p", path, corners))
     assert (rows[1]["x"], rows[1]["v"]) == pytest.approx((40 * math.cos(math.pi / 6), -20 + 30), rel=1e-5)
     shadow = rows[3]
     assert shadow["v"] == pytest.approx(-20)

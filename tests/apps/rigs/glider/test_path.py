@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from tank2sim.apps.rigs.glider.path import fly, path_of
-from tank2sim.apps.rigs.glider.programme import GlideProgramme, ProgrammeStep, read_programme
+from tank2sim.apps.rigs.glider.path import GlideProgramme, ProgrammeStep, fly, path_of, read_programme
 from tank2sim.apps.rigs.glider.steady import glide_as_printed, steady_glide
 from tank2sim.bundled import bundled
 from tank2sim.cards import read_card

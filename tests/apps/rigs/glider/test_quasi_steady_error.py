@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from tank2sim.analysis.linearisation import state_space
-from tank2sim.apps.rigs.glider.quasi_steady_error import swing_errors
 from tank2sim.apps.rigs.glider.steady import smallest_angle, steady_glide
-from tank2sim.apps.rigs.glider.transient import equilibrium
+from tank2sim.apps.rigs.glider.transient import equilibrium, swing_errors
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
 from tank2sim.simulation.integrator import Integrator

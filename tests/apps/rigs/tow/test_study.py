@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import printed_tows
 import pytest
 from numpy.polynomial import Polynomial
 from scipy import stats
@@ -10,11 +11,19 @@ from scipy import stats
 from tank2sim.apps.rigs.tow import paper as tow_paper
 from tank2sim.apps.rigs.tow.equation_error import discretise, solve_by_qr
 from tank2sim.apps.rigs.tow.identify import identify_tow
-from tank2sim.apps.rigs.tow.model_selection import SIMPLE, SIMPLE_LATE, TowModel, compare_models, mass_range
 from tank2sim.apps.rigs.tow.output_error import TowOptions, fit_speeds, simulated_speeds
 from tank2sim.apps.rigs.tow.records import Tows, read_tows
 from tank2sim.apps.rigs.tow.result import TowResult
-from tank2sim.apps.rigs.tow.study import speed_polynomials, study_tows, towed_body
+from tank2sim.apps.rigs.tow.study import (
+    SIMPLE,
+    SIMPLE_LATE,
+    TowModel,
+    compare_models,
+    mass_range,
+    speed_polynomials,
+    study_tows,
+    towed_body,
+)
 from tank2sim.bundled import bundled
 from tank2sim.errors import InputError
 
@@ -50,12 +59,12 @@ def test_speed_polynomials_of_the_printed_means_next_to_table_2():
 
 def test_largest_deviation_of_the_printed_model_settles_the_sign_of_B2():
     def deviation(coefficients):
-        speeds = simulated_speeds(coefficients, tow_paper.FORCE_N, tow_paper.TIMES_S)
+        speeds = simulated_speeds(coefficients, printed_tows.FORCE_N, tow_paper.TIMES_S)
         return np.max(np.abs(speeds - tow_paper.MEANS_MPS))
 
     assert deviation(tow_paper.SOLUTION) == pytest.approx(0.0142, abs=5e-5)
     assert deviation(replace(tow_paper.SOLUTION, B2_kgspm2=26096.0)) == pytest.approx(0.113, abs=5e-4)
-    problem = discretise(tow_paper.SPEED, tow_paper.TIMES_S, ("B1", "B2", "B3"), tow_paper.FORCE_N)
+    problem = discretise(printed_tows.SPEED, tow_paper.TIMES_S, ("B1", "B2", "B3"), printed_tows.FORCE_N)
     right = dict(zip(vars(tow_paper.SOLUTION), solve_by_qr(problem), strict=True))
     assert deviation(replace(tow_paper.SOLUTION, **right)) == pytest.approx(0.0128, abs=5e-5)
 
@@ -165,7 +174,7 @@ def test_json_keeps_its_keys_and_has_more(study):
 def test_one_tow_is_not_compared_tow_by_tow(table_1):
     alone = table_1.only(0)
     study = study_tows(identify_tow(alone, terms=("B3",)), alone)
-    assert study.tow_by_tow == {} and SIMPLE.label in [one.label for one in study.models]
+    assert study.tow_by_tow == {} and SIMPLE.unknowns in [one.unknowns for one in study.models]
 
 
 def test_the_body_is_what_is_given_before_what_the_file_says(table_1):

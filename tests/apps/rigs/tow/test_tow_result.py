@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from tank2sim.apps.rigs.tow import paper as tow_paper
-from tank2sim.apps.rigs.tow.charts import drag_chart, tow_speed_chart
 from tank2sim.apps.rigs.tow.identify import identify_tow
 from tank2sim.apps.rigs.tow.records import read_tows
-from tank2sim.apps.rigs.tow.result import TowResult
+from tank2sim.apps.rigs.tow.result import TowResult, drag_chart, tow_speed_chart
 from tank2sim.apps.rigs.tow.study import TowSpeeds, study_tows, towed_body
 from tank2sim.bundled import bundled
 from tests.answer.drawn import panels, rows_of, whole_panel

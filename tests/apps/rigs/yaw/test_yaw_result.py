@@ -5,7 +5,6 @@ import pytest
 from tank2sim.apps.rigs.yaw.identify import YawOptions, identify_yaw
 from tank2sim.apps.rigs.yaw.records import read_yaw_record
 from tank2sim.apps.rigs.yaw.result import YawResult
-from tank2sim.apps.rigs.yaw.study import study_yaw
 from tests.answer.drawn import rows_of
 from tests.yaw_truth import Truth, record, written
 
@@ -19,7 +18,7 @@ def found(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def result(found):
-    return YawResult(study_yaw(found), identification=found)
+    return YawResult(found.study(), identification=found)
 
 
 @pytest.fixture(scope="module")
@@ -63,12 +62,12 @@ def test_every_subinterval_has_its_residual(result, charts):
 
 def test_tables_hold_the_estimates_and_the_friction(found, result):
     estimates, friction = result.tables
-    best = found.estimates["energy_least_squares"]
+    best = found.methods["energy_least_squares"]
     assert estimates.rows[0][3] == pytest.approx(1e4 * best.total_inertia_kgm2)
     assert [row[:2] for row in friction.rows] == [["coulomb", "N m"], ["viscous", "N m s"], ["quadratic", "N m s²"]]
     assert friction.heads[2:5] == ("energy least squares", "as many equations", "output error")
-    assert float(friction.rows[1][2].split(" ± ")[0]) == pytest.approx(1e4 * best.friction["viscous"][0], rel=1e-3)
-    assert result.notices == found.notices
+    assert float(friction.rows[1][2].split(" ± ")[0]) == pytest.approx(1e4 * best.friction["viscous_Nms"], rel=1e-3)
+    assert result.notices == found.estimates.notices
     assert result.key_figures[0].value == pytest.approx(300, rel=0.01)
 
 

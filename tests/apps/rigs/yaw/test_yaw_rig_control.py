@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from alyshev_rigs import ELLIPSOID_T1, SHIP_T1, SHIP_T2
 
-from tank2sim.apps.rigs.yaw.control import AdaptiveController, TunedController
-from tank2sim.apps.rigs.yaw.model import ELLIPSOID_T1, SHIP_T1, SHIP_T2
 from tank2sim.apps.rigs.yaw.programme import PAPER_PROGRAMME, dissipation_from_work, inertia_from_work
-from tank2sim.apps.rigs.yaw.simulation import Measuring, run_yaw_rig
+from tank2sim.apps.rigs.yaw.simulation import AdaptiveController, Measuring, TunedController, run_yaw_rig
 from tank2sim.errors import InputError
 
 EXACT = Measuring(encoder=False)

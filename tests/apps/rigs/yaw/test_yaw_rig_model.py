@@ -6,11 +6,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from alyshev_rigs import ELLIPSOID_T1, SHIP_T1
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tank2sim.apps.rigs.yaw.card import TankWalls, YawRig, YawRigCard
-from tank2sim.apps.rigs.yaw.model import ELLIPSOID_T1, SHIP_T1, wall_nearness, yaw_rig_model
+from tank2sim.apps.rigs.yaw.model import wall_nearness, yaw_rig_model
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError

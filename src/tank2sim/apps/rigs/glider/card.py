@@ -8,15 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from tank2sim.cards.card import Card
-from tank2sim.cards.form import (
-    BodyModel,
-    BodySection,
-    CardSection,
-    Environment,
-    Mass,
-    Positive,
-    TimeConstant,
-)
+from tank2sim.cards.form import BodyModel, BodySection, CardSection, Environment, Mass, Positive, TimeConstant
 
 
 class GliderModel(BodyModel):

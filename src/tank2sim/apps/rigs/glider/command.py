@@ -11,7 +11,7 @@ from tank2sim.api.verbs import verb
 from tank2sim.arguments import AngleArgument, NumberArgument, PositiveArgument
 
 if TYPE_CHECKING:
-    from tank2sim.apps.rigs.glider.programme import GlideProgramme
+    from tank2sim.apps.rigs.glider.path import GlideProgramme
     from tank2sim.apps.rigs.glider.result import GlideResult
     from tank2sim.dynamics.vessel import Vessel
 
@@ -80,7 +80,7 @@ def glide(
     import numpy as np
 
     from tank2sim.apps.rigs.glider.card import GliderCard
-    from tank2sim.apps.rigs.glider.programme import read_programme
+    from tank2sim.apps.rigs.glider.path import read_programme
     from tank2sim.apps.rigs.glider.result import GlideResult
     from tank2sim.apps.rigs.glider.study import GlideQuestion, study_glider
 

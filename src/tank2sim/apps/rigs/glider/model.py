@@ -102,7 +102,19 @@ def glider_model(card: GliderCard) -> Model:
 
 
 def _inputs(card: GliderCard) -> tuple[Input, ...]:
-    half = math.pi / 2
+    def angle(name: str, description: str, start: float, nominal: float) -> Input:
+        half = math.pi / 2
+        return Input(
+            name=f"{name}.command",
+            unit="rad",
+            display_unit="deg",
+            start=start,
+            nominal=nominal,
+            minimum=-half,
+            maximum=half,
+            description=description,
+        )
+
     return (
         Input(
             name="buoyancy.command",
@@ -111,25 +123,8 @@ def _inputs(card: GliderCard) -> tuple[Input, ...]:
             nominal=card.glider.buoyancy_kg,
             description="Ordered net buoyancy, displaced mass less own mass: + rises, - sinks",
         ),
-        Input(
-            name="pitch.command",
-            unit="rad",
-            display_unit="deg",
-            start=-_PITCH,
-            nominal=_PITCH,
-            minimum=-half,
-            maximum=half,
-            description="Ordered pitch, + nose up",
-        ),
-        Input(
-            name="roll.command",
-            unit="rad",
-            display_unit="deg",
-            nominal=0.1,
-            minimum=-half,
-            maximum=half,
-            description="Ordered roll, + starboard side down",
-        ),
+        angle("pitch", "Ordered pitch, + nose up", -_PITCH, _PITCH),
+        angle("roll", "Ordered roll, + starboard side down", 0.0, 0.1),
     )
 
 
@@ -149,10 +144,7 @@ def _parameters(card: GliderCard) -> tuple[Parameter, ...]:
         constant("glider.mass", "kg", "Mass with the ballast", glider.mass_kg),
         constant("glider.added_mass_axial", "kg", "Added mass along the hull", glider.added_mass_axial_kg),
         constant(
-            "glider.added_mass_normal",
-            "kg",
-            "Added mass across the hull, up and down",
-            glider.added_mass_normal_kg,
+            "glider.added_mass_normal", "kg", "Added mass across the hull, up and down", glider.added_mass_normal_kg
         ),
         constant("glider.reference_area", "m2", "Area to which the coefficients refer", glider.reference_area_m2),
         constant("glider.lift_slope", "1", "C_L by incidence, 1/rad", glider.lift_slope),
@@ -198,13 +190,8 @@ def _step(card: GliderCard) -> float:
         0.5 * card.environment.water_density_kgpm3 * glider.reference_area_m2 * _usual_speed(card) * glider.lift_slope
     )
     incidence = (glider.mass_kg + glider.added_mass_normal_kg) / grip
-    controls = (
-        glider.buoyancy_time_constant_s,
-        glider.pitch_time_constant_s,
-        glider.roll_time_constant_s,
-    )
-    longest = _STEP_SHARE * min(incidence, *controls)
-    return rounded_down(longest)
+    controls = (glider.buoyancy_time_constant_s, glider.pitch_time_constant_s, glider.roll_time_constant_s)
+    return rounded_down(_STEP_SHARE * min(incidence, *controls))
 
 
 def _states(card: GliderCard, inputs: dict[str, Input], parameters: dict[str, Parameter]) -> tuple[State, ...]:
@@ -274,11 +261,11 @@ def _dynamics(symbols: dict[str, ca.SX], card: GliderCard) -> list[Quantity]:
     drag_area = half * drag_coefficient(held, symbols["glider.drag_zero"], symbols["glider.drag_quadratic"])
     carried = momentum(at, *(symbols[f"glider.{name}"] for name in ("mass", "added_mass_axial", "added_mass_normal")))
     force = forces(at, lift_area, drag_area, symbols["buoyancy.mass"] * symbols["glider.gravity"])
-    rates = [
+    pitching, rolling = (
         (symbols[f"{name}.command"] - symbols[f"{name}.angle"]) / symbols[f"{name}.time_constant"]
         for name in ("pitch", "roll")
-    ]
-    others = ca.jacobian(carried, at.pitch) * rates[0] + ca.jacobian(carried, at.roll) * rates[1]
+    )
+    others = ca.jacobian(carried, at.pitch) * pitching + ca.jacobian(carried, at.roll) * rolling
     udot, wdot, turn = ca.vertsplit(glider_accelerations(at, carried, force, others))
     weight = card.glider.buoyancy_kg * card.environment.gravity_mps2
     worth = (LARGEST_INCIDENCE - abs(incidence)) / (LARGEST_INCIDENCE - SMALL_INCIDENCE)

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, look_of
+from tank2sim.answer.charts.motion import History, Signal, history_chart
+from tank2sim.answer.charts.parts import equal_frame, vector
+from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, layer, layered
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, records_table, table
 from tank2sim.answer.result import Result
-from tank2sim.apps.rigs.glider.charts import (
-    corners_of,
-    elevation_chart,
-    isometric_chart,
-    plan_chart,
-    polar_chart,
-    programme_chart,
-    quasi_steady_chart,
-    space_path,
-    swing_chart,
-)
 from tank2sim.apps.rigs.glider.study import (
     BalancedGlide,
     GlideState,
@@ -28,9 +23,13 @@ from tank2sim.apps.rigs.glider.study import (
     QuasiSteadyErrors,
     TransientPath,
 )
+from tank2sim.apps.rigs.glider.transient import ProgrammeError, SwingError
+from tank2sim.arrays import Array, Columns
+from tank2sim.units import to_si
 
 if TYPE_CHECKING:
     import pandas as pd
+
 
 _ROUNDING_N = 1e-9
 """Forces below this are rounding of an equilibrium. Project choice: a millionth of the smallest net buoyancy."""
@@ -205,7 +204,7 @@ class GlideResult(Result[GlideStudy]):
             caption = f"Range on {first.budget_kg:g} kg of ballast pushed out at {first.depth_m:g} m"
             tables.append(table(caption, heads, rows))
         polar = Illustration(
-            chart=polar_chart(self.study.polar, marked, title="Glide polar"),
+            chart=polar_chart(self.study.polar, marked),
             caption="From the best glide to almost straight down. Grey: the path of the best glide; no path is less "
             "steep.",
         )
@@ -235,26 +234,24 @@ class GlideResult(Result[GlideStudy]):
     def _path(self) -> Section:
         study = self.study
         tables = [_path_table("Path of steady glides, start and end of each step", study.path)]
-        paths = [space_path("steady glides", study.path_histories)]
+        paths = {"steady glides": study.path_histories}
         if study.transient:
-            paths.append(space_path("transient", study.transient.histories))
+            paths["transient"] = study.transient.histories
         if study.path_as_printed:
             tables.append(_path_table("Path by the equations as printed", study.path_as_printed))
-            paths.append(space_path("as printed", study.path_as_printed_histories))
+            paths["as printed"] = study.path_as_printed_histories
+        isometric = isometric_chart("steady glides", study.path_histories, study.path)
         charts = [
-            Illustration(chart=plan_chart(paths, title="Path from above")),
-            Illustration(chart=elevation_chart(paths, title="Path from the side, rolled out")),
+            Illustration(chart=plan_chart(paths)),
+            Illustration(chart=elevation_chart(paths)),
             Illustration(
-                chart=isometric_chart(paths[0], corners_of(study.path), title="Path in isometric projection"),
+                chart=isometric,
                 caption="Plumb lines lead from the shadow, at the height of the start, to the ends of the steps.",
             ),
-            *_programme(study.transient),
         ]
+        if study.transient:
+            charts.append(Illustration(chart=programme_chart(study.transient)))
         return Section(heading="Path of the programme", tables=tables, charts=charts)
-
-
-def _programme(transient: TransientPath | None) -> list[Illustration]:
-    return [Illustration(chart=programme_chart(transient, title="Programme and motion"))] if transient else []
 
 
 def _printed_table(glides: Sequence[BalancedGlide], printed: Sequence[BalancedGlide], *, turning: bool) -> Table:
@@ -286,12 +283,185 @@ def _path_table(caption: str, places: Sequence[PathPlace]) -> Table:
 
 
 def _quasi_steady(errors: QuasiSteadyErrors) -> Section:
-    swings = swing_chart(errors.swings, title="Error of the quasi-steady motion, swings")
-    steps = quasi_steady_chart(errors.steps, title="Error of the quasi-steady path, steps")
+    swings = swing_chart(errors.swings)
+    steps = quasi_steady_chart(errors.steps)
     return Section(
         heading="How slowly the controls must change",
         text="A path of steady glides holds where the controls change slowly. The transient model, with mass and added "
         "mass, shows how slowly: it flies swings and steps of the controls.",
         folded=True,
         charts=[Illustration(chart=swings, caption=_SWINGS), Illustration(chart=steps, caption=_STEPS)],
+    )
+
+
+SpacePaths = Mapping[str, Columns]
+"""Label to the columns of a path in space in the order of time: ``x_m`` north, ``y_m`` east, ``height_m``."""
+
+
+def plan_chart(paths: SpacePaths) -> ChartSpec:
+    """Paths from above: north up, east to the right, one scale."""
+    drawn = [(label, vector(path["y_m"]), vector(path["x_m"])) for label, path in paths.items()]
+    return _plane(drawn, ("east y (m)", "north x (m)"), title="Path from above", height_px=480)
+
+
+def elevation_chart(paths: SpacePaths) -> ChartSpec:
+    """Paths from the side, rolled out: height above the start against the way over the ground, one scale."""
+    drawn = []
+    for label, path in paths.items():
+        steps = np.hypot(np.diff(vector(path["x_m"])), np.diff(vector(path["y_m"])))
+        drawn.append((label, np.concatenate([[0.0], np.cumsum(steps)]), vector(path["height_m"])))
+    return _plane(
+        drawn, ("way over the ground (m)", "height (m)"), title="Path from the side, rolled out", height_px=360
+    )
+
+
+def isometric_chart(label: str, path: Columns, corners: Sequence[PathPlace]) -> ChartSpec:
+    """A path in isometric projection: north to the upper right, east to the lower right, height up, one scale.
+
+    Its shadow is drawn at the height of the start, and plumb lines from there to the `corners` of the path `label`.
+    """
+    north, east, height = (vector(path[name]) for name in ("x_m", "y_m", "height_m"))
+    drawn = [(label, *_projected(north, east, height)), ("seen from above", *_projected(north, east, 0 * height))]
+    arm = 0.25 * max(1.0, float(np.abs(north).max()), float(np.abs(east).max()))
+    lines = [
+        (name, name, [(0.0, 0.0), _projected(*end)])
+        for name, end in (("north", (arm, 0, 0)), ("east", (0, arm, 0)), ("up", (0, 0, arm)))
+    ]
+    for number, place in enumerate(corners):
+        ends = [_projected(place.x_m, place.y_m, height_m) for height_m in (0.0, place.height_m)]
+        lines.append((f"plumb {number}", "", ends))
+    arms: list[ChartRecord] = [
+        {"axis": axis, "name": name if i else "", "x": float(across), "v": float(up), "i": i}
+        for axis, name, points in lines
+        for i, (across, up) in enumerate(points)
+    ]
+    return _plane(drawn, ("", ""), title="Path in isometric projection", height_px=480, arms=arms)
+
+
+def _projected(north: Any, east: Any, height: Any) -> tuple[Any, Any]:
+    """Across and up in isometric projection."""
+    cos, sin = math.cos(math.pi / 6), math.sin(math.pi / 6)
+    return cos * (north + east), sin * (north - east) + height
+
+
+def polar_chart(polar: Columns, marked: Mapping[str, GlideState]) -> ChartSpec:
+    """The polar: speed down against speed over the ground, with marked glides."""
+    line = PlotSeries(
+        label="polar",
+        x=polar["horizontal_speed_mps"],
+        y=-polar["climb_mps"],
+        closed=True,
+        more={"angle": np.abs(polar["path_angle_deg"])},
+    )
+    glides = [
+        PlotSeries(
+            label=label,
+            x=[glide.horizontal_speed_mps],
+            y=[-glide.climb_mps],
+            points=True,
+            more={"angle": [abs(glide.path_angle_deg)]},
+        )
+        for label, glide in marked.items()
+    ]
+    best = max(marked.values(), key=lambda glide: glide.horizontal_speed_mps / -glide.climb_mps)
+    across = PlotAxis(title="speed over the ground (m/s)", zero=True)
+    up = PlotAxis(title="speed down (m/s)", zero=True, scale={"reverse": True})
+    tangent = [{"x": 0.0, "v": 0.0}, {"x": best.horizontal_speed_mps, "v": -best.climb_mps}]
+    over = [layer("line", tangent, {"x": across.channel("x"), "y": up.channel("v")}, style="reference")]
+    return curve_chart(
+        Plot(series=[line, *glides], up=up, height_px=380, over=over),
+        across,
+        title="Glide polar",
+        width_px=620,
+        described="Glide polar: speed down against speed over the ground.",
+        shown={"run:N": "glide", "x:Q": "over the ground (m/s)", "v:Q": "down (m/s)", "angle:Q": "path angle (deg)"},
+        point_px=90,
+    )
+
+
+_PROGRAMME = {
+    "buoyancy_kg": ("net buoyancy, + light (kg)", "1"),
+    "pitch_deg": ("pitch, + up", "rad"),
+    "roll_deg": ("roll, + to starboard", "rad"),
+    "incidence_deg": ("incidence", "rad"),
+    "speed_mps": ("speed", "m/s"),
+}
+
+
+def programme_chart(transient: TransientPath) -> ChartSpec:
+    """Orders and the motion of the transient model over time."""
+    histories = []
+    for label, columns in (("orders and steady glides", transient.orders), ("transient", transient.histories)):
+        values = {name: to_si(name, 1.0)[1] * columns[name] for name in _PROGRAMME}
+        histories.append(History(label=label, time_s=columns["t_s"], values=values))
+    panels = [Signal(name=name, title=words, unit=unit) for name, (words, unit) in _PROGRAMME.items()]
+    return history_chart(histories, panels, title="Programme and motion", height_px=90)
+
+
+def quasi_steady_chart(errors: Sequence[ProgrammeError]) -> ChartSpec:
+    """Largest distance from the transient path, per cent of the way, against the length of a step."""
+    series = [(error.label, error.duration_s, error.share) for error in errors]
+    return _errors(
+        series,
+        ("length of a step (s)", "distance of the paths (% of the way)"),
+        title="Error of the quasi-steady path, steps",
+    )
+
+
+def swing_chart(errors: Sequence[SwingError]) -> ChartSpec:
+    """Error of velocity or rate of turn, per cent, against the period of a swing."""
+    series = [(error.label, error.period_s, error.share) for error in errors]
+    return _errors(series, ("period of the swing (s)", "error (%)"), title="Error of the quasi-steady motion, swings")
+
+
+def _errors(series: Sequence[tuple[str, Array, Array]], titles: tuple[str, str], *, title: str) -> ChartSpec:
+    """Shares in per cent against times, both logarithmic."""
+    curves = [PlotSeries(label=label, x=time, y=100 * share) for label, time, share in series]
+    across = PlotAxis(title=titles[0], log=True, nice=False, padding=12, form="~g")
+    up = PlotAxis(title=titles[1], log=True, form="~g")
+    text = ", ".join(label for label, _, _ in series)
+    place = {"x": across.channel("x"), "y": up.channel("v"), "color": look_of(curves).colour}
+    dots = layer("point", [row for curve in curves for row in curve.rows], place, clip=True, filled=True)
+    return curve_chart(
+        Plot(series=curves, up=up, height_px=340, over=[dots]),
+        across,
+        title=title,
+        width_px=680,
+        described=f"{titles[1]} against {titles[0]} of {text}.",
+        shown={"run:N": "programme"},
+    )
+
+
+def _plane(
+    drawn: Sequence[tuple[str, Array, Array]],
+    titles: tuple[str, str],
+    *,
+    title: str,
+    height_px: int,
+    arms: Sequence[ChartRecord] = (),
+) -> ChartSpec:
+    """Lines in a plane with one scale; with `arms`, lines of reference with a name at their end, there are no axes."""
+    across = np.concatenate([*(outline[1] for outline in drawn), vector([arm["x"] for arm in arms])])
+    up = np.concatenate([*(outline[2] for outline in drawn), vector([arm["v"] for arm in arms])])
+    frame = equal_frame(across, up, width_px=680, height_px=height_px)
+    place = frame.axes(across=("x", titles[0]), up=("v", titles[1]))
+    if arms:
+        place = {name: axis | {"axis": None} for name, axis in place.items()}
+    series = [PlotSeries(label=label, x=x, y=y, closed=True) for label, x, y in drawn]
+    look = look_of(series)
+    rows = [row for each in series for row in each.rows]
+    marks = {**place, "color": look.colour, "strokeDash": look.dash, "order": "i:Q"}
+    layers = [layer("line", rows, marks, clip=True)]
+    if arms:
+        along = {**place, "detail": "axis:N", "order": "i:Q"}
+        layers.append(layer("line", arms, along, style="reference", strokeWidth=0.8, clip=True))
+        text = {**place, "text": "name:N"}
+        layers.append(layer("text", arms, text, style="reference", dx=5, align="left", clip=True))
+    return layered(
+        layers,
+        size=(frame.width_px, frame.height_px),
+        window=["x", "y"],
+        title=title,
+        description="Paths of " + ", ".join(label for label, _, _ in drawn) + "; both axes have one scale.",
+        usermeta={"equal_scales": True},
     )

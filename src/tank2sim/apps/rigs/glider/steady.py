@@ -35,28 +35,10 @@ _STEEPEST = math.radians(89.9)
 class SteadyGlide:
     """A steady glide: angles in rad, SI.
 
-    Parameters
-    ----------
-    path_angle_rad, pitch_rad : float
-        epsilon and theta, + up.
-    incidence_rad : float
-        alpha, + when the flow comes from below.
-    roll_rad : float
-        gamma, + starboard side down.
-    buoyancy_kg : float
-        Net buoyancy m0, + light.
-    speed_mps : float
-        Speed v along the path.
-    lift_coefficient, drag_coefficient : float
-        C_L has the sign of the incidence.
-    lift_N, drag_N : float
-        With the sign of their coefficients.
-    turning_radius_m : float
-        R, without sign; inf without roll.
-    turn_rate_radps : float
-        Rate of the course, + to starboard.
-    as_printed : bool
-        True for the equations as printed in the paper.
+    epsilon (path angle) and theta (pitch) are + up, alpha (incidence) + when the flow comes from below, gamma (roll) +
+    starboard side down, m0 (net buoyancy) + light. Lift has the sign of the incidence; R, the turning radius, is
+    without sign and inf without roll; the rate of the course is + to starboard. `as_printed` is True for the equations
+    as printed.
     """
 
     path_angle_rad: float
@@ -87,10 +69,7 @@ class SteadyGlide:
 def ballast_kg(card: GliderCard, buoyancy_kg: float) -> float | None:
     """m_b of (1), m0 = m - (m_h + m_b), kg; None if the card does not state the mass m_h of the hull.
 
-    Raises
-    ------
-    InputError
-        It would be negative.
+    InputError if it would be negative.
     """
     hull = card.glider.hull_mass_kg
     if hull is None:
@@ -119,16 +98,10 @@ def smallest_angle(card: GliderCard, roll_rad: float = 0.0) -> float:
 def steady_glide(
     card: GliderCard, path_angle_rad: float, *, roll_rad: float = 0.0, buoyancy_kg: float | None = None
 ) -> SteadyGlide:
-    """The steady glide on a path.
+    """The steady glide on a path (rad, + up), with a roll (rad, + starboard side down) and a net buoyancy m0 (kg, +
+    light).
 
-    Parameters
-    ----------
-    path_angle_rad : float
-        epsilon, + up.
-    roll_rad : float
-        gamma, + starboard side down.
-    buoyancy_kg : float, optional
-        Net buoyancy m0, + light; by default that of the card, light to climb and heavy to dive. 0 gives speed 0.
+    By default m0 is that of the card, light to climb and heavy to dive. 0 gives speed 0.
 
     Raises
     ------
@@ -154,14 +127,8 @@ def steady_glide(
     under = slope**2 - 4 * (section.drag_quadratic - section.lift_quadratic * tau) * section.drag_zero
     # The small root, written so that nothing cancels and that it also holds where C_D = C_L tau.
     size = 2 * section.drag_zero / (slope + math.sqrt(max(0.0, under)))
-    lift = lift_coefficient(size, section.lift_slope, section.lift_quadratic)
     drag = drag_coefficient(size, section.drag_zero, section.drag_quadratic)
-    half = 0.5 * card.environment.water_density_kgpm3 * section.reference_area_m2
-    share = drag * math.sin(steep) + lift * math.cos(roll_rad) * math.cos(steep)
-    speed = math.sqrt(abs(buoyancy) * card.environment.gravity_mps2 / (half * share))
-    aside = half * lift * abs(math.sin(roll_rad))
-    radius = section.mass_kg * math.cos(steep) ** 2 / aside if aside else math.inf
-    return _made(_Found(path_angle_rad, roll_rad, buoyancy, size, speed, radius, lift, drag), half)
+    return _glide(card, (path_angle_rad, roll_rad, buoyancy), size, drag)
 
 
 def glide_at_pitch(
@@ -169,10 +136,7 @@ def glide_at_pitch(
 ) -> SteadyGlide:
     """The steady glide at a pitch theta (rad, + up) in place of a path angle: (2) and (8) together.
 
-    Raises
-    ------
-    InputError
-        As :func:`steady_glide`; the message names the smallest pitch.
+    Raises as :func:`steady_glide`; the message names the smallest pitch.
     """
     _check(pitch_rad, roll_rad)
     buoyancy = _buoyancy(card, pitch_rad, buoyancy_kg)
@@ -208,21 +172,14 @@ def glide_as_printed(
     buoyancy = _buoyancy(card, path_angle_rad, buoyancy_kg)
     _check(path_angle_rad, roll_rad)
     section = card.glider
-    steep, upright = abs(path_angle_rad), math.cos(roll_rad)
-    tau = math.tan(steep) * upright
+    tau = math.tan(abs(path_angle_rad)) * math.cos(roll_rad)
     under = section.drag_quadratic - section.lift_quadratic * tau
     size = (section.lift_slope * tau - section.drag_zero) / under if under > 0 else -1.0
     if size <= 0:
         problem = f"{math.degrees(path_angle_rad):g} deg gives no incidence by (8) as printed"
         raise InputError(card.source, "path angle", problem, "give another angle, or leave --as-printed out")
     drag = size * (section.drag_zero + section.drag_quadratic * size)
-    lift = lift_coefficient(size, section.lift_slope, section.lift_quadratic)
-    half = 0.5 * card.environment.water_density_kgpm3 * section.reference_area_m2
-    share = drag * math.sin(steep) + lift * upright * math.cos(steep)
-    speed = math.sqrt(abs(buoyancy) * card.environment.gravity_mps2 / (half * share))
-    radius = radius_as_printed(card, lift, path_angle_rad, roll_rad)
-    found = _Found(path_angle_rad, roll_rad, buoyancy, size, speed, radius, lift, drag)
-    return _made(found, half, as_printed=True)
+    return _glide(card, (path_angle_rad, roll_rad, buoyancy), size, drag, as_printed=True)
 
 
 def radius_as_printed(card: GliderCard, lift: float, path_angle_rad: float, roll_rad: float) -> float:
@@ -251,39 +208,34 @@ def force_residual(card: GliderCard, glide: SteadyGlide) -> tuple[float, float, 
     )
 
 
-@dataclass(frozen=True)
-class _Found:
-    """Solution of the equations; magnitudes without sign."""
-
-    path_angle: float
-    roll: float
-    buoyancy: float
-    incidence: float
-    speed: float
-    radius: float
-    lift: float
-    drag: float
-
-
-def _made(found: _Found, half: float, *, as_printed: bool = False) -> SteadyGlide:
-    upward = math.copysign(1.0, found.path_angle)
-    incidence = -upward * found.incidence
-    along = found.speed * (1.0 if as_printed else math.cos(found.path_angle))  # (13): v t = R dphi in print
-    turn = -upward * math.copysign(1.0, found.roll) * along / found.radius if math.isfinite(found.radius) else 0.0
-    force = half * found.speed**2
+def _glide(
+    card: GliderCard, flown: tuple[float, float, float], size: float, drag: float, *, as_printed: bool = False
+) -> SteadyGlide:
+    """The glide with path angle, roll (rad) and net buoyancy (kg) at an incidence of that size (rad), with that C_D."""
+    path_angle, roll, buoyancy = flown
+    section, steep, upward = card.glider, abs(path_angle), math.copysign(1.0, path_angle)
+    lift = lift_coefficient(size, section.lift_slope, section.lift_quadratic)
+    half = 0.5 * card.environment.water_density_kgpm3 * section.reference_area_m2
+    share = drag * math.sin(steep) + lift * math.cos(roll) * math.cos(steep)
+    speed = math.sqrt(abs(buoyancy) * card.environment.gravity_mps2 / (half * share))
+    aside = half * lift * abs(math.sin(roll))
+    radius = section.mass_kg * math.cos(steep) ** 2 / aside if aside else math.inf
+    if as_printed:
+        radius = radius_as_printed(card, lift, path_angle, roll)
+    along = speed * (1.0 if as_printed else math.cos(path_angle))  # (13): v t = R dphi in print
     return SteadyGlide(
-        path_angle_rad=found.path_angle,
-        pitch_rad=found.path_angle + incidence,
-        incidence_rad=incidence,
-        roll_rad=found.roll,
-        buoyancy_kg=found.buoyancy,
-        speed_mps=found.speed,
-        lift_coefficient=-upward * found.lift,
-        drag_coefficient=found.drag,
-        lift_N=-upward * force * found.lift,
-        drag_N=force * found.drag,
-        turning_radius_m=found.radius,
-        turn_rate_radps=turn,
+        path_angle_rad=path_angle,
+        pitch_rad=path_angle - upward * size,
+        incidence_rad=-upward * size,
+        roll_rad=roll,
+        buoyancy_kg=buoyancy,
+        speed_mps=speed,
+        lift_coefficient=-upward * lift,
+        drag_coefficient=drag,
+        lift_N=-upward * (half * speed**2) * lift,
+        drag_N=half * speed**2 * drag,
+        turning_radius_m=radius,
+        turn_rate_radps=-upward * math.copysign(1.0, roll) * along / radius if math.isfinite(radius) else 0.0,
         as_printed=as_printed,
     )
 

@@ -10,9 +10,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from tank2sim.apps.rigs.glider.card import GliderCard
-from tank2sim.apps.rigs.glider.path import GlidePath, fly
-from tank2sim.apps.rigs.glider.programme import GlideProgramme
-from tank2sim.apps.rigs.glider.quasi_steady_error import SwingError, swing_errors
+from tank2sim.apps.rigs.glider.path import GlidePath, GlideProgramme, fly
 from tank2sim.apps.rigs.glider.steady import (
     SteadyGlide,
     ballast_kg,
@@ -24,13 +22,14 @@ from tank2sim.apps.rigs.glider.steady import (
 from tank2sim.apps.rigs.glider.transient import (
     Compared,
     ProgrammeError,
+    SwingError,
     compare_with_steady,
     equilibrium,
     quasi_steady_error,
+    swing_errors,
 )
 from tank2sim.arrays import Array, Columns, Number, Unbounded
 from tank2sim.dynamics.build import build
-from tank2sim.dynamics.model import Model
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.notices import Notice
 from tank2sim.simulation.integrator import NO_COMPILER, Integrator
@@ -38,33 +37,28 @@ from tank2sim.simulation.integrator import NO_COMPILER, Integrator
 _STEEPEST = math.radians(89.5)
 
 
-def glide_polar(
-    card: GliderCard, *, roll_rad: float = 0.0, buoyancy_kg: float | None = None, points: int = 200
-) -> tuple[SteadyGlide, ...]:
-    """Dives from the smallest angle to almost straight down; `buoyancy_kg` is a magnitude, by default the card's."""
-    least = smallest_angle(card, roll_rad)
+def glide_polar(card: GliderCard) -> tuple[SteadyGlide, ...]:
+    """Dives with the card's buoyancy from the smallest angle to almost straight down."""
+    least = smallest_angle(card)
     # Closer where the path is shallow: speed and incidence change there as the root of the angle above the smallest.
-    angles = least + (_STEEPEST - least) * np.linspace(0, 1, points) ** 2
-    size = card.glider.buoyancy_kg if buoyancy_kg is None else abs(buoyancy_kg)
-    return tuple(steady_glide(card, -angle, roll_rad=roll_rad, buoyancy_kg=-size) for angle in angles.tolist())
+    angles = least + (_STEEPEST - least) * np.linspace(0, 1, 200) ** 2
+    return tuple(steady_glide(card, -angle) for angle in angles.tolist())
 
 
-def best_glide(card: GliderCard, *, buoyancy_kg: float | None = None) -> SteadyGlide:
+def best_glide(card: GliderCard) -> SteadyGlide:
     """The dive of largest range for its depth: the smallest angle, at the greatest ratio of lift to drag."""
-    size = card.glider.buoyancy_kg if buoyancy_kg is None else abs(buoyancy_kg)
-    return steady_glide(card, -smallest_angle(card), buoyancy_kg=-size)
+    return steady_glide(card, -smallest_angle(card))
 
 
-def fastest_glide(card: GliderCard, *, buoyancy_kg: float | None = None) -> SteadyGlide:
+def fastest_glide(card: GliderCard) -> SteadyGlide:
     """The dive with the greatest speed over the ground, v cos(epsilon). Its angle does not depend on the buoyancy."""
-    size = card.glider.buoyancy_kg if buoyancy_kg is None else abs(buoyancy_kg)
     found = minimize_scalar(
         lambda angle: -steady_glide(card, -angle).horizontal_speed_mps,
         bounds=(smallest_angle(card), _STEEPEST),
         method="bounded",
         options={"xatol": 1e-10},
     )
-    return steady_glide(card, -float(found.x), buoyancy_kg=-size)
+    return steady_glide(card, -float(found.x))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,10 +95,7 @@ class Range:
 def glide_range(card: GliderCard, glide: SteadyGlide, *, budget_kg: float, depth_m: float) -> Range:
     """The range of dives and climbs at the angle and net buoyancy of a glide.
 
-    Raises
-    ------
-    InputError
-        Budget or depth is not positive, or the glide has no buoyancy or turns.
+    InputError if budget or depth is not positive, or the glide has no buoyancy or turns.
     """
     for name, value in (("budget_kg", budget_kg), ("depth_m", depth_m)):
         if not 0 < value < math.inf:
@@ -130,19 +121,10 @@ def glide_range(card: GliderCard, glide: SteadyGlide, *, budget_kg: float, depth
 class GlideQuestion:
     """Settings of the study.
 
-    Parameters
-    ----------
-    angles_rad : tuple of float
-        Paths of steady glides, + up, which all have `roll_rad` and a net buoyancy of the size `buoyancy_kg` (by default
-        the card's).
-    programme : GlideProgramme, optional
-        To be flown, by the steady glides and by the transient model.
-    as_printed : bool
-        True for the paper's equations in addition to the corrected ones.
-    budget_kg, depth_m : float, optional
-        Ballast that can be expelled, and the depth of the dives, for the range. Both or neither.
-    views : bool
-        True for the polar and the error of the quasi-steady assumption against the speed of a programme.
+    Steady glides are on the paths `angles_rad`, + up, with `roll_rad` and a net buoyancy of the size `buoyancy_kg`, by
+    default the card's. The programme is flown by the steady glides and by the transient model; `as_printed` adds the
+    paper's equations. Ballast that can be expelled and depth of the dives, for the range: both or neither. With `views`
+    also the polar and the error of the quasi-steady assumption against the speed of a programme.
     """
 
     angles_rad: tuple[float, ...] = ()
@@ -241,7 +223,7 @@ class GlideDesign:
     ranges: tuple[Range, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class PathPlace:
     """A place of a path: north, east, height, and heading clockwise from north."""
 
@@ -252,7 +234,7 @@ class PathPlace:
     heading_deg: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class TransientPlace:
     """A place of the transient motion: north, east, depth; and its speed."""
 
@@ -306,7 +288,6 @@ class GlideStudy:
         Size of the net buoyancy of the card.
     states : tuple of AngleGlide
         Glides at the given angles.
-    design : GlideDesign
     polar : dict
         Columns ``path_angle_deg``, ``horizontal_speed_mps``, ``climb_mps``.
     as_printed : tuple of BalancedGlide
@@ -319,10 +300,8 @@ class GlideStudy:
         Length of the path through the water.
     path_histories, path_as_printed_histories : dict
         Columns ``t_s``, ``x_m``, ``y_m``, ``height_m`` to draw.
-    transient : TransientPath, optional
     quasi_steady_error : QuasiSteadyErrors, optional
         Only if views were asked for.
-    notices : tuple of Notice
     """
 
     glider: str
@@ -344,19 +323,13 @@ class GlideStudy:
 
 
 def study_glider(card: GliderCard, question: GlideQuestion) -> GlideStudy:
-    """Run the study.
-
-    Raises
-    ------
-    InputError
-        An angle or a step cannot be flown, or budget and depth are not both given.
-    """
+    """Run the study; InputError for an angle or step that cannot be flown, or a budget without depth or the reverse."""
     model = build(card)
-    glides = tuple(_glides(card, question))
+    glides = _glides(card, question)
     printed = _glides(card, question, as_printed=True) if question.as_printed else ()
-    path = fly(card, question.programme) if question.programme else None
-    printed_path = (
-        fly(card, question.programme, as_printed=True) if question.programme and question.as_printed else None
+    path, printed_path = (
+        fly(card, question.programme, as_printed=as_printed) if question.programme and asked else None
+        for as_printed, asked in ((False, True), (True, question.as_printed))
     )
     integrator = Integrator(model) if path or question.views else None
     best, fastest = best_glide(card), fastest_glide(card)
@@ -372,7 +345,9 @@ def study_glider(card: GliderCard, question: GlideQuestion) -> GlideStudy:
             AngleGlide(
                 **_state_fields(glide),
                 force_residual_N=force_residual(card, glide),
-                turning_radius_with_added_mass_m=_radius(model, glide),
+                turning_radius_with_added_mass_m=(
+                    equilibrium(model, glide).turning_radius_m if glide.turn_rate_radps else math.inf
+                ),
                 ballast_kg=ballast_kg(card, glide.buoyancy_kg),
             )
             for glide in glides
@@ -407,10 +382,12 @@ def study_glider(card: GliderCard, question: GlideQuestion) -> GlideStudy:
 
 def _state_fields(glide: SteadyGlide) -> dict[str, Any]:
     """Fields of :class:`GlideState`."""
-    angles = ("path_angle", "pitch", "incidence", "roll")
-    found = {f"{name}_deg": math.degrees(getattr(glide, f"{name}_rad")) for name in angles}
-    found |= {"turn_rate_degps": math.degrees(glide.turn_rate_radps)}
-    return found | {part.name: getattr(glide, part.name) for part in fields(GlideState) if part.name not in found}
+    found = {}
+    for part in fields(GlideState):
+        name = part.name.replace("_degps", "_radps").replace("_deg", "_rad")
+        value = getattr(glide, name)
+        found[part.name] = value if name == part.name else math.degrees(value)
+    return found
 
 
 def _state(glide: SteadyGlide) -> GlideState:
@@ -418,26 +395,14 @@ def _state(glide: SteadyGlide) -> GlideState:
 
 
 def _places(path: GlidePath | None) -> tuple[PathPlace, ...]:
-    return tuple(
-        PathPlace(
-            t_s=place.time_s,
-            x_m=place.north_m,
-            y_m=place.east_m,
-            height_m=place.height_m,
-            heading_deg=math.degrees(place.heading_rad),
-        )
-        for place in (path.places if path else ())
-    )
+    return tuple(PathPlace(*place[:4], math.degrees(place.heading_rad)) for place in (path.places if path else ()))
 
 
 def _transient(found: Compared) -> TransientPath:
-    motion = found.motion
-    named = {"x_m": "motion.x", "y_m": "motion.y", "depth_m": "motion.z", "speed_mps": "motion.speed"}
+    motion, named = found.motion, ("motion.x", "motion.y", "motion.z", "motion.speed")
+    times = [place.time_s for place in found.path.places]
     return TransientPath(
-        path=tuple(
-            TransientPlace(t_s=place.time_s, **{key: motion.at(name, place.time_s) for key, name in named.items()})
-            for place in found.path.places
-        ),
+        path=tuple(TransientPlace(time, *(motion.at(name, time) for name in named)) for time in times),
         distance_m=found.distance_m,
         distance_by_length=found.share,
         histories=found.histories(),
@@ -446,18 +411,13 @@ def _transient(found: Compared) -> TransientPath:
 
 
 def _glides(card: GliderCard, question: GlideQuestion, *, as_printed: bool = False) -> list[SteadyGlide]:
-    equations = glide_as_printed if as_printed else steady_glide
-    found = []
-    for angle in question.angles_rad:
-        size = question.buoyancy_kg
-        buoyancy = None if size is None else math.copysign(size, angle)
-        found.append(equations(card, angle, roll_rad=question.roll_rad, buoyancy_kg=buoyancy))
-    return found
-
-
-def _radius(model: Model, glide: SteadyGlide) -> float:
-    """Turning radius of the transient model, m; inf where the glide does not turn."""
-    return equilibrium(model, glide).turning_radius_m if glide.turn_rate_radps else math.inf
+    equations, size = glide_as_printed if as_printed else steady_glide, question.buoyancy_kg
+    return [
+        equations(
+            card, angle, roll_rad=question.roll_rad, buoyancy_kg=None if size is None else math.copysign(size, angle)
+        )
+        for angle in question.angles_rad
+    ]
 
 
 def _ranges(card: GliderCard, question: GlideQuestion, glides: tuple[SteadyGlide, ...]) -> list[Range]:

@@ -28,18 +28,10 @@ _FEWEST_INTERVALS = 10
 
 @dataclass(frozen=True, eq=False)
 class SpeedFit:
-    """The polynomial through the mean speeds of the tows.
+    """The polynomial v*(t), m/s over s, through the mean speeds of the tows.
 
-    Parameters
-    ----------
-    polynomial : Polynomial
-        v*(t), m/s over s.
-    span_s : float
-        Time of the last reading, which scales the powers of `covariance`.
-    scatter_mps : float
-        Standard deviation of a single reading about the polynomial.
-    covariance : array, (degree + 1, degree + 1)
-        Covariance of the coefficients of (t / span)^k.
+    `scatter_mps` is the standard deviation of a reading about it; `covariance` (degree + 1, degree + 1) is that of the
+    coefficients of (t / span)^k, with the span up to the last reading.
     """
 
     polynomial: Polynomial
@@ -50,20 +42,10 @@ class SpeedFit:
 
 @dataclass(frozen=True, eq=False)
 class EquationError:
-    """The integral (1.6) as a sum over the nodes of Simpson's rule.
+    """The integral (1.6) as a sum over the nodes (s) of Simpson's rule with their weights (s).
 
-    Parameters
-    ----------
-    time_s, weights : arrays, (nodes,)
-        Nodes, s, and their weights, s.
-    basis : array, (nodes, 1 + terms)
-        w of (1.12): a* and the powers of v* of the chosen terms.
-    terms : tuple of str
-        The drag terms, in the order of (1.5).
-    force_N : array, (nodes,)
-        T.
-    mass_kg : float, optional
-        M, if known; then only the drag terms are unknown. It is the first of all estimates in either case.
+    `basis` (nodes, 1 + terms) is w of (1.12): a* and the powers of v* of the drag terms, in the order of (1.5). With a
+    known M only the drag terms are unknown; M is the first of all estimates in either case.
     """
 
     time_s: Array
@@ -111,13 +93,8 @@ class EquationError:
 def fit_mean_speed(tows: Tows, degree: int = 2) -> SpeedFit:
     """Least-squares polynomial through the mean of the tows at each time, as in (2.1).
 
-    The scatter assumes independent readings of equal variance after the release; the speed at t = 0 is zero
-    without error.
-
-    Raises
-    ------
-    InputError
-        The readings after the release do not outnumber the coefficients of the polynomial.
+    The scatter assumes independent readings of equal variance after the release; the speed at t = 0 is zero without
+    error. InputError if the readings after the release do not outnumber the coefficients.
     """
     span = float(tows.time_s[-1])
     powers = np.vander(tows.time_s / span, degree + 1, increasing=True)
@@ -158,20 +135,10 @@ def discretise(
     *,
     mass_kg: float | None = None,
 ) -> EquationError:
-    """The discrete form of (1.6) for a speed polynomial over the time of the readings.
+    """The discrete form of (1.6) for a speed polynomial v*(t), m/s, and a force T(t), N, over the times of the
+    readings.
 
-    Parameters
-    ----------
-    speed : Polynomial
-        v*(t), m/s.
-    times_s : array
-        Times of the readings, rising.
-    terms : tuple of str
-        Drag terms in the order of (1.5), any of B1, B2, B3.
-    force : float or Polynomial
-        T(t), N over s.
-    mass_kg : float, optional
-        M, if known.
+    Drag terms are any of B1, B2, B3 in this order; M is given if it is known.
     """
     time, weights = simpson_nodes(times_s)
     v = speed(time)
@@ -205,20 +172,18 @@ def covariance(problem: EquationError, estimates: Array, speed: SpeedFit) -> Arr
     is not used: these residuals are the misfit of smooth curves, not noise, and on simulated tows it gave less than
     half of the true standard error of M.
     """
-    first = len(problem.known)
-    norms = column_norms(problem.free_design)
-    r = np.linalg.qr(problem.free_design / norms)[1]
+    first, free = len(problem.known), problem.free_design
+    norms = column_norms(free)
+    r = np.linalg.qr(free / norms)[1]
     residuals = problem.target - problem.design @ estimates
-    v = speed.polynomial(problem.time_s)
-    root_weights = np.sqrt(problem.weights)[:, None]
-    scaled_time = problem.time_s / speed.span_s
+    v, scaled_time = speed.polynomial(problem.time_s), problem.time_s / speed.span_s
     columns = []
     for k in range(len(speed.covariance)):
         v_change = scaled_time**k
         a_change = k * scaled_time ** max(k - 1, 0) / speed.span_s
         drag_changes = [DRAG_POWERS[term] * v ** (DRAG_POWERS[term] - 1) * v_change for term in problem.terms]
-        design_change = root_weights * np.column_stack([a_change, *drag_changes])
-        right = (design_change.T @ residuals)[first:] - problem.free_design.T @ (design_change @ estimates)
+        design_change = np.sqrt(problem.weights)[:, None] * np.column_stack([a_change, *drag_changes])
+        right = (design_change.T @ residuals)[first:] - free.T @ (design_change @ estimates)
         columns.append(np.linalg.solve(r, np.linalg.solve(r.T, right / norms)) / norms)
     sensitivity = np.vstack([np.zeros((first, len(columns))), np.column_stack(columns)])
     return sensitivity @ speed.covariance @ sensitivity.T

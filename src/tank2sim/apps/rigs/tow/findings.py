@@ -1,21 +1,34 @@
-"""Findings of an identification from tows for its user, each of a sentence."""
+"""Estimates from tows by one method, and findings on them for the user, each a sentence."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 from numpy.polynomial import Polynomial
 from scipy import stats
 
-from tank2sim.apps.rigs.tow.fit import TowFit
 from tank2sim.apps.rigs.tow.output_error import simulated_speeds
 from tank2sim.apps.rigs.tow.records import Tows
-from tank2sim.arrays import Array
+from tank2sim.apps.rigs.tow.surge import DRAG_POWERS, SurgeCoefficients
+from tank2sim.arrays import Array, Unbounded
 from tank2sim.identification.conditioning import COLLINEAR, scaled_condition
 from tank2sim.notices import Notice, caution
+
+TOW_PARAMETERS = {
+    "M": "total_mass_kg",
+    "B1": "B1_kgs2pm3",
+    "B2": "B2_kgspm2",
+    "B3": "B3_kgpm",
+    "delay": "start_delay_s",
+}
+"""Unknown of (1.5) to its name with unit, as in :class:`SurgeCoefficients`, the card and the JSON."""
+
+DELAY = "delay"
+"""Unknown that (1.5) does not have: time from t = 0 to the start of the body, s."""
 
 ADDED_SHARES = (0.0, 1.0)
 """Added mass in surge over the mass with the water inside. A sphere has 0.5, slender bodies less (Lamb 1932, art. 92
@@ -47,30 +60,97 @@ _TWO_SIDED_95 = 1.96
 _SIGNIFICANCE = 0.05
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TowFit:
+    """Estimates of M, the chosen drag terms of (1.5) and the start delay by one method.
+
+    Parameters
+    ----------
+    method : str
+        ``paper``, ``qr`` or ``output_error``.
+    unknowns : tuple of str
+        M, the drag terms in the order of (1.5), and ``delay`` if it was estimated.
+    estimated : tuple of str
+        Unknowns that are estimated: all, or all but a given M.
+    estimates : dict
+        Name with unit (:data:`TOW_PARAMETERS`, ``added_mass_kg``) to value, SI.
+    standard_errors : dict
+        Name with unit to standard error (one standard deviation); empty if the method gives none. A given mass has 0.
+    correlation : array (unknowns, unknowns), optional
+        Correlations of the unknowns.
+    condition, condition_scaled : float
+        Condition number of the normal matrix, of (b_ij) in (1.12); and of that matrix with a diagonal of ones, which
+        is free of the units.
+    J : float
+        J of (1.6), N s^(1/2), with the polynomial speed of the tows.
+    largest_speed_error_mps : float
+        Largest absolute difference of the integrated speed from the mean of the tows; infinite where it overflows.
+    """
+
+    method: str
+    unknowns: tuple[str, ...]
+    estimated: tuple[str, ...]
+    estimates: dict[str, float]
+    standard_errors: dict[str, float]
+    correlation: Array | None
+    condition: Unbounded
+    condition_scaled: Unbounded
+    J: float
+    largest_speed_error_mps: Unbounded
+
+    @property
+    def values(self) -> Array:
+        """Estimates (unknowns,), SI."""
+        return np.array([self.estimates[TOW_PARAMETERS[name]] for name in self.unknowns])
+
+    @property
+    def errors(self) -> Array | None:
+        """Standard errors (unknowns,), SI; None where the method gives none."""
+        known = self.standard_errors
+        return np.array([known[TOW_PARAMETERS[name]] for name in self.unknowns]) if known else None
+
+    @property
+    def drag_terms(self) -> dict[str, float]:
+        """Drag term of (1.5) to its coefficient, SI."""
+        return {name: self.estimates[TOW_PARAMETERS[name]] for name in self.unknowns if name in DRAG_POWERS}
+
+    @property
+    def start_delay_s(self) -> float:
+        """Time from t = 0 to the start of the body, s; 0 if it was not estimated."""
+        return self.estimates.get(TOW_PARAMETERS[DELAY], 0.0)
+
+    @property
+    def coefficients(self) -> SurgeCoefficients:
+        """Mass and drag; terms that were not estimated are 0."""
+        return surge_coefficients(dict(zip(self.unknowns, self.values.tolist(), strict=True)))
+
+    @property
+    def added_mass_kg(self) -> float:
+        """lambda11 = M - m."""
+        return self.estimates["added_mass_kg"]
+
+
+def surge_coefficients(estimates: Mapping[str, float]) -> SurgeCoefficients:
+    """Mass and drag from unknowns and their values, SI; a delay among them is left out."""
+    return SurgeCoefficients(**{TOW_PARAMETERS[name]: value for name, value in estimates.items() if name != DELAY})
+
+
 def tow_findings(
     tows: Tows, force: Polynomial, speed: Polynomial, fits: Mapping[str, TowFit], designs: Mapping[str, Array]
 ) -> Iterator[Notice]:
     """Sentences on terms that are not identifiable, impossible values, and misfits beyond the scatter.
 
-    Parameters
-    ----------
-    tows : Tows
-        The readings.
-    force : Polynomial
-        Towing force, N over s.
-    speed : Polynomial
-        v*(t) of the equation error, m/s over s.
-    fits : mapping
-        Method to its fit. The method of the paper is omitted if QR, with the same estimates, is included.
-    designs : mapping
-        Method to its design matrix (rows, free unknowns).
+    `force` is in N over s, `speed` is v*(t) of the equation error, m/s over s; `designs` are the design matrices (rows,
+    free unknowns) by method. The method of the paper is omitted if QR, with the same estimates, is among the fits.
     """
-    messages = [fit for name, fit in fits.items() if name != "paper" or "qr" not in fits]
-    yield from _identifiability(messages, designs)
-    for fit in messages:
-        yield from _plausibility(fit, tows.top_speed_mps)
-    if any(fit.method != "output_error" for fit in messages):
-        yield from _polynomial_findings(tows, speed, messages[0])
+    chosen = [fit for name, fit in fits.items() if name != "paper" or "qr" not in fits]
+    yield from _collinear(chosen, designs)
+    for fit in chosen:
+        yield from _uncertain(fit)
+    for fit in chosen:
+        yield from _impossible(fit, tows.top_speed_mps)
+    if any(fit.method != "output_error" for fit in chosen):
+        yield from _polynomial_findings(tows, speed, chosen[0])
     if "output_error" in fits:
         fit = fits["output_error"]
         speeds = simulated_speeds(fit.coefficients, force, tows.time_s, fit.start_delay_s)
@@ -82,7 +162,15 @@ def tow_findings(
                 f"it is {abs(fast):.3g} m/s too {'fast' if fast > 0 else 'slow'}; "
                 f"{'' if fit.start_delay_s else 'a late start or '}a force that it lacks is likely."
             )
-    yield from _disagreement(messages)
+    for first, second in combinations(chosen, 2):
+        if first.errors is None or second.errors is None:
+            continue
+        difference = abs(first.values[0] - second.values[0])
+        if difference > _TWO_SIDED_95 * math.hypot(first.errors[0], second.errors[0]):
+            yield Notice(
+                f"{first.method} and {second.method} differ in M by {difference:.3g} kg, more than their standard "
+                "errors explain; this is the accuracy of the mass."
+            )
 
 
 def identifiable_terms(fits: Sequence[TowFit], designs: Mapping[str, Array]) -> tuple[str, ...]:
@@ -101,7 +189,7 @@ def identifiable_terms(fits: Sequence[TowFit], designs: Mapping[str, Array]) -> 
     return ()
 
 
-def _identifiability(fits: Sequence[TowFit], designs: Mapping[str, Array]) -> Iterator[Notice]:
+def _collinear(fits: Sequence[TowFit], designs: Mapping[str, Array]) -> Iterator[Notice]:
     collinear = [fit for fit in fits if fit.condition_scaled > COLLINEAR**2]
     if collinear:
         numbers = " and ".join(f"{fit.condition_scaled:.2g} ({fit.method})" for fit in collinear)
@@ -110,28 +198,30 @@ def _identifiability(fits: Sequence[TowFit], designs: Mapping[str, Array]) -> It
             f"number is {numbers}, above the limit of {COLLINEAR**2:g}; take fewer terms "
             f"(--terms {','.join(identifiable_terms(fits, designs)) or 'none'})."
         )
-    for fit in fits:
-        if fit.errors is None or fit.correlation is None:
-            continue
-        pairs = [
-            f"{fit.unknowns[i]} and {fit.unknowns[j]} ({fit.correlation[i, j]:+.4f})"
-            for i, j in combinations(range(len(fit.unknowns)), 2)
-            if abs(fit.correlation[i, j]) > _CORRELATED
-        ]
-        if pairs:
-            yield Notice(
-                f"{fit.method}: almost fully correlated are {', '.join(pairs)}; only their combination is known."
-            )
-        uncertain = [
-            f"{name} ({value:.3g}, standard error {error:.2g})"
-            for name, value, error in zip(fit.unknowns, fit.values, fit.errors, strict=True)
-            if _TWO_SIDED_95 * error > abs(value)
-        ]
-        if uncertain:
-            yield Notice(f"{fit.method}: not distinguishable from zero at 95 %: {', '.join(uncertain)}.")
 
 
-def _plausibility(fit: TowFit, top_speed_mps: float) -> Iterator[Notice]:
+def _uncertain(fit: TowFit) -> Iterator[Notice]:
+    """Pairs of unknowns that are almost one, and unknowns that may be zero."""
+    if fit.correlation is None or fit.errors is None:
+        return
+    pairs = [
+        f"{fit.unknowns[i]} and {fit.unknowns[j]} ({fit.correlation[i, j]:+.4f})"
+        for i, j in combinations(range(len(fit.unknowns)), 2)
+        if abs(fit.correlation[i, j]) > _CORRELATED
+    ]
+    if pairs:
+        yield Notice(f"{fit.method}: almost fully correlated are {', '.join(pairs)}; only their combination is known.")
+    zero = [
+        f"{name} ({value:.3g}, standard error {error:.2g})"
+        for name, value, error in zip(fit.unknowns, fit.values, fit.errors, strict=True)
+        if _TWO_SIDED_95 * error > abs(value)
+    ]
+    if zero:
+        yield Notice(f"{fit.method}: not distinguishable from zero at 95 %: {', '.join(zero)}.")
+
+
+def _impossible(fit: TowFit, top_speed_mps: float) -> Iterator[Notice]:
+    """Masses, speeds and drags that no body has."""
     if fit.values[0] <= 0:
         yield Notice(
             f"{fit.method}: the mass M is negative ({fit.values[0]:.4g} kg), which no body has; do not use this fit."
@@ -141,15 +231,15 @@ def _plausibility(fit: TowFit, top_speed_mps: float) -> Iterator[Notice]:
     if not np.isfinite(fit.largest_speed_error_mps):
         yield Notice(f"{fit.method}: the speed with these values grows without bound; do not use this fit.")
     speeds = np.linspace(0.0, top_speed_mps, 401)[1:]
-    drags = fit.drag_N(speeds)
+    drags = fit.coefficients.drag_N(speeds)
+    minus = ", ".join(term for term, value in fit.drag_terms.items() if value < 0)
     if drags.min() < 0:
         yield Notice(
             f"{fit.method}: the drag is negative over {100 * np.mean(drags < 0):.0f} % of the speeds up to "
             f"{top_speed_mps:.3g} m/s reached, down to {drags.min():.2g} N at {speeds[drags.argmin()]:.2g} "
             "m/s; no hull has that."
         )
-    minus = ", ".join(term for term, value in fit.drag_terms.items() if value < 0)
-    if minus and drags.min() >= 0:
+    elif minus:
         yield Notice(
             f"{fit.method}: the drag terms have opposite signs ({minus} negative) and largely cancel each other."
         )
@@ -157,7 +247,7 @@ def _plausibility(fit: TowFit, top_speed_mps: float) -> Iterator[Notice]:
 
 def _added_mass(fit: TowFit) -> Iterator[Notice]:
     """An added mass that is none, or more than the mass, by more than its error."""
-    mass_kg = fit.estimates["total_mass_kg"] - fit.added_mass_kg
+    mass_kg = fit.values[0] - fit.added_mass_kg
     share = fit.added_mass_kg / mass_kg
     error = _TWO_SIDED_95 * fit.standard_errors.get("total_mass_kg", 0.0) / mass_kg
     low, high = ADDED_SHARES
@@ -167,17 +257,12 @@ def _added_mass(fit: TowFit) -> Iterator[Notice]:
                 f"{fit.method}: the added mass is negative ({fit.added_mass_kg:.4g} kg), but not beyond its error."
             )
         return
-    units = [
-        f"{name} (then {(1 + share) * factor - 1:.2g})"
-        for name, factor in FOREIGN_UNITS.items()
-        if USUAL_SHARES[0] <= (1 + share) * factor - 1 <= USUAL_SHARES[1]
-    ]
+    usual = {name: (1 + share) * factor - 1 for name, factor in FOREIGN_UNITS.items()}
+    units = [f"{name} (then {own:.2g})" for name, own in usual.items() if USUAL_SHARES[0] <= own <= USUAL_SHARES[1]]
     likely = f"; it would fit a body if {' or if '.join(units)}" if units else ""
-    yield (
-        caution(
-            f"{fit.method}: the added mass is {fit.added_mass_kg:.4g} kg, {share:.3g} times the mass, and bodies "
-            f"that are towed have {low:g} to {high:g}{likely}; check force, mass and speeds."
-        )
+    yield caution(
+        f"{fit.method}: the added mass is {fit.added_mass_kg:.4g} kg, {share:.3g} times the mass, and bodies "
+        f"that are towed have {low:g} to {high:g}{likely}; check force, mass and speeds."
     )
 
 
@@ -215,15 +300,3 @@ def _worst_misfit(tows: Tows, speeds: Array, estimates: int) -> int | None:
     if stats.f.sf(ratio, lack_freedom, pure_freedom) > _SIGNIFICANCE:
         return None
     return int(np.flatnonzero(moving)[np.argmax(lack)])
-
-
-def _disagreement(fits: Sequence[TowFit]) -> Iterator[Notice]:
-    for first, second in combinations(fits, 2):
-        if first.errors is None or second.errors is None:
-            continue
-        difference = abs(first.values[0] - second.values[0])
-        if difference > _TWO_SIDED_95 * math.hypot(first.errors[0], second.errors[0]):
-            yield Notice(
-                f"{first.method} and {second.method} differ in M by {difference:.3g} kg, more than their standard "
-                "errors explain; this is the accuracy of the mass."
-            )

@@ -13,21 +13,21 @@ known value.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from tank2sim.apps.rigs.tow import equation_error, output_error
-from tank2sim.apps.rigs.tow.findings import tow_findings
-from tank2sim.apps.rigs.tow.fit import TowFit, TowSolution
+from tank2sim.apps.rigs.tow.findings import DELAY, TOW_PARAMETERS, TowFit, surge_coefficients, tow_findings
 from tank2sim.apps.rigs.tow.output_error import AT_ONCE, TowOptions
 from tank2sim.apps.rigs.tow.records import Tows, as_force, checked_force, force_words, mean_force
 from tank2sim.apps.rigs.tow.surge import DRAG_POWERS
+from tank2sim.arrays import Array
 from tank2sim.cards.writing import SurgeResult, surge_card_text
 from tank2sim.errors import InputError
-from tank2sim.identification.conditioning import SINGULAR_CONDITION, scaled_condition
+from tank2sim.identification.conditioning import SINGULAR_CONDITION, correlation_matrix, scaled_condition
 from tank2sim.notices import Notice
 
 TOW_METHODS = ("paper", "qr", "output_error")
@@ -87,12 +87,9 @@ class TowIdentification:
 def parse_terms(text: str) -> tuple[str, ...]:
     """Drag terms from an option's text, ``"B3,B2,B1"`` or ``"none"``, in the order of (1.5).
 
-    Raises
-    ------
-    InputError
-        A term is unknown or repeated.
+    InputError if a term is unknown or repeated.
     """
-    return () if text.strip().lower() == "none" else _checked_terms([word.strip() for word in text.split(",")])
+    return () if text.strip().lower() == "none" else _checked_terms(word.strip() for word in text.split(","))
 
 
 def identify_tow(
@@ -125,17 +122,25 @@ def identify_tow(
         Force or mass is missing or not positive, a term is unknown or repeated, no unknown remains, or the tows do not
         determine the unknowns (too few readings, no motion, no acceleration).
     """
-    pull = _force(tows, force)
+    pull = (
+        checked_force(force, tows.time_s)
+        if isinstance(force, Polynomial)
+        else as_force(_positive(tows, "force_N", force, tows.force_N))
+    )
     mass = _positive(tows, "mass_kg", mass_kg, tows.mass_kg)
     terms = _checked_terms(terms)
-    _check_assumptions(tows, terms, speed_degree, options)
+    if speed_degree < 2:
+        raise ValueError(f"degree {speed_degree} below 2")
+    if options.total_mass_kg is not None:
+        _positive(tows, "total_mass_kg", options.total_mass_kg, None)
+        if not terms:
+            raise InputError("--total-mass-kg", "", "leaves nothing to estimate", "take drag terms (--terms B3)")
     speed = equation_error.fit_mean_speed(tows, speed_degree)
     problem = equation_error.discretise(speed.polynomial, tows.time_s, terms, pull, mass_kg=options.total_mass_kg)
     _check_solvable(tows, problem)
-    solutions = _solutions(tows, speed, problem, pull, options)
+    solutions = dict(_solutions(tows, speed, problem, pull, options))
     fits = {name: _fit(name, solution, (tows, mass, pull), problem) for name, solution in solutions.items()}
-    designs = {name: solution.design for name, solution in solutions.items()}
-    notes = _notes(tows, force, mass, set(TOW_METHODS) - set(fits))
+    designs = {name: design for name, (_, design, _) in solutions.items()}
     return TowIdentification(
         tows=str(tows.path),
         force_N=mean_force(pull, tows.time_s),
@@ -148,8 +153,16 @@ def identify_tow(
         top_speed_mps=tows.top_speed_mps,
         speed_polynomial=tuple(speed.polynomial.coef.tolist()),
         methods=fits,
-        notices=(*notes, *tow_findings(tows, pull, speed.polynomial, fits, designs)),
+        notices=(
+            *map(Notice, _notes(tows, force, mass, set(TOW_METHODS) - set(fits))),
+            *tow_findings(tows, pull, speed.polynomial, fits, designs),
+        ),
     )
+
+
+_Solution = tuple[Array, Array, Array | None]
+"""M, the coefficients of the drag terms, and the delay if it is estimated, SI; design without the column of a given M;
+covariance of all of them, None where the method gives none."""
 
 
 def _solutions(
@@ -158,51 +171,59 @@ def _solutions(
     problem: equation_error.EquationError,
     force: Polynomial,
     options: TowOptions,
-) -> dict[str, TowSolution]:
-    design = problem.free_design
+) -> Iterator[tuple[str, _Solution]]:
+    design, known = problem.free_design, problem.known
     values = equation_error.solve_by_qr(problem)
-    found = {
-        "paper": TowSolution(equation_error.solve_normal_equations(problem), design),
-        "qr": TowSolution(values, design, equation_error.covariance(problem, values, speed)),
-    }
+    yield "paper", (equation_error.solve_normal_equations(problem), design, None)
+    yield "qr", (values, design, equation_error.covariance(problem, values, speed))
     fit = output_error.fit_speeds(tows, force, problem.terms, options)
     if fit is not None:
-        covariance = np.zeros((len(problem.known) + len(fit.estimates),) * 2)
-        covariance[len(problem.known) :, len(problem.known) :] = fit.covariance
-        found["output_error"] = TowSolution(np.concatenate([problem.known, fit.estimates]), fit.design, covariance)
-    return found
+        spread = np.pad(fit.covariance, (len(known), 0))
+        yield "output_error", (np.concatenate([known, fit.estimates]), fit.design, spread)
 
 
 def _fit(
-    method: str, solution: TowSolution, known: tuple[Tows, float, Polynomial], problem: equation_error.EquationError
+    method: str, solution: _Solution, known: tuple[Tows, float, Polynomial], problem: equation_error.EquationError
 ) -> TowFit:
-    tows, mass_kg, force = known
-    J = problem.J(solution.values[: 1 + len(problem.terms)])
-    fit = solution.fit(method, problem.terms, mass_kg, J)
-    speeds = output_error.simulated_speeds(fit.coefficients, force, tows.time_s, fit.start_delay_s)
-    error = float(np.max(np.abs(speeds - tows.mean_speed_mps))) if np.isfinite(speeds).all() else math.inf
-    return replace(fit, largest_speed_error_mps=error)
+    """A solution with the names of its unknowns, and its errors."""
+    (values, design, spread), (tows, mass_kg, force) = solution, known
+    unknowns = ("M", *problem.terms, DELAY)[: len(values)]
+    names = [TOW_PARAMETERS[name] for name in unknowns]
+    estimates = dict(zip(names, values.tolist(), strict=True))
+    errors: dict[str, float] = {}
+    if spread is not None:
+        errors = dict(zip(names, np.sqrt(np.maximum(np.diag(spread), 0.0)).tolist(), strict=True))
+        errors["added_mass_kg"] = errors["total_mass_kg"]
+    coefficients = surge_coefficients(dict(zip(unknowns, values.tolist(), strict=True)))
+    delay = estimates.get(TOW_PARAMETERS[DELAY], 0.0)
+    speeds = output_error.simulated_speeds(coefficients, force, tows.time_s, delay)
+    return TowFit(
+        method=method,
+        unknowns=unknowns,
+        estimated=unknowns[len(unknowns) - design.shape[1] :],
+        estimates={**estimates, "added_mass_kg": estimates["total_mass_kg"] - mass_kg},
+        standard_errors=errors,
+        correlation=None if spread is None else correlation_matrix(spread),
+        condition=float(np.linalg.cond(design) ** 2),
+        condition_scaled=scaled_condition(design) ** 2,
+        J=problem.J(values[: 1 + len(problem.terms)]),
+        largest_speed_error_mps=(
+            float(np.max(np.abs(speeds - tows.mean_speed_mps))) if np.isfinite(speeds).all() else math.inf
+        ),
+    )
 
 
-def _notes(tows: Tows, force: float | Polynomial | None, mass_kg: float, failed: set[str]) -> list[Notice]:
-    notes = []
+def _notes(tows: Tows, force: float | Polynomial | None, mass_kg: float, failed: set[str]) -> Iterator[str]:
     used = force if isinstance(force, float | int) else tows.force_N
     for name, used_value, written in (("force_N", used, tows.force_N), ("mass_kg", mass_kg, tows.mass_kg)):
         if written is not None and written != used_value:
-            notes.append(f"The file of the tows states {name} {written:g}; {used_value:g} was given and used.")
+            yield f"The file of the tows states {name} {written:g}; {used_value:g} was given and used."
     if isinstance(force, Polynomial) and tows.force_N is not None:
-        notes.append(f"The file of the tows states force_N {tows.force_N:g}; {force_words(force)} was given and used.")
+        yield f"The file of the tows states force_N {tows.force_N:g}; {force_words(force)} was given and used."
     if tows.time_s[0] == 0 and np.nanmax(np.abs(tows.speed_mps[0])) > 0:
-        notes.append("The speed at t_s = 0 is not zero in every tow; a start from rest at that time is assumed.")
+        yield "The speed at t_s = 0 is not zero in every tow; a start from rest at that time is assumed."
     for method in failed:
-        notes.append(f"{method}: the fit did not converge and is left out; take fewer terms (--terms B3).")
-    return [Notice(text) for text in notes]
-
-
-def _force(tows: Tows, given: float | Polynomial | None) -> Polynomial:
-    if isinstance(given, Polynomial):
-        return checked_force(given, tows.time_s)
-    return as_force(_positive(tows, "force_N", given, tows.force_N))
+        yield f"{method}: the fit did not converge and is left out; take fewer terms (--terms B3)."
 
 
 def _positive(tows: Tows, name: str, given: float | None, written: float | None) -> float:
@@ -225,15 +246,6 @@ def _checked_terms(terms: Iterable[str]) -> tuple[str, ...]:
     return tuple(term for term in DRAG_POWERS if term in terms)
 
 
-def _check_assumptions(tows: Tows, terms: tuple[str, ...], speed_degree: int, options: TowOptions) -> None:
-    if speed_degree < 2:
-        raise ValueError(f"degree {speed_degree} below 2")
-    if options.total_mass_kg is not None:
-        _positive(tows, "total_mass_kg", options.total_mass_kg, None)
-        if not terms:
-            raise InputError("--total-mass-kg", "", "leaves nothing to estimate", "take drag terms (--terms B3)")
-
-
 def _check_solvable(tows: Tows, problem: equation_error.EquationError) -> None:
     if tows.top_speed_mps <= 0:
         raise InputError(tows.path, "", "no tow has a speed above zero", "give tows in which the body moves forward")
@@ -252,14 +264,7 @@ def tow_card_text(
 ) -> str:
     """TOML text of the card with the numbers of one method; its notes are the notices of the result.
 
-    Parameters
-    ----------
-    fit : TowFit
-        One of ``result.methods``.
-    name, source : str
-        Name of the body, and source of the numbers.
-    length_m : float, optional
-        Length of the body, if known.
+    `fit` is one of ``result.methods``; name of the body, source of the numbers, and length if known.
     """
     values = {key: value for key, value in fit.estimates.items() if key not in ("added_mass_kg", "start_delay_s")}
     return surge_card_text(

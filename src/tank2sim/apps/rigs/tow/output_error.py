@@ -4,26 +4,20 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 from numpy.polynomial import Polynomial
-from scipy import stats
-from scipy.optimize import least_squares
 
+from tank2sim.apps.rigs.search import WithSlopes, least_misfit, pseudo_inverse
 from tank2sim.apps.rigs.tow.records import Tows, as_force, mean_force
 from tank2sim.apps.rigs.tow.surge import DRAG_POWERS, SurgeCoefficients, surge_model
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.identification.conditioning import column_norms, scaled_condition
-from tank2sim.identification.trials.methods.gauss_newton import is_minimum
 from tank2sim.simulation.scheme import runge_kutta_step
 from tank2sim.simulation.sensitivity import augmented_step
-
-Predictor = Callable[[Array], tuple[Array, Array]]
 
 MOST_STEPS = 5000
 """Most steps of the integration over a record; a longer record has longer steps than the model's, because its body is
@@ -35,14 +29,8 @@ _LATEST_START = 0.5
 
 @dataclass(frozen=True)
 class TowOptions:
-    """Assumptions on the tows in addition to (1.5).
-
-    Parameters
-    ----------
-    start_delay : bool
-        Estimate a delay of the start after t = 0, the same in all tows.
-    total_mass_kg : float, optional
-        M, if known: it is not estimated.
+    """Assumptions on the tows in addition to (1.5): a start delay after t = 0, the same in all tows, is estimated; and
+    M, if it is known, is not.
     """
 
     start_delay: bool = False
@@ -57,14 +45,8 @@ AT_ONCE = TowOptions()
 class OutputErrorFit:
     """The least-squares fit of the integrated speeds.
 
-    Parameters
-    ----------
-    estimates : array, (unknowns,)
-        M (unless known), the drag coefficients, the start delay (if estimated); SI.
-    design : array, (readings, unknowns)
-        Sensitivities of the speeds at the readings to the estimates.
-    residuals_mps : array, (readings,)
-        Fitted speed less reading.
+    Estimates (unknowns,) are M (unless known), the drag coefficients and the start delay (if estimated), SI; `design`
+    (readings, unknowns) the sensitivities of the speeds; residuals (readings,) the fitted speed less the reading.
     """
 
     estimates: Array
@@ -84,42 +66,18 @@ class OutputErrorFit:
     @property
     def covariance(self) -> Array:
         """Covariance of the estimates, for independent readings of equal variance and a true model."""
-        norms = column_norms(self.design)
-        inverse = np.linalg.pinv(self.design / norms) / norms[:, None]
+        inverse = pseudo_inverse(self.design)
         return self.scatter_mps**2 * inverse @ inverse.T
-
-    @property
-    def half_widths(self) -> Array:
-        """Half-widths of the 95 % intervals of the estimates, by Student's t, (unknowns,)."""
-        half: Array = stats.t.ppf(0.975, self.freedom) * np.sqrt(np.diag(self.covariance))
-        return half
-
-    @property
-    def condition_scaled(self) -> float:
-        """Condition number of J'J with a diagonal of ones."""
-        return scaled_condition(self.design) ** 2
-
-    @property
-    def aic(self) -> float:
-        """Akaike's n ln(SSE/n) + 2 k, with n readings and k estimates; lower is better, only differences matter."""
-        n = len(self.residuals_mps)
-        mean_square = max(float(np.mean(self.residuals_mps**2)), np.finfo(float).tiny)
-        return n * math.log(mean_square) + 2 * len(self.estimates)
 
 
 def speed_predictor(
     times_s: Array, force: float | Polynomial, terms: tuple[str, ...], options: TowOptions = AT_ONCE
-) -> Predictor:
-    """Speeds of (1.5) from rest, and their sensitivities.
+) -> WithSlopes:
+    """Speeds of (1.5) from rest (times,), and their sensitivities (times, unknowns), as a function of the estimates.
 
-    The body is at rest until t = 0, or until the start delay, and then moves under T(t) of the same clock. The
-    force of each integration step is the mean of T over the step, which preserves the impulse.
-
-    Returns
-    -------
-    callable
-        ``predict(estimates) -> (speeds (times,), sensitivities (times, unknowns))`` with estimates = (M, B..., delay),
-        SI; without M if it is known, without delay if it is not estimated. A delay is >= 0.
+    Estimates are (M, B..., delay), SI; without M if it is known, without delay (>= 0) if it is not estimated. The body
+    is at rest until t = 0, or until the start delay, and then moves under T(t) of the same clock. The force of each
+    integration step is the mean of T over the step, which preserves the impulse.
     """
     pull = as_force(force)
     model = _unit_model()
@@ -184,10 +142,7 @@ def fit_speeds(
 ) -> OutputErrorFit | None:
     """Least squares of the integrated speeds against all readings after the release; None if it does not converge.
 
-    Raises
-    ------
-    InputError
-        The readings after the release do not outnumber the estimates.
+    InputError if the readings after the release do not outnumber the estimates.
     """
     read = ~np.isnan(tows.speed_mps) & (tows.time_s > 0)[:, None]
     row_of_reading = np.nonzero(read)[0]
@@ -198,30 +153,16 @@ def fit_speeds(
         problem = f"{len(readings)} readings after the release do not test {len(scale)} estimates"
         raise InputError(tows.path, "", problem, "give more readings, or take fewer terms (--terms B3)")
 
-    @functools.lru_cache(maxsize=2)  # residuals and Jacobian are evaluated at the same point
-    def at(*scaled: float) -> tuple[Array, Array]:
-        speeds, sensitivities = predict(np.array(scaled) * scale)
+    def misfit(scaled: Array) -> tuple[Array, Array]:
+        speeds, sensitivities = predict(scaled * scale)
         return speeds[row_of_reading] - readings, sensitivities[row_of_reading] * scale
 
     lowest = np.where(np.isinf(highest), -np.inf, 0.0)
-    found = least_squares(
-        lambda scaled: at(*scaled)[0],
-        start,
-        lambda scaled: at(*scaled)[1],
-        (lowest, highest),
-        xtol=1e-12,
-        ftol=1e-12,
-        gtol=1e-12,
-    )
-    if not found.success or not np.isfinite(found.x).all():
-        return None
-    variance = max(float(np.mean(found.fun**2)), np.finfo(float).tiny)
-    H, g = found.jac.T @ found.jac, found.jac.T @ found.fun
-    stays = is_minimum(H, g, variance=variance, bounded=(found.x, lowest, highest))
-    if np.array_equal(found.x, start) and not stays:  # the search did not move: it would be the guess
+    found = least_misfit(misfit, start, (lowest, highest), tolerances=(1e-12, 1e-12, 1e-12))
+    if found is None:
         return None
     best = np.where(found.active_mask < 0, 0.0, found.x)
-    residuals, design = at(*best)
+    residuals, design = misfit(best)
     return OutputErrorFit(best * scale, design / scale, residuals)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.polynomial import Polynomial
 
 from tank2sim.apps.rigs.tow.records import Tows
 from tank2sim.apps.rigs.tow.surge import SurgeCoefficients
@@ -20,27 +19,8 @@ TABLE_2: tuple[tuple[tuple[float, ...], float], ...] = (
 )
 """Coefficients in rising powers of t and error of the speed polynomials, by degree."""
 
-SPEED = Polynomial(TABLE_2[2][0])
-"""(2.1), whose first coefficient has lost its minus sign in print."""
-FORCE_N = 11.63
-
-INNER_PRODUCTS = np.array(
-    [
-        [0.0006072, 0.0000264, 0.0001971, 0.0015685],
-        [0.0000264, 0.0000041, 0.0000276, 0.0001867],
-        [0.0001971, 0.0000276, 0.0001867, 0.0012860],
-        [0.0015685, 0.0001867, 0.0012860, 0.0090830],
-    ]
-)
-"""b_ij before (2.3)."""
-FORCE_PRODUCTS = np.array([2.00615, 0.10564, 0.77341, 5.99223])
-"""b_i0 before (2.3)."""
-
 SOLUTION = SurgeCoefficients(total_mass_kg=2550.0, B1_kgs2pm3=92418.0, B2_kgspm2=-26096.0, B3_kgpm=2015.0)
 """(2.4), which is not the solution of (1.12) with the printed products; (2.3) has lost the minus sign of B2."""
-LARGEST_DEVIATION_MPS = 0.014
-MASS_BY_THEORY_KG = 2489.0
-"""M_s of (2.5)."""
 
 
 def are_of_the_paper(tows: Tows) -> bool:

@@ -34,20 +34,9 @@ BODY_KEYS = ("length_m", "beam_m", "volume_m3", "water_density_kgpm3", "kinemati
 class Tows:
     """Speeds of one body in tows by the same force.
 
-    Parameters
-    ----------
-    path : Path
-        The file they come from.
-    names : tuple of str
-        Column of each tow.
-    time_s : array, (times,)
-        Rising; 0 is the moment of release.
-    speed_mps : array, (times, tows)
-        nan where nothing was recorded; each row and each tow has at least one reading.
-    force_N, mass_kg : float or None
-        Towing force and mass of the body with the water in it, where the file states them.
-    body : dict
-        Other numbers that the file gives of the body and the water, SI: the keys of :data:`BODY_KEYS` to numbers.
+    Times (s) rise from the release, 0; speeds (times, tows) are nan where nothing was recorded; each row and each tow
+    has at least one reading. Force and mass of the body with the water in it, and the keys of :data:`BODY_KEYS`, are as
+    the file states them. `names` are the columns.
     """
 
     path: Path
@@ -75,15 +64,8 @@ class Tows:
         """The highest reading."""
         return float(np.nanmax(self.speed_mps))
 
-    def only(self, number: int) -> Tows:
-        """One of the tows by itself, from 0, at the times when it was read."""
-        return self._of([number])
-
-    def without(self, number: int) -> Tows:
-        """All tows but one."""
-        return self._of([other for other in range(len(self.names)) if other != number])
-
-    def _of(self, numbers: list[int]) -> Tows:
+    def only(self, *numbers: int) -> Tows:
+        """The tows of these `numbers`, from 0, at the times when they were read."""
         speed = self.speed_mps[:, numbers]
         read = ~np.isnan(speed).all(axis=1)
         names = tuple(self.names[number] for number in numbers)
@@ -148,13 +130,11 @@ def read_tows(path: Path | str | CsvTable) -> Tows:
 
 
 def _check_name(table: CsvTable, name: str) -> None:
-    if _SPEED.fullmatch(name):
-        return
-    if name.startswith("speed") and not name.endswith("_mps"):
-        problem, remedy = "is not a speed in m/s", "convert it to m/s and call it speed_1_mps, speed_2_mps, ..."
-    else:
-        problem, remedy = "is not a speed of a tow", "delete it, or call it speed_1_mps, speed_2_mps, ..."
-    raise InputError(table.path, f"column {name}", problem, remedy)
+    if not _SPEED.fullmatch(name):
+        other = name.startswith("speed") and not name.endswith("_mps")
+        problem = "is not a speed in m/s" if other else "is not a speed of a tow"
+        remedy = f"{'convert it to m/s and' if other else 'delete it, or'} call it speed_1_mps, speed_2_mps, ..."
+        raise InputError(table.path, f"column {name}", problem, remedy)
 
 
 def _positive(table: CsvTable, key: str) -> float | None:
@@ -170,13 +150,7 @@ def as_force(force: float | Polynomial) -> Polynomial:
 
 
 def parse_force(text: str) -> Polynomial:
-    """T(t) from an option's text ``c0,c1,...``: T = c0 + c1 t + ..., N over s.
-
-    Raises
-    ------
-    InputError
-        It is not a list of finite numbers.
-    """
+    """T(t) from an option's text ``c0,c1,...``: T = c0 + c1 t + ..., N over s; InputError for any other text."""
     try:
         coefficients = [float(word) for word in text.split(",")]
     except ValueError:
@@ -187,13 +161,8 @@ def parse_force(text: str) -> Polynomial:
 
 
 def checked_force(force: Polynomial, times_s: Array) -> Polynomial:
-    """The force, if it pulls forward from the release to the last reading.
-
-    Raises
-    ------
-    InputError
-        It is negative at some time, or zero throughout.
-    """
+    """The force, if it pulls forward from the release to the last reading; InputError if negative, or zero
+    throughout."""
     end = float(times_s[-1])
     times = np.linspace(0.0, end, 201)
     values = force(times)

@@ -2,38 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import PurePath
 from typing import TYPE_CHECKING, ClassVar
 
+import numpy as np
+
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_layers, look_of
+from tank2sim.answer.charts.motion import History, Signal, history_chart
+from tank2sim.answer.charts.parts import plain, series_look, vector
+from tank2sim.answer.charts.rows import RowPlot, row_layers
+from tank2sim.answer.charts.vega import STACKS, ChartRecord, ChartSpec, PlotAxis, Rule, layered
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.parts import (
-    Cell,
-    Column,
-    Illustration,
-    KeyFigure,
-    Section,
-    Table,
-    Verdict,
-    records_table,
-    table,
-)
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, records_table, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.rigs.tow import paper as tow_paper
-from tank2sim.apps.rigs.tow.charts import drag_chart, ellipse_chart, model_chart, tow_speed_chart
-from tank2sim.apps.rigs.tow.fit import TOW_PARAMETERS, TowFit
+from tank2sim.apps.rigs.tow.findings import TOW_PARAMETERS, TowFit
 from tank2sim.apps.rigs.tow.identify import tow_card_text
-from tank2sim.apps.rigs.tow.model_selection import TowByTow
 from tank2sim.apps.rigs.tow.records import force_words
-from tank2sim.apps.rigs.tow.study import TowStudy
+from tank2sim.apps.rigs.tow.study import Ellipse, FittedModel, TowByTow, TowSpeeds, TowStudy
 from tank2sim.apps.rigs.tow.theory import DragPolynomial, TowedBody, drag_polynomial
 from tank2sim.cards import Card, parse_card
 from tank2sim.identification.conditioning import COLLINEAR
 
 if TYPE_CHECKING:
     import pandas as pd
+
 
 _LARGEST_CONDITION = COLLINEAR**2
 """Scaled condition number up to which the unknowns can be distinguished."""
@@ -54,6 +50,9 @@ _ELLIPSES = (
     "The regions are linearised and take the readings as independent; the points are the same models fitted to single "
     "tows. A long slanting region means that only a combination of mass and drag is known. Where the two regions part, "
     "the start decides."
+)
+_BY_TOW = (
+    "Each tow by itself, and one left out in turn. These errors hold also where the readings of one tow err together."
 )
 _THEORY = (
     "M_s = k* (1 + k₁₁) ρ V, with Lamb's k₁₁ of ellipsoids and the published k* = 0.96 for the free surface. "
@@ -186,25 +185,21 @@ class TowResult(Result[TowStudy]):
     @property
     def sections(self) -> Sequence[Section]:
         """Speeds, estimates, models of other size, drag, theory, single tows."""
-        body = self.study.body
-        return [
-            *self._speeds(),
-            self._estimates(),
-            self._models(),
-            *([self._drag(body), self._theory()] if body else []),
-            *self._by_tow(),
-        ]
-
-    def _speeds(self) -> list[Section]:
-        speeds = self.study.speeds
-        if not speeds.simulated_mps:
-            return []
-        chart = Illustration(
-            chart=tow_speed_chart(speeds, title="Speeds of the tows and of the models"),
-            caption=f"The lower panel shows the differences from {next(iter(speeds.simulated_mps))}.",
-            name="measured_and_computed_speeds",
-        )
-        return [Section(heading="Measured and computed speeds", charts=[chart])]
+        study, sections = self.study, []
+        if study.speeds.simulated_mps:
+            chart = Illustration(
+                chart=tow_speed_chart(study.speeds),
+                caption=f"The lower panel shows the differences from {next(iter(study.speeds.simulated_mps))}.",
+                name="measured_and_computed_speeds",
+            )
+            sections.append(Section(heading="Measured and computed speeds", charts=[chart]))
+        sections += [self._estimates(), self._models()]
+        if study.body:
+            sections += [self._drag(study.body), self._theory()]
+        if study.tow_by_tow:
+            by_tow = [_subset_table(label, subset) for label, subset in study.tow_by_tow.items()]
+            sections.append(Section(heading="Tow by tow", text=_BY_TOW, tables=by_tow, folded=True))
+        return sections
 
     def _estimates(self) -> Section:
         fits = self.study.methods.values()
@@ -252,6 +247,11 @@ class TowResult(Result[TowStudy]):
             chart = ellipse_chart(study.confidence_ellipses, study.tow_by_tow)
             charts.append(Illustration(chart=chart, caption=_ELLIPSES, name=name))
         unknowns = [name for name in _UNITS if any(name in model.estimates for model in study.models)]
+        by_tow = [
+            f"M by single tows, {label}: {', '.join(f'{row[0]:.0f}' for row in subset.alone)} kg. With one tow left "
+            f"out in turn: ± {subset.jackknife_half_widths_95[0]:.0f} kg (95 %)."
+            for label, subset in study.tow_by_tow.items()
+        ]
         estimates: list[list[Cell]] = [
             [
                 model.label,
@@ -284,7 +284,7 @@ class TowResult(Result[TowStudy]):
             text="The same readings by output error with fewer and with more unknowns (delay: time from t = 0 to the "
             "start of the body).",
             tables=[
-                table("Output error, models of different size", columns, rows, *self._masses_by_tow(), folded=True),
+                table("Output error, models of different size", columns, rows, *by_tow, folded=True),
                 table(
                     "Estimates of these models with 95 % half-widths",
                     ("model", *heads),
@@ -296,74 +296,41 @@ class TowResult(Result[TowStudy]):
             charts=charts,
         )
 
-    def _masses_by_tow(self) -> list[str]:
-        return [
-            f"M by single tows, {label}: {', '.join(f'{row[0]:.0f}' for row in subset.alone)} kg. With one tow left "
-            f"out in turn: ± {subset.jackknife_half_widths_95[0]:.0f} kg (95 %)."
-            for label, subset in self.study.tow_by_tow.items()
-        ]
-
     def _drag(self, body: TowedBody) -> Section:
-        drags = self._drags(body)
-        orders = ("A1 (s²/m²)", "A2 (s/m)", "A3")
-        rows: list[list[Cell]] = [
-            [name, area, *values]
-            for name, drag in drags.items()
-            for area, values in (
-                ("L²", asdict(drag).values()),
-                ("V^(2/3)", asdict(drag.times(body.area_ratio)).values()),
-            )
-        ]
-        chart = Illustration(
-            chart=drag_chart(drags, body, self.study.top_speed_mps),
-            caption=f"L = {body.length_m:g} m, V = {body.volume_m3:.4g} m³, ν = {format_number(body.viscosity_m2ps)} "
-            "m²/s. The axes fit the curves that stay above zero; no hull has a coefficient below zero.",
-        )
-        caption = "Drag coefficient C = A1 v² + A2 v + A3"
-        drag_table = table(caption, ("method", "referred to", *orders), rows, folded=True)
-        return Section(heading="Drag coefficient", tables=[drag_table], charts=[chart])
-
-    def _drags(self, body: TowedBody) -> dict[str, DragPolynomial]:
-        """C referred to L^2 by method, by the best usable model, and as printed."""
+        study = self.study
+        found = study.drag_coefficients
         drags = {
             _METHODS[name]: drag.by_length_squared
-            for name, drag in self.study.drag_coefficients.items()
-            if name != "paper" or "qr" not in self.study.drag_coefficients
+            for name, drag in found.items()
+            if name != "paper" or "qr" not in found
         }
-        if best := self.study.best:
+        if best := study.best:
             drag = drag_polynomial(best.coefficients, body)
             if drag not in drags.values():
                 drags[f"best usable: {best.label}"] = drag
-        if self.study.tows_of_the_paper:
+        if study.tows_of_the_paper:
             drags["as printed"] = drag_polynomial(tow_paper.SOLUTION, body)
-        return drags
+        rows: list[list[Cell]] = []
+        for name, drag in drags.items():
+            rows.append([name, "L²", *asdict(drag).values()])
+            rows.append([name, "V^(2/3)", *asdict(drag.times(body.area_ratio)).values()])
+        chart = Illustration(
+            chart=drag_chart(drags, body, study.top_speed_mps),
+            caption=f"L = {body.length_m:g} m, V = {body.volume_m3:.4g} m³, ν = {format_number(body.viscosity_m2ps)} "
+            "m²/s. The axes fit the curves that stay above zero; no hull has a coefficient below zero.",
+        )
+        heads = ("method", "referred to", "A1 (s²/m²)", "A2 (s/m)", "A3")
+        drag_table = table("Drag coefficient C = A1 v² + A2 v + A3", heads, rows, folded=True)
+        return Section(heading="Drag coefficient", tables=[drag_table], charts=[chart])
 
     def _theory(self) -> Section:
         estimate = ""
         if best := self.study.best:
             mass, half = best.estimates["M"], best.half_widths_95["M"]
             estimate = f" The tows give {mass:.0f} ± {half:.0f} kg by the best usable model."
-        fields = {
-            "basis": "body",
-            "k11": "k₁₁",
-            "deep_kg": "(1 + k₁₁) ρ V",
-            "near_surface_kg": "near the surface, M_s",
-        }
+        fields = {"basis": "body", "k11": "k₁₁", "deep_kg": "(1 + k₁₁) ρ V", "near_surface_kg": "near the surface, M_s"}
         masses = records_table("Mass in surge by theory (2.5)", self.study.mass_by_theory, fields=fields)
         return Section(heading="Mass by theory", text=_THEORY + estimate, tables=[masses])
-
-    def _by_tow(self) -> list[Section]:
-        if not self.study.tow_by_tow:
-            return []
-        return [
-            Section(
-                heading="Tow by tow",
-                text="Each tow by itself, and one left out in turn. These errors hold also where the readings of one "
-                "tow err together.",
-                tables=[_subset_table(label, subset) for label, subset in self.study.tow_by_tow.items()],
-                folded=True,
-            )
-        ]
 
 
 def _with_error(fit: TowFit, key: str) -> Cell:
@@ -386,3 +353,141 @@ def _subset_table(label: str, subset: TowByTow) -> Table:
     ]
     heads = ("tows", *(f"{name} ({_UNITS[name]})" for name in subset.unknowns))
     return table(label[0].upper() + label[1:], heads, rows, on_screen=False)
+
+
+_SPEEDS = (Signal(name="speed", title="speed", unit="m/s"), Signal(name="left", title="less the model", unit="m/s"))
+
+
+def tow_speed_chart(speeds: TowSpeeds) -> ChartSpec:
+    """Readings as points and simulated speeds as lines; below, all of them less the first simulation.
+
+    Parameters
+    ----------
+    speeds : TowSpeeds
+        With at least one simulation.
+    """
+    time, simulated = speeds.t_s, speeds.simulated_mps
+    reference = next(iter(simulated.values()))
+    at_readings = np.interp(time, speeds.simulated_t_s, reference)
+    runs = []
+    for label, speed in speeds.measured_mps.items():
+        signals = {"speed": speed, "left": speed - at_readings}
+        runs.append(History(label=label, time_s=time, values=signals, measured=True))
+    for name, speed in simulated.items():
+        runs.append(
+            History(label=name, time_s=speeds.simulated_t_s, values={"speed": speed, "left": speed - reference})
+        )
+    return history_chart(runs, _SPEEDS, title="Speeds of the tows and of the models", height_px=230)
+
+
+def drag_chart(drags: Mapping[str, DragPolynomial], body: TowedBody, top_speed_mps: float) -> ChartSpec:
+    """C referred to L^2 against speed, and C referred to V^(2/3) against Reynolds number."""
+    speeds = np.linspace(0.0, top_speed_mps, 121)
+    panels = []
+    shown: dict[str, str | tuple[str, str]] = {
+        "run:N": "by",
+        "speed:Q": "v (m/s)",
+        "re:Q": ("Re", ",.3~s"),
+        "c:Q": "C by L²",
+        "cv:Q": "C by V^(2/3)",
+    }
+    for across, values, name, factor in (
+        (PlotAxis(title="speed (m/s)", nice=False), speeds, "C referred to L²", 1.0),
+        (
+            PlotAxis(title="Reynolds number v L / ν", nice=False, form="~s"),
+            body.reynolds(speeds),
+            "C referred to V^(2/3)",
+            body.area_ratio,
+        ),
+    ):
+        series = []
+        for label, drag in drags.items():
+            both = {"c": drag.at(speeds), "cv": drag.times(body.area_ratio).at(speeds)}
+            more = {"speed": speeds, "re": body.reynolds(speeds), **both}
+            series.append(PlotSeries(label=label, x=values, y=drag.times(factor).at(speeds), more=more))
+        # From a little below 0 to above the highest C of the curves that stay above zero; of all, if none does.
+        curves = [vector(line.y) for line in series]
+        kept = [curve for curve in curves if curve.min() >= 0] or curves
+        low, high = min(0.0, *(float(curve.min()) for curve in kept)), max(float(curve.max()) for curve in kept)
+        margin = 0.08 * (high - low)
+        up = PlotAxis(title=name, domain=(low - margin, high + margin))
+        plot = Plot(series=series, up=up, rules=[Rule(at=[0.0])])
+        layers = curve_layers(plot, across, look_of(series), shown=shown)
+        panels.append(layered(layers, size=(330, 300)))
+    return {
+        "hconcat": panels,
+        "spacing": 28,
+        "title": "Drag coefficient",
+        "description": "Drag coefficient referred to length squared over speed, and to volume over Reynolds number.",
+        "usermeta": STACKS,
+    }
+
+
+def ellipse_chart(ellipses: Sequence[Ellipse], by_tow: Mapping[str, TowByTow]) -> ChartSpec:
+    """Joint 95 % regions of M and B3 from all tows, and each tow by itself as a point."""
+    series = [
+        PlotSeries(label=f"95 %: {ellipse.label}", x=ellipse.mass_kg, y=ellipse.B3_kgpm, closed=True)
+        for ellipse in ellipses
+    ]
+    for name, way in by_tow.items():
+        if way.unknowns[:2] == ("M", "B3") and name.startswith("output error"):
+            known = np.flatnonzero(np.isfinite(np.asarray(way.alone)[:, :2]).all(axis=1))
+            if len(known):
+                mass, drag = np.asarray(way.alone)[known, :2].T
+                label, more = f"each tow: {', '.join(way.unknowns)}", {"tow": known + 1.0}
+                series.append(PlotSeries(label=label, x=mass, y=drag, points=True, more=more))
+    return curve_chart(
+        Plot(series=series, up=PlotAxis(title="B3 (kg/m)"), height_px=360),
+        PlotAxis(title="M (kg)"),
+        title="M and B3 together",
+        width_px=620,
+        described="Joint 95 % regions of M and B3 with and without a start delay, and the estimates of each tow.",
+        shown={"run:N": "of", "tow:O": "tow"},
+        point_px=70,
+    )
+
+
+_VERDICTS = ("usable", "not determined", "drag negative somewhere")
+
+
+def model_chart(models: Sequence[FittedModel]) -> ChartSpec:
+    """M with its 95 % interval, and AIC above the lowest, of each model."""
+    lowest = min(model.aic for model in models)
+    rows: list[ChartRecord] = []
+    for model in models:
+        mass, half = model.estimates["M"], model.half_widths_95["M"]
+        verdict = 0 if model.usable else 1 if model.drag_nowhere_negative else 2
+        rows.append(
+            {"name": model.label, "run": _VERDICTS[verdict], "v": plain(mass), "m": plain(mass)}
+            | {"low": plain(mass - half), "high": plain(mass + half)}
+            | {"least": plain(mass - half), "most": plain(mass + half), "aic": plain(model.aic - lowest)}
+        )
+    verdicts = [verdict for verdict in _VERDICTS if any(row["run"] == verdict for row in rows)]
+    shown = {
+        "name:N": "model",
+        "run:N": "it is",
+        "m:Q": "M (kg)",
+        "least:Q": "from",
+        "most:Q": "to",
+        "aic:Q": "AIC above the lowest",
+    }
+    mass_rows = RowPlot(
+        rows=rows,
+        across=PlotAxis(title="M with its 95 % interval (kg)"),
+        shown=shown,
+        look=series_look(verdicts, as_points=verdicts),
+    )
+    rank_rows = replace(
+        mass_rows,
+        rows=[row | {"v": row["aic"], "low": None} for row in rows],
+        across=PlotAxis(title="AIC above the lowest", zero=True),
+        side={"labels": False},
+    )
+    masses, ranks = (row_layers(each, span_px=2, size=70, strokeWidth=2) for each in (mass_rows, rank_rows))
+    height = 30 * len(models)
+    return {
+        "hconcat": [layered(masses, size=(340, height)), layered(ranks, size=(280, height))],
+        "title": "Models of different size",
+        "description": "Mass and AIC of each model fitted by output error.",
+        "usermeta": STACKS,
+    }

@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from scipy import stats
 
 from tank2sim.apps.rigs.tow.equation_error import discretise, fit_mean_speed, solve_by_qr
-from tank2sim.apps.rigs.tow.fit import DELAY
+from tank2sim.apps.rigs.tow.findings import DELAY, surge_coefficients
 from tank2sim.apps.rigs.tow.identify import TowIdentification
-from tank2sim.apps.rigs.tow.model_selection import (
-    SIMPLE,
-    SIMPLE_LATE,
-    FittedModel,
-    TowByTow,
-    best_model,
-    compare_models,
-    mass_range,
-    tow_by_tow,
-)
-from tank2sim.apps.rigs.tow.output_error import simulated_speeds
+from tank2sim.apps.rigs.tow.output_error import OutputErrorFit, TowOptions, fit_speeds, simulated_speeds
 from tank2sim.apps.rigs.tow.paper import are_of_the_paper
 from tank2sim.apps.rigs.tow.records import Tows
+from tank2sim.apps.rigs.tow.surge import SurgeCoefficients
 from tank2sim.apps.rigs.tow.theory import (
     VISCOSITY_M2PS,
     WATER_KGPM3,
@@ -33,14 +28,11 @@ from tank2sim.apps.rigs.tow.theory import (
     drag_polynomial,
     masses_by_theory,
 )
-from tank2sim.arrays import Array, Columns
+from tank2sim.arrays import Array, Columns, Number, Unbounded
 from tank2sim.errors import InputError
-from tank2sim.identification.conditioning import COLLINEAR
+from tank2sim.identification.conditioning import COLLINEAR, SINGULAR_CONDITION, scaled_condition
 from tank2sim.notices import Notice
 from tank2sim.records.thinning import drawn_columns
-
-_LEVEL = 0.95
-_DEGREES = range(4)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +41,6 @@ class SpeedPolynomial:
 
     Parameters
     ----------
-    degree : int
     coefficients : tuple of float
         In rising powers of t, m/s over s.
     rms_mps : float
@@ -126,7 +117,6 @@ class TowStudy(TowIdentification):
         Regions of M and B3, without and with a start delay.
     mass_by_theory : tuple of MassByTheory
         (2.5); empty without the size.
-    speeds : TowSpeeds
     body : TowedBody, optional
         Size of the body, if known.
     drag_coefficients : dict
@@ -151,19 +141,11 @@ class TowStudy(TowIdentification):
 
 
 def study_tows(result: TowIdentification, tows: Tows, body: TowedBody | None = None) -> TowStudy:
-    """The study of a result; with the size of the body also its drag coefficients and the theory.
-
-    Parameters
-    ----------
-    result : TowIdentification
-    tows : Tows
-        Its readings.
-    body : TowedBody, optional
-    """
+    """The study of a result of tows; with the size of the body also its drag coefficients and the theory."""
     models = compare_models(tows, result.force)
     near = [model for model in models if model.unknowns in (SIMPLE.unknowns, SIMPLE_LATE.unknowns)]
     study = TowStudy(
-        **{part.name: getattr(result, part.name) for part in fields(result)},
+        **vars(result),
         tows_of_the_paper=are_of_the_paper(tows),
         speed_polynomials=tuple(speed_polynomials(tows)),
         models=models,
@@ -179,10 +161,10 @@ def study_tows(result: TowIdentification, tows: Tows, body: TowedBody | None = N
 
 
 def _drag_coefficients(result: TowIdentification, body: TowedBody) -> dict[str, DragCoefficients]:
-    found = {name: drag_polynomial(fit.coefficients, body) for name, fit in result.methods.items()}
+    drags = {name: drag_polynomial(fit.coefficients, body) for name, fit in result.methods.items()}
     return {
         name: DragCoefficients(by_length_squared=drag, by_volume_two_thirds=drag.times(body.area_ratio))
-        for name, drag in found.items()
+        for name, drag in drags.items()
     }
 
 
@@ -209,16 +191,9 @@ def _speeds(result: TowIdentification, tows: Tows, best: FittedModel | None) -> 
 
 
 def towed_body(tows: Tows, mass_kg: float, given: Mapping[str, float | None]) -> TowedBody | None:
-    """The body from the given values, else from the file of the tows; None if its length is unknown.
+    """The body from the `given` values of :data:`.BODY_KEYS`, else from the tows' file; None if its length is unknown.
 
     The default volume is the mass of the body, with the water inside, over the density of water: it floats.
-
-    Parameters
-    ----------
-    mass_kg : float
-        m, with the water inside.
-    given : mapping
-        Keys of :data:`tank2sim.apps.rigs.tow.records.BODY_KEYS` to values, None if not given.
 
     Raises
     ------
@@ -228,7 +203,7 @@ def towed_body(tows: Tows, mass_kg: float, given: Mapping[str, float | None]) ->
     for key, value in given.items():
         if value is not None and not (np.isfinite(value) and value > 0):
             raise InputError("--" + key.replace("_", "-"), "", f"is {value:g}", "a positive number was expected")
-    known = {**tows.body, **{key: value for key, value in given.items() if value is not None}}
+    known = tows.body | {key: value for key, value in given.items() if value is not None}
     if "length_m" not in known:
         return None
     density = known.get("water_density_kgpm3", WATER_KGPM3)
@@ -241,28 +216,27 @@ def towed_body(tows: Tows, mass_kg: float, given: Mapping[str, float | None]) ->
     )
 
 
-def speed_polynomials(tows: Tows, degrees: Sequence[int] = _DEGREES) -> Iterator[SpeedPolynomial]:
-    """Rows of Table 2, while readings outnumber coefficients."""
-    for degree in degrees:
+def speed_polynomials(tows: Tows) -> Iterator[SpeedPolynomial]:
+    """Rows of Table 2, degrees 0 to 3, while readings outnumber coefficients."""
+    for degree in range(4):
         try:
             fitted = fit_mean_speed(tows, degree).polynomial
         except InputError:
             return
         square = float(np.sum((fitted(tows.time_s) - tows.mean_speed_mps) ** 2))
         count = len(tows.time_s)
-        coefficients = tuple(float(value) for value in fitted.coef)
         yield SpeedPolynomial(
             degree=degree,
-            coefficients=coefficients,
+            coefficients=tuple(fitted.coef.tolist()),
             rms_mps=(square / count) ** 0.5,
             rms_less_one_mps=(square / (count - 1)) ** 0.5,
         )
 
 
-def confidence_ellipse(fitted: FittedModel, points: int = 121) -> Ellipse:
+def confidence_ellipse(fitted: FittedModel) -> Ellipse:
     """Joint 95 % region of M and B3, the first unknowns of a model, by the linearised covariance and Fisher's F."""
-    radius = np.sqrt(2 * stats.f.ppf(_LEVEL, 2, fitted.freedom))
-    angle = np.linspace(0, 2 * np.pi, points)
+    radius = np.sqrt(2 * stats.f.ppf(0.95, 2, fitted.freedom))
+    angle = np.linspace(0, 2 * np.pi, 121)
     circle = radius * np.vstack([np.cos(angle), np.sin(angle)])
     # By the eigenvectors, which also describe a region without width.
     squares, axes = np.linalg.eigh(fitted.covariance[:2, :2])
@@ -297,15 +271,9 @@ def _notes(study: TowStudy) -> Iterator[Notice]:
         )
     best = min(study.models, key=lambda fitted: fitted.aic, default=None)
     if best is not None and not best.usable:
-        yield Notice(
-            f"The model of lowest AIC is {best.label}, with "
-            + (
-                "a drag that is negative at some speeds"
-                if not best.drag_nowhere_negative
-                else "unknowns that cannot be separated"
-            )
-            + "; a better fit is not a better model."
-        )
+        separated = "unknowns that cannot be separated"
+        fault = separated if best.drag_nowhere_negative else "a drag that is negative at some speeds"
+        yield Notice(f"The model of lowest AIC is {best.label}, with {fault}; a better fit is not a better model.")
     late = {model.unknowns: model.aic for model in study.models}
     if not study.start_delay and late.get(SIMPLE_LATE.unknowns, 0.0) < late.get(SIMPLE.unknowns, 0.0) - 4:
         yield Notice("A start delay explains these tows much better than none (--start-delay).")
@@ -324,3 +292,224 @@ def _notes(study: TowStudy) -> Iterator[Notice]:
         )
     if study.start_delay:
         yield Notice("A card has no start delay: a simulation of these tows begins later by it.")
+
+
+_NO_DELAY_S = 1e-3
+_FAR_BEHIND = 20.0
+"""AIC above the best from which a model is excluded: project choice. The usual 10 (Burnham & Anderson 2002) is for
+independent readings, and errors within a tow may be correlated."""
+
+
+class TowModel(NamedTuple):
+    """Drag terms in addition to M, in the order of (1.5), and True for a start delay."""
+
+    terms: tuple[str, ...]
+    start_delay: bool = False
+
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """Names of the unknowns."""
+        return ("M", *self.terms, *([DELAY] if self.start_delay else []))
+
+
+MODELS = tuple(
+    TowModel(terms, late) for terms in ((), ("B3",), ("B2", "B3"), ("B1", "B2", "B3")) for late in (False, True)
+)
+"""From the mass alone to all of (1.5), each without and with a start delay."""
+
+SIMPLE, SIMPLE_LATE = TowModel(("B3",)), TowModel(("B3",), start_delay=True)
+"""The models that are also fitted to each tow: short tows determine their unknowns."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FittedModel:
+    """A model fitted to all readings by output error; SI.
+
+    Parameters
+    ----------
+    unknowns : tuple of str
+        M, the drag terms in the order of (1.5), and ``delay`` if the body starts late.
+    estimates, half_widths_95 : dict
+        Unknown to its estimate, and to the half-width of its 95 % interval, for independent readings of equal variance.
+    covariance : array (unknowns, unknowns)
+        Covariance of the estimates.
+    freedom : int
+        Readings less estimates.
+    scatter_mps : float
+        Standard deviation of a reading about the fitted speed.
+    aic : float
+        Akaike's criterion; only differences matter.
+    condition_scaled : float
+        Condition number of the normal matrix with a diagonal of ones.
+    drag_nowhere_negative : bool
+        Whether M is positive and the drag not negative up to the highest measured speed.
+    determined : bool
+        Whether the scaled condition number is at most 900 and a delay is not at its bound, 0.
+    """
+
+    unknowns: tuple[str, ...]
+    estimates: dict[str, float]
+    half_widths_95: dict[str, Number]
+    covariance: Array
+    freedom: int
+    scatter_mps: float
+    aic: float
+    condition_scaled: Unbounded
+    drag_nowhere_negative: bool
+    determined: bool
+
+    @property
+    def label(self) -> str:
+        """``M, B3, delay``."""
+        return ", ".join(self.unknowns)
+
+    @property
+    def usable(self) -> bool:
+        """Whether the tows determine the model, and a hull can have its drag."""
+        return self.drag_nowhere_negative and self.determined
+
+    @property
+    def coefficients(self) -> SurgeCoefficients:
+        """Mass and drag."""
+        return surge_coefficients(self.estimates)
+
+    @property
+    def mass_interval_kg(self) -> tuple[float, float]:
+        """95 % interval of M, for independent readings of equal variance."""
+        middle, half = self.estimates["M"], self.half_widths_95["M"]
+        return middle - half, middle + half
+
+
+def best_model(models: Sequence[FittedModel]) -> FittedModel | None:
+    """The usable model of the lowest AIC; None without any."""
+    return min((model for model in models if model.usable), key=lambda model: model.aic, default=None)
+
+
+def compare_models(tows: Tows, force: Polynomial, models: Sequence[TowModel] = MODELS) -> tuple[FittedModel, ...]:
+    """The models fitted to all readings, without those that have too few readings or do not converge.
+
+    AIC assumes independent readings of equal variance. Readings of a tow are not quite independent: small differences
+    are not significant.
+    """
+    fits = ((model, _fit_or_none(tows, force, model)) for model in models)
+    return tuple(_fitted(model, fit, tows.top_speed_mps) for model, fit in fits if fit is not None)
+
+
+def _fitted(model: TowModel, fit: OutputErrorFit, top_speed_mps: float) -> FittedModel:
+    estimates = dict(zip(model.unknowns, fit.estimates.tolist(), strict=True))
+    half_widths = stats.t.ppf(0.975, fit.freedom) * np.sqrt(np.diag(fit.covariance))
+    condition, count = scaled_condition(fit.design) ** 2, len(fit.residuals_mps)
+    mean_square = max(float(np.mean(fit.residuals_mps**2)), np.finfo(float).tiny)
+    lowest = float(np.min(surge_coefficients(estimates).drag_N(np.linspace(0.0, top_speed_mps, 401))))
+    late = not model.start_delay or fit.estimates[-1] > _NO_DELAY_S
+    return FittedModel(
+        unknowns=model.unknowns,
+        estimates=estimates,
+        half_widths_95=dict(zip(model.unknowns, half_widths.tolist(), strict=True)),
+        covariance=fit.covariance,
+        freedom=fit.freedom,
+        scatter_mps=fit.scatter_mps,
+        aic=count * math.log(mean_square) + 2 * len(estimates),
+        condition_scaled=condition,
+        drag_nowhere_negative=bool(fit.estimates[0] > 0 and lowest >= 0),
+        determined=bool(late and condition <= COLLINEAR**2),
+    )
+
+
+def mass_range(fitted: Sequence[FittedModel]) -> tuple[float, float] | None:
+    """Lowest and highest M within the 95 % intervals of the plausible models that the tows determine.
+
+    Models with an AIC far above the best of these are excluded.
+    """
+    best = best_model(fitted)
+    if best is None:
+        return None
+    intervals = [model.mass_interval_kg for model in fitted if model.usable and model.aic <= best.aic + _FAR_BEHIND]
+    return min(low for low, _ in intervals), max(high for _, high in intervals)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TowByTow:
+    """Estimates of one method, tow by tow; SI.
+
+    Parameters
+    ----------
+    unknowns : tuple of str
+        Names of the unknowns.
+    together : array (unknowns,)
+        From all tows.
+    alone, left_out : arrays (tows, unknowns)
+        From each tow alone, and from all tows except it; nan where impossible.
+    jackknife_standard_errors : array (unknowns,)
+        Jackknife standard errors over tows; nan if one of the fits failed. They are valid also for correlated readings
+        within a tow.
+    jackknife_half_widths_95 : array (unknowns,)
+        Half-widths of the jackknife 95 % intervals, with Student's t of n - 1 degrees of freedom.
+    spread_standard_errors : array (unknowns,)
+        Standard errors of the mean of the single tows' estimates: their spread over root n.
+    """
+
+    unknowns: tuple[str, ...]
+    together: Array
+    alone: Array
+    left_out: Array
+    jackknife_standard_errors: Array
+    jackknife_half_widths_95: Array
+    spread_standard_errors: Array
+
+
+def tow_by_tow(tows: Tows, force: Polynomial, terms: tuple[str, ...], degree: int = 2) -> dict[str, TowByTow]:
+    """Single-tow and jackknife estimates by the paper's algorithm with `terms` and a polynomial of that `degree`, and
+    by the simple models.
+
+    Empty for fewer than three tows, whose spread is not informative. Names are the methods with their unknowns.
+    """
+
+    def by_paper(tows: Tows) -> Array | None:
+        try:
+            speed = fit_mean_speed(tows, degree).polynomial
+        except InputError:
+            return None
+        problem = discretise(speed, tows.time_s, terms, force)
+        return None if scaled_condition(problem.design) > SINGULAR_CONDITION else solve_by_qr(problem)
+
+    def by_output_error(model: TowModel, tows: Tows) -> Array | None:
+        fit = _fit_or_none(tows, force, model)
+        return None if fit is None else fit.estimates
+
+    ways: list[tuple[str, tuple[str, ...], Callable[[Tows], Array | None]]] = [
+        ("as published", ("M", *terms), by_paper),
+        *(("output error", model.unknowns, partial(by_output_error, model)) for model in (SIMPLE, SIMPLE_LATE)),
+    ]
+    if len(tows.names) < 3:
+        return {}
+    return {f"{way}: {', '.join(unknowns)}": _each(tows, unknowns, estimate) for way, unknowns, estimate in ways}
+
+
+def _each(tows: Tows, unknowns: tuple[str, ...], estimate: Callable[[Tows], Array | None]) -> TowByTow:
+    def row(tows: Tows) -> Array:
+        found = estimate(tows) if tows.top_speed_mps > 0 else None
+        return np.full(len(unknowns), np.nan) if found is None else found
+
+    count = len(tows.names)
+    alone = np.array([row(tows.only(number)) for number in range(count)])
+    others = [[other for other in range(count) if other != number] for number in range(count)]
+    left_out = np.array([row(tows.only(*rest)) for rest in others])
+    # sqrt((n - 1)/n sum (x_i - mean x)^2): Efron 1982, The jackknife, the bootstrap and other resampling plans.
+    errors = np.sqrt((count - 1) / count * np.sum((left_out - left_out.mean(axis=0)) ** 2, axis=0))
+    return TowByTow(
+        unknowns=unknowns,
+        together=row(tows),
+        alone=alone,
+        left_out=left_out,
+        jackknife_standard_errors=errors,
+        jackknife_half_widths_95=stats.t.ppf(0.975, count - 1) * errors,
+        spread_standard_errors=np.std(alone, axis=0, ddof=1) / math.sqrt(count),
+    )
+
+
+def _fit_or_none(tows: Tows, force: Polynomial, model: TowModel) -> OutputErrorFit | None:
+    try:
+        return fit_speeds(tows, force, model.terms, TowOptions(start_delay=model.start_delay))
+    except InputError:
+        return None

@@ -28,18 +28,18 @@ _STEP_S = 0.1
 class SurgeCoefficients:
     """Coefficients of (1.5), SI; the drag is positive against the motion.
 
-    Parameters
-    ----------
-    total_mass_kg : float
-        M, the mass of the body with the water in it plus its added mass lambda11.
-    B1_kgs2pm3, B2_kgspm2, B3_kgpm : float
-        Coefficients of the fourth, third and second power of the speed.
+    M is the mass of the body with the water in it plus its added mass lambda11; B1, B2, B3 multiply the fourth, third
+    and second power of the speed.
     """
 
     total_mass_kg: float
     B1_kgs2pm3: float = 0.0
     B2_kgspm2: float = 0.0
     B3_kgpm: float = 0.0
+
+    def drag_N(self, speed_mps: Any) -> Any:
+        """Drag in N at speeds in m/s."""
+        return drag(speed_mps, self.B1_kgs2pm3, self.B2_kgspm2, self.B3_kgpm)
 
 
 def drag(speed: Any, b1: Any, b2: Any, b3: Any) -> Any:

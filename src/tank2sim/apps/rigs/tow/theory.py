@@ -54,13 +54,7 @@ class TowedBody:
 
     @property
     def height_m(self) -> float:
-        """Height of the ellipsoid that has this length, breadth and volume.
-
-        Raises
-        ------
-        ValueError
-            There is no breadth.
-        """
+        """Height of the ellipsoid that has this length, breadth and volume; ValueError if there is no breadth."""
         if self.beam_m is None:
             raise ValueError("the height needs a breadth")
         return 6 * self.volume_m3 / (math.pi * self.length_m * self.beam_m)
@@ -92,9 +86,7 @@ def drag_polynomial(coefficients: SurgeCoefficients, body: TowedBody) -> DragPol
     """A_i = B_i / (rho L^2 / 2), (1.5): C referred to L^2; times :attr:`TowedBody.area_ratio` referred to V^(2/3)."""
     unit = 0.5 * body.density_kgpm3 * body.length_m**2
     return DragPolynomial(
-        A1_s2pm2=coefficients.B1_kgs2pm3 / unit,
-        A2_spm=coefficients.B2_kgspm2 / unit,
-        A3=coefficients.B3_kgpm / unit,
+        A1_s2pm2=coefficients.B1_kgs2pm3 / unit, A2_spm=coefficients.B2_kgspm2 / unit, A3=coefficients.B3_kgpm / unit
     )
 
 

@@ -9,14 +9,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from tank2sim.cards.card import Card
-from tank2sim.cards.form import (
-    BodyModel,
-    BodySection,
-    CardSection,
-    Environment,
-    Length,
-    TimeConstant,
-)
+from tank2sim.cards.form import BodyModel, BodySection, CardSection, Environment, Length, TimeConstant
 
 
 class YawRigModel(BodyModel):
@@ -89,7 +82,6 @@ class YawRig(CardSection):
         Moment of gravity -G sin(psi - psi_0).
     pulses_per_turn : float
         Pulses of the encoder in a turn.
-    walls : TankWalls, optional
     """
 
     inertia_kgm2: Annotated[float, Field(ge=1e-9, le=1e15)]

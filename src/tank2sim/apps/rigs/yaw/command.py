@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -17,11 +16,8 @@ from tank2sim.notices import Notice
 if TYPE_CHECKING:
     import pandas as pd
 
-    from tank2sim.apps.rigs.yaw.card import YawRigCard
-    from tank2sim.apps.rigs.yaw.programme import YawProgramme
     from tank2sim.apps.rigs.yaw.records import YawRecord
     from tank2sim.apps.rigs.yaw.result import YawResult
-    from tank2sim.apps.rigs.yaw.theory import FloatingBody
     from tank2sim.cards import Card
     from tank2sim.dynamics.vessel import Vessel
 
@@ -37,11 +33,7 @@ YawMethod = Literal[
 
 
 def write_yaw_card(
-    result: YawResult,
-    path: Path,
-    *,
-    card: Vessel | str | Path | None = None,
-    length_m: PositiveArgument | None = None,
+    result: YawResult, path: Path, *, card: Vessel | str | Path | None = None, length_m: PositiveArgument | None = None
 ) -> YawResult:
     """Return the result with the card as its file, and a notice about it.
 
@@ -58,14 +50,17 @@ def write_yaw_card(
     from tank2sim.dynamics.vessel import as_vessel
 
     if card is None:
-        text, files = f"{path}: the rig's card has the estimates of {result.method}", result.rig_card(path.stem)
-        return _with_notice(replace(result, files=files.files(path)), text)
-    before, ship = as_vessel(card).manoeuvring(), result.with_nrdot(card, length_m)
-    value, error = result.nrdot(length_m)
-    spread = "" if error is None else f" ± {error:.2g}"
-    was = f"{before.derivatives['Nrdot']:.4g} before" if "Nrdot" in before.derivatives else "not on the card before"
-    text = f"{path}: N_rdot' = {value:.4g}{spread} ({was}) of {ship.name}, by {result.method}"
-    return _with_notice(replace(result, files={path: ship.card.text}), text)
+        text, files = f"the rig's card has the estimates of {result.method}", result.rig_card(path.stem).files(path)
+    else:
+        before, ship = as_vessel(card).manoeuvring().derivatives, result.with_nrdot(card, length_m)
+        value, error = result.nrdot(length_m)
+        spread = "" if error is None else f" ± {error:.2g}"
+        was = f"{before['Nrdot']:.4g} before" if "Nrdot" in before else "not on the card before"
+        text, files = (
+            f"N_rdot' = {value:.4g}{spread} ({was}) of {ship.name}, by {result.method}",
+            {path: ship.card.text},
+        )
+    return _with_notice(replace(result, files=files), f"{path}: {text}")
 
 
 @verb(
@@ -152,8 +147,8 @@ def yaw(
     from tank2sim.apps.rigs.yaw.identify import YawOptions, identify_yaw, parse_yaw_terms, torque_constant
     from tank2sim.apps.rigs.yaw.records import read_yaw_record
     from tank2sim.apps.rigs.yaw.result import YawResult
-    from tank2sim.apps.rigs.yaw.study import study_yaw
-    from tank2sim.apps.rigs.yaw.theory import theory_values
+    from tank2sim.apps.rigs.yaw.simulation import rig_card_of, similarity_words, simulated_file
+    from tank2sim.apps.rigs.yaw.theory import parse_body, theory_values
     from tank2sim.records.csv_table import is_frame, table_or_path
 
     if (reference is None) != (reference_inertia_kgm2 is None):
@@ -163,7 +158,7 @@ def yaw(
     if reference is not None and reference_inertia_kgm2 is not None:
         in_air = identify_yaw([read_yaw_record(table_or_path(reference, "reference"))])
         torque_constant_NmpA, error = torque_constant(in_air, reference_inertia_kgm2)
-    known = None if rig is None else _rig_card(rig, "rig")
+    known = None if rig is None else rig_card_of(rig, "rig")
     options = YawOptions(
         inertia_kgm2=inertia_kgm2,
         inertia_error_kgm2=inertia_error_kgm2,
@@ -173,7 +168,7 @@ def yaw(
         terms=parse_yaw_terms(terms if isinstance(terms, str) else ",".join(terms)) if terms else None,
         mirror_limit=mirror_percent / 100,
     )
-    body = _floating_body(theory) if theory else None
+    body = parse_body(theory) if theory else None
     if isinstance(records, str | Path) or is_frame(records):
         sources = [table_or_path(records, "records")]
     else:
@@ -182,33 +177,32 @@ def yaw(
     def result(read: Sequence[YawRecord]) -> YawResult:
         found = identify_yaw(read, options)
         values = theory_values(body, found.records[0].programme.max_rate_radps) if body else ()
-        return YawResult(study_yaw(found, values), method, found, known)
+        return YawResult(found.study(values), method, found, known)
 
-    rest = {
-        "medium": medium != "water",
-        "controller": controller != "tuned",
-        "similar_to": similar_to,
-        "noise_A": noise_A,
-    }
     if simulate is None:
-        if given := next((name for name, value in rest.items() if value), ""):
+        simulated = {
+            "medium": medium != "water",
+            "controller": controller != "tuned",
+            "similar_to": similar_to,
+            "noise_A": noise_A,
+        }
+        if given := next((name for name, value in simulated.items() if value), ""):
             raise ArgumentError(given, "", "is of a simulated rig", "give the card to simulate as well")
         return result([read_yaw_record(source) for source in sources])
     path = sources[0] if sources else None
     if len(sources) != 1 or not isinstance(path, Path):
         raise ArgumentError("simulate", "", f"has {len(sources)} records to write", "give the name of one file")
-    card = _rig_card(simulate, "simulate")
-    record, text = _simulated(card, path, medium, controller, similar_to, noise_A)
+    card = rig_card_of(simulate, "simulate")
+    record, text = simulated_file(card, path, medium, controller, similar_to, noise_A)
     try:
         found = result([record])
     except InputError as fault:
         if fault.source != str(path):
             raise
-        raise InputError(
-            card.source, fault.place, f"the record simulated of it: {fault.problem}", fault.remedy
-        ) from None
+        problem = f"the record simulated of it: {fault.problem}"
+        raise InputError(card.source, fault.place, problem, fault.remedy) from None
     write_together({path: text}, inputs=[Path(card.source)])
-    return _with_notice(found, _similarity(record, similar_to)) if similar_to else found
+    return _with_notice(found, similarity_words(record, similar_to)) if similar_to else found
 
 
 @checked
@@ -237,102 +231,13 @@ def simulate_yaw(
     InputError
         The file exists, the card is not one of a yaw rig, or the motor saturates.
     """
-    rig = _rig_card(card, "card")
-    _, text = _simulated(rig, Path(path), medium, controller, similar_to, noise_A)
+    from tank2sim.apps.rigs.yaw.simulation import rig_card_of, simulated_file
+
+    rig = rig_card_of(card, "card")
+    _, text = simulated_file(rig, Path(path), medium, controller, similar_to, noise_A)
     write_together({Path(path): text}, inputs=[Path(rig.source)])
     return Path(path)
 
 
-def _simulated(
-    rig: YawRigCard,
-    path: Path,
-    medium: Literal["water", "air"],
-    controller: str,
-    similar_to: str | None,
-    noise_A: float,
-) -> tuple[YawRecord, str]:
-    """A simulated record, and the text of its file."""
-    from tank2sim.apps.rigs.yaw.control import AdaptiveController
-    from tank2sim.apps.rigs.yaw.records import yaw_record_text
-    from tank2sim.apps.rigs.yaw.simulation import simulated_record
-
-    if path.exists():
-        raise InputError(path, "", "exists, and may be a measurement", "give the simulated record a new name")
-    chosen = AdaptiveController() if controller == "adaptive" else None
-    programme = _similar(rig, similar_to) if similar_to else None
-    record = simulated_record(rig, path, noise_A, medium=medium, controller=chosen, programme=programme)
-    return record, yaw_record_text(record)
-
-
-def _rig_card(given: Vessel | Card | str | Path, argument: str) -> YawRigCard:
-    from tank2sim.apps.rigs.yaw.card import YawRigCard
-    from tank2sim.dynamics.vessel import as_vessel
-
-    card = as_vessel(given).card
-    if not isinstance(card, YawRigCard):
-        raise card.fault("model.kind", f"is {card.model.kind!r}", f"give a card of the yaw rig as {argument}")
-    return card
-
-
-def _ship_motion(text: str) -> tuple[float, ...]:
-    """Length and beam (m), yaw rate (deg/min) and time (s) of a text ``L,B,R,T``."""
-    try:
-        length, beam, rate_degpmin, time_s = (float(word) for word in text.split(","))
-    except ValueError:
-        length = beam = rate_degpmin = time_s = 0.0
-    if not all(0 < value < math.inf for value in (length, beam, abs(rate_degpmin), time_s)):
-        remedy = "write length and beam in m, yaw rate in deg/min and time in s: 38,8,100,120"
-        raise ArgumentError("similar_to", "", f"{text!r} is not a motion of a ship", remedy)
-    return length, beam, rate_degpmin, time_s
-
-
-def _similar(card: YawRigCard, text: str) -> YawProgramme:
-    """The programme of a ship's motion at the size of the card's body."""
-    from tank2sim.apps.rigs.yaw.programme import Similarity, programme_of
-
-    length, beam, rate_degpmin, time_s = _ship_motion(text)
-    body = card.ship
-    if body.length_m is None or body.beam_m is None:
-        raise card.fault("ship", "has no length_m or no beam_m", "add them, on the waterline")
-    ratio = Similarity(ship_length_m=length, ship_beam_m=beam, length_m=body.length_m, beam_m=body.beam_m)
-    try:
-        return ratio.programme(math.radians(rate_degpmin / 60), time_s, programme_of(card))
-    except ValueError as error:
-        raise ArgumentError("similar_to", "", str(error), "give another motion of the ship") from None
-
-
-def _similarity(record: YawRecord, text: str) -> str:
-    """Sentence on the scale of rates between a ship's motion and its record."""
-    length, beam, rate_degpmin, time_s = _ship_motion(text)
-    model_degps = math.degrees(record.programme.max_rate_radps)
-    return (
-        f"{length:g} m x {beam:g} m at model size: rates times {60 * model_degps / rate_degpmin:.4g}, so "
-        f"{rate_degpmin:g} deg/min in {time_s:g} s is {model_degps:.4g} deg/s in {3 * record.programme.rise_s:.4g} s"
-    )
-
-
 def _with_notice(result: YawResult, text: str) -> YawResult:
     return replace(result, study=replace(result.study, notices=(*result.study.notices, Notice(text))))
-
-
-def _floating_body(text: str) -> FloatingBody:
-    """From ``L,B,T,H`` or ``L,B,T,H,CB``, or from a card that states these."""
-    from tank2sim.apps.rigs.yaw.theory import FloatingBody
-    from tank2sim.dynamics.vessel import as_vessel
-
-    if "," not in text:
-        ship = as_vessel(text).card.ship
-        sizes = [ship.length_m, ship.beam_m, ship.draught_m, ship.water_depth_m, ship.block_coefficient]
-    else:
-        try:
-            sizes = [float(word) for word in text.split(",")]
-        except ValueError:
-            sizes = []
-    missing = len(sizes) not in (4, 5) or any(size is None or not size > 0 for size in sizes[:4])
-    if missing or (sizes[4:] and sizes[4] is not None and not 0 < sizes[4] <= 1):
-        problem = f"{text!r} does not state length, beam, draught and depth of water"
-        remedy = "write for example 0.67,0.20,0.08,0.22,0.47, or name a card with them"
-        raise ArgumentError("theory", "", problem, remedy)
-    length, beam, draught, depth = (size or 0.0 for size in sizes[:4])
-    block = sizes[4] if len(sizes) > 4 else None
-    return FloatingBody(length_m=length, beam_m=beam, draught_m=draught, depth_m=depth, block_coefficient=block)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from tank2sim.apps.rigs.yaw.energy import EnergyFit, YawEstimate
-from tank2sim.apps.rigs.yaw.intervals import ENERGY_TERMS
+from tank2sim.apps.rigs.yaw.energy import EnergyFit, YawMethodEstimate, term_and_unit
 from tank2sim.apps.rigs.yaw.records import YawRecord
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice, caution
@@ -32,41 +31,32 @@ _APART = 3.0
 _SHARPER = 3.0
 
 
-def check_current(records: tuple[YawRecord, ...]) -> list[Notice]:
+def check_current(records: tuple[YawRecord, ...]) -> Iterator[Notice]:
     """Notes on the files and their currents; InputError for a motor that is saturated or idle."""
-    notes = []
     for record in records:
-        notes += [note.of(record.path.name) for note in record.notes]
+        name, column = record.path.name, (record.path, "column current_A")
+        yield from (note.of(name) for note in record.notes)
         largest = float(np.abs(record.current_A).max())
         if largest < _LEAST_A:
-            problem, remedy = f"stays below {_LEAST_A:g} A: the motor did not turn the body", "give the current in A"
-            raise InputError(record.path, "column current_A", problem, remedy)
+            problem = f"stays below {_LEAST_A:g} A: the motor did not turn the body"
+            raise InputError(*column, problem, "give the current in A")
         if largest > _STRONG_A:
-            text = f"the current reaches {largest:.3g} A; if the column is in mA, divide it by 1000."
-            notes.append(Notice(text).of(record.path.name))
-        limit = record.constants.get("max_current_A")
-        if limit is None:
-            continue
-        full = np.abs(record.current_A) >= _FULL * limit
-        for pair in record.programme.pairs():
-            for begin, end in pair:
-                bad = full & (record.time_s >= begin) & (record.time_s <= end)
-                if bad.any():
-                    row = int(np.flatnonzero(bad)[0])
-                    problem = f"reaches the motor's {limit:g} A at {record.time_s[row]:.3f} s, where it is evaluated"
-                    remedy = "run a slower programme, or lower gains"
-                    if largest > _ANOTHER_UNIT * limit:
-                        remedy = f"its largest is {largest:.3g} A: if the column is in mA, divide it by 1000"
-                    raise InputError(record.path, "column current_A", problem, remedy)
-        if full.any():
-            first = record.time_s[int(np.flatnonzero(full)[0])]
-            notes.append(
-                Notice(
-                    f"{record.path.name}: the motor is saturated at {first:.3f} s, outside the intervals that are "
-                    "evaluated."
-                )
+            yield Notice(f"the current reaches {largest:.3g} A; if the column is in mA, divide it by 1000.").of(name)
+        limit = record.constants.get("max_current_A", math.inf)
+        full = np.flatnonzero(np.abs(record.current_A) >= _FULL * limit)
+        times = record.time_s[full]
+        for begin, end in (ends for pair in record.programme.pairs() for ends in pair):
+            bad = times[(times >= begin) & (times <= end)]
+            if bad.size:
+                problem = f"reaches the motor's {limit:g} A at {bad[0]:.3f} s, where it is evaluated"
+                remedy = "run a slower programme, or lower gains"
+                if largest > _ANOTHER_UNIT * limit:
+                    remedy = f"its largest is {largest:.3g} A: if the column is in mA, divide it by 1000"
+                raise InputError(*column, problem, remedy)
+        if times.size:
+            yield Notice(
+                f"{name}: the motor is saturated at {times[0]:.3f} s, outside the intervals that are evaluated."
             )
-    return notes
 
 
 def check_turn(record: YawRecord) -> None:
@@ -95,132 +85,101 @@ def check_sign(record: YawRecord, fit: EnergyFit) -> None:
         raise InputError(record.path, "column current_A", problem, "give current and angle the same positive sense")
 
 
-def check_mirror(records: tuple[YawRecord, ...], mirror: tuple[float, ...], limit: float) -> list[Notice]:
-    """Notes on intervals that are not quite mirror images; InputError beyond the limit."""
-    place = 0
-    for record in records:
-        for number in range(record.programme.humps):
-            if mirror[place] > limit:
-                pair = record.programme.pairs()[number]
-                problem = (
-                    f"the intervals {_span(pair.accelerating_s)} and {_span(pair.braking_s)} are not mirror images: "
-                    f"their rates differ by up to {100 * mirror[place]:.1f} % of the largest, and {100 * limit:g} % is "
-                    "allowed"
-                )
-                remedy = "check start_s and rise_s, tune the controller, leave the hump out, or raise mirror_percent"
-                raise InputError(record.path, "", problem, remedy)
-            place += 1
-    worst = max(mirror)
-    if worst > _NOT_QUITE_MIRRORED:
-        return [
-            Notice(
-                f"The accelerating and braking intervals are mirror images to {100 * worst:.1f} % of the largest rate: "
-                "the two-interval formulas are biased by the difference in dissipation."
+def check_mirror(records: tuple[YawRecord, ...], mirror: tuple[float, ...], limit: float) -> Iterator[Notice]:
+    """Note on intervals that are not quite mirror images; InputError beyond the limit."""
+    pairs = [(record, pair) for record in records for pair in record.programme.pairs()]
+    for (record, pair), share in zip(pairs, mirror, strict=True):
+        if share > limit:
+            speeding, braking = (f"{begin:.2f}-{end:.2f} s" for begin, end in pair)
+            problem = (
+                f"the intervals {speeding} and {braking} are not mirror images: their rates differ by up to "
+                f"{100 * share:.1f} % of the largest, and {100 * limit:g} % is allowed"
             )
-        ]
-    return []
-
-
-def _span(ends: tuple[float, float]) -> str:
-    return f"{ends[0]:.2f}-{ends[1]:.2f} s"
+            remedy = "check start_s and rise_s, tune the controller, leave the hump out, or raise mirror_percent"
+            raise InputError(record.path, "", problem, remedy)
+    if max(mirror) > _NOT_QUITE_MIRRORED:
+        yield Notice(
+            f"The accelerating and braking intervals are mirror images to {100 * max(mirror):.1f} % of the largest "
+            "rate: the two-interval formulas are biased by the difference in dissipation."
+        )
 
 
 def check_added_inertia(
-    record: YawRecord, inertia_kgm2: float, added: Mapping[str, tuple[float, float | None]]
-) -> list[Notice]:
-    """Notes, marked, on an added inertia (kg m2, with its error, by method) that is uncertain or that few bodies have;
+    record: YawRecord, inertia_kgm2: float, methods: Mapping[str, YawMethodEstimate]
+) -> Iterator[Notice]:
+    """Note, marked, on an added inertia (kg m2, of the first method) that is uncertain or that few bodies have;
     InputError where all methods make it negative by more than its error: no body has that."""
-    if not added:
-        return []
-    value, error = next(iter(added.values()))
-    doubt = 2 * (error or 0.0)
+    added = [(found.inertia[1], 2 * (found.inertia[2] or 0.0)) for found in methods.values()]
+    value, doubt = added[0]
     ratio = value / inertia_kgm2
-    if all(each + 2 * (other or 0.0) < 0 for each, other in added.values()):
-        total = value + inertia_kgm2
+    if all(each + other < 0 for each, other in added):
         problem = (
             f"the added inertia is {value:.3g} kg m2, and no body has a negative one: J_zz is {inertia_kgm2:.4g} "
-            f"kg m2, body and water together have {total:.4g}"
+            f"kg m2, body and water together have {value + inertia_kgm2:.4g}"
         )
         remedy = "check J_zz, the torque constant, the unit of the current (A), and that the body in air was the same"
         raise InputError(record.path, "", problem, remedy)
     if value < doubt:
-        return [
-            caution(
-                f"the added inertia does not differ from zero: {1e4 * value:.3g}e-4 ± {1e4 * doubt / 2:.2g}e-4 "
-                "kg m2; run a faster programme, more humps, or a body that carries more water."
-            )
-        ]
-    if not _LEAST_ADDED - doubt / inertia_kgm2 <= ratio <= _MOST_ADDED + doubt / inertia_kgm2:
-        return [
-            caution(
-                f"the added inertia is {ratio:.3g} times J_zz ({inertia_kgm2:.4g} kg m2), and ships have 0.25 to 2 "
-                "in deep water; check the units of J_zz (kg m2), torque constant (N m/A), current (A) and time (s)."
-            )
-        ]
-    return []
+        yield caution(
+            f"the added inertia does not differ from zero: {1e4 * value:.3g}e-4 ± {1e4 * doubt / 2:.2g}e-4 "
+            "kg m2; run a faster programme, more humps, or a body that carries more water."
+        )
+    elif not _LEAST_ADDED - doubt / inertia_kgm2 <= ratio <= _MOST_ADDED + doubt / inertia_kgm2:
+        yield caution(
+            f"the added inertia is {ratio:.3g} times J_zz ({inertia_kgm2:.4g} kg m2), and ships have 0.25 to 2 "
+            "in deep water; check the units of J_zz (kg m2), torque constant (N m/A), current (A) and time (s)."
+        )
 
 
-def check_explained(records: tuple[YawRecord, ...], misfit_rad: float | None) -> list[Notice]:
+def check_explained(records: tuple[YawRecord, ...], misfit_rad: float) -> Iterator[Notice]:
     """Notes if (3) does not explain the record's motion, or a single hump cannot show it."""
-    notes = []
-    if misfit_rad is not None and misfit_rad > _PULSE_RAD:
-        notes.append(
+    if misfit_rad > _PULSE_RAD:
+        yield Notice(
             f"(3) leaves {misfit_rad:.2g} rad of the angle (rms), more than an encoder's pulse: gravity, walls or "
             "another effect is missing in the terms, and no standard error includes it."
         )
-    (first, *further) = records
-    if not further and first.programme.humps == 1 and first.programme.turn_per_interval_rad < 2 * math.pi:
-        notes.append(
+    programme = records[0].programme
+    if len(records) == programme.humps == 1 and programme.turn_per_interval_rad < 2 * math.pi:
+        yield Notice(
             "One hump of part of a turn does not distinguish a moment of gravity from inertia: give two humps or more "
             "that begin at other angles."
         )
-    return [Notice(text) for text in notes]
 
 
-def estimate_notes(fit: EnergyFit, estimates: dict[str, YawEstimate]) -> list[Notice]:
-    """Notes on the estimates."""
-    best, two = estimates["energy_least_squares"], estimates["two_intervals"]
-    notes = []
-    if two.bias_kgm2 is not None:
-        share = 100 * two.bias_kgm2 / best.total_inertia_kgm2
-        parts = two.bias_from
-        notes.append(
-            f"The two-interval formula (1) lies {1e4 * two.bias_kgm2:+.3g}e-4 kg m2 ({share:+.2g} % of the total) from "
-            f"the least squares: {1e4 * parts['dissipation']:+.3g}e-4 because the intervals differ in dissipation, "
-            f"{1e4 * parts['speeds']:+.3g}e-4 because their end speeds differ. Its standard error does not "
-            "include this bias."
-        )
-    if len(two.by_hump_kgm2) > 1:
-        humps = ", ".join(f"{1e4 * value:.4g}" for value in two.by_hump_kgm2)
-        notes.append(
+def estimate_notes(methods: Mapping[str, YawMethodEstimate]) -> Iterator[Notice]:
+    """Notes on the estimates: bias, scatter of the humps, terms near zero, and the nonlinear least squares."""
+    best, two = methods["energy_least_squares"], methods["two_intervals"]
+    bias, parts = two.bias_against_least_squares_kgm2 or 0.0, two.bias_from_kgm2
+    yield Notice(
+        f"The two-interval formula (1) lies {1e4 * bias:+.3g}e-4 kg m2 "
+        f"({100 * bias / best.total_inertia_kgm2:+.2g} % of the total) from "
+        f"the least squares: {1e4 * parts['dissipation']:+.3g}e-4 because the intervals differ in dissipation, "
+        f"{1e4 * parts['speeds']:+.3g}e-4 because their end speeds differ. Its standard error does not "
+        "include this bias."
+    )
+    if len(two.total_inertia_by_hump_kgm2) > 1:
+        humps = ", ".join(f"{1e4 * value:.4g}" for value in two.total_inertia_by_hump_kgm2)
+        yield Notice(
             f"It is the mean of {humps} e-4 kg m2 (total), hump by hump; while the controller's gains are still being "
             "tuned, a hump differs."
         )
-    for term, (value, error) in best.friction.items():
+    for name, value in best.friction.items():
+        error, (term, unit) = best.friction_standard_errors[name], term_and_unit(name)
         if error is not None and abs(value) < 2 * error:
-            notes.append(f"{term} does not differ from zero: {value:.3g} ± {error:.2g} {ENERGY_TERMS[term][1]}.")
-    return [*map(Notice, notes), *_comparison_notes(best, estimates.get("output_error"))]
-
-
-def _comparison_notes(best: YawEstimate, nonlinear: YawEstimate | None) -> list[Notice]:
-    """Note on the nonlinear least squares, where they are more accurate or disagree with the energy least squares."""
-    if nonlinear is None or not best.inertia_error_kgm2 or not nonlinear.inertia_error_kgm2:
-        return []
-    difference = abs(best.total_inertia_kgm2 - nonlinear.total_inertia_kgm2)
-    error = math.hypot(best.inertia_error_kgm2, nonlinear.inertia_error_kgm2)
-    if difference > _APART * error:
-        return [
-            Notice(
-                f"energy_least_squares and output_error differ by {1e4 * difference:.3g}e-4 kg m2, "
-                f"{difference / error:.2g} times their errors: an effect in the record is missing in the equations of "
-                "both, and in both errors."
-            )
-        ]
-    if nonlinear.inertia_error_kgm2 < best.inertia_error_kgm2 / _SHARPER:
-        return [
-            Notice(
-                f"output_error is more accurate, ± {1e4 * nonlinear.inertia_error_kgm2:.2g}e-4 against "
-                f"± {1e4 * best.inertia_error_kgm2:.2g}e-4 kg m2; a card gets it with output_error as method."
-            )
-        ]
-    return []
+            yield Notice(f"{term} does not differ from zero: {value:.3g} ± {error:.2g} {unit}.")
+    nonlinear, error = methods.get("output_error"), best.total_inertia_standard_error_kgm2
+    if nonlinear is None or not error or not nonlinear.total_inertia_standard_error_kgm2:
+        return
+    sharper = nonlinear.total_inertia_standard_error_kgm2
+    difference, both = abs(best.total_inertia_kgm2 - nonlinear.total_inertia_kgm2), math.hypot(error, sharper)
+    if difference > _APART * both:
+        yield Notice(
+            f"energy_least_squares and output_error differ by {1e4 * difference:.3g}e-4 kg m2, "
+            f"{difference / both:.2g} times their errors: an effect in the record is missing in the equations of "
+            "both, and in both errors."
+        )
+    elif sharper < error / _SHARPER:
+        yield Notice(
+            f"output_error is more accurate, ± {1e4 * sharper:.2g}e-4 against "
+            f"± {1e4 * error:.2g}e-4 kg m2; a card gets it with output_error as method."
+        )

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import f as f_test
@@ -20,20 +21,26 @@ from tank2sim.apps.rigs.yaw.diagnostics import (
     estimate_notes,
 )
 from tank2sim.apps.rigs.yaw.energy import (
+    ENERGY_TERMS,
     EnergyFit,
-    YawEstimate,
+    Interval,
+    YawMethodEstimate,
     as_many_equations,
     energy_balance,
+    estimate_from,
     fit_energy,
-    least_squares_estimate,
+    intervals,
+    mirror_difference,
     two_intervals,
 )
-from tank2sim.apps.rigs.yaw.intervals import ENERGY_TERMS, Interval, intervals, mirror_difference
-from tank2sim.apps.rigs.yaw.model import UNKNOWN_RIG
-from tank2sim.apps.rigs.yaw.output_error import AngleFit, fit_angle
-from tank2sim.apps.rigs.yaw.records import Medium, YawRecord, refuse_copied_records
+from tank2sim.apps.rigs.yaw.model import TORQUE_CONSTANT_NMPA, UNKNOWN_RIG
+from tank2sim.apps.rigs.yaw.output_error import fit_angle
+from tank2sim.apps.rigs.yaw.records import YawRecord, refuse_copied_records
+from tank2sim.apps.rigs.yaw.theory import TheoryValue
+from tank2sim.arrays import Array, Columns
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.notices import Notice
+from tank2sim.records.thinning import drawn_columns
 
 YAW_METHODS = (
     "energy_least_squares",
@@ -46,30 +53,20 @@ YAW_METHODS = (
 """The first gives the numbers of a card; ``_reference`` uses the programme's speeds instead of the body's."""
 
 AIR_TERMS = ("inertia", "coulomb", "viscous")
-WATER_TERMS = ("inertia", "coulomb", "viscous", "quadratic")
+WATER_TERMS = (*AIR_TERMS, "quadratic")
 GRAVITY = ("gravity_sine", "gravity_cosine")
 _RARE = 1e-3
 _SLIGHT = 0.01
-TORQUE_CONSTANT_NMPA = 0.051
-"""k_t of the paper's motor."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class YawOptions:
     """Known values in addition to the records, and options of their evaluation.
 
-    Parameters
-    ----------
-    inertia_kgm2, inertia_error_kgm2 : float, optional
-        J_zz, and its standard error; by default from records in air or from the file.
-    torque_constant_NmpA, torque_constant_error : float, optional
-        k_t, and its relative standard error.
-    known : YawRig, optional
-        Known walls, gravity, and differences between accelerating and braking.
-    terms : tuple of str, optional
-        Terms to estimate, by default those of (3) for the medium.
-    mirror_limit : float
-        Largest accepted difference of the rates of two mirror images, over the largest rate.
+    J_zz and its standard error are by default from records in air or from the file, k_t (with its relative standard
+    error) from the file. `known` has walls, gravity, and differences between accelerating and braking. Terms are by
+    default those of (3) for the medium. `mirror_limit` is the largest accepted difference of the rates of two mirror
+    images, over the largest rate.
     """
 
     inertia_kgm2: float | None = None
@@ -81,8 +78,7 @@ class YawOptions:
     mirror_limit: float = 0.25
 
 
-@dataclass(frozen=True, kw_only=True)
-class BodyInertia:
+class _BodyInertia(NamedTuple):
     """J_zz in kg m2, its standard error (None if unknown), its source, and True if it depends on the records' k_t."""
 
     value_kgm2: float
@@ -93,59 +89,24 @@ class BodyInertia:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class YawIdentification:
-    """Estimates of a body on the rig.
+    """Records of one medium and their estimates; `fit` is the energy least squares with actual speeds.
 
-    Parameters
-    ----------
-    records : tuple of YawRecord
-        Records of the medium.
-    medium : str
-        ``water``, or ``air`` if no record is of water.
-    torque_constant_NmpA, torque_constant_error : float
-        k_t and its relative standard error.
-    body : BodyInertia or None
-        J_zz; None in air, where it is estimated, and where it is unknown.
-    estimates : dict
-        Method to estimate.
-    fit : EnergyFit
-        The energy least squares with actual speeds.
-    ideal : Interval
-        The programme's accelerating interval.
-    angle : AngleFit or None
-        The nonlinear least squares, where they converged.
-    mirror : tuple of float
-        Difference of the rates of each pair, over the largest.
-    notices : tuple of Notice
-        Messages for the user, in sentences.
+    `air` has the estimates of records in air, if there are records in water as well.
     """
 
     records: tuple[YawRecord, ...]
-    medium: Medium
-    torque_constant_NmpA: float
-    torque_constant_error: float
-    body: BodyInertia | None
-    estimates: dict[str, YawEstimate]
+    estimates: YawEstimates
     fit: EnergyFit
-    ideal: Interval
-    angle: AngleFit | None
-    mirror: tuple[float, ...]
-    notices: tuple[Notice, ...]
-    air: YawIdentification | None = field(default=None)
+    air: YawEstimates | None = None
 
-    def added_inertia(self, method: str) -> tuple[float, float | None] | None:
-        """lambda661 by a method and its standard error, kg m2; None where J_zz is not known.
+    @property
+    def methods(self) -> dict[str, YawMethodEstimate]:
+        """Method to its estimates."""
+        return self.estimates.methods
 
-        Combines the errors of the total, of J_zz and of k_t. The last is proportional to the total, or to the
-        difference where J_zz was found in air with the same k_t.
-        """
-        if self.body is None:
-            return None
-        estimate = self.estimates[method]
-        added = estimate.total_inertia_kgm2 - self.body.value_kgm2
-        scaled = added if self.body.by_torque_constant else estimate.total_inertia_kgm2
-        parts = [estimate.inertia_error_kgm2, self.body.error_kgm2, self.torque_constant_error * scaled]
-        known = [part for part in parts if part is not None]
-        return added, math.hypot(*known) if estimate.inertia_error_kgm2 is not None else None
+    def study(self, theory: Sequence[TheoryValue] = ()) -> YawStudy:
+        """The study, with the added inertia from the form of the body."""
+        return YawStudy(**vars(self.estimates), air=self.air, theory=tuple(theory))
 
 
 def identify_yaw(records: Sequence[YawRecord], options: YawOptions | None = None) -> YawIdentification:
@@ -160,216 +121,359 @@ def identify_yaw(records: Sequence[YawRecord], options: YawOptions | None = None
         records are one, or the records do not separate the terms.
     """
     options = options or YawOptions()
-    wet = tuple(record for record in records if record.medium == "water")
-    dry = tuple(record for record in records if record.medium == "air")
     if not records:
         raise ArgumentError("records", "", "is empty", "give one or more CSV files")
     alike = refuse_copied_records(records)
+    wet = tuple(record for record in records if record.medium == "water")
+    dry = tuple(record for record in records if record.medium == "air")
     if not wet:
-        found = _result(dry, "air", options, None)
-        return replace(found, notices=(*alike, *found.notices))
-    air = _result(dry, "air", replace(options, terms=None), None) if dry else None
-    found = _result(wet, "water", options, air)
-    return replace(found, notices=(*alike, *found.notices))
+        return _identified(dry, options, None, alike)
+    air = _identified(dry, replace(options, terms=None), None) if dry else None
+    return _identified(wet, options, air, alike)
 
 
 def torque_constant(reference: YawIdentification, known_inertia_kgm2: float) -> tuple[float, float]:
     """k_t (N m/A) and its relative standard error, from records in air of a body whose inertia is known.
 
     All terms of (3) are proportional to k_t: the records give J/k_t, independent of the k_t of the evaluation.
-
-    Raises
-    ------
-    InputError
-        The records are of water, where the added inertia is unknown, too.
+    InputError for records of water, where the added inertia is unknown, too.
     """
-    if reference.medium != "air":
+    if reference.estimates.medium != "air":
         path = reference.records[0].path
         raise InputError(path, "", "is of a body in water", "give a record in air ('# medium: air')")
-    best = reference.estimates[YAW_METHODS[0]]
-    error = (best.inertia_error_kgm2 or 0.0) / best.total_inertia_kgm2
-    return reference.torque_constant_NmpA * known_inertia_kgm2 / best.total_inertia_kgm2, error
+    best = reference.methods[YAW_METHODS[0]]
+    error = (best.total_inertia_standard_error_kgm2 or 0.0) / best.total_inertia_kgm2
+    return reference.estimates.torque_constant_NmpA * known_inertia_kgm2 / best.total_inertia_kgm2, error
 
 
 def parse_yaw_terms(text: str) -> tuple[str, ...]:
     """Terms from an option's text, ``"coulomb,viscous,quadratic"``; the inertia is always among them.
 
-    Raises
-    ------
-    InputError
-        A term is unknown or repeated.
+    InputError if a term is unknown or repeated.
     """
     words = [word.strip() for word in text.split(",") if word.strip() not in ("", "inertia")]
     for word in words:
         if word not in ENERGY_TERMS or words.count(word) > 1:
-            known = ", ".join(term for term in ENERGY_TERMS if term != "inertia")
-            raise ArgumentError(
-                "terms", "", f"{word!r} is not a term, or is repeated", f"take any of {known}, once each"
-            )
+            problem, known = f"{word!r} is not a term, or is repeated", ", ".join([*ENERGY_TERMS][1:])
+            raise ArgumentError("terms", "", problem, f"take any of {known}, once each")
     return ("inertia", *(term for term in ENERGY_TERMS if term in words))
-
-
-def _result(
-    records: tuple[YawRecord, ...], medium: Medium, options: YawOptions, air: YawIdentification | None
-) -> YawIdentification:
-    constant, notes = _torque_constant(records, options)
-    notes += check_current(records)
-    for record in records:
-        check_turn(record)
-    pairs = [pair for record in records for pair in intervals(record)]
-    mirror = tuple(mirror_difference(pair) for pair in pairs)
-    notes += check_mirror(records, mirror, options.mirror_limit)
-    rig = options.known
-    programmed = [pair for record in records for pair in intervals(record, "reference")]
-
-    def fitted(terms: tuple[str, ...]) -> tuple[EnergyFit, EnergyFit]:
-        expected = energy_balance(programmed, terms, constant, rig)
-        measured = fit_energy(energy_balance(pairs, terms, constant, rig), records[0], expected)
-        return measured, fit_energy(expected, records[0])
-
-    terms = options.terms or (AIR_TERMS if medium == "air" else WATER_TERMS)
-    fit, reference = fitted(terms)
-    if options.terms is None and (found := _with_gravity(fit, fitted)):
-        (fit, reference), gravity_notes = found
-        notes += gravity_notes
-    check_sign(records[0], fit)
-    ideal = programmed[0][0]
-    estimates = {
-        "energy_least_squares": least_squares_estimate("energy_least_squares", fit, ideal),
-        "as_many_equations": as_many_equations("as_many_equations", fit, ideal),
-        "two_intervals": two_intervals("two_intervals", fit.balance, fit),
-        "energy_least_squares_reference": least_squares_estimate("energy_least_squares_reference", reference, ideal),
-        "two_intervals_reference": two_intervals("two_intervals_reference", reference.balance, fit),
-    }
-    angle, omissions = _angle(records, _rig(constant, rig), estimates["energy_least_squares"], ideal)
-    notes += [*omissions, *check_explained(records, angle.estimate.misfit if angle else None)]
-    if angle:
-        estimates["output_error"] = angle.estimate
-    body, remarks = _body(records, medium, options, air)
-    identified = YawIdentification(
-        records=records,
-        medium=medium,
-        torque_constant_NmpA=constant,
-        torque_constant_error=options.torque_constant_error,
-        body=body,
-        estimates={name: estimates[name] for name in YAW_METHODS if name in estimates},
-        fit=fit,
-        ideal=ideal,
-        angle=angle,
-        mirror=mirror,
-        notices=(*notes, *remarks, *estimate_notes(fit, estimates)),
-        air=air,
-    )
-    added = {name: value for name in estimates if (value := identified.added_inertia(name)) is not None}
-    first = check_added_inertia(records[0], body.value_kgm2 if body else 0.0, added)
-    return replace(identified, notices=(*first, *identified.notices))
 
 
 Fits = tuple[EnergyFit, EnergyFit]
 
 
-def _with_gravity(fit: EnergyFit, fitted: Callable[[tuple[str, ...]], Fits]) -> tuple[Fits, list[Notice]] | None:
-    """The fits with a moment of gravity, with a note, if the residual work varies with the angle.
+def _identified(
+    records: tuple[YawRecord, ...], options: YawOptions, air: YawIdentification | None, notes: tuple[Notice, ...] = ()
+) -> YawIdentification:
+    """Estimates from records of one medium."""
+    first, rig, before = records[0], options.known, notes
+    constant, unknown = _torque_constant(records, options)
+    notes = (*unknown, *check_current(records))
+    for record in records:
+        check_turn(record)
+    pairs = [pair for record in records for pair in intervals(record)]
+    mirror = tuple(mirror_difference(pair) for pair in pairs)
+    notes += tuple(check_mirror(records, mirror, options.mirror_limit))
+    programmed = [pair for record in records for pair in intervals(record, "reference")]
+
+    def fitted(terms: tuple[str, ...]) -> Fits:
+        expected = energy_balance(programmed, terms, constant, rig)
+        return fit_energy(energy_balance(pairs, terms, constant, rig), first, expected), fit_energy(expected, first)
+
+    fits = fitted(options.terms or (AIR_TERMS if first.medium == "air" else WATER_TERMS))
+    if options.terms is None:
+        fits, found = _with_gravity(fits, fitted)
+        notes += found
+    fit, ideal = fits[0], programmed[0][0]
+    check_sign(first, fit)
+    methods = _energy_estimates(fits, ideal)
+    driven = (rig or UNKNOWN_RIG).model_copy(update={"torque_constant_NmpA": constant})
+    angle, omissions = _angle(records, driven, fit, ideal)
+    if angle:
+        methods["output_error"] = angle[0]
+    misfit_rad = float(np.sqrt(np.mean(angle[2] ** 2))) if angle else 0.0
+    body, remarks = _body(records, options, air)
+    if body:
+        methods = {name: _added(found, body, options.torque_constant_error) for name, found in methods.items()}
+    doubts = check_added_inertia(first, body.value_kgm2, methods) if body else ()
+    methods = {name: methods[name] for name in YAW_METHODS if name in methods}
+    estimates = YawEstimates(
+        records=tuple(str(record.path) for record in records),
+        medium=first.medium,
+        torque_constant_NmpA=constant,
+        body_inertia_kgm2=body.value_kgm2 if body else None,
+        body_inertia_standard_error_kgm2=body.error_kgm2 if body else None,
+        body_inertia_source=body.source if body else None,
+        added_inertia_kgm2={name: found.added_inertia_kgm2 for name, found in methods.items()},
+        dissipation_J={name: found.dissipation_J for name, found in methods.items()},
+        methods=methods,
+        mirror_difference=mirror,
+        histories=record_histories(records, fit),
+        energy_balance=energy_balance_means(fit),
+        energy_residuals=energy_residuals(fit),
+        angle_residual=angle_residual(angle[1], angle[2]) if angle else None,
+        notices=(
+            *before,
+            *doubts,
+            *notes,
+            *omissions,
+            *check_explained(records, misfit_rad),
+            *remarks,
+            *estimate_notes(methods),
+        ),
+    )
+    return YawIdentification(records=records, estimates=estimates, fit=fit, air=air.estimates if air else None)
+
+
+def _energy_estimates(fits: Fits, ideal: Interval) -> dict[str, YawMethodEstimate]:
+    """Estimates by the energy, with measured speeds and with those of the programme."""
+    fit, reference = fits
+    plain, programmed = (estimate_from(each.balance.terms, each.coefficients, each.covariance, ideal) for each in fits)
+    return {
+        "energy_least_squares": plain,
+        "as_many_equations": as_many_equations(fit, ideal),
+        "two_intervals": two_intervals(fit.balance, fit),
+        "energy_least_squares_reference": programmed,
+        "two_intervals_reference": two_intervals(reference.balance, fit),
+    }
+
+
+def _added(found: YawMethodEstimate, body: _BodyInertia, constant_error: float) -> YawMethodEstimate:
+    """An estimate with lambda661 and its standard error: those of the total, of J_zz and of k_t together.
+
+    The last is proportional to the total, or to the difference where J_zz was found in air with the same k_t.
+    """
+    added, error = found.total_inertia_kgm2 - body.value_kgm2, found.total_inertia_standard_error_kgm2
+    scaled = added if body.by_torque_constant else found.total_inertia_kgm2
+    parts = (error, body.error_kgm2, constant_error * scaled)
+    spread = None if error is None else math.hypot(*(part for part in parts if part is not None))
+    return replace(found, added_inertia_kgm2=added, added_inertia_standard_error_kgm2=spread)
+
+
+def _with_gravity(fits: Fits, fitted: Callable[[tuple[str, ...]], Fits]) -> tuple[Fits, tuple[Notice, ...]]:
+    """The fits with a moment of gravity, with a note, if the residual work varies with the angle; else as they are.
 
     By the F test of the two terms at a thousandth, for a moment of at least a hundredth of the motor's mean: the test
     alone would find the rounding of a record without noise.
     """
+    fit = fits[0]
     try:
         extended, reference = fitted((*fit.balance.terms, *GRAVITY))
     except InputError:  # the angles do not separate it
-        return None
+        return fits, ()
     freedom = len(extended.residuals_J) - len(extended.coefficients)
     after, before = float(extended.residuals_J @ extended.residuals_J), float(fit.residuals_J @ fit.residuals_J)
     moment = float(np.hypot(*extended.coefficients[-2:]))
-    turned = sum(
-        abs(interval.angle_rad[-1] - interval.angle_rad[0]) for pair in extended.balance.pairs for interval in pair
-    )
+    turned = sum(abs(each.angle_rad[-1] - each.angle_rad[0]) for pair in extended.balance.pairs for each in pair)
     mean = float(np.abs(extended.balance.work_J).sum()) / turned
     if moment < _SLIGHT * mean or f_test.sf((before - after) / 2 / (after / freedom), 2, freedom) > _RARE:
-        return None
+        return fits, ()
     note = (
         f"The residual of (3) varies with the angle: a moment of gravity of {moment:.3g} N m is among the terms "
         f"(--terms {','.join(fit.balance.terms[1:])} omits it). The two-interval formulas neglect it."
     )
-    return (extended, reference), [Notice(note)]
+    return (extended, reference), (Notice(note),)
 
 
 def _angle(
-    records: tuple[YawRecord, ...], rig: YawRig, first: YawEstimate, ideal: Interval
-) -> tuple[AngleFit | None, list[Notice]]:
+    records: tuple[YawRecord, ...], rig: YawRig, fit: EnergyFit, ideal: Interval
+) -> tuple[tuple[YawMethodEstimate, Array, Array] | None, list[Notice]]:
     """The nonlinear least squares, or None with the reason."""
-    beyond = [term for term in first.friction if term not in (*WATER_TERMS, *GRAVITY)]
+    beyond = [term for term in fit.balance.terms if term not in (*WATER_TERMS, *GRAVITY)]
     if beyond:
-        return None, [
-            Notice(
-                f"output_error fits the terms of (3) and gravity and is left out, because {', '.join(beyond)} was "
-                "requested."
-            )
-        ]
-    angle = fit_angle(records, rig, first, ideal)
+        problem = f"fits the terms of (3) and gravity and is left out, because {', '.join(beyond)} was requested."
+        return None, [Notice(f"output_error {problem}")]
+    angle = fit_angle(records, rig, fit, ideal)
     return angle, [] if angle else [Notice("output_error: the fit of the angle did not converge and is left out.")]
 
 
-def _rig(constant: float, known: YawRig | None) -> YawRig:
-    """The rig of the nonlinear least squares, with the known terms."""
-    return (known or UNKNOWN_RIG).model_copy(update={"torque_constant_NmpA": constant})
-
-
 def _torque_constant(records: tuple[YawRecord, ...], options: YawOptions) -> tuple[float, list[Notice]]:
-    constants = {record.constants.get("torque_constant_NmpA") for record in records}
     if options.torque_constant_NmpA is not None:
         return options.torque_constant_NmpA, []
+    constants = {record.constants.get("torque_constant_NmpA") for record in records}
     if len(constants) > 1:
-        raise InputError(
-            records[0].path,
-            "comment torque_constant_NmpA",
-            "is not the same in all records",
-            "give torque_constant_NmpA",
-        )
+        place, problem = "comment torque_constant_NmpA", "is not the same in all records"
+        raise InputError(records[0].path, place, problem, "give torque_constant_NmpA")
     (stated,) = constants
     if stated is not None:
         return stated, []
     taken = f"the published rig's {TORQUE_CONSTANT_NMPA:g} N m/A is taken."
-    note = f"No record states the torque constant: {taken}"
-    return TORQUE_CONSTANT_NMPA, [Notice(note)]
+    return TORQUE_CONSTANT_NMPA, [Notice(f"No record states the torque constant: {taken}")]
 
 
 def _body(
-    records: tuple[YawRecord, ...], medium: Medium, options: YawOptions, air: YawIdentification | None
-) -> tuple[BodyInertia | None, list[Notice]]:
-    if medium == "air":
+    records: tuple[YawRecord, ...], options: YawOptions, air: YawIdentification | None
+) -> tuple[_BodyInertia | None, list[Notice]]:
+    """J_zz of a body in water, as given, from air or from a file; and what is missing of it."""
+    stated = next((record for record in records if "inertia_kgm2" in record.constants), None)
+    if records[0].medium == "air":
         return None, []
     if options.inertia_kgm2 is not None:
-        given = BodyInertia(value_kgm2=options.inertia_kgm2, error_kgm2=options.inertia_error_kgm2, source="as given")
-        return given, _lacking(given)
-    if air is not None:
-        best = air.estimates[YAW_METHODS[0]]
-        names = ", ".join(record.path.name for record in air.records)
-        return BodyInertia(
-            value_kgm2=best.total_inertia_kgm2,
-            error_kgm2=best.inertia_error_kgm2,
-            source=f"in air, {names}",
-            by_torque_constant=True,
-        ), []
+        body = _BodyInertia(options.inertia_kgm2, options.inertia_error_kgm2, "as given")
+    elif air is not None:
+        best, names = air.methods[YAW_METHODS[0]], ", ".join(record.path.name for record in air.records)
+        error = best.total_inertia_standard_error_kgm2
+        return _BodyInertia(best.total_inertia_kgm2, error, f"in air, {names}", by_torque_constant=True), []
+    elif stated is not None:
+        error = stated.constants.get("inertia_error_kgm2")
+        body = _BodyInertia(stated.constants["inertia_kgm2"], error, f"comment of {stated.path.name}")
+    else:
+        problem = "J_zz is unknown, so that the added inertia cannot be separated from the total"
+        return None, [Notice(f"{problem}: give a record in air as well, or inertia_kgm2.")]
+    problem = "J_zz has no standard error, and the error of the added inertia does not include one"
+    remedy = "give inertia_error_kgm2, or a line '# inertia_error_kgm2: 0.0002'."
+    return body, [] if body.error_kgm2 is not None else [Notice(f"{problem}: {remedy}")]
+
+
+_HISTORY_SAMPLES = 900
+"""Samples of a record, enough to show each peak of its signals."""
+
+STAGES = ("accelerating", "braking")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class EnergyBalance:
+    """Work in the parts of the intervals, J: means over all pairs, in order of time.
+
+    Parameters
+    ----------
+    motor_J : dict
+        Stage (:data:`STAGES`) to the work of the motor (parts,).
+    spent_J : dict
+        Term to stage to the work that it takes (parts,).
+    """
+
+    motor_J: dict[str, Array]
+    spent_J: dict[str, dict[str, Array]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class EnergyResidual:
+    """Residual work of a subinterval, J, with its stage, hump and mean rate."""
+
+    stage: str
+    hump: int
+    rate_degps: float
+    left_J: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class YawEstimates:
+    """Estimates of a body from records of one medium.
+
+    Parameters
+    ----------
+    records : tuple of str
+        Files.
+    medium : str
+        ``water`` or ``air``.
+    body_inertia_kgm2, body_inertia_standard_error_kgm2, body_inertia_source
+        J_zz, its standard error and its source; None where it is not known, and in air, where it is estimated.
+    added_inertia_kgm2, dissipation_J : dict
+        Method to lambda661 (None where J_zz is not known), and to B + D.
+    methods : dict
+        Method to all its estimates.
+    mirror_difference : tuple of float
+        Difference of the rates of each pair of mirror images, over the largest.
+    histories : dict
+        Record to its columns, to draw.
+    angle_residual : dict, optional
+        ``t_s`` and ``residual_rad`` of the nonlinear least squares, where they converged.
+    """
+
+    records: tuple[str, ...]
+    medium: str
+    torque_constant_NmpA: float
+    body_inertia_kgm2: float | None
+    body_inertia_standard_error_kgm2: float | None
+    body_inertia_source: str | None
+    added_inertia_kgm2: dict[str, float | None]
+    dissipation_J: dict[str, float]
+    methods: dict[str, YawMethodEstimate]
+    mirror_difference: tuple[float, ...]
+    histories: dict[str, Columns]
+    energy_balance: EnergyBalance
+    energy_residuals: tuple[EnergyResidual, ...]
+    angle_residual: Columns | None
+    notices: tuple[Notice, ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class YawStudy(YawEstimates):
+    """Estimates of a body; :class:`YawEstimates` has the other parameters.
+
+    Parameters
+    ----------
+    air : YawEstimates, optional
+        Estimates from records in air, if there are records in water as well.
+    theory : tuple of TheoryValue
+        Added inertia from the form of the body.
+    """
+
+    air: YawEstimates | None
+    theory: tuple[TheoryValue, ...]
+
+
+def record_histories(records: Sequence[YawRecord], fit: EnergyFit) -> dict[str, Columns]:
+    """Record name to histories: evaluated rate, rate of the programme, tracking error and current."""
+    found, before = {}, 0
     for record in records:
-        if (stated := record.constants.get("inertia_kgm2")) is not None:
-            error = record.constants.get("inertia_error_kgm2")
-            inertia = BodyInertia(value_kgm2=stated, error_kgm2=error, source=f"comment of {record.path.name}")
-            return inertia, _lacking(inertia)
-    return None, [
-        Notice(
-            "J_zz is unknown, so that the added inertia cannot be separated from the total: give a record in air as "
-            "well, or inertia_kgm2."
-        )
-    ]
+        programme, time = record.programme, record.time_s
+        reference = programme.at(time)
+        rate = np.full(len(time), np.nan)
+        for pair in fit.balance.pairs[before : before + programme.humps]:
+            for interval in pair:
+                inside = (time >= interval.time_s[0]) & (time <= interval.time_s[-1])
+                rate[inside] = np.interp(time[inside], interval.time_s, interval.rate_radps)
+        before += programme.humps
+        offset = record.angle_rad[0] - float(programme.at(time[:1]).angle_rad[0])
+        columns = {
+            "t_s": time,
+            "rate_radps": rate,
+            "programme_rate_radps": reference.rate_radps,
+            "tracking_error_rad": reference.angle_rad + offset - record.angle_rad,
+            "current_A": record.current_A,
+        }
+        found[record.path.name] = drawn_columns(columns, _HISTORY_SAMPLES, peaks=True)
+    return found
 
 
-def _lacking(body: BodyInertia) -> list[Notice]:
-    if body.error_kgm2 is not None:
-        return []
-    return [
-        Notice(
-            "J_zz has no standard error, and the error of the added inertia does not include one: give "
-            "inertia_error_kgm2, or a line '# inertia_error_kgm2: 0.0002'."
+def energy_balance_means(fit: EnergyFit) -> EnergyBalance:
+    """Work of the motor and of each term in each part of the intervals, means over all pairs."""
+    balance = fit.balance
+    shape = (len(balance.pairs), 2, balance.parts)
+    # Braking parts are numbered as mirror images.
+    order = (slice(None), slice(None, None, -1))
+
+    def stages(values: Array) -> dict[str, Array]:
+        mean = values.reshape(shape).mean(axis=0)
+        return {name: mean[place][order[place]] for place, name in enumerate(STAGES)}
+
+    spent = balance.rows * fit.coefficients
+    return EnergyBalance(
+        motor_J=stages(balance.work_J),
+        spent_J={term: stages(spent[:, column]) for column, term in enumerate(balance.terms)},
+    )
+
+
+def energy_residuals(fit: EnergyFit) -> tuple[EnergyResidual, ...]:
+    """Residual work of each subinterval."""
+    balance, residuals = fit.balance, iter(fit.residuals_J.tolist())
+    return tuple(
+        EnergyResidual(
+            stage=STAGES[interval.braking],
+            hump=interval.number + 1,
+            rate_degps=float(np.degrees(np.mean(interval.part(part, balance.parts).rate_radps))),
+            left_J=next(residuals),
         )
-    ]
+        for pair in balance.pairs
+        for interval in pair
+        for part in range(balance.parts)
+    )
+
+
+def angle_residual(time_s: Array, residual_rad: Array) -> Columns:
+    """Residual angle of the integrated equation, with a gap (nan) between fitted parts."""
+    breaks = np.flatnonzero(np.abs(np.diff(time_s)) > 1.0) + 1
+    time = np.insert(time_s, breaks, time_s[breaks - 1] + 0.01)
+    return drawn_columns({"t_s": time, "residual_rad": np.insert(residual_rad, breaks, np.nan)}, peaks=True)

@@ -27,40 +27,9 @@ _STEP_S = 0.001
 _KNEE_RADPS = 2.5e-4
 
 
-_TORQUE_CONSTANT_NMPA = 0.051
-"""Torque constant of the paper's motor, N m/A."""
+TORQUE_CONSTANT_NMPA = 0.051
+"""k_t of the paper's motor."""
 
-ELLIPSOID_T1 = YawRig(
-    inertia_kgm2=204.3e-4,
-    added_inertia_kgm2=300.4e-4,
-    coulomb_Nm=7.9e-4,
-    viscous_Nms=117.4e-4,
-    quadratic_Nms2=381.0e-4,
-    torque_constant_NmpA=_TORQUE_CONSTANT_NMPA,
-)
-"""The paper's ellipsoid in water, its least squares of Tables 1 and 2."""
-SHIP_T1 = YawRig(
-    inertia_kgm2=179.6e-4,
-    added_inertia_kgm2=302.0e-4,
-    coulomb_Nm=9.8e-4,
-    viscous_Nms=43.5e-4,
-    quadratic_Nms2=1434.6e-4,
-    torque_constant_NmpA=_TORQUE_CONSTANT_NMPA,
-)
-SHIP_T2 = YawRig(
-    inertia_kgm2=179.6e-4,
-    added_inertia_kgm2=531.1e-4,
-    coulomb_Nm=2.7e-4,
-    viscous_Nms=216.7e-4,
-    quadratic_Nms2=1480.9e-4,
-    torque_constant_NmpA=_TORQUE_CONSTANT_NMPA,
-)
-ELLIPSOID_AIR = YawRig(
-    inertia_kgm2=204.3e-4, coulomb_Nm=10.9e-4, viscous_Nms=7.6e-4, torque_constant_NmpA=_TORQUE_CONSTANT_NMPA
-)
-SHIP_AIR = YawRig(
-    inertia_kgm2=179.6e-4, coulomb_Nm=10.3e-4, viscous_Nms=10.7e-4, torque_constant_NmpA=_TORQUE_CONSTANT_NMPA
-)
 UNKNOWN_RIG = YawRig(inertia_kgm2=1.0, torque_constant_NmpA=1.0)
 """A rig of which nothing is known: the first two numbers are placeholders for those that are to be found."""
 
@@ -96,17 +65,10 @@ def wall_terms(
 
 
 def yaw_rig_model(name: str, rig: YawRig, *, with_current_loop: bool = True) -> Model:
-    """The rig as a model.
+    """The rig as a model of the body `name`; the tunable parameters start with the values of `rig`.
 
-    Parameters
-    ----------
-    name : str
-        The body.
-    rig : YawRig
-        Start values of the tunable parameters.
-    with_current_loop : bool
-        The input is ``motor.command`` (A), and the current follows; else the input is ``motor.current`` itself, as a
-        record has it.
+    The input is ``motor.command`` (A), and the current follows; `with_current_loop` False makes it ``motor.current``
+    itself, as a record has it.
     """
     parameters = {parameter.name: parameter for parameter in _parameters(rig)}
     p = {key: parameter.symbol for key, parameter in parameters.items()}
@@ -125,12 +87,19 @@ def yaw_rig_model(name: str, rig: YawRig, *, with_current_loop: bool = True) -> 
         derivative="motion.rdot",
         start=p["initial.r"],
     )
-    motor = _current_loop(p) if with_current_loop else (_current_input(),)
+    recorded = Input(name="motor.current", unit="A", description="Current of the motor, + turns clockwise")
+    motor = _current_loop(p) if with_current_loop else (recorded,)
+    pulse = 2 * math.pi / p["encoder.pulses"]
     current = motor[0]
     quantities = [
         Quantity(name="motion.psidot", unit="rad/s", description="Rate of the yaw angle", value=rate.symbol),
         *_mechanics(heading.symbol, rate.symbol, current.symbol, p, rig.walls),
-        _encoder(heading.symbol, p),
+        Quantity(
+            name="encoder.angle",
+            unit="rad",
+            description="Yaw angle as the encoder counts it, whole pulses",
+            value=ca.floor(heading.symbol / pulse) * pulse,
+        ),
         *(variable for variable in motor if isinstance(variable, Quantity)),
     ]
     outputs = [heading.name, rate.name, "motion.rdot", "encoder.angle", "moment.motor", "moment.resistance"]
@@ -144,10 +113,6 @@ def yaw_rig_model(name: str, rig: YawRig, *, with_current_loop: bool = True) -> 
         outputs=(*outputs, current.name) if with_current_loop else tuple(outputs),
         step_s=_STEP_S,
     )
-
-
-def _current_input() -> Input:
-    return Input(name="motor.current", unit="A", description="Current of the motor, + turns clockwise")
 
 
 def _current_loop(p: dict[str, ca.SX]) -> tuple[State, Input, Quantity]:
@@ -169,16 +134,6 @@ def _current_loop(p: dict[str, ca.SX]) -> tuple[State, Input, Quantity]:
         value=(allowed - current.symbol) / p["motor.lag"],
     )
     return current, command, loop
-
-
-def _encoder(heading: ca.SX, p: dict[str, ca.SX]) -> Quantity:
-    pulse = 2 * math.pi / p["encoder.pulses"]
-    return Quantity(
-        name="encoder.angle",
-        unit="rad",
-        description="Yaw angle as the encoder counts it, whole pulses",
-        value=ca.floor(heading / pulse) * pulse,
-    )
 
 
 def _mechanics(

@@ -8,22 +8,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from scipy.optimize import OptimizeResult, least_squares
+from scipy.optimize import OptimizeResult
 from scipy.stats import t as student
 
+from tank2sim.apps.rigs.search import WithSlopes, least_misfit, pseudo_inverse
 from tank2sim.apps.rigs.yaw.card import YawRig
-from tank2sim.apps.rigs.yaw.energy import YawEstimate, estimate_from
-from tank2sim.apps.rigs.yaw.intervals import Interval, smooth_angle
+from tank2sim.apps.rigs.yaw.energy import EnergyFit, Interval, YawMethodEstimate, estimate_from, smooth_angle
 from tank2sim.apps.rigs.yaw.model import yaw_rig_model
 from tank2sim.apps.rigs.yaw.records import YawRecord
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.identification.conditioning import column_norms
-from tank2sim.identification.trials.methods.gauss_newton import is_minimum
 from tank2sim.simulation.scheme import runge_kutta_step
 from tank2sim.simulation.sensitivity import augmented_step
 
@@ -50,48 +48,33 @@ _NAMES = {
 """Term to the parameter of the model; its J_zz is 0, so that the added inertia is the total."""
 
 
-@dataclass(frozen=True, eq=False)
-class _Hump:
+class _Hump(NamedTuple):
+    """Angles (n,), mean currents of the steps (n - 1,), angle and rate at the start, and variance of such a current."""
+
     time_s: Array
     angle_rad: Array
     current_A: Array
     start: tuple[float, float]
     noise_A2: float
-    """Variance of the error of the current's mean over a step."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class AngleFit:
-    """Residuals of the angle: times (s), residuals (rad), in the order of the humps."""
+def fit_angle(
+    records: tuple[YawRecord, ...], rig: YawRig, first: EnergyFit, ideal: Interval
+) -> tuple[YawMethodEstimate, Array, Array] | None:
+    """Fit (3) to the angle of all humps: the estimate, times (s) and residuals (rad); None if it does not converge.
 
-    estimate: YawEstimate
-    time_s: Array
-    residual_rad: Array
-
-
-def fit_angle(records: tuple[YawRecord, ...], rig: YawRig, first: YawEstimate, ideal: Interval) -> AngleFit | None:
-    """Fit (3) to the angle of all humps; None if it does not converge.
-
-    Parameters
-    ----------
-    records : tuple of YawRecord
-        Records of the same body and medium.
-    rig : YawRig
-        Its torque constant, and known effects beyond (3).
-    first : YawEstimate
-        Start values, and the terms to fit.
-    ideal : Interval
-        The programme's interval, whose dissipation is reported.
+    `rig` has the torque constant and known effects beyond (3), `first` the start values and the terms; the dissipation
+    that is reported is that of the programme's interval `ideal`.
     """
-    terms = tuple(term for term in (*_NAMES, *_GRAVITY) if term == "inertia" or term in first.friction)
+    known = dict(zip(first.balance.terms, first.coefficients.tolist(), strict=True))
+    terms = tuple(term for term in (*_NAMES, *_GRAVITY) if term in known)
     humps = [hump for record in records for hump in _humps(record)]
     predict = _predictor(rig, terms)
-    values = np.array([first.total_inertia_kgm2, *(first.friction[term][0] for term in terms[1:])])
-    scale = np.maximum(np.abs(values), 1e-3 * abs(first.total_inertia_kgm2))
+    values = np.array([known[term] for term in terms])
+    scale = np.maximum(np.abs(values), 1e-3 * abs(values[0]))
     count = len(terms)
-    begin = np.concatenate([values / scale, *(hump.start for hump in humps)])
 
-    def evaluate(unknown: Array) -> tuple[Array, Array]:
+    def misfit(unknown: Array) -> tuple[Array, Array]:
         residuals, slopes = [], []
         for place, hump in enumerate(humps):
             at = count + 2 * place
@@ -102,58 +85,26 @@ def fit_angle(records: tuple[YawRecord, ...], rig: YawRig, first: YawEstimate, i
             slopes.append(wide)
         return np.concatenate(residuals), np.vstack(slopes)
 
-    last: list[tuple[Array, Array, Array]] = []
-
-    def kept(unknown: Array) -> tuple[Array, Array]:
-        if not last or not np.array_equal(last[0][0], unknown):
-            last[:] = [(unknown.copy(), *evaluate(unknown))]
-        return last[0][1], last[0][2]
-
-    found = _search(kept, begin, count)
-    if found is None or not np.isfinite(found.x).all() or found.x[0] == 0:
+    found = _search(misfit, np.concatenate([values / scale, *(hump.start for hump in humps)]), count)
+    if found is None or found.x[0] == 0:
         return None
-    best = dict(zip(terms, found.x[:count] * scale, strict=True))
-    gain = rig.torque_constant_NmpA / best["inertia"], _decay(best, ideal)
-    covariance = _covariance(found.fun, evaluate(found.x)[1], humps, gain)[:count, :count] * np.outer(scale, scale)
-    misfit = float(np.sqrt(np.mean(found.fun**2)))
-    estimate = estimate_from("output_error", terms, found.x[:count] * scale, covariance, ideal, misfit)
-    return AngleFit(estimate=estimate, time_s=np.concatenate([h.time_s for h in humps]), residual_rad=found.fun)
+    values = found.x[:count] * scale
+    best = dict(zip(terms, values, strict=True))
+    # 1/s, at which a disturbance of the rate dies away, at the mean rate of the interval.
+    rate = float(np.abs(ideal.rate_radps).mean())
+    decay = max(0.0, best.get("viscous", 0.0) + 2 * rate * best.get("quadratic", 0.0)) / abs(best["inertia"])
+    gain = rig.torque_constant_NmpA / best["inertia"], decay
+    covariance = _covariance(found.fun, misfit(found.x)[1], humps, gain)[:count, :count] * np.outer(scale, scale)
+    estimate = estimate_from(terms, values, covariance, ideal)
+    return estimate, np.concatenate([hump.time_s for hump in humps]), found.fun
 
 
-def _search(evaluate: Callable[[Array], tuple[Array, Array]], begin: Array, count: int) -> OptimizeResult | None:
+def _search(misfit: WithSlopes, begin: Array, count: int) -> OptimizeResult | None:
     """The search from `begin`; if the integration diverges with negative friction, a second one from zero friction."""
     upright = begin.copy()
     upright[1:count] = np.maximum(upright[1:count], 0.0)
-    for start in (begin, upright):
-        try:
-            found = least_squares(
-                lambda z: evaluate(z)[0], start, lambda z: evaluate(z)[1], xtol=1e-7, ftol=1e-8, max_nfev=_TRIES
-            )
-        except ValueError:
-            continue
-        variance = max(float(np.mean(found.fun**2)), np.finfo(float).tiny)
-        stays = is_minimum(found.jac.T @ found.jac, found.jac.T @ found.fun, variance=variance)
-        if found.success and (stays or not np.array_equal(found.x, start)):
-            return found
-    return None
-
-
-def _decay(best: dict[str, float], ideal: Interval) -> float:
-    """1/s, at which a disturbance of the rate dies away, at the mean rate of the interval."""
-    rate = float(np.abs(ideal.rate_radps).mean())
-    return max(0.0, best.get("viscous", 0.0) + 2 * rate * best.get("quadratic", 0.0)) / abs(best["inertia"])
-
-
-def _from_current(parts: list[Array], humps: list[_Hump], gain: tuple[float, float]) -> Array:
-    """Variances that the noise of the current gives, which the model takes for moments that were there."""
-    variances = np.zeros(len(parts[0]))
-    for part, hump in zip(parts, humps, strict=True):
-        since = np.maximum(0.0, hump.time_s[:, None] - hump.time_s[None, 1:])
-        # Angle after a step of moment on a body that the water brakes.
-        swung = -np.expm1(-gain[1] * since) / gain[1] if gain[1] > 1e-6 else since
-        response = gain[0] * np.diff(hump.time_s) * swung
-        variances += hump.noise_A2 * np.sum((part @ response) ** 2, axis=1)
-    return variances
+    searches = (least_misfit(misfit, z, tolerances=(1e-7, 1e-8, 1e-8), most_steps=_TRIES) for z in (begin, upright))
+    return next((found for found in searches if found is not None), None)
 
 
 def _covariance(residuals: Array, design: Array, humps: list[_Hump], gain: tuple[float, float]) -> Array:
@@ -164,8 +115,7 @@ def _covariance(residuals: Array, design: Array, humps: list[_Hump], gain: tuple
     1987). The last includes errors common to all humps, such as those of the encoder where the humps turn by whole
     counts. `gain` is k_t/J and the decay of the rate.
     """
-    norms = column_norms(design)
-    inverse = np.linalg.pinv(design / norms) / norms[:, None]
+    inverse = pseudo_inverse(design)
     alone: Array = inverse @ inverse.T * float(residuals @ residuals) / max(1, len(residuals) - design.shape[1])
     ends = np.cumsum([len(hump.angle_rad) for hump in humps])[:-1]
     parts = np.split(inverse * residuals, ends, axis=1)
@@ -185,6 +135,18 @@ def _covariance(residuals: Array, design: Array, humps: list[_Hump], gain: tuple
     return alone * np.outer(wider, wider)
 
 
+def _from_current(parts: list[Array], humps: list[_Hump], gain: tuple[float, float]) -> Array:
+    """Variances that the noise of the current gives, which the model takes for moments that were there."""
+    variances = np.zeros(len(parts[0]))
+    for part, hump in zip(parts, humps, strict=True):
+        since = np.maximum(0.0, hump.time_s[:, None] - hump.time_s[None, 1:])
+        # Angle after a step of moment on a body that the water brakes.
+        swung = -np.expm1(-gain[1] * since) / gain[1] if gain[1] > 1e-6 else since
+        response = gain[0] * np.diff(hump.time_s) * swung
+        variances += hump.noise_A2 * np.sum((part @ response) ** 2, axis=1)
+    return variances
+
+
 def _newey_west(scores: Array, lags: int) -> Array:
     """Covariance of the sum of the columns, with Bartlett's weights up to `lags`."""
     covariance: Array = scores @ scores.T
@@ -196,7 +158,8 @@ def _newey_west(scores: Array, lags: int) -> Array:
 
 def _humps(record: YawRecord) -> list[_Hump]:
     programme, time = record.programme, record.time_s
-    step = max(_STEP_S, float(np.median(np.diff(time))))
+    interval = float(np.median(np.diff(time)))
+    step = max(_STEP_S, interval)
     work = np.concatenate([[0.0], np.cumsum(np.diff(time) * (record.current_A[1:] + record.current_A[:-1]) / 2)])
     # Third differences of the current are nearly its noise; the median ignores the instants at which the body breaks
     # loose.
@@ -211,41 +174,33 @@ def _humps(record: YawRecord) -> list[_Hump]:
         if len(times) < 10:
             raise InputError(record.path, "column t_s", f"has fewer than 10 rows in hump {number + 1}", "sample faster")
         spline = smooth_angle(record, (first, first + programme.rise_s))
-        humps.append(
-            _Hump(
-                times,
-                np.interp(times, time, record.angle_rad),
-                np.diff(np.interp(times, time, work)) / np.diff(times),
-                (float(spline(times[0])), float(spline(times[0], 1))),
-                noise_A2 * float(np.median(np.diff(time))) / step,
-            )
-        )
+        angles, currents = np.interp(times, time, record.angle_rad), np.diff(np.interp(times, time, work))
+        start = float(spline(times[0])), float(spline(times[0], 1))
+        humps.append(_Hump(times, angles, currents / np.diff(times), start, noise_A2 * interval / step))
     return humps
 
 
-def _predictor(rig: YawRig, terms: tuple[str, ...]):  # type: ignore[no-untyped-def]
+def _predictor(rig: YawRig, terms: tuple[str, ...]) -> Callable[[Array, Array, _Hump], tuple[Array, Array]]:
     """``predict(values, start, hump) -> (angles (n,), sensitivities (n, terms + 2))``."""
     model = yaw_rig_model("body", rig, with_current_loop=False)
-    parameters = model.parameter_values({"body.inertia": 0.0})
-    chosen = [model.parameter_names.index(_NAMES[term]) for term in terms if term in _NAMES]
-    braking = model.parameter_names.index("friction.quadratic_braking")
+    places = {name: place for place, name in enumerate(model.parameter_names)}
+    given, x, h = ca.SX.sym("c", len(terms)), model.x, ca.SX.sym("h")
+    values = dict(zip(terms, ca.vertsplit(given), strict=True))
+    whole = ca.SX(model.parameter_values({"body.inertia": 0.0}))
+    for term, name in _NAMES.items():
+        if term in values:
+            whole[places[name]] = values[term]
+    if any(term in values for term in _GRAVITY):
+        sine = rig.gravity_Nm * math.cos(rig.gravity_angle_rad) + values.get("gravity_sine", 0.0)
+        cosine = values.get("gravity_cosine", 0.0) - rig.gravity_Nm * math.sin(rig.gravity_angle_rad)
+        whole[places["gravity.moment"]] = ca.sqrt(sine**2 + cosine**2 + 1e-24)
+        whole[places["gravity.angle"]] = ca.atan2(-cosine, sine)
     rougher = rig.quadratic_braking - rig.quadratic_Nms2
-    given, x = ca.SX.sym("c", len(terms)), model.x
-    whole = ca.SX(parameters)
-    for place, value in zip(chosen, ca.vertsplit(given), strict=False):  # terms of gravity are the last
-        whole[place] = value
-    if extra := dict(zip(terms[len(chosen) :], ca.vertsplit(given)[len(chosen) :], strict=True)):
-        sine = rig.gravity_Nm * math.cos(rig.gravity_angle_rad) + extra.get("gravity_sine", 0.0)
-        cosine = extra.get("gravity_cosine", 0.0) - rig.gravity_Nm * math.sin(rig.gravity_angle_rad)
-        whole[model.parameter_names.index("gravity.moment")] = ca.sqrt(sine**2 + cosine**2 + 1e-24)
-        whole[model.parameter_names.index("gravity.angle")] = ca.atan2(-cosine, sine)
-    whole[braking] = whole[model.parameter_names.index("friction.quadratic")] + rougher
-    h = ca.SX.sym("h")
+    whole[places["friction.quadratic_braking"]] = whole[places["friction.quadratic"]] + rougher
     following = x
     for _ in range(_SUBSTEPS):
         following = runge_kutta_step(model)(following, model.u, whole, h / _SUBSTEPS)
     step = augmented_step(following, x, given, (model.u, h, given), of_starts=2)
-    width = 1 + len(terms) + 2
     first = np.hstack([np.zeros((2, len(terms))), np.eye(2)])
     loops: dict[int, ca.Function] = {}
 
@@ -255,8 +210,7 @@ def _predictor(rig: YawRig, terms: tuple[str, ...]):  # type: ignore[no-untyped-
         begin = np.hstack([start[:, None], first])
         intervals = np.diff(hump.time_s)[None, :]
         path = loops[count](begin, hump.current_A[None, :], intervals, np.repeat(values[:, None], count, axis=1))
-        row = np.asarray(path)[0].reshape(-1, width)
-        at = np.vstack([begin[0], row])
+        at = np.vstack([begin[0], np.asarray(path)[0].reshape(-1, begin.shape[1])])
         return at[:, 0], at[:, 1:]
 
     return predict

@@ -149,12 +149,7 @@ class YawProgramme:
         slope = 2 * k * t1
         joints = np.array([0, t1, t2, t3, 2 * t3, 2 * t3 + t1, 2 * t3 + t2, 3 * t3, _REST * t3])
         rising = [(k, 0, 0), (0, slope, k * t1**2), (-k, 2 * k * (t3 - t2), top - k * (t3 - t2) ** 2), (0, 0, top)]
-        falling = [
-            (-k, 0, top),
-            (0, -slope, top - k * t1**2),
-            (k, -2 * k * (t3 - t2), k * (t3 - t2) ** 2),
-            (0, 0, 0),
-        ]
+        falling = [(-k, 0, top), (0, -slope, top - k * t1**2), (k, -2 * k * (t3 - t2), k * (t3 - t2) ** 2), (0, 0, 0)]
         return PPoly(np.array(rising + falling, dtype=float).T, joints)
 
     @cached_property
@@ -167,13 +162,7 @@ PAPER_PROGRAMME = YawProgramme(max_rate_radps=math.pi / 12, rise_s=40 / 9)
 
 
 def programme_of(card: YawRigCard) -> YawProgramme:
-    """The programme of a card; the paper's if it has none.
-
-    Raises
-    ------
-    InputError
-        It is none that can be run.
-    """
+    """The programme of a card; the paper's if it has none. InputError if it cannot be run."""
     stated = card.programme
     if stated is None:
         return PAPER_PROGRAMME
@@ -203,10 +192,7 @@ def full_turns(programme: YawProgramme) -> YawProgramme:
 class Similarity:
     """A ship's turning motion at model size, by the Froude number over the beam and the Strouhal number of turning.
 
-    Parameters
-    ----------
-    ship_length_m, ship_beam_m, length_m, beam_m : float
-        Waterline dimensions of ship and model.
+    Lengths and beams of ship and model are those of the waterline.
     """
 
     ship_length_m: float

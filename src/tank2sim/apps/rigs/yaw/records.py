@@ -95,11 +95,8 @@ def read_yaw_record(path: Path | str | CsvTable) -> YawRecord:
     if medium not in get_args(Medium):
         raise InputError(table.path, "comment medium", f"is {medium!r}", "write '# medium: air' or '# medium: water'")
     programme, missing = _programme(table, time)
-    notes = (
-        [f"the file does not state {' and '.join(missing)} of the programme; the values of the published rig are used."]
-        if missing
-        else []
-    )
+    unknown = f"the file does not state {' and '.join(missing)} of the programme"
+    notes = [f"{unknown}; the values of the published rig are used."] if missing else []
     whole = np.unwrap(angle)
     turns = int(np.count_nonzero(np.abs(np.diff(angle)) > math.pi))
     if turns:
@@ -121,10 +118,7 @@ def read_yaw_record(path: Path | str | CsvTable) -> YawRecord:
 def refuse_copied_records(records: Sequence[YawRecord]) -> tuple[Notice, ...]:
     """Refuse a record that is another one again, also turned, cut, thinned or rounded; notices of mirror images.
 
-    Raises
-    ------
-    InputError
-        Names the second file, and which one it is again.
+    InputError names the second file, and which one it is again.
     """
     seen = [
         Recording(record.time_s, {"angle_rad": record.angle_rad, "current_A": record.current_A}) for record in records
@@ -171,23 +165,22 @@ def _positive(table: CsvTable, key: str) -> float | None:
 
 def _programme(table: CsvTable, time: Array) -> tuple[YawProgramme, list[str]]:
     """The programme, and what the file does not state of it."""
+    kinds = (*PROGRAMME_KINDS, "full_turn")
     kind = table.comments.get("programme", "unidirectional").strip().lower()
-    if kind not in (*PROGRAMME_KINDS, "full_turn"):
-        expected = ", ".join((*PROGRAMME_KINDS, "full_turn"))
-        raise InputError(table.path, "comment programme", f"is {kind!r}", f"one of {expected} was expected")
-    rate = _rate(table)
-    start = table.comment_number("start_s") or 0.0
-    settle, rise = table.comment_number("settle_s"), _positive(table, "rise_s")
-    missing = ["max_rate_degps"] if rate is None else []
-    missing += ["rise_s"] if rise is None and kind != "full_turn" else []
+    if kind not in kinds:
+        problem, remedy = f"is {kind!r}", f"one of {', '.join(kinds)} was expected"
+        raise InputError(table.path, "comment programme", problem, remedy)
+    stated = {
+        "max_rate_radps": _rate(table),
+        "rise_s": _positive(table, "rise_s"),
+        "settle_s": table.comment_number("settle_s"),
+        "start_s": table.comment_number("start_s"),
+    }
+    missing = ["max_rate_degps"] if stated["max_rate_radps"] is None else []
+    missing += ["rise_s"] if stated["rise_s"] is None and kind != "full_turn" else []
+    known = {key: value for key, value in stated.items() if value is not None}
     try:
-        programme = YawProgramme(
-            max_rate_radps=PAPER_PROGRAMME.max_rate_radps if rate is None else rate,
-            rise_s=PAPER_PROGRAMME.rise_s if rise is None else rise,
-            settle_s=PAPER_PROGRAMME.settle_s if settle is None else settle,
-            start_s=start,
-            humps=1,
-        )
+        programme = replace(PAPER_PROGRAMME, humps=1, **known)  # type: ignore[arg-type]
         programme = full_turns(programme) if kind == "full_turn" else programme
         humps = _humps(table, time, programme, kind)
         whole = replace(programme, humps=humps, kind="reversing" if kind == "reversing" else "unidirectional")

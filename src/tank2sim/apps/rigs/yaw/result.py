@@ -25,18 +25,9 @@ from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.rigs.yaw.card import YawRigCard
-from tank2sim.apps.rigs.yaw.found_card import (
-    BEST,
-    body_length,
-    known_added_inertia,
-    nrdot_prime,
-    rig_card_text,
-    tank_density,
-    with_nrdot,
-)
-from tank2sim.apps.rigs.yaw.identify import YAW_METHODS, YawIdentification
-from tank2sim.apps.rigs.yaw.intervals import ENERGY_TERMS
-from tank2sim.apps.rigs.yaw.study import EnergyBalance, EnergyResidual, YawMethodEstimate, YawStudy
+from tank2sim.apps.rigs.yaw.energy import YawMethodEstimate, term_and_unit
+from tank2sim.apps.rigs.yaw.found_card import nrdot_prime, rig_card_text, with_nrdot
+from tank2sim.apps.rigs.yaw.identify import YAW_METHODS, EnergyBalance, EnergyResidual, YawIdentification, YawStudy
 from tank2sim.arrays import Columns
 from tank2sim.cards import Card, parse_card
 from tank2sim.errors import ArgumentError, InputError
@@ -92,7 +83,7 @@ class YawResult(Result[YawStudy]):
     """
 
     study: YawStudy
-    method: str = BEST
+    method: str = YAW_METHODS[0]
     identification: YawIdentification | None = None
     rig: YawRigCard | None = None
     files: Mapping[Path, str | bytes] = field(default_factory=dict)
@@ -123,10 +114,8 @@ class YawResult(Result[YawStudy]):
             for name, unit in (("added_inertia", "kgm2"), ("total_inertia", "kgm2"), ("dissipation", "J"))
             for error in ("", "_standard_error")
         ]
-        rows = [
-            (method, *(getattr(found, column) for column in columns)) for method, found in self.study.methods.items()
-        ]
-        return pd.DataFrame(rows, columns=["method", *columns]).set_index("method")
+        rows = [[getattr(found, column) for column in columns] for found in self.study.methods.values()]
+        return pd.DataFrame(rows, columns=columns, index=pd.Index(self.study.methods, name="method"))
 
     @property
     def added_inertia_kgm2(self) -> float | None:
@@ -146,9 +135,7 @@ class YawResult(Result[YawStudy]):
         InputError
             The added inertia or the length is not known, or the added inertia is negative.
         """
-        found, method = self._identified, self._known_method()
-        known_added_inertia(found, method)  # before the length: without it no length helps
-        return nrdot_prime(found, method, body_length(found, length_m), tank_density(found))
+        return nrdot_prime(self._identified, self._known_method(), length_m)
 
     def with_nrdot(self, card: Any, length_m: float | None = None) -> Any:
         """A ship with N_rdot of the body on the rig on its card, the value before in a comment.
@@ -164,12 +151,11 @@ class YawResult(Result[YawStudy]):
         InputError
             As :meth:`nrdot`, or the card is not one of a ship that manoeuvres.
         """
-        self.nrdot(length_m)
         from tank2sim import Ship
         from tank2sim.dynamics.vessel import as_vessel
 
-        ship, length = as_vessel(card).manoeuvring(), body_length(self._identified, length_m)
-        return Ship(with_nrdot(ship, self._identified, self._known_method(), length))
+        found = self.nrdot(length_m)
+        return Ship(with_nrdot(as_vessel(card).manoeuvring(), *found, self.method))
 
     def rig_card(self, name: str = "yaw rig") -> Card:
         """The card of the rig with its body, called `name`.
@@ -202,7 +188,7 @@ class YawResult(Result[YawStudy]):
     @property
     def headline(self) -> tuple[str, ...]:
         """The inertia by the energy least squares, and the records."""
-        kind, inertia, error = self._best.inertia
+        kind, inertia, error = self.study.methods[YAW_METHODS[0]].inertia
         shown = f"{1e4 * inertia:.4g}" if error is None else f"({1e4 * inertia:.4g} ± {1e4 * error:.2g})"
         return (
             f"The {kind} yaw inertia is {shown} · 10⁻⁴ kg m² by the energy least squares; ± is one standard error.",
@@ -210,13 +196,9 @@ class YawResult(Result[YawStudy]):
         )
 
     @property
-    def _best(self) -> YawMethodEstimate:
-        return self.study.methods[YAW_METHODS[0]]
-
-    @property
     def key_figures(self) -> Sequence[KeyFigure]:
         """Inertia, dissipation, bias of the two-interval formula, mirror images."""
-        best = self._best
+        best = self.study.methods[YAW_METHODS[0]]
         kind, inertia, error = best.inertia
         bias = 100 * (self.study.methods["two_intervals"].bias_against_least_squares_kgm2 or 0.0)
         bias /= best.total_inertia_kgm2
@@ -252,19 +234,27 @@ class YawResult(Result[YawStudy]):
     def sections(self) -> Sequence[Section]:
         """Estimates, energy balance, records, residuals, theory."""
         study = self.study
-        estimates = _chart(_estimates_chart(study.methods), "Dashed: the energy least squares.", "estimates_by_method")
-        balance = _chart(_balance_chart(study.energy_balance), "The mean over all pairs.", "energy_balance")
-        residuals = _chart(_energy_residual_chart(study.energy_residuals), "", "energy_balance")
         records = [
             _chart(_record_chart(name, columns), "", "record_and_programme")
             for name, columns in study.histories.items()
         ]
         sections = [
             Section(
-                heading="Estimates by method", text=_ESTIMATES, tables=[_estimates(study.methods)], charts=[estimates]
+                heading="Estimates by method",
+                text=_ESTIMATES,
+                tables=[_estimates(study.methods)],
+                charts=[
+                    _chart(_estimates_chart(study.methods), "Dashed: the energy least squares.", "estimates_by_method")
+                ],
             ),
             Section(
-                heading="Energy balance", text=_BALANCE, tables=[_friction(study.methods)], charts=[balance, residuals]
+                heading="Energy balance",
+                text=_BALANCE,
+                tables=[_friction(study.methods)],
+                charts=[
+                    _chart(_balance_chart(study.energy_balance), "The mean over all pairs.", "energy_balance"),
+                    _chart(_energy_residual_chart(study.energy_residuals), "", "energy_balance"),
+                ],
             ),
             Section(heading="Record and programme", text="The rate is shown where it is evaluated.", charts=records),
         ]
@@ -292,16 +282,16 @@ def _scaled(value: float | None) -> float | None:
 
 
 def _estimates(methods: Mapping[str, YawMethodEstimate]) -> Table:
+    fields = (
+        "added_inertia_kgm2",
+        "added_inertia_standard_error_kgm2",
+        "total_inertia_kgm2",
+        "dissipation_J",
+        "dissipation_standard_error_J",
+        "bias_against_least_squares_kgm2",
+    )
     rows: list[list[Cell]] = [
-        [
-            method.replace("_", " "),
-            _scaled(found.added_inertia_kgm2),
-            _scaled(found.added_inertia_standard_error_kgm2),
-            _scaled(found.total_inertia_kgm2),
-            _scaled(found.dissipation_J),
-            _scaled(found.dissipation_standard_error_J),
-            _scaled(found.bias_against_least_squares_kgm2),
-        ]
+        [method.replace("_", " "), *(_scaled(getattr(found, field)) for field in fields)]
         for method, found in methods.items()
     ]
     columns = [
@@ -323,26 +313,24 @@ def _friction(methods: Mapping[str, YawMethodEstimate]) -> Table:
     terms = dict.fromkeys(term for found in given.values() for term in found.friction)
     rows: list[list[Cell]] = []
     for term in terms:
-        unit = next(unit for name, (_, unit) in ENERGY_TERMS.items() if term == f"{name}_{unit}")
+        words, unit = term_and_unit(term)
         cells: list[Cell] = []
         for found in given.values():
             value, error = _scaled(found.friction.get(term)), found.friction_standard_errors.get(term)
             shown = None if value is None else format_number(value)
             cells.append(shown if error is None else f"{shown} ± {format_number(1e4 * error, 2)}")
-        rows.append([term.removesuffix(f"_{unit}").replace("_", " "), _UNITS[unit], *cells])
+        rows.append([words.replace("_", " "), _UNITS[unit], *cells])
     heads = ("term", "unit", *(name.replace("_", " ") for name in given))
     return table("Friction and water, times 10⁴", heads, rows, folded=True)
 
 
 def _record_chart(name: str, columns: Columns) -> ChartSpec:
     """Rate where it is evaluated next to the programme's, tracking error, and current, over the whole record."""
-    time = columns["t_s"]
-    columns_shown = {"rate": "rate_radps", "error": "tracking_error_rad", "current": "current_A"}
-    values = {key: columns[column] for key, column in columns_shown.items()}
-    programme = {"rate": columns["programme_rate_radps"]}
+    shown = {"rate": "rate_radps", "error": "tracking_error_rad", "current": "current_A"}
+    runs = {name: shown, "programme": {"rate": "programme_rate_radps"}}
     histories = [
-        History(label=name, time_s=time, values=values),
-        History(label="programme", time_s=time, values=programme),
+        History(label=label, time_s=columns["t_s"], values={key: columns[column] for key, column in signals.items()})
+        for label, signals in runs.items()
     ]
     return history_chart(histories, _SIGNALS, title=f"{name}: programme and record")
 

@@ -1,10 +1,15 @@
-"""Runs of the yaw rig and their records: body, motor and encoder under a sampled controller and a programme."""
+"""Runs of the yaw rig and their records: body, motor and encoder under a sampled controller and a programme.
+
+The controllers are (4), tuned from run to run, and (6), adaptive, as a digital controller carries them out. Both are
+functions of one sample, ``step(memory, angle, angle_ref, rate_ref, gains) -> (memory after, command)``, with rectangles
+for integrals and a held value for the filter, at the interval `h` of the sampling.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,32 +17,133 @@ import casadi as ca
 import numpy as np
 
 from tank2sim.apps.rigs.yaw.card import YawRig, YawRigCard
-from tank2sim.apps.rigs.yaw.control import Controller, TunedController
 from tank2sim.apps.rigs.yaw.model import yaw_rig_model
-from tank2sim.apps.rigs.yaw.programme import Reference, YawProgramme, programme_of
-from tank2sim.apps.rigs.yaw.records import Medium, YawRecord
+from tank2sim.apps.rigs.yaw.programme import (
+    Similarity,
+    YawProgramme,
+    dissipation_from_work,
+    inertia_from_work,
+    programme_of,
+)
+from tank2sim.apps.rigs.yaw.records import Medium, YawRecord, yaw_record_text
+from tank2sim.apps.rigs.yaw.theory import numbers_of
 from tank2sim.arrays import Array
-from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
+from tank2sim.cards import Card
+from tank2sim.dynamics.vessel import Vessel, as_vessel
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.simulation.scheme import runge_kutta_step
+
+
+class Law(NamedTuple):
+    """A controller: the start of its memory, its gains of the first run, and its step of one sample."""
+
+    start: tuple[float, ...]
+    gains: Mapping[str, float]
+    step: Callable[[ca.SX, ca.SX, ca.SX, ca.SX, ca.SX], tuple[ca.SX, ca.SX]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TunedController:
+    """(4): u = (K_P + K_I/p) e + K_D (w_ref - p/(T_o p + 1) phi), e = phi_ref - phi.
+
+    `inertia_kgm2` is a10 = J* + lambda66, from which the first gains are taken, with a20 = 0.1 a10 (N m s) for the
+    friction; `divisor` is n1, `integral_gain` K_I, `filter_s` T_o. `tune` takes new gains after every pair of
+    intervals. `as_printed` takes the first gains as they are printed, with a10 and a20 exchanged, and t4, t5 for the
+    limits of braking where t5, t6 are meant.
+    """
+
+    inertia_kgm2: float
+    divisor: float = 1.0
+    integral_gain: float = 1.0
+    filter_s: float = 0.1
+    tune: bool = True
+    as_printed: bool = False
+
+    def first_gains(self, lag_s: float, torque_constant_NmpA: float) -> tuple[float, float]:
+        """K_P and K_D of the first run: a20 and a10 over n1 T_c k_t."""
+        scale = self.divisor * lag_s * torque_constant_NmpA
+        proportional, derivative = 0.1 * self.inertia_kgm2 / scale, self.inertia_kgm2 / scale
+        return (derivative, proportional) if self.as_printed else (proportional, derivative)
+
+    def tuned_gains(
+        self, programme: YawProgramme, time_s: Array, current: Array, lag_s: float
+    ) -> tuple[float, float] | None:
+        """K_P and K_D from the `current` of the last completed pair of intervals: the first fractions of (1) and (2).
+
+        With the programme's rates, the braking limits t5, t6, and `lag_s` T_c; None without a pair.
+        """
+        pairs = [pair for pair in programme.pairs() if max(pair.accelerating_s[1], pair.braking_s[1]) <= time_s[-1]]
+        if not pairs:
+            return None
+        speeding, braking = pairs[-1]
+        if self.as_printed:  # t4 to t5, where the rate has hardly begun to fall
+            t4 = braking[0] - programme.settle_s - programme.rise_s / 6
+            braking = t4, t4 + programme.rise_s / 6
+        works: list[float] = []  # int w I dt, A rad
+        for ends in (braking, speeding):
+            times = np.linspace(*ends, 401)
+            rate = programme.at(times).rate_radps
+            works.insert(0, float(np.trapezoid(rate * np.interp(times, time_s, current), times)))
+        square, scale = float(np.trapezoid(rate**2, times)), self.divisor * lag_s
+        derivative = inertia_from_work(works[0], works[1], float(rate[0]), float(rate[-1])) / scale
+        return dissipation_from_work(works[0], works[1]) / (scale * square), derivative
+
+    def law(self, h: float, lag_s: float, torque_constant_NmpA: float) -> Law:
+        """The controller at the sampling interval `h`, s, for a motor with T_c and k_t."""
+
+        def step(memory: ca.SX, angle: ca.SX, angle_ref: ca.SX, rate_ref: ca.SX, gains: ca.SX) -> tuple[ca.SX, ca.SX]:
+            integral, filtered = memory[0], memory[1]
+            error = angle_ref - angle
+            rate = (angle - filtered) / self.filter_s
+            command = gains[0] * error + self.integral_gain * integral + gains[1] * (rate_ref - rate)
+            return ca.vertcat(integral + h * error, filtered + h * rate), command
+
+        gains = self.first_gains(lag_s, torque_constant_NmpA)
+        return Law((0.0, 0.0), dict(zip(("K_P", "K_D"), gains, strict=True)), step)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AdaptiveController:
+    """(5) and (6): u = d(kt xi)/dt + kt xi + gamma1 kt sgn w_ref + gamma2 kt w_ref |w_ref|.
+
+    xi' = sigma0 kt^2 (e - xi), and kt' = lambda0 while |W_f e| > delta0, W_f = 1/(T_f p + 1). With both gammas 0 it is
+    (5). The paper does not state the first kt; 20 is a project choice, with which the loop is stable.
+    """
+
+    sigma0: float = 0.008
+    lambda0: float = 1.0
+    delta0_rad: float = 0.006
+    gamma1: float = 2e-4
+    gamma2: float = 1e-4
+    filter_s: float = 0.2
+    first_gain: float = 20.0
+
+    def law(self, h: float, lag_s: float, torque_constant_NmpA: float) -> Law:
+        """The controller at the sampling interval `h`, s; it knows nothing of the motor."""
+
+        def step(memory: ca.SX, angle: ca.SX, angle_ref: ca.SX, rate_ref: ca.SX, gains: ca.SX) -> tuple[ca.SX, ca.SX]:
+            xi, gain, smooth = memory[0], memory[1], memory[2]
+            error = angle_ref - angle
+            gain_rate = ca.if_else(ca.fabs(smooth) > self.delta0_rad, self.lambda0, 0)
+            xi_rate = self.sigma0 * gain**2 * (error - xi)
+            feed = self.gamma1 * ca.sign(rate_ref) + self.gamma2 * rate_ref * ca.fabs(rate_ref)
+            command = gain_rate * xi + gain * xi_rate + gain * xi + gain * feed
+            smooth_rate = (error - smooth) / self.filter_s
+            return ca.vertcat(xi + h * xi_rate, gain + h * gain_rate, smooth + h * smooth_rate), command
+
+        return Law((0.0, self.first_gain, 0.0), {}, step)
+
+
+Controller = TunedController | AdaptiveController
 
 
 @dataclass(frozen=True, kw_only=True)
 class Measuring:
     """Measurement settings of a rig.
 
-    Parameters
-    ----------
-    encoder : bool
-        Controller and record use whole pulses; else the exact angle.
-    current_noise_A : float
-        Standard deviation of the recorded current.
-    control_s : float
-        Sampling interval of the controller; a millisecond is a project choice, the paper states none.
-    record_every : int
-        Samples of the controller per row of the record.
-    seed : int
-        Seed of the noise.
+    With the encoder, controller and record use whole pulses, else the exact angle. The noise of the recorded current is
+    a standard deviation. The controller samples every millisecond, a project choice, the paper states none;
+    `record_every` of its samples make a row of the record.
     """
 
     encoder: bool = True
@@ -56,21 +162,11 @@ class Saturation(NamedTuple):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class YawRun:
-    """Result of a run; all arrays (rows,).
+    """Result of a run, arrays (rows,): the record, with the noise of the current, and the true values, which a rig does
+    not measure.
 
-    Parameters
-    ----------
-    programme : YawProgramme
-        The programme of the run.
-    time_s, angle_rad, current_A : array
-        The record: angle as measured, current with noise.
-    true_angle_rad, true_rate_radps, true_current_A : array
-        True values, which a rig does not measure.
-    gains : tuple
-        Gains of each hump, by name; empty for a controller without gains.
-    memory : tuple of float
-        States of the controller at the end.
-    saturation : Saturation or None
+    `gains` are those of each hump, by name; none for a controller without gains. `memory` has the states of the
+    controller at the end.
     """
 
     programme: YawProgramme
@@ -83,12 +179,11 @@ class YawRun:
     gains: tuple[dict[str, float], ...]
     memory: tuple[float, ...]
     saturation: Saturation | None
-    reference: Reference = field(repr=False)
 
     @property
     def error_rad(self) -> Array:
         """Tracking error e = phi_ref - phi of the true angle."""
-        return self.reference.angle_rad - self.true_angle_rad
+        return self.programme.at(self.time_s).angle_rad - self.true_angle_rad
 
 
 def run_yaw_rig(
@@ -101,23 +196,19 @@ def run_yaw_rig(
 ) -> YawRun:
     """Simulate a programme on the rig under a controller, from rest.
 
-    Raises
-    ------
-    InputError
-        The motor saturates without `allow_saturation`: the message states the time and the required current.
+    InputError if the motor saturates without `allow_saturation`: the message states the time and the required current.
     """
     measuring = measuring or Measuring()
     h = measuring.control_s
-    model = yaw_rig_model("yaw rig", rig)
     law = controller.law(h, rig.current_lag_s, rig.torque_constant_NmpA)
-    steps = round(programme.end_s / h)
-    time: Array = np.arange(steps + 1, dtype=np.float64) * h
+    time: Array = np.arange(round(programme.end_s / h) + 1, dtype=np.float64) * h
     reference = programme.at(time)
     gains = tuple(law.gains.values())
-    sample = _closed_loop(model, law.step, len(law.start), len(law.gains), measuring)
-    state = np.concatenate([np.asarray(model.initial(model.parameter_values())).ravel(), law.start])
-    states, commands, used = [state[:, None]], [], []
-    for begin, end in _humps(programme, steps, h):
+    start, sample = _closed_loop(rig, law, measuring)
+    states, commands, used = [start[:, None]], [], []
+    # Ends of the humps; the time before the start belongs to the first one.
+    ends = [round((programme.start_s + hump * programme.period_s) / h) for hump in range(1, programme.humps)]
+    for begin, end in zip([0, *ends], [*ends, len(time) - 1], strict=True):
         used.append(dict(zip(law.gains, gains, strict=True)))
         driven = np.vstack([reference.angle_rad[begin:end], reference.rate_radps[begin:end]])
         given = np.vstack([driven, *(np.full(end - begin, gain) for gain in gains)])
@@ -125,94 +216,53 @@ def run_yaw_rig(
         states.append(np.asarray(after))
         commands.append(np.asarray(ordered).ravel())
         if isinstance(controller, TunedController) and controller.tune:
-            gains = _tuned(controller, rig, programme, time[: end + 1], np.hstack(states)[2]) or gains
-    path, command_A = np.hstack(states), np.concatenate(commands)
-    saturation = _saturation(time, command_A, rig.max_current_A)
-    if saturation and not allow_saturation:
-        _refuse(saturation, command_A, rig)
-    return _recorded(rig, programme, measuring, _Path(time, path, reference, tuple(used), saturation))
-
-
-class _Path(NamedTuple):
-    time_s: Array
-    states: Array
-    reference: Reference
-    gains: tuple[dict[str, float], ...]
-    saturation: Saturation | None
-
-
-def _recorded(rig: YawRig, programme: YawProgramme, measuring: Measuring, path: _Path) -> YawRun:
+            current = np.hstack(states)[2]
+            gains = controller.tuned_gains(programme, time[: end + 1], current, rig.current_lag_s) or gains
+    path = np.hstack(states)
+    saturation = _saturation(rig, np.concatenate(commands), h, allowed=allow_saturation)
     every = slice(None, None, measuring.record_every)
-    time, states = path.time_s[every], path.states[:, every]
+    angle, rate, driven_A = path[:3, every]
     pulse = 2 * math.pi / rig.pulses_per_turn
-    noise = measuring.current_noise_A * np.random.default_rng(measuring.seed).standard_normal(len(time))
+    noise = measuring.current_noise_A * np.random.default_rng(measuring.seed).standard_normal(len(driven_A))
     return YawRun(
         programme=programme,
-        time_s=time,
-        angle_rad=np.floor(states[0] / pulse) * pulse if measuring.encoder else states[0],
-        current_A=states[2] + noise,
-        true_angle_rad=states[0],
-        true_rate_radps=states[1],
-        true_current_A=states[2],
-        gains=path.gains,
-        memory=tuple(float(value) for value in path.states[3:, -1]),
-        saturation=path.saturation,
-        reference=Reference(*(column[every] for column in path.reference)),
+        time_s=time[every],
+        angle_rad=np.floor(angle / pulse) * pulse if measuring.encoder else angle,
+        current_A=driven_A + noise,
+        true_angle_rad=angle,
+        true_rate_radps=rate,
+        true_current_A=driven_A,
+        gains=tuple(used),
+        memory=tuple(path[3:, -1].tolist()),
+        saturation=saturation,
     )
 
 
-def _closed_loop(model: Model, law: object, memories: int, gains: int, measuring: Measuring) -> ca.Function:
-    """``sample([state; memory], [angle_ref; rate_ref; gains]) -> (next, command)``: one interval of the controller."""
+def _closed_loop(rig: YawRig, law: Law, measuring: Measuring) -> tuple[Array, ca.Function]:
+    """Start of rig and controller, and ``sample([state; memory], [angle_ref; rate_ref; gains]) -> (next, command)``."""
+    model = yaw_rig_model("yaw rig", rig)
     states = len(model.states)
-    whole, given = ca.SX.sym("z", states + memories), ca.SX.sym("given", 2 + gains)
+    whole, given = ca.SX.sym("z", states + len(law.start)), ca.SX.sym("given", 2 + len(law.gains))
     x, memory = whole[:states], whole[states:]
     parameters = model.parameter_values()
     outputs = model.output(x, ca.SX(0), parameters)
     measured = outputs[model.outputs.index("encoder.angle")] if measuring.encoder else x[0]
-    assert callable(law)
-    following, command = law(memory, measured, given[0], given[1], given[2:])
+    following, command = law.step(memory, measured, given[0], given[1], given[2:])
     after = runge_kutta_step(model)(x, command, parameters, measuring.control_s)
-    return ca.Function("sample", [whole, given], [ca.vertcat(after, following), command], {"cse": True})
+    start: Array = np.concatenate([np.asarray(model.initial(parameters)).ravel(), law.start])
+    return start, ca.Function("sample", [whole, given], [ca.vertcat(after, following), command], {"cse": True})
 
 
-def _humps(programme: YawProgramme, steps: int, h: float) -> list[tuple[int, int]]:
-    """First sample and the one after the last of each hump; the time before the start belongs to the first hump."""
-    ends = [round((programme.start_s + (hump + 1) * programme.period_s) / h) for hump in range(programme.humps)]
-    ends[-1] = steps
-    return list(zip([0, *ends[:-1]], ends, strict=True))
-
-
-def _tuned(
-    controller: TunedController, rig: YawRig, programme: YawProgramme, time: Array, current: Array
-) -> tuple[float, float] | None:
-    """Gains from the last completed pair of intervals, with the programme's rates; None without a pair."""
-    done = [pair for pair in programme.pairs() if max(pair.accelerating_s[1], pair.braking_s[1]) <= time[-1]]
-    if not done:
-        return None
-    works, square, rates = [], [], []
-    speeding, braking = done[-1]
-    if controller.as_printed:  # t4 to t5, where the rate has hardly begun to fall
-        t4 = braking[0] - programme.settle_s - programme.rise_s / 6
-        braking = t4, t4 + programme.rise_s / 6
-    for begin, end in (speeding, braking):
-        times = np.linspace(begin, end, 401)
-        rate = programme.at(times).rate_radps
-        works.append(float(np.trapezoid(rate * np.interp(times, time, current), times)))
-        square.append(float(np.trapezoid(rate**2, times)))
-        rates.append((float(rate[0]), float(rate[-1])))
-    return controller.tuned_gains((works[0], works[1]), (*rates[0], square[0]), rig.current_lag_s)
-
-
-def _saturation(time: Array, command_A: Array, limit_A: float) -> Saturation | None:
-    beyond = np.flatnonzero(np.abs(command_A) > limit_A)
+def _saturation(rig: YawRig, command_A: Array, h: float, *, allowed: bool) -> Saturation | None:
+    """Where the ordered current, at intervals of `h` s, is beyond the motor's; refused unless `allowed`."""
+    beyond = np.flatnonzero(np.abs(command_A) > rig.max_current_A)
     if not beyond.size:
         return None
-    return Saturation(float(time[beyond[0]]), float(beyond.size * (time[1] - time[0])))
-
-
-def _refuse(saturation: Saturation, command_A: Array, rig: YawRig) -> None:
+    found = Saturation(float(beyond[0] * h), float(beyond.size * h))
+    if allowed:
+        return found
     problem = (
-        f"saturates the motor, first at {saturation.first_s:.3f} s and for {saturation.total_s:.3g} s in all: "
+        f"saturates the motor, first at {found.first_s:.3f} s and for {found.total_s:.3g} s in all: "
         f"up to {np.abs(command_A).max():.3g} A is ordered, and {rig.max_current_A:g} A is available"
     )
     raise InputError("yaw rig", "", problem, "take a slower programme, lower gains or a stronger motor")
@@ -247,26 +297,11 @@ def simulated_record(
     controller: Controller | None = None,
     programme: YawProgramme | None = None,
 ) -> YawRecord:
-    """Simulate the record of a programme on the card's rig, including its encoder.
+    """Simulate the record of a programme on the card's rig, including its encoder, for the file `path`.
 
-    Parameters
-    ----------
-    card : YawRigCard
-    path : Path
-        The file of the record.
-    current_noise_A : float
-        Standard deviation of the recorded current.
-    medium : str
-        In ``air`` the rig is that of :func:`rig_in_air`.
-    controller : optional
-        By default (4), with the true inertia.
-    programme : optional
-        By default the card's.
-
-    Raises
-    ------
-    InputError
-        The motor saturates, or the card lacks a rig or a programme.
+    In ``air`` the rig is that of :func:`rig_in_air`. The controller is by default (4), with the true inertia, the
+    programme that of the card; the noise of the recorded current is a standard deviation. InputError if the motor
+    saturates, or the card lacks a programme.
     """
     wet, programme = card.yaw_rig, programme or programme_of(card)
     rig = rig_in_air(wet) if medium == "air" else wet
@@ -290,3 +325,60 @@ def rig_in_air(rig: YawRig) -> YawRig:
     """
     water = ("added_inertia_kgm2", "quadratic_Nms2", "inertia_accelerating_kgm2", "inertia_braking_kgm2")
     return rig.model_copy(update={**dict.fromkeys(water, 0.0), "braking_quadratic_Nms2": None, "walls": None})
+
+
+def simulated_file(
+    rig: YawRigCard,
+    path: Path,
+    medium: Medium,
+    controller: str,
+    similar_to: str | None,
+    noise_A: float,
+) -> tuple[YawRecord, str]:
+    """A simulated record, and the text of its file; `controller` and `similar_to` as of :func:`tank2sim.yaw`."""
+    if path.exists():
+        raise InputError(path, "", "exists, and may be a measurement", "give the simulated record a new name")
+    chosen = AdaptiveController() if controller == "adaptive" else None
+    programme = similar_programme(rig, similar_to) if similar_to else None
+    record = simulated_record(rig, path, noise_A, medium=medium, controller=chosen, programme=programme)
+    return record, yaw_record_text(record)
+
+
+def rig_card_of(given: Vessel | Card | str | Path, argument: str) -> YawRigCard:
+    """The card of a yaw rig `given` as `argument`; InputError for a card of another kind."""
+    card = as_vessel(given).card
+    if not isinstance(card, YawRigCard):
+        raise card.fault("model.kind", f"is {card.model.kind!r}", f"give a card of the yaw rig as {argument}")
+    return card
+
+
+def similar_programme(card: YawRigCard, text: str) -> YawProgramme:
+    """The programme of a ship's motion (`text` ``L,B,R,T``) at the size of the card's body."""
+    length, beam, rate_degpmin, time_s = _ship_motion(text)
+    body = card.ship
+    if body.length_m is None or body.beam_m is None:
+        raise card.fault("ship", "has no length_m or no beam_m", "add them, on the waterline")
+    ratio = Similarity(ship_length_m=length, ship_beam_m=beam, length_m=body.length_m, beam_m=body.beam_m)
+    try:
+        return ratio.programme(math.radians(rate_degpmin / 60), time_s, programme_of(card))
+    except ValueError as error:
+        raise ArgumentError("similar_to", "", str(error), "give another motion of the ship") from None
+
+
+def _ship_motion(text: str) -> tuple[float, ...]:
+    """Length and beam (m), yaw rate (deg/min) and time (s) of a text ``L,B,R,T``."""
+    numbers = numbers_of(text, (4,))
+    if not numbers or not numbers[2] or min(numbers[0], numbers[1], numbers[3]) <= 0:
+        remedy = "write length and beam in m, yaw rate in deg/min and time in s: 38,8,100,120"
+        raise ArgumentError("similar_to", "", f"{text!r} is not a motion of a ship", remedy)
+    return tuple(numbers)
+
+
+def similarity_words(record: YawRecord, text: str) -> str:
+    """Sentence on the scale of rates between a ship's motion (`text` ``L,B,R,T``) and its record."""
+    length, beam, rate_degpmin, time_s = _ship_motion(text)
+    model_degps = math.degrees(record.programme.max_rate_radps)
+    return (
+        f"{length:g} m x {beam:g} m at model size: rates times {60 * model_degps / rate_degpmin:.4g}, so "
+        f"{rate_degpmin:g} deg/min in {time_s:g} s is {model_degps:.4g} deg/s in {3 * record.programme.rise_s:.4g} s"
+    )

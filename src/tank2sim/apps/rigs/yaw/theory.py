@@ -12,6 +12,8 @@ from typing import Literal
 from scipy.special import ellipeinc, ellipkinc
 
 from tank2sim.dynamics.ellipsoid import lamb_coefficients
+from tank2sim.dynamics.vessel import as_vessel
+from tank2sim.errors import ArgumentError
 
 Stage = Literal["accelerating", "braking"]
 
@@ -63,15 +65,10 @@ def ellipsoid_water_inertia(body: FloatingBody) -> float:
 
 
 def ratio_by_7(length_over_beam: float, draught_ratio: float, *, as_printed: bool = False) -> float:
-    """Added over displaced inertia of a triaxial ellipsoid by (7), p = L/B > 1 and q = 2T/B < 1.
+    """Added over displaced inertia of a triaxial ellipsoid by (7), p = L/B > 1 and q = 2T/B < 1; else ValueError.
 
     The print has (p^2 - 1) in the numerator where (p^2 - 1)^2 belongs, and the letter E for both elliptic integrals;
     with the square and F for the second it is Lamb's value (k66). `as_printed` leaves the square out.
-
-    Raises
-    ------
-    ValueError
-        The axes are not in the order L > B > 2T > 0 that (7) is written for.
     """
     p, q = length_over_beam, draught_ratio
     if not p > 1 > q > 0:
@@ -105,20 +102,9 @@ def rotational_froude_number(body: FloatingBody, rate_radps: float, gravity_mps2
 def added_inertia_by_8(body: FloatingBody, rate_radps: float, stage: Stage, *, bracket: float = 0.088) -> float:
     """lambda66 of a ship by (8), as printed: a regression over models turned in a circulating tank.
 
-    Parameters
-    ----------
-    rate_radps : float
-        Yaw rate, rad/s.
-    stage : str
-        The water is being set in motion, or overtakes the body.
-    bracket : float
-        Second factor of the last bracket; 0.088 in the print, 0.08 (with a rate 3/4 as large) comes nearest to the
-        paper's own table.
-
-    Raises
-    ------
-    ValueError
-        The body has no block coefficient.
+    The stage says whether the water is being set in motion, or overtakes the body. `bracket` is the second factor of
+    the last bracket; 0.088 in the print, 0.08 (with a rate 3/4 as large) comes nearest to the paper's own table.
+    ValueError for a body without block coefficient.
     """
     a, b = _SPEED_FACTORS[stage]
     length, beam, draught, block = body.length_m, body.beam_m, body.draught_m, body.block
@@ -193,3 +179,28 @@ def theory_values(body: FloatingBody, rate_radps: float) -> tuple[TheoryValue, .
         values.append(row(f"(8) {stage}", added_inertia_by_8(body, rate_radps, stage), remark))
     values.append(row("(9)", added_inertia_by_9(body), "spheroid's ratio with the ship's inertia of water"))
     return tuple(values)
+
+
+def numbers_of(text: str, counts: tuple[int, ...]) -> list[float]:
+    """Finite numbers of a `text` with commas; none unless there are as many as one of `counts`."""
+    try:
+        numbers = [float(word) for word in text.split(",")]
+    except ValueError:
+        return []
+    return numbers if len(numbers) in counts and all(map(math.isfinite, numbers)) else []
+
+
+def parse_body(text: str) -> FloatingBody:
+    """From a text ``L,B,T,H`` or ``L,B,T,H,CB``, or from a card that states these."""
+    if "," in text:
+        sizes: list[float | None] = [*numbers_of(text, (4, 5))]
+    else:
+        ship = as_vessel(text).card.ship
+        sizes = [ship.length_m, ship.beam_m, ship.draught_m, ship.water_depth_m, ship.block_coefficient]
+    stated, block = [size for size in sizes[:4] if size and size > 0], sizes[4] if len(sizes) > 4 else None
+    if len(stated) < 4 or (block is not None and not 0 < block <= 1):
+        problem = f"{text!r} does not state length, beam, draught and depth of water"
+        remedy = "write for example 0.67,0.20,0.08,0.22,0.47, or name a card with them"
+        raise ArgumentError("theory", "", problem, remedy)
+    length, beam, draught, depth = stated
+    return FloatingBody(length_m=length, beam_m=beam, draught_m=draught, depth_m=depth, block_coefficient=block)

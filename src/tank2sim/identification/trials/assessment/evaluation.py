@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import ParamSpec, TypeVar
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.methods.coloured_noise import white
-from tank2sim.identification.trials.methods.shooting import Shooting, cut
+from tank2sim.identification.trials.methods.output_error import Shooting, cut
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
@@ -26,6 +27,9 @@ from tank2sim.simulation.manoeuvres import Turn
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 from tank2sim.simulation.recorded import recorded, repeat, steerable
 from tank2sim.simulation.trajectory import Trajectory
+
+_Given = ParamSpec("_Given")
+_Found = TypeVar("_Found")
 
 _WINDOW = 5.0
 """Length of the windows of a free-running comparison, in L/u0 (30 s of a 7 m model at 1.18 m/s)."""
@@ -40,20 +44,13 @@ _LEAST_NOISE = 1e-3
 
 @dataclass(frozen=True)
 class Following:
-    """Errors of a model on one run.
-
-    Parameters
-    ----------
-    name : str
-    windows : mapping
-        Signal to (root mean square of the error, of the measurement less its mean) over windows of :data:`_WINDOW`,
-        each with its own initial state; SI.
-    whole : mapping
-        Signal to root mean square error over the whole run from one initial state; inf where the motion diverged.
-    """
+    """Errors of a model on one run."""
 
     name: str
+    # Signal to (root mean square of the error, of the measurement less its mean) over windows of :data:`_WINDOW`, each
+    # with its own initial state; SI
     windows: Mapping[str, tuple[float, float]]
+    # Signal to root mean square error over the whole run from one initial state; inf where the motion diverged
     whole: Mapping[str, float]
 
     def relative(self, signal: str) -> float:
@@ -101,24 +98,14 @@ def pooled(results: Sequence[Following], signal: str) -> float:
 
 @dataclass(frozen=True)
 class FigureComparison:
-    """A figure of a manoeuvre.
+    """A figure of a manoeuvre."""
 
-    Parameters
-    ----------
-    trial, name : str
-        Trial, and name of the figure with its unit.
-    measured : float
-    predicted : float or None
-        By the closed-loop simulation; None where the simulation does not reach it.
-    interval : (float, float) or None
-        95 % prediction interval; None where it was not computed.
-    """
-
+    # `trial`, `name`: Trial, and name of the figure with its unit
     trial: str
     name: str
     measured: float
-    predicted: float | None
-    interval: tuple[float, float] | None = None
+    predicted: float | None  # By the closed-loop simulation; None where the simulation does not reach it
+    interval: tuple[float, float] | None = None  # 95 % prediction interval; None where it was not computed
 
     @property
     def error(self) -> float:
@@ -129,29 +116,27 @@ class FigureComparison:
         return difference / self.measured if self.name.endswith("_m") else difference
 
 
+def or_none(function: Callable[_Given, _Found], *given: _Given.args, **named: _Given.kwargs) -> _Found | None:
+    """The result of a `function`; None where the records do not allow it, or a motion leaves all bounds."""
+    try:
+        return function(*given, **named)
+    except InputError:
+        return None
+
+
 def predicted_figures(card: ManoeuvringCard, trials: Sequence[Trial]) -> tuple[FigureComparison, ...]:
     """Figures of the turns and zigzags among trials, measured and simulated in closed loop from the measured start.
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-        Card of the ship.
-    trials : sequence of Trial
-        At the ship's size; trials other than turns and zigzags are ignored.
+    `card`: Card of the ship. `trials`: At the ship's size; trials other than turns and zigzags are ignored.
     """
-    model = build(steerable(card))
-    integrator = Integrator(model)
+    integrator = Integrator(build(steerable(card)))
     figures = []
     for trial in trials:
-        record = recorded(trial, model)
+        record = recorded(trial, integrator.model)
         if record is None:
             continue
-        try:
-            simulated = repeat(record, integrator).figures
-        except InputError:  # the motion left all bounds: none of its figures is reached
-            simulated = {}
-        turn = isinstance(record.manoeuvre, Turn)
-        predicted = select_figures(simulated, turn=turn)
+        turn, run = isinstance(record.manoeuvre, Turn), or_none(repeat, record, integrator)
+        predicted = select_figures(run.figures, turn=turn) if run else {}  # without a run none is reached
         figures += [
             FigureComparison(trial.name, name, value, predicted.get(name))
             for name, value in select_figures(record.figures, turn=turn).items()
@@ -161,31 +146,16 @@ def predicted_figures(card: ManoeuvringCard, trials: Sequence[Trial]) -> tuple[F
 
 @dataclass(frozen=True, eq=False)
 class Passage:
-    """One trial and its simulation by a model.
+    """One trial and its simulation by a model."""
 
-    Parameters
-    ----------
-    name : str
-        Name of the trial.
-    closed_loop : bool
-        True for a turn or zigzag: the model was steered as in the manoeuvre, from the measured start. False: it was
-        driven by the recorded rudder, from the initial state that fits the record best.
-    time_s : array (n,)
-        In the trial's own time.
-    measured : mapping
-        Measured signals among :data:`_SHOWN` (n,), nan where not measured.
-    model_time_s : array (m,)
-        In the trial's own time; empty where the motion left all bounds.
-    simulated : mapping
-        Each of :data:`_SHOWN` (m,).
-    """
-
-    name: str
+    name: str  # Name of the trial
+    # True for a turn or zigzag: the model was steered as in the manoeuvre, from the measured start. False: it was
+    # driven by the recorded rudder, from the initial state that fits the record best.
     closed_loop: bool
-    time_s: Array
-    measured: Mapping[str, Array]
-    model_time_s: Array
-    simulated: Mapping[str, Array]
+    time_s: Array  # (n,): In the trial's own time
+    measured: Mapping[str, Array]  # Measured signals among :data:`_SHOWN` (n,), nan where not measured
+    model_time_s: Array  # (m,): In the trial's own time; empty where the motion left all bounds
+    simulated: Mapping[str, Array]  # Each of :data:`_SHOWN` (m,)
 
 
 _SHOWN = ("rudder", "motion.psi", "motion.r", "motion.speed", "motion.beta", "motion.x", "motion.y")
@@ -198,46 +168,28 @@ def comparison_windows(
 ) -> tuple[Passage, ...]:
     """Trials and their simulations by a card's model: turns and zigzags in closed loop, others replayed.
 
-    Parameters
-    ----------
-    problem : Problem
-        Set up with a card and these trials; its prior means are the card's values.
-    card : ManoeuvringCard
-        That card.
-    trials : sequence of Trial
-        One for each run of the problem.
-    noise : mapping
-        Standard deviation by variable: weighs signals in the initial state of a replayed trial.
+    `problem`: Set up with a card and these trials; its prior means are the card's values. `card`: That card. `trials`:
+    One for each run of the problem. `noise`: Standard deviation by variable: weighs signals in the initial state of a
+    replayed trial.
     """
-    model = build(steerable(card))
-    integrator, shooting = Integrator(model), None
+    integrator = Integrator(build(steerable(card)))
     found = []
     for trial, run in zip(trials, problem.runs, strict=True):
-        manoeuvre = recorded(trial, model)
-        ground = not {"motion.u", "motion.v"} <= set(_given(run))
-        simulated: Trajectory | None
-        if manoeuvre is None:
-            shooting = shooting or Shooting(problem, starts_alone=True)
-            begin, replayed = run.begin_s, _replayed(shooting, run, noise)
-            simulated = replayed if replayed.is_finite() else None
-        else:
-            try:
-                begin, simulated = manoeuvre.begin_s, repeat(manoeuvre, integrator).trajectory
-            except InputError:  # the motion left all bounds
-                begin, simulated = manoeuvre.begin_s, None
-        columns = {} if simulated is None else _shown_of(simulated, ground=ground)
-        times = np.zeros(0) if simulated is None else begin + simulated.t
-        found.append(Passage(run.name, manoeuvre is not None, run.times, _measured_in(run, problem), times, columns))
+        record = recorded(trial, integrator.model)
+        repeated = or_none(repeat, record, integrator) if record else None
+        replayed = None if record else _replayed(problem, run, noise)
+        simulated = repeated.trajectory if repeated else replayed
+        given = {name: run.column(name) for name in run.seen if not np.isnan(run.column(name)).all()}
+        times, columns = np.zeros(0), {}
+        if simulated is not None:
+            times = simulated.t + (record.begin_s if record else run.begin_s)
+            columns = _shown_of(simulated, ground=not {"motion.u", "motion.v"} <= given.keys())
+        measured = _measured_in(run, given, problem)
+        found.append(Passage(run.name, record is not None, run.times, measured, times, columns))
     return tuple(found)
 
 
-def _given(run: SampledRun) -> dict[str, Array]:
-    """Measured columns of a run, by variable."""
-    return {name: run.column(name) for name in run.seen if not np.isnan(run.column(name)).all()}
-
-
-def _measured_in(run: SampledRun, problem: Problem) -> dict[str, Array]:
-    given = _given(run)
+def _measured_in(run: SampledRun, given: Mapping[str, Array], problem: Problem) -> dict[str, Array]:
     rudder = run.inputs[:, problem.model.input_names.index("rudder.command")]
     columns = {"rudder": rudder, **{name: values for name, values in given.items() if name in _SHOWN}}
     for ahead, side in (("motion.u_ground", "motion.v_ground"), ("motion.u", "motion.v")):
@@ -266,15 +218,15 @@ def _drift(side: Array, speed: Array) -> Array:
     return angle
 
 
-def _replayed(shooting: Shooting, run: SampledRun, noise: Mapping[str, float]) -> Trajectory:
-    """The whole run with its recorded inputs, from the initial state that fits the record best."""
-    problem = shooting.problem
+def _replayed(problem: Problem, run: SampledRun, noise: Mapping[str, float]) -> Trajectory | None:
+    """The whole run with its recorded inputs, from the initial state that fits the record best; None if it diverges."""
     model, values = problem.model, problem.prior_mean
-    pieces = cut(problem, run, None)
+    shooting, pieces = Shooting(problem, starts_alone=True), cut(problem, run, None)
     x = shooting.settled(pieces, values, [white(noise.get(name) or 1.0) for name in problem.seen]).states[0]
     u, p = pieces.inputs[0], problem.parameters(values)
     y = np.array(model.output(x.T, u.T, np.repeat(p[:, None], len(x), axis=1))).T
-    return Trajectory(model, run.step_s * np.arange(len(x), dtype=float), x, u, y)
+    found = Trajectory(model, run.step_s * np.arange(len(x), dtype=float), x, u, y)
+    return found if found.is_finite() else None
 
 
 def select_figures(figures: Mapping[str, object], *, turn: bool) -> dict[str, float]:
@@ -312,15 +264,9 @@ def compare_card(
 ) -> Comparison:
     """Compare a card's model with trials.
 
-    Parameters
-    ----------
-    card, trials
-        Card and trials of the same size.
-    residual : mapping
-        Expected standard deviation of each variable's error: it weighs the signals in the fit of a window's initial
-        state. With weights of sensor noise alone, the state would follow a single signal.
-    whole : bool
-        Compare also outside the card's range of speeds.
+    `card`, `trials`: Card and trials of the same size. `residual`: Expected standard deviation of each variable's
+    error: it weighs the signals in the fit of a window's initial state. With weights of sensor noise alone, the state
+    would follow a single signal. `whole`: Compare also outside the card's range of speeds.
     """
     problem = problem_from_card(card, trials.trials, trials.driven_by, whole=whole)
     weights = {name: residual.get(name) or 1.0 for name in problem.seen}

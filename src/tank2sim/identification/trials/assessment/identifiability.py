@@ -6,20 +6,19 @@ combination of ``Nv`` and ``Nr`` is determined (Hwang 1980, J. Ship Research 26;
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import qr
 
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, Unbounded
 from tank2sim.cards.terms import Term, parse_term
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import correlation_matrix
 from tank2sim.identification.trials.methods.equation_error import EquationErrorSettings, equation_error, weights_of
-from tank2sim.identification.trials.methods.posterior import scaled_prior
-from tank2sim.identification.trials.methods.weak_form import WeakForm
-from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
-from tank2sim.identification.trials.problem.measured_motion import MEASURED_STATES
+from tank2sim.identification.trials.methods.weak_form import MEASURED_STATES, WeakForm
+from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, scaled_prior
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 from tank2sim.notices import Notice
 
@@ -44,68 +43,62 @@ STILL = {"motion.u": 0.002, "motion.v": 0.002, "motion.r": 0.002, "rudder": 0.00
 0.1 deg of drift or rudder, a tenth of the smallest manoeuvre's)."""
 
 
-@dataclass(frozen=True, eq=False)
-class Identifiability:
-    """Identifiability of k parameters; everything in units of the prior's standard errors (with its scale).
+@dataclass(frozen=True, eq=False, kw_only=True)
+class IdentifiabilityStudy:
+    """How well the trials determine the parameters (k), in units of the prior's standard errors.
 
     Parameters
     ----------
-    free : tuple of str
-        Names of the parameters.
-    singular_values : array (k,)
-        Singular values of the weighted sensitivities, falling; below 1 the prior has more information than the trials.
+    parameters : tuple of str
     condition : float
-        Largest over smallest of them, inf where the smallest is zero.
+        Largest over smallest singular value.
+    singular_values : array (k,)
+        Of the weighted sensitivities, falling; below 1 the prior has more information than the trials.
     correlation : array (k, k)
-        Correlation of the estimates by the trials alone.
-    pairs : tuple of (str, str, float)
-        Parameters whose absolute correlation exceeds :data:`CLOSE_CORRELATION`, the closest first.
+        By the trials alone.
+    correlated_pairs : tuple of (str, str, float)
+        The closest first.
     unseen : tuple of tuple of str
         Combinations of parameters that the trials do not determine.
-    share : array (k,)
-        Share of each parameter's information from the trials: 1 - (variance after / variance before).
     notices : tuple of Notice
-        The same in words.
     """
 
-    free: tuple[str, ...]
+    parameters: tuple[str, ...]
+    condition: Unbounded
     singular_values: Array
-    condition: float
     correlation: Array
-    pairs: tuple[tuple[str, str, float], ...]
+    correlated_pairs: tuple[tuple[str, str, float], ...]
     unseen: tuple[tuple[str, ...], ...]
-    share: Array
     notices: tuple[Notice, ...]
 
 
-def identifiability(problem: Problem, estimate: Estimate) -> Identifiability:
-    """Identifiability of the parameters after a fit.
-
-    Parameters
-    ----------
-    problem : Problem
-        The prior.
-    estimate : Estimate
-        Its information and the scale of the prior.
-    """
+def identifiability(problem: Problem, estimate: Estimate) -> IdentifiabilityStudy:
+    """Identifiability of the parameters after a fit, by the information of the estimate and its scale of the prior."""
     unit = scaled_prior(problem, estimate.prior_scale)
     information = estimate.information * np.outer(unit, unit)
     values, vectors = np.linalg.eigh(information)
     singular = np.sqrt(np.maximum(values, 0.0))[::-1]
     alone = correlation_matrix(np.asarray(np.linalg.inv(information + _ALONE * np.eye(len(unit))), dtype=np.float64))
     names = tuple(_short(name) for name in estimate.free)
-    pairs = _pairs(names, alone)
+    above = np.argwhere(np.triu(np.abs(alone) > CLOSE_CORRELATION, 1))
+    pairs = sorted(((names[a], names[b], float(alone[a, b])) for a, b in above), key=lambda pair: -abs(pair[2]))
     unseen = _directions(names, vectors[:, values < WEAK])
-    return Identifiability(
-        free=estimate.free,
-        singular_values=singular,
+    return IdentifiabilityStudy(
+        parameters=names,
         condition=float(singular[0] / singular[-1]) if singular[-1] > 0 else np.inf,
-        correlation=alone,
-        pairs=pairs,
+        singular_values=singular,
+        correlation=np.round(alone, 7),
+        correlated_pairs=tuple(pairs),
         unseen=unseen,
-        share=1 - np.diag(np.linalg.inv(information + problem.known)) / np.diag(np.linalg.inv(problem.known)),
         notices=(*_pair_messages(pairs), *_direction_messages(unseen)),
     )
+
+
+def share_from_trials(problem: Problem, estimate: Estimate) -> Array:
+    """Share of each parameter's information (k,) from the trials: 1 - (variance after / variance before)."""
+    unit = scaled_prior(problem, estimate.prior_scale)
+    after = np.linalg.inv(estimate.information * np.outer(unit, unit) + problem.known)
+    return np.asarray(1 - np.diag(after) / np.diag(np.linalg.inv(problem.known)))
 
 
 def refuse_unseen(problem: Problem) -> tuple[str, ...]:
@@ -120,16 +113,13 @@ def refuse_unseen(problem: Problem) -> tuple[str, ...]:
     constant, and the constant part of a term that needs motion is not counted, because a constant force has the same
     effect.
 
-    Raises
-    ------
-    InputError
-        With the refused parameters, and the motions that show them.
+    Raises InputError: With the refused parameters, and the motions that show them.
     """
     estimate = equation_error(problem, settings=EquationErrorSettings(rounds=2))
     form = WeakForm(problem)
     inverse = weights_of(form, form.at(estimate.values)).inverse
     quiet = WeakForm(problem.with_runs(tuple(_quietened(form, place) for place in range(len(problem.runs)))))
-    jacobian = np.concatenate([windows.jacobian for windows in quiet.at(estimate.values)])
+    jacobian = quiet.at(estimate.values).jacobian
     size = _large(problem, estimate.values)
     missing = []
     for place, name in enumerate(problem.free):
@@ -200,12 +190,6 @@ def _remedy(missing: list[str]) -> str:
     return f"{moving}hold them at the card's values: {' '.join(map(_short, missing))}"
 
 
-def _pairs(names: tuple[str, ...], correlations: Array) -> tuple[tuple[str, str, float], ...]:
-    above = np.argwhere(np.triu(np.abs(correlations) > CLOSE_CORRELATION, 1))
-    found = [(names[a], names[b], float(correlations[a, b])) for a, b in above]
-    return tuple(sorted(found, key=lambda pair: -abs(pair[2])))
-
-
 def _directions(names: tuple[str, ...], vectors: Array) -> tuple[tuple[str, ...], ...]:
     """The parameters in each of the unseen directions (k, m), mixed so that each has as few as possible."""
     count = vectors.shape[1]
@@ -220,7 +204,7 @@ def _directions(names: tuple[str, ...], vectors: Array) -> tuple[tuple[str, ...]
     )
 
 
-def _pair_messages(pairs: tuple[tuple[str, str, float], ...]) -> list[Notice]:
+def _pair_messages(pairs: Sequence[tuple[str, str, float]]) -> Iterator[Notice]:
     """Messages on correlated pairs, one for each cause."""
     drifting: list[str] = []
     remaining: list[str] = []
@@ -228,13 +212,11 @@ def _pair_messages(pairs: tuple[tuple[str, str, float], ...]) -> list[Notice]:
         a, b = parse_term(first), parse_term(second)
         drifts = a is not None and b is not None and _drift(a, b)
         (drifting if drifts else remaining).append(f"{first} and {second} ({value:.3f})")
-    messages = []
     if drifting:
         cause = "sway and yaw are nearly proportional in these trials"
-        messages.append(f"the estimates of {_listed(drifting)} are correlated, and drift together: {cause}")
+        yield Notice(f"the estimates of {_listed(drifting)} are correlated, and drift together: {cause}")
     if remaining:
-        messages.append(f"the estimates of {_listed(remaining)} are correlated: the trials hardly distinguish them")
-    return [Notice(text) for text in messages]
+        yield Notice(f"the estimates of {_listed(remaining)} are correlated: the trials hardly distinguish them")
 
 
 def _drift(first: Term, second: Term) -> bool:
@@ -243,13 +225,11 @@ def _drift(first: Term, second: Term) -> bool:
     return same and not (first.acceleration or second.acceleration) and first.v + first.r == second.v + second.r
 
 
-def _direction_messages(unseen: tuple[tuple[str, ...], ...]) -> list[Notice]:
-    single = [direction[0] for direction in unseen if len(direction) == 1]
-    several = [_listed(list(direction)) for direction in unseen if len(direction) > 1]
-    messages = [f"the trials show next to nothing of {_listed(single)}: the prior remains"] if single else []
-    if several:
-        messages.append(f"the trials determine only a combination of {'; of '.join(several)}")
-    return [Notice(text) for text in messages]
+def _direction_messages(unseen: tuple[tuple[str, ...], ...]) -> Iterator[Notice]:
+    if single := [direction[0] for direction in unseen if len(direction) == 1]:
+        yield Notice(f"the trials show next to nothing of {_listed(single)}: the prior remains")
+    if several := [_listed(list(direction)) for direction in unseen if len(direction) > 1]:
+        yield Notice(f"the trials determine only a combination of {'; of '.join(several)}")
 
 
 def _listed(words: list[str]) -> str:

@@ -17,9 +17,8 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.examination import doubts
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.methods.posterior import BLOCK
 from tank2sim.identification.trials.methods.weak_form import WeakForm
-from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
+from tank2sim.identification.trials.problem.estimation_problem import BLOCK, Estimate, Problem
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
@@ -107,12 +106,8 @@ def not_of_ship(card: ManoeuvringCard, trials: Measured, evidence: Sequence[str]
 def far_from_card(fitted: Problem, estimate: Estimate) -> tuple[str, ...]:
     """Evidence in an estimate: coefficients of sway or yaw, or the rudder's moment, that are another ship's.
 
-    Parameters
-    ----------
-    fitted : Problem
-        With the standard errors of the card.
-    estimate : Estimate
-        Its ``prior_scale`` has the factors on these errors that the trials demand, by equation (``Y``, ``N``).
+    `fitted`: With the standard errors of the card. `estimate`: Its ``prior_scale`` has the factors on these errors that
+    the trials demand, by equation (``Y``, ``N``).
     """
     far = []
     for letter, what in (("Y", "sway"), ("N", "yaw")):
@@ -156,19 +151,13 @@ def _mean(values_and_errors: list[tuple[float, float]]) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class RudderEffect:
-    """Yaw acceleration by the rudder in one trial: regression coefficients over the card's own derivative.
+    """Yaw acceleration by the rudder in one trial: regression coefficients over the card's own derivative."""
 
-    Parameters
-    ----------
-    measured, modelled : float
-        Coefficients of the measured accelerations and of the accelerations of the card along the same motion.
-    covariance : array (2, 2)
-        Covariance of the two coefficients.
-    """
-
+    # `measured`, `modelled`: Coefficients of the measured accelerations and of the accelerations of the card along the
+    # same motion
     measured: float
     modelled: float
-    covariance: Array
+    covariance: Array  # (2, 2): Covariance of the two coefficients
 
     @property
     def determined(self) -> bool:
@@ -188,31 +177,19 @@ class RudderEffect:
         return self.measured - factor * self.modelled, float(error)
 
 
-@dataclass(frozen=True, eq=False)
-class _Responses:
-    """Windows after moves of the rudder: regressors (n, 2 + runs), accelerations as measured and by the card (n, 2),
-    the number of the block of each (n,), and the card's own derivative by the rudder (n,)."""
-
-    regressors: Array
-    accelerations: Array
-    block: Array
-    slope: Array
-
-
 def _effect(problem: Problem, runs: Sequence[SampledRun]) -> RudderEffect | None:
     """The yaw acceleration by the rudder in runs; None where they do not show it."""
     found = _responses(problem, runs)
     if found is None:
         return None
-    X, Y = found.regressors, found.accelerations
-    slope = float(np.mean(found.slope)) if len(X) > X.shape[1] else 0.0
+    X, Y, block, by_rudder = found
+    slope = float(np.mean(by_rudder)) if len(X) > X.shape[1] else 0.0
     if not slope or np.linalg.matrix_rank(X) < X.shape[1] or not np.isfinite(Y).all():
         return None
     inverse = np.linalg.inv(X.T @ X)
     coefficients = inverse @ X.T @ Y
     left = Y - X @ coefficients
-    names = np.unique(found.block)
-    shares = np.array([inverse[0] @ X[found.block == name].T @ left[found.block == name] for name in names])
+    shares = np.array([inverse[0] @ X[block == name].T @ left[block == name] for name in np.unique(block)])
     spare = len(X) - X.shape[1]
     by_blocks = shares.T @ shares * len(X) / spare  # Liang and Zeger 1986; of one block it is 0
     by_windows = inverse[0, 0] * (left.T @ left) / spare * _OVERLAP
@@ -221,23 +198,22 @@ def _effect(problem: Problem, runs: Sequence[SampledRun]) -> RudderEffect | None
     return RudderEffect(float(measured), float(modelled), covariance / slope**2)
 
 
-def _responses(problem: Problem, runs: Sequence[SampledRun]) -> _Responses | None:
-    """The windows after moves of the rudder of runs; None where no velocities are known."""
+def _responses(problem: Problem, runs: Sequence[SampledRun]) -> tuple[Array, Array, Array, Array] | None:
+    """Windows after moves of the rudder: regressors (n, 2 + runs), accelerations as measured and by the card (n, 2),
+    the number of the block of each (n,), and the card's own derivative by the rudder (n,); None without velocities."""
     rudder = problem.model.input_names.index("rudder.command")
-    one, nudged_runs = problem.without(problem.free[1:]), []
-    for run in runs:
-        inputs = run.inputs.copy()
-        inputs[:, rudder] += _NUDGE
-        nudged_runs.append(replace(run, inputs=inputs))
+    one, nudge = problem.without(problem.free[1:]), np.zeros(len(problem.model.input_names))
+    nudge[rudder] = _NUDGE
+    both = tuple(runs), tuple(replace(run, inputs=run.inputs + nudge) for run in runs)
     try:
-        form, nudged = WeakForm(one.with_runs(tuple(runs))), WeakForm(one.with_runs(tuple(nudged_runs)))
+        form, nudged = (WeakForm(one.with_runs(each)) for each in both)
     except InputError:
         return None
     per_block = max(1, round(BLOCK * problem.ship_time / form.half))
     lead = round(_RESPONSE * problem.ship_time / form.half)
-    found, windows = [], 0
-    both = zip(form.runs, form.at(one.prior_mean), nudged.at(one.prior_mean), strict=True)
-    for number, (windowed, at, by) in enumerate(both):
+    found = []
+    at, by = (each.at(one.prior_mean).residuals[:, 2] for each in (form, nudged))
+    for number, (windowed, span) in enumerate(zip(form.runs, form.spans, strict=True)):
         angle = windowed.averaging @ windowed.run.inputs[:-1, rudder]
         yaw_rate = windowed.averaging @ windowed.middle[:, 2]
         moves = [np.ptp(angle[max(0, place - lead) : place + 1]) for place in range(len(angle))]
@@ -246,10 +222,10 @@ def _responses(problem: Problem, runs: Sequence[SampledRun]) -> _Responses | Non
         measured = windowed.change[:, 2]
         columns = (
             np.column_stack([angle, yaw_rate, mean]),
-            np.column_stack([measured, measured - at.residuals[:, 2]]),
-            windows + np.arange(len(angle)) // per_block,
-            (at.residuals[:, 2] - by.residuals[:, 2]) / _NUDGE,
+            np.column_stack([measured, measured - at[span]]),
+            span.start + np.arange(len(angle)) // per_block,
+            (at[span] - by[span]) / _NUDGE,
         )
         found.append([column[kept] for column in columns])
-        windows += len(angle)
-    return _Responses(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
+    regressors, accelerations, block, slope = (np.concatenate(columns) for columns in zip(*found, strict=True))
+    return regressors, accelerations, block, slope

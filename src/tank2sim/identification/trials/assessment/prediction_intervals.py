@@ -2,6 +2,14 @@
 
 Each member has its own random generator (numpy's SeedSequence, spawned): results depend on the seed alone, not on the
 executor or the order of its work.
+
+Random forces that the model does not explain are first-order Gauss-Markov forces X, Y, N: covariance P exp(-|tau|/T).
+In simulation each is a sum of harmonics,
+
+    F(t) = sum over j of a_j cos(w_j t) + b_j sin(w_j t),    a_j, b_j ~ N(0, P/m),    j = 1 ... m,
+
+whose frequencies are drawn from the spectrum, which is Cauchy's distribution of scale 1/T (the spectral representation
+of Shinozuka and Jan 1972, J. Sound Vib. 25): a function of time, so that integration and events stay as they are.
 """
 
 from __future__ import annotations
@@ -16,27 +24,20 @@ from functools import lru_cache
 
 import casadi as ca
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
-from tank2sim.dynamics.model import Model
+from tank2sim.dynamics.model import Model, Parameter, Quantity, State
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.assessment.evaluation import Comparison, compare_card
-from tank2sim.identification.trials.assessment.model_selection import Criteria, criteria
-from tank2sim.identification.trials.assessment.residual_forces import (
-    Disturbances,
-    disturbances_of,
-    disturbed,
-    draw_disturbances,
-    fastest_rate,
-)
-from tank2sim.identification.trials.methods.shooting import cut
-from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
-from tank2sim.identification.trials.problem.measured_motion import sensor_noise
-from tank2sim.identification.trials.problem.picklable import PicklableShip, Portable, map_tasks, portable
+from tank2sim.identification.trials.assessment.evaluation import Comparison, compare_card, or_none
+from tank2sim.identification.trials.assessment.model_selection import MethodChoice
+from tank2sim.identification.trials.methods.output_error import cut
+from tank2sim.identification.trials.methods.weak_form import WeakForm, WeakWindows, sensor_noise
+from tank2sim.identification.trials.problem.estimation_problem import DrivenShip, Estimate, Problem, model_bounds
 from tank2sim.identification.trials.problem.prepare_trials import Measured
-from tank2sim.identification.trials.problem.sampled_runs import SampledRun
+from tank2sim.identification.trials.problem.water_current import WaterCurrent
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Manoeuvre
@@ -46,129 +47,226 @@ from tank2sim.simulation.run import simulate
 from tank2sim.simulation.scheme import runge_kutta_step
 from tank2sim.units import from_si
 
+HARMONICS = 16
+"""Harmonics of a force (project choice): one in each sixteenth of its power, from slow drift to shaking."""
+
+LAGS = 12
+"""Residuals up to this many half windows apart determine the correlation time (project choice: 4 L/u0)."""
+
+FORCES = {"X": "N", "Y": "N", "N": "N.m"}
+
+
+@dataclass(frozen=True, eq=False)
+class Disturbances:
+    """Gauss-Markov forces."""
+
+    covariance: Array  # (3, 3): Covariance of X, Y (N) and N (N m)
+    correlation_s: float  # Time in which their correlation falls to 1/e, s
+
+
+def disturbances_of(problem: Problem, values: Array) -> Disturbances:
+    """Forces in the trials beyond the model with its free parameters at `values` (k,).
+
+    From the covariances of the weak form's residuals from window to window, less the part of sensor noise. They include
+    model error, which looks like a force.
+    """
+    form = WeakForm(problem)
+    acceleration, correlation_s = gauss_markov(form, form.at(values))
+    masses = _mass_matrix(problem.model, problem.parameters(values))
+    return Disturbances(masses @ acceleration @ masses.T, correlation_s)
+
+
+def gauss_markov(form: WeakForm, windows: WeakWindows) -> tuple[Array, float]:
+    """Covariance (3, 3) and correlation time, s, of the random accelerations that fit the residuals best.
+
+    Least squares over the covariances at lags 0 to :data:`LAGS`.
+    """
+    step = form.runs[0].run.step_s
+    bump = form.runs[0].averaging[0].toarray().ravel()
+    bump = bump[bump > 0]
+    noise = np.mean([run.motion.noise**2 for run in form.runs], axis=0)
+    count, lag = len(bump), len(bump) // 2
+    covariances = _lagged(form, windows)
+    size = np.sqrt(np.maximum(np.diag(covariances[0]), 1e-100))
+    slopes = np.diff(np.concatenate([[0.0], bump, [0.0]])) / step
+    for place in range(min(3, len(covariances))):  # noise of a sample is in every window that contains it
+        shared = slopes[place * lag :] @ slopes[: len(slopes) - place * lag]
+        covariances[place] -= np.diag(noise) * shared
+    traces = np.array([np.trace(lagged / np.outer(size, size)) for lagged in covariances])
+    overlap = np.correlate(bump, bump, "full")
+    apart = np.arange(-count + 1, count) * step
+
+    def theory(correlation_s: float) -> Array:
+        distances = np.abs(apart[None, :] - np.arange(len(covariances))[:, None] * lag * step)
+        return np.asarray(np.exp(-distances / correlation_s) @ overlap)
+
+    def misfit(logarithm: float) -> float:
+        shape = theory(float(np.exp(logarithm)))
+        height = max(float(shape @ traces / (shape @ shape)), 0.0)
+        return float(np.sum((traces - height * shape) ** 2))
+
+    half = lag * step
+    best = minimize_scalar(misfit, bounds=(np.log(0.1 * half), np.log(30 * half)), method="bounded")
+    correlation_s = float(np.exp(best.x))
+    shape = theory(correlation_s)
+    covariance = np.einsum("l,lij->ij", shape, covariances) / (shape @ shape)
+    values, vectors = np.linalg.eigh((covariance + covariance.T) / 2 / np.outer(size, size))
+    return (vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(size, size), correlation_s
+
+
+def disturbed(model: Model) -> Model:
+    """The model with random forces; their parameters, 0 by default, are those of :func:`draw_disturbances`."""
+    clock = State(
+        name="disturbance.clock",
+        unit="s",
+        description="Time since the start",
+        derivative="disturbance.pace",
+        start=0.0,
+    )
+    pace = Quantity(name="disturbance.pace", unit="1", description="1: time passes", value=ca.SX(1.0))
+    rates = [_parameter(f"disturbance.rate_{j}", "rad/s") for j in range(HARMONICS)]
+    model = model.extend(clock, pace, *rates)
+    angles = [rate.symbol * clock.symbol for rate in rates]
+    for force, unit in FORCES.items():
+        waves = [
+            (_parameter(f"disturbance.{force}_{wave}_{j}", unit), function(angle))
+            for j, angle in enumerate(angles)
+            for wave, function in (("cos", ca.cos), ("sin", ca.sin))
+        ]
+        total = sum((parameter.symbol * value for parameter, value in waves), start=ca.SX(0.0))
+        model = model.extend(*(parameter for parameter, _ in waves))
+        model = model.redefine(f"force.{force}", lambda old, total=total: old + total)  # type: ignore[misc]
+    return model
+
+
+def draw_disturbances(disturbances: Disturbances, fastest: float, rng: np.random.Generator) -> dict[str, float]:
+    """Parameters of a :func:`disturbed` model for one course of the forces, drawn by `rng`.
+
+    `disturbances`: Their covariance and correlation time. `fastest`: Highest frequency that integration resolves,
+    rad/s: higher frequencies are set to it.
+    """
+    share = (np.arange(HARMONICS) + rng.random(HARMONICS)) / HARMONICS  # one in each part of equal power
+    rates = np.minimum(np.tan(np.pi / 2 * share) / disturbances.correlation_s, fastest)
+    values, vectors = np.linalg.eigh(disturbances.covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0) / HARMONICS)
+    parameters = {f"disturbance.rate_{j}": float(rate) for j, rate in enumerate(rates)}
+    for wave in ("cos", "sin"):
+        heights = root @ rng.standard_normal((3, HARMONICS))
+        for force, row in zip(FORCES, heights, strict=True):
+            parameters |= {f"disturbance.{force}_{wave}_{j}": float(height) for j, height in enumerate(row)}
+    return parameters
+
+
+def fastest_rate(model: Model) -> float:
+    """Highest frequency that a model's step resolves, rad/s: ten steps in a period (project choice)."""
+    return 2 * np.pi / (10 * model.step_s)
+
+
+def _parameter(name: str, unit: str) -> Parameter:
+    return Parameter(name=name, unit=unit, description="Of a random force", start=0.0)
+
+
+def _lagged(form: WeakForm, windows: WeakWindows) -> Array:
+    """Covariances (lags, 3, 3) of residuals at lags of half windows."""
+    pieces = [windows.residuals[part] for part in form.pieces]
+    lags = min(LAGS + 1, max(len(piece) for piece in pieces))
+    sums, counts = np.zeros((lags, 3, 3)), np.zeros(lags)
+    for piece in pieces:
+        for lag in range(min(lags, len(piece))):
+            early, late = piece[: len(piece) - lag], piece[lag:]
+            sums[lag] += (late.T @ early + early.T @ late) / 2
+            counts[lag] += len(early)
+    return sums / counts[:, None, None]
+
+
+def _mass_matrix(model: Model, p: Array) -> Array:
+    """Mass matrix (3, 3) at rest, SI."""
+    names = ("surge", "sway", "sway_yaw", "yaw_sway", "yaw")
+    expression = model.expand(ca.vcat([model.symbol(f"inertia.{name}") for name in names]))
+    function = ca.Function("masses", [model.x, model.u, model.p], [expression])
+    start = np.array(model.initial(p)).ravel()
+    surge, sway, sway_yaw, yaw_sway, yaw = np.array(function(start, model.input_values(), p)).ravel()
+    return np.array([[surge, 0.0, 0.0], [0.0, sway, sway_yaw], [0.0, yaw_sway, yaw]])
+
+
+LEVELS = (0.025, 0.5, 0.975)
+"""Levels of the quantiles of an interval of 95 %, and its median."""
+
 NORMAL_95 = 1.96
 """Half the width of a normal distribution's 95 % interval, in standard deviations."""
 
 IN_BANDS = {f"overshoots_deg.{number}": f"overshoot_{number}_deg" for number in (1, 2)}
-"""Name of a figure in :class:`Bands` to its name in a comparison, where they differ."""
+"""Name of a figure of members (:func:`bands`) to its name in a comparison, where they differ."""
 
 
 @dataclass(frozen=True, eq=False)
-class FittedProblem:
-    """A problem, its estimate, and the card with it; `whole` for a comparison with runs at all their speeds."""
+class Fit:
+    """A fit in one structure."""
 
+    started: ManoeuvringCard  # The start card of the estimate, in the structure
+    unseen: tuple[str, ...]  # Parameters that the trials do not show, held as the card has them
     problem: Problem
     estimate: Estimate
-    card: ManoeuvringCard
-    whole: bool = False
+    card: ManoeuvringCard  # With the estimate
+    current: WaterCurrent | None = None  # Estimated with the coefficients
+    choice: MethodChoice | None = None  # Where the options leave the method open
+
+    @property
+    def whole(self) -> bool:
+        """Whether the card is compared with runs at all their speeds."""
+        return self.started.model.valid_speed_mps is None
+
+    @property
+    def disturbances(self) -> Disturbances | None:
+        """Random forces that the fit does not explain; None where the velocities were not measured."""
+        return or_none(disturbances_of, self.problem, self.estimate.values)
 
 
-@dataclass(frozen=True, eq=False)
-class WeightedFit:
-    """A fit in one of several structures, and the weight of its predictions."""
-
-    fit: FittedProblem
-    weight: float
-
-
-@dataclass(frozen=True)
-class PredictionSettings:
-    """Number of members, seed and quantiles.
-
-    Parameters
-    ----------
-    members : int
-        Simulations; 200 give the ends of a 95 % band to about a tenth of its width (project choice).
-    seed : int
-    levels : tuple of float
-        Levels of the quantiles.
-    """
-
-    members: int = 200
-    seed: int = 0
-    levels: tuple[float, ...] = (0.025, 0.5, 0.975)
-
-
-@dataclass(frozen=True, eq=False)
-class Bands:
-    """Predicted distribution of the figures of a manoeuvre.
-
-    Parameters
-    ----------
-    levels : tuple of float
-    quantiles : mapping
-        Figure to its value at each level; those of a list are ``overshoots_deg.1`` and so on.
-    members : mapping
-        Figure to its value in each member (members,), nan where not reached.
-    failed : int
-        Members whose motion left all bounds.
-    """
-
-    levels: tuple[float, ...]
-    quantiles: Mapping[str, tuple[float, ...]]
-    members: Mapping[str, Array]
-    failed: int
+def generators(members: int, seed: int = 0) -> list[np.random.Generator]:
+    """A random generator for each of the `members`."""
+    return [np.random.default_rng(each) for each in np.random.SeedSequence(seed).spawn(members)]
 
 
 def bands(
-    ship: PicklableShip,
+    ship: DrivenShip,
     estimate: Estimate,
     manoeuvre: Manoeuvre | Recorded,
+    rngs: Sequence[np.random.Generator],
     disturbances: Disturbances | None = None,
-    settings: PredictionSettings | None = None,
     executor: Executor | None = None,
-) -> Bands:
-    """Bands of a manoeuvre's figures: coefficients drawn from their covariance, or from samples of their posterior, and
-    random forces during the manoeuvre.
+) -> dict[str, Array]:
+    """Figures of a manoeuvre to their value in each member (members,), nan where not reached; those of a list are
+    ``overshoots_deg.1`` and so on.
 
-    Parameters
-    ----------
-    ship : PicklableShip
-        The model is driven by the rudder's order, also if the trials were driven by its angle.
-    estimate : Estimate
-        Values and covariance of parameters of the ship's model; drawn values stay within the model's bounds.
-    manoeuvre
-        One of :mod:`tank2sim.simulation.manoeuvres`, or a recorded one, repeated from its start.
-    disturbances : Disturbances, optional
-        By default none: only coefficients are uncertain.
-    settings : PredictionSettings, optional
-    executor : concurrent.futures.Executor, optional
-        By default the members run in sequence in this process.
-
-    Raises
-    ------
-    InputError
-        The motion of every member leaves all bounds.
+    Coefficients are drawn from their covariance, or from samples of their posterior, within the bounds of the model,
+    and there are random forces during the manoeuvre. `ship`: Driven by the rudder's order, also if the trials were
+    driven by its angle. `manoeuvre`: One of :mod:`tank2sim.simulation.manoeuvres`, or a recorded one, repeated from its
+    start. `rngs`: One for each member. `disturbances`: By default none: only coefficients are uncertain. Raises
+    InputError: The motion of every member leaves all bounds.
     """
-    settings = settings or PredictionSettings()
     ship = replace(ship, driven_by="order")
-    model = ship.model()
+    model = ship.model
     tasks = []
-    for rng in _generators(settings):
-        values = _within_bounds(model, estimate.free, estimate.draw(rng))
+    for rng in rngs:
+        drawn = np.clip(estimate.draw(rng), *model_bounds(model, estimate.free))
+        values = dict(zip(estimate.free, drawn.tolist(), strict=True))
         if disturbances is not None:
             values |= draw_disturbances(disturbances, fastest_rate(model), rng)
         tasks.append((ship, manoeuvre, values))
-    results = list(map_tasks(_figures, tasks, executor))
-    reached = [figures for figures in results if figures is not None]
-    if not reached:
+    results = list((map if executor is None else executor.map)(_figures, tasks))
+    names = dict.fromkeys(name for figures in results for name in figures)
+    if not names:
         raise InputError(model.origin, "", "the motion leaves all bounds in every member", "check the estimates")
-    names = list(dict.fromkeys(name for figures in reached for name in figures))
-    members = {
-        name: np.array([np.nan if figures is None else figures.get(name, np.nan) for figures in results])
-        for name in names
-    }
-    members = {name: column for name, column in members.items() if not np.isnan(column).all()}
-    quantiles = {name: tuple(map(float, np.nanquantile(member, settings.levels))) for name, member in members.items()}
-    return Bands(settings.levels, quantiles, members, len(results) - len(reached))
+    members = {name: np.array([figures.get(name, np.nan) for figures in results]) for name in names}
+    return {name: column for name, column in members.items() if not np.isnan(column).all()}
 
 
 def bootstrap(
-    problem: Portable,
+    problem: Problem,
     estimate: Estimate,
     estimator: Callable[[Problem], Estimate],
     disturbances: Disturbances,
-    settings: PredictionSettings | None = None,
+    rngs: Sequence[np.random.Generator],
     executor: Executor | None = None,
 ) -> Array:
     """Parametric bootstrap: estimates (members, k) from runs that were simulated with the estimate (Efron 1979).
@@ -177,43 +275,22 @@ def bootstrap(
     are drawn, too, around the estimate. Members in which a run leaves all bounds are omitted; this happens in long runs
     of a course-unstable ship.
 
-    Parameters
-    ----------
-    problem : Portable
-        The estimated problem.
-    estimate : Estimate
-        The true values of the simulation.
-    estimator : callable
-        ``estimator(problem) -> Estimate``; a function of a module for an executor of processes.
-    disturbances : Disturbances
-        Random forces on the simulated ship.
-    settings, executor
-        As for :func:`bands`.
+    `problem`: As the fit took it, without the scale of its prior: the `estimator`, a function of a module for an
+    executor of processes, scales it again. `disturbances`: Random forces on the simulated ship. `rngs`: One for each
+    member.
     """
-    tasks = [(problem, estimate, estimator, disturbances, rng) for rng in _generators(settings or PredictionSettings())]
-    estimates = [values for values in map_tasks(_again, tasks, executor) if values is not None]
-    return np.array(estimates).reshape(-1, len(estimate.free))
-
-
-def _generators(settings: PredictionSettings) -> list[np.random.Generator]:
-    return [np.random.default_rng(seed) for seed in np.random.SeedSequence(settings.seed).spawn(settings.members)]
-
-
-def _within_bounds(model: Model, names: tuple[str, ...], values: Array) -> dict[str, float]:
-    within = {}
-    for name, value in zip(names, values, strict=True):
-        lowest, highest = model[name].minimum, model[name].maximum
-        within[name] = float(np.clip(value, lowest, highest)) if (lowest, highest) != (None, None) else float(value)
-    return within
+    tasks = [(problem, estimate, estimator, disturbances, rng) for rng in rngs]
+    found = (map if executor is None else executor.map)(_again, tasks)
+    return np.array([values for values in found if values is not None]).reshape(-1, len(estimate.free))
 
 
 @lru_cache(maxsize=8)
-def _integrator(ship: PicklableShip) -> Integrator:
-    return Integrator(disturbed(ship.model()))
+def _integrator(ship: DrivenShip) -> Integrator:
+    return Integrator(disturbed(ship.model))
 
 
-def _figures(task: tuple[PicklableShip, Manoeuvre | Recorded, dict[str, float]]) -> dict[str, float] | None:
-    """Figures of one member, None if its motion leaves all bounds."""
+def _figures(task: tuple[DrivenShip, Manoeuvre | Recorded, dict[str, float]]) -> dict[str, float]:
+    """Figures of one member, none if its motion leaves all bounds."""
     ship, manoeuvre, values = task
     integrator = _integrator(ship)
     try:
@@ -221,11 +298,11 @@ def _figures(task: tuple[PicklableShip, Manoeuvre | Recorded, dict[str, float]])
             return flat(repeat(manoeuvre, integrator, values).figures)
         return flat(simulate(integrator.model, manoeuvre, parameters=values, integrator=integrator).figures)
     except InputError:
-        return None
+        return {}
 
 
 def flat(figures: Figures) -> dict[str, float]:
-    """Figures as single numbers: those of a list with their position in the name, None as nan."""
+    """`figures` as single numbers: those of a list with their position in the name, None as nan."""
     single: dict[str, float] = {}
     for name, value in figures.items():
         if isinstance(value, list | tuple):
@@ -235,85 +312,63 @@ def flat(figures: Figures) -> dict[str, float]:
     return single
 
 
-@dataclass(frozen=True, eq=False)
-class _Simulator:
-    """Motion of a disturbed ship, and its observed values."""
-
-    model: Model
-    steps: Chain
-    shown: RowFunction
-
-
 @lru_cache(maxsize=8)
-def _simulator(ship: PicklableShip, seen: tuple[str, ...]) -> _Simulator:
-    model = disturbed(ship.model())
+def _simulator(ship: DrivenShip, seen: tuple[str, ...]) -> tuple[Model, Chain, RowFunction]:
+    """A disturbed ship, a step of its motion, and its observed values."""
+    model = disturbed(ship.model)
     shown = ca.densify(model.expand(ca.vcat([model.symbol(name) for name in seen])))
     function = ca.Function("shown", [model.x, model.u, model.p], [shown], {"cse": True})
-    return _Simulator(model, Chain(runge_kutta_step(model)), RowFunction(function))
+    return model, Chain(runge_kutta_step(model)), RowFunction(function)
 
 
-_Again = tuple[Portable, Estimate, Callable[[Problem], Estimate], Disturbances, np.random.Generator]
-
-
-def _again(task: _Again) -> Array | None:
+def _again(
+    task: tuple[Problem, Estimate, Callable[[Problem], Estimate], Disturbances, np.random.Generator],
+) -> Array | None:
     """The estimate from one simulated set of runs, None if a run leaves all bounds."""
-    portable, estimate, estimator, disturbances, rng = task
-    problem = portable.problem()
-    simulator = _simulator(portable.ship, problem.seen)
+    problem, estimate, estimator, disturbances, rng = task
+    assert problem.ship is not None
+    model, steps, shown = _simulator(problem.ship, problem.seen)
     runs = []
     for run in problem.runs:
-        forces = draw_disturbances(disturbances, fastest_rate(simulator.model), rng)
-        values = dict(zip(estimate.free, map(float, estimate.values), strict=True))
-        p = simulator.model.parameter_values({**values, **forces})
-        measured = _simulated(problem, run, simulator, p)
-        if measured is None:
+        forces = draw_disturbances(disturbances, fastest_rate(model), rng)
+        p = model.parameter_values({**dict(zip(estimate.free, map(float, estimate.values), strict=True)), **forces})
+        start = np.append(cut(problem, run, None).starts[0], 0.0)  # the clock is the last state
+        states = steps.run(start, run.inputs[:-1], p, np.array([run.step_s]))
+        if not np.isfinite(states).all() or np.abs(states).max() > 1e9:
             return None
-        noise = sensor_noise(problem, run) * rng.standard_normal(measured.shape)
-        runs.append(replace(run, measured=np.where(np.isnan(run.measured), np.nan, measured + noise)))
+        measured = shown(states, run.inputs, p)[0]
+        measured += sensor_noise(problem, run) * rng.standard_normal(measured.shape)
+        runs.append(replace(run, measured=np.where(np.isnan(run.measured), np.nan, measured)))
     correlated = np.linalg.cholesky(np.linalg.inv(problem.known)) @ rng.standard_normal(len(estimate.values))
     mean = estimate.values + problem.prior_error * correlated
     return estimator(replace(problem, runs=tuple(runs), prior_mean=mean)).values
 
 
-def _simulated(problem: Problem, run: SampledRun, simulator: _Simulator, p: Array) -> Array | None:
-    """Observed values (n, ny) of a run under its own inputs; None if the motion leaves all bounds."""
-    start = np.append(cut(problem, run, None).starts[0], 0.0)  # the clock is the last state
-    states = simulator.steps.run(start, run.inputs[:-1], p, np.array([run.step_s]))
-    if not np.isfinite(states).all() or np.abs(states).max() > 1e9:
-        return None
-    return simulator.shown(states, run.inputs, p)[0]
-
-
 def compare_held_out(
-    fitted: FittedProblem,
-    held: Measured,
-    members: int,
-    executor: Executor | None = None,
-    average: Sequence[WeightedFit] = (),
+    fit: Fit, held: Measured, members: int, executor: Executor | None = None, average: Sequence[tuple[Fit, float]] = ()
 ) -> Comparison:
     """Comparison of the new card with held-out trials, with a 95 % prediction interval of each figure.
 
     The intervals are of simulations with coefficients drawn from their covariance, under random forces with the size
     and correlation time of those that the fit does not explain (:func:`bands`). They are wider by what is uncertain of
-    the measured point and of the heading's zero (:class:`.recorded.Recorded`). With an `average` over structures, which
-    holds `fitted`, the members of each are as many as its weight says.
+    the measured point and of the heading's zero (:class:`.recorded.Recorded`). With an `average` over structures, fits
+    with their weights that hold `fit`, the members of each are as many as its weight says.
     """
-    plain = compare_card(fitted.card, held, fitted.estimate.noise, whole=fitted.whole)
+    plain = compare_card(fit.card, held, fit.estimate.noise, whole=fit.whole)
     if not members or not plain.figures:
         return plain
-    model = build(steerable(fitted.card))
+    model = build(steerable(fit.card))
     intervals: dict[tuple[str, str], tuple[float, float]] = {}
     for trial in held.trials:
         manoeuvre = recorded(trial, model)
         if manoeuvre is None:
             continue
         pooled_members: dict[str, list[Array]] = {}
-        for part in average or (WeightedFit(fitted, 1.0),):
-            settings = PredictionSettings(members=round(part.weight * members))
-            for name, values in _members(part.fit, manoeuvre, settings, executor).items():
+        for part, weight in average or ((fit, 1.0),):
+            for name, values in _members(part, manoeuvre, round(weight * members), executor).items():
                 pooled_members.setdefault(name, []).append(values)
         for name, parts in pooled_members.items():
-            lowest, median, highest = np.nanquantile(np.concatenate(parts), PredictionSettings().levels)
+            lowest, median, highest = np.nanquantile(np.concatenate(parts), LEVELS)
             figure = IN_BANDS.get(name, name)
             error = NORMAL_95 * from_si(figure, manoeuvre.reading_errors.get(figure, 0.0))
             below, above = math.hypot(median - lowest, error), math.hypot(highest - median, error)
@@ -322,49 +377,11 @@ def compare_held_out(
     return replace(plain, figures=figures)
 
 
-def _members(
-    fitted: FittedProblem, manoeuvre: Recorded, settings: PredictionSettings, executor: Executor | None
-) -> Mapping[str, Array]:
+def _members(fit: Fit, manoeuvre: Recorded, members: int, executor: Executor | None) -> Mapping[str, Array]:
     """Figure to its value in each member of a fit; empty where no member's motion stays within bounds."""
-    if not settings.members:
-        return {}
-    ship = PicklableShip(steerable(fitted.card).text, "order")
+    ship = DrivenShip(steerable(fit.card).text, "order")
     # Without an executor by threads: half of a simulation is machine code, and processes would begin too slowly.
     making = nullcontext(executor) if executor is not None else ThreadPoolExecutor(os.cpu_count())
     with making as pool, suppress(InputError):
-        return bands(ship, fitted.estimate, manoeuvre, _disturbances(fitted), settings, pool).members
+        return bands(ship, fit.estimate, manoeuvre, generators(members), fit.disturbances, pool)
     return {}
-
-
-def criteria_or_none(fitted: FittedProblem) -> Criteria | None:
-    """Information criteria of the fit; None where the velocities were not measured."""
-    try:
-        return criteria(fitted.problem, fitted.estimate)
-    except InputError:
-        return None
-
-
-def bootstrap_estimates(
-    fitted: FittedProblem,
-    driven_by: str,
-    estimator: Callable[[Problem], Estimate],
-    members: int,
-    executor: Executor | None,
-) -> Array | None:
-    """Estimates from simulated trials (:func:`bootstrap`); None without `members` or without known residual forces."""
-    if not members:
-        return None
-    disturbances = _disturbances(fitted)
-    if disturbances is None:  # without velocities the residual forces are unknown
-        return None
-    # The prior is that of the fit, without its scale: the estimator scales it again.
-    problem = portable(fitted.problem, fitted.card, driven_by)
-    return bootstrap(problem, fitted.estimate, estimator, disturbances, PredictionSettings(members=members), executor)
-
-
-def _disturbances(fitted: FittedProblem) -> Disturbances | None:
-    """Random forces that the fit does not explain; None where the velocities were not measured."""
-    try:
-        return disturbances_of(fitted.problem, fitted.estimate.values)
-    except InputError:
-        return None

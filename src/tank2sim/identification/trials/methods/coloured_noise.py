@@ -32,6 +32,11 @@ class ColouredNoise:
         colour = (1 - 2 * self.phi * self.psi + self.psi**2) / (1 - self.phi**2)
         return self.sigma * float(np.sqrt(colour))
 
+    @property
+    def correlated_samples(self) -> float:
+        """Samples after which the autocorrelation of the residual has fallen to 1/e of that at a lag of one."""
+        return float(-1 / np.log(self.phi)) if self.phi > 0 else 0.0
+
     def whitened(self, residuals: Array) -> Array:
         """``w / sigma`` of residuals or their derivatives, along axis -2 if 3-D (pieces, n, columns), else axis 1.
 
@@ -60,17 +65,11 @@ def white(deviation: float) -> ColouredNoise:
 def estimate_coloured_noise(pieces: Sequence[Array], smallest: float) -> ColouredNoise:
     """Noise of one signal from its residuals.
 
-    Parameters
-    ----------
-    pieces : sequence of arrays (n,)
-        Residuals of continuous pieces, nan where not measured.
-    smallest : float
-        Least plausible deviation, in the signal's unit (rounding of the record).
+    `pieces` each (n,): Residuals of continuous pieces, nan where not measured. `smallest`: Least plausible deviation,
+    in the signal's unit (rounding of the record).
 
-    Notes
-    -----
-    The AR(1) part follows from the autocovariances at lags 1 and 2, the white part from the excess at lag 0;
-    psi is the root within the unit circle of the spectral factorisation.
+    The AR(1) part follows from the autocovariances at lags 1 and 2, the white part from the excess at lag 0; psi is the
+    root within the unit circle of the spectral factorisation.
     """
     g0, g1, g2 = (_autocovariance(pieces, lag) for lag in (0, 1, 2))
     g0 = max(g0, smallest**2)

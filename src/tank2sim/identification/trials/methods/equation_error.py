@@ -9,7 +9,8 @@ towards zero by the share of the motion that they cause (as in any regression on
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,9 +18,17 @@ from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise, estimate_coloured_noise, white
 from tank2sim.identification.trials.methods.gauss_newton import damped_gauss_newton, is_minimum, refuse_stopped
-from tank2sim.identification.trials.methods.posterior import BLOCK, evidence_scale, sandwich, scaled_prior
 from tank2sim.identification.trials.methods.weak_form import WEAK_EQUATIONS, WIDTH, WeakForm, WeakWindows
-from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
+from tank2sim.identification.trials.problem.estimation_problem import (
+    BLOCK,
+    Estimate,
+    Problem,
+    SearchReport,
+    evidence_scale,
+    sandwich,
+    scaled_prior,
+    silent,
+)
 from tank2sim.notices import Notice
 
 REPORTED_NOISE = 0.01
@@ -28,37 +37,20 @@ REPORTED_NOISE = 0.01
 
 @dataclass(frozen=True)
 class EquationErrorSettings:
-    """Settings of equation error.
+    """Settings of equation error."""
 
-    Parameters
-    ----------
-    width : float
-        Width of the test functions, in L/u0.
-    scale_prior : bool
-        Multiply the prior's standard errors, by groups, by the factor of largest evidence, at least 1.
-    rounds : int
-        Number of estimates of noise (and prior).
-    """
-
-    width: float = WIDTH
+    width: float = WIDTH  # Width of the test functions, in L/u0
+    # Multiply the prior's standard errors, by groups, by the factor of largest evidence, at least 1
     scale_prior: bool = True
-    rounds: int = 3
+    rounds: int = 3  # Number of estimates of noise (and prior)
 
 
 @dataclass(frozen=True, eq=False)
 class WhiteningWeights:
-    """Weights that whiten residuals: the root of the covariance of the three equations, and the colour of each.
+    """Weights that whiten residuals: the root of the covariance of the three equations, and the colour of each."""
 
-    Parameters
-    ----------
-    inverse : array (3, 3)
-        L^-1, with L L' the covariance of the residuals, L lower triangular.
-    colour : tuple of ColouredNoise
-        Colour of the three components of L^-1 e.
-    """
-
-    inverse: Array
-    colour: tuple[ColouredNoise, ...]
+    inverse: Array  # (3, 3): L^-1, with L L' the covariance of the residuals, L lower triangular
+    colour: tuple[ColouredNoise, ...]  # Colour of the three components of L^-1 e
 
     def whitened(self, values: Array, pieces: tuple[slice, ...]) -> Array:
         """Residuals (windows, 3) or their derivatives (windows, 3, k), whitened."""
@@ -92,28 +84,26 @@ def equation_error(
 ) -> Estimate:
     """Estimate the free parameters by equation error.
 
-    Parameters
-    ----------
-    problem : Problem
-        k free parameters.
-    start : array (k,), optional
-        Start of the search; by default the prior's mean.
-    settings : EquationErrorSettings, optional
-    progress : callable
-        Called with each better estimate; its exceptions propagate.
-
-    Raises
-    ------
-    InputError
-        A run lacks velocities and signals that determine them, all runs are shorter than a window, or the search
-        cannot move from its start, although the data ask for it (:class:`.StoppedSearchError`).
+    `problem`: k free parameters. `start` (k,): Start of the search; by default the prior's mean. `progress`: Called
+    with each better estimate; its exceptions propagate. Raises InputError: A run lacks velocities and signals that
+    determine them, all runs are shorter than a window, or the search cannot move from its start, although the data ask
+    for it (:class:`.StoppedSearchError`).
     """
     settings = settings or EquationErrorSettings()
+    problem = replace(problem, captive=None)  # by the trials alone
     form = WeakForm(problem, settings.width)
-    refuse_empty(form)
+    if not len(form.change):
+        names = ", ".join(run.run.name for run in form.runs)
+        remedy = (
+            f"heading and positions, or u, v and r, are needed without gaps over {2 * form.half:.3g} s at least: add "
+            "the rows that are missing, with straight lines where a gap is short, or the readings of another sensor"
+        )
+        raise InputError(names, "", "has no stretch long enough", remedy)
     first = values = (problem.prior_mean if start is None else start).astype(float)
     windows = form.at(values)
-    weights = first_weights(form)
+    # A tenth of the spread of each acceleration, before any residual is known.
+    spread = 0.1 * np.sqrt(np.mean(form.change**2, axis=0))
+    weights = WhiteningWeights(np.diag(1 / np.where(spread > 0, spread, 1.0)), (white(1.0),) * 3)
     scale: dict[str, float] = {}
     costs = []
     for number in range(settings.rounds):
@@ -125,10 +115,10 @@ def equation_error(
             if settings.scale_prior:
                 scale = evidence_scale(problem, normal.information, values, scale)
     if np.array_equal(values, first):
-        known = problem.prior_precision(prior)
-        H, g = normal.information + known, normal.gradient + known @ (values - problem.prior_mean)
-        refuse_stopped("equation error", is_minimum(H, g, bounded=(values, *problem.bounds)))
-    deviations = np.sqrt(np.mean(np.concatenate([window.residuals for window in windows]) ** 2, axis=0))
+        known, pull, _ = problem.before(values, prior)
+        stays = is_minimum(normal.information + known, normal.gradient + pull, bounded=(values, *problem.bounds))
+        refuse_stopped("equation error", stays)
+    deviations = np.sqrt(np.mean(windows.residuals**2, axis=0))
     return Estimate(
         method="equation_error",
         free=problem.free,
@@ -142,57 +132,27 @@ def equation_error(
     )
 
 
-def refuse_empty(form: WeakForm) -> None:
-    """Raise InputError if no run has a window."""
-    if all(run.averaging.shape[0] == 0 for run in form.runs):
-        names = ", ".join(run.run.name for run in form.runs)
-        remedy = (
-            f"heading and positions, or u, v and r, are needed without gaps over {2 * form.half:.3g} s at least: add "
-            "the rows that are missing, with straight lines where a gap is short, or the readings of another sensor"
-        )
-        raise InputError(names, "", "has no stretch long enough", remedy)
-
-
-def first_weights(form: WeakForm) -> WhiteningWeights:
-    """A tenth of the spread of each acceleration, before any residual is known."""
-    every = np.concatenate([run.change for run in form.runs])
-    spread = 0.1 * np.sqrt(np.mean(every**2, axis=0))
-    return WhiteningWeights(np.diag(1 / np.where(spread > 0, spread, 1.0)), (white(1.0),) * 3)
-
-
-def weights_of(form: WeakForm, windows: list[WeakWindows]) -> WhiteningWeights:
+def weights_of(form: WeakForm, windows: WeakWindows) -> WhiteningWeights:
     """Covariance and colour of the residuals."""
-    every = np.concatenate([window.residuals for window in windows])
-    covariance = every.T @ every / len(every)
-    smallest = 1e-12 * np.mean(np.concatenate([run.change for run in form.runs]) ** 2, axis=0)
+    covariance = windows.residuals.T @ windows.residuals / len(windows.residuals)
+    smallest = 1e-12 * np.mean(form.change**2, axis=0)
     covariance += np.diag(np.where(smallest > 0, smallest, 1.0))  # an equation without residual would be singular
     inverse = np.linalg.inv(np.linalg.cholesky(covariance))
-    pieces = [
-        inverse @ window.residuals[piece].T
-        for window, run in zip(windows, form.runs, strict=True)
-        for piece in run.pieces
-    ]
+    pieces = [inverse @ windows.residuals[piece].T for piece in form.pieces]
     return WhiteningWeights(
         inverse, tuple(estimate_coloured_noise([piece[place] for piece in pieces], 1e-6) for place in range(3))
     )
 
 
-def normal_equations(form: WeakForm, windows: list[WeakWindows], weights: WhiteningWeights) -> _Normal:
+def normal_equations(form: WeakForm, windows: WeakWindows, weights: WhiteningWeights) -> _Normal:
     """Cost, information, gradient and its shares by blocks of time, of all runs without the prior."""
-    k = len(form.problem.free)
-    information, gradient, cost, scores = np.zeros((k, k)), np.zeros(k), 0.0, []
     per_block = max(1, round(BLOCK * form.problem.ship_time / form.half))
-    for window, run in zip(windows, form.runs, strict=True):
-        if not len(window.residuals):
-            continue
-        r = weights.whitened(window.residuals, run.pieces)
-        J = -weights.whitened(window.jacobian, run.pieces)
-        cost += float(np.sum(r**2))
-        information += np.einsum("wik,wil->kl", J, J, optimize=True)
-        pull = np.einsum("wik,wi->wk", J, r)
-        gradient += pull.sum(axis=0)
-        scores.append(np.add.reduceat(pull, np.arange(0, len(pull), per_block), axis=0))
-    return _Normal(cost, information, gradient, scores)
+    r = weights.whitened(windows.residuals, form.pieces)
+    J = -weights.whitened(windows.jacobian, form.pieces)
+    pull = np.einsum("wik,wi->wk", J, r)
+    of_runs = [pull[span] for span in form.spans if span.stop > span.start]
+    scores = [np.add.reduceat(part, np.arange(0, len(part), per_block), axis=0) for part in of_runs]
+    return _Normal(float(np.sum(r**2)), np.einsum("wik,wil->kl", J, J, optimize=True), pull.sum(axis=0), scores)
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,37 +160,33 @@ class _Point:
     """Parameters (k,), the windows with them, and the sum of squares with the prior."""
 
     values: Array
-    windows: list[WeakWindows]
+    windows: WeakWindows
     cost: float
 
 
 def _minimise(
     form: WeakForm,
     values: Array,
-    windows: list[WeakWindows],
+    windows: WeakWindows,
     weights: WhiteningWeights,
     errors: Array,
     progress: SearchReport,
-) -> tuple[Array, list[WeakWindows], _Normal]:
+) -> tuple[Array, WeakWindows, _Normal]:
     """Damped Gauss-Newton steps; values, windows and normal equations at the best point."""
     problem = form.problem
-    prior = problem.prior_precision(errors)
 
-    def point(values: Array, windows: list[WeakWindows]) -> _Point:
-        distance = values - problem.prior_mean
-        cost = float(distance @ prior @ distance)
-        for window, run in zip(windows, form.runs, strict=True):
-            cost += float(np.sum(weights.whitened(window.residuals, run.pieces) ** 2))
-        return _Point(values, windows, cost)
+    def point(values: Array, windows: WeakWindows) -> _Point:
+        cost = float(np.sum(weights.whitened(windows.residuals, form.pieces) ** 2))
+        return _Point(values, windows, cost + problem.before(values, errors)[2])
 
     def linearise(start: _Point) -> _Normal:
         return normal_equations(form, start.windows, weights)
 
     def move(start: _Point, normal: _Normal, damping: float) -> _Point:
+        prior, pull, _ = problem.before(start.values, errors)
         # In units of the prior's errors the matrix is well scaled.
         scaled = (normal.information + prior) * np.outer(errors, errors)
-        gradient = normal.gradient + prior @ (start.values - problem.prior_mean)
-        step = errors * np.linalg.solve(scaled + damping * np.diag(np.diag(scaled)), gradient * errors)
+        step = errors * np.linalg.solve(scaled + damping * np.diag(np.diag(scaled)), (normal.gradient + pull) * errors)
         values = np.clip(start.values - step, *problem.bounds)
         return point(values, form.at(values))
 
@@ -243,18 +199,14 @@ def _minimise(
     return best.values, best.windows, last or linearise(best)
 
 
-def _form_notices(form: WeakForm) -> list[Notice]:
+def _form_notices(form: WeakForm) -> Iterator[Notice]:
     """Notices of regressors with remaining noise, and of parameters that no acceleration depends on."""
-    messages = []
     spread = np.concatenate([run.motion.smooth[:, :3] for run in form.runs]).std(axis=0)
     noise = np.sqrt(np.mean([run.motion.remaining_noise**2 for run in form.runs], axis=0))
     for name, size, error in zip("uvr", spread, noise, strict=True):
         share = (error / size) ** 2 if size > 0 else 0.0
         if share > REPORTED_NOISE:
-            messages.append(
-                f"{100 * share:.0f} % of the variance of {name} is noise: its coefficients come out too small"
-            )
+            yield Notice(f"{100 * share:.0f} % of the variance of {name} is noise: its coefficients come out too small")
     blind = [name for name, seen in zip(form.problem.free, form.seen, strict=True) if not seen]
     if blind:
-        messages.append(f"equation error does not determine {', '.join(blind)}: no acceleration depends on them")
-    return [Notice(text) for text in messages]
+        yield Notice(f"equation error does not determine {', '.join(blind)}: no acceleration depends on them")

@@ -25,14 +25,8 @@ def is_minimum(H: Array, g: Array, *, variance: float = 1.0, bounded: tuple[Arra
     The step that the normal equations ask for lowers the sum by ``g' H^-1 g``: at a minimum by less than one variance
     for each unknown.
 
-    Parameters
-    ----------
-    H, g : arrays (k, k) and (k,)
-        Normal equations at the point.
-    variance : float
-        Variance of the residuals.
-    bounded : (array, array, array), optional
-        Values (k,) and their least and largest: an unknown that is pressed against a bound stays there.
+    `H`, `g` (k, k) and (k,): Normal equations at the point. `variance`: Variance of the residuals. `bounded` (array,
+    array, array): Values (k,) and their least and largest: an unknown that is pressed against a bound stays there.
 
     Examples
     --------
@@ -62,13 +56,8 @@ def refuse_stopped(method: str, at_minimum: bool) -> None:
 def within_bounds(H: Array, g: Array, values: Array, bounds: tuple[Array, Array]) -> Array:
     """The step of the normal equations ``H step = -g`` with unknowns that reach a bound held there.
 
-    Parameters
-    ----------
-    H, g : arrays (k, k) and (k,)
-    values : array (k,)
-        Where the step begins, within the bounds.
-    bounds : (array, array)
-        Least and largest values (k,).
+    `H`, `g` (k, k) and (k,). `values` (k,): Where the step begins, within the bounds. `bounds` (array, array): Least
+    and largest values (k,).
 
     Examples
     --------
@@ -109,28 +98,11 @@ def damped_gauss_newton(
 ) -> tuple[Point, tuple[float, ...], System | None]:
     """Steps that each lower the cost, until none does.
 
-    Parameters
-    ----------
-    start : Point
-        With its ``cost``.
-    linearise : callable
-        Normal equations at a point.
-    move : callable
-        ``move(point, system, damping) -> point``.
-    report : callable
-        ``report(point, gain) -> bool``, called with each better point: True ends the search.
-    steps : int
-        Most steps.
-    damping_range : (float, float)
-        A damping up to the first falls to 0 after a step; the second is the least after a failed attempt.
-
-    Returns
-    -------
-    best : Point
-    costs : tuple of float
-        Costs of all points after the start, the best last.
-    system : System or None
-        Normal equations at the best point; None where they were not computed.
+    `start`: With its ``cost``. `linearise`: Normal equations at a point. `move`: ``move(point, system, damping) ->
+    point``. `report`: ``report(point, gain) -> bool``, called with each better point: True ends the search. `steps`:
+    Most steps. `damping_range`: A damping up to the first falls to 0 after a step; the second is the least after a
+    failed attempt. Returns `costs`: Costs of all points after the start, the best last. Returns `system`: Normal
+    equations at the best point; None where they were not computed.
     """
     point, damping = start, 0.0
     costs: tuple[float, ...] = ()
@@ -171,18 +143,9 @@ def least_squares_steps(
 ) -> tuple[Array, Array]:
     """Unknowns (k,) and residuals (n,) after some steps that each lower the sum of squares.
 
-    Parameters
-    ----------
-    misfit : callable
-        ``misfit(at) -> residuals``; may be nan where a motion exceeds all bounds: such points are never taken.
-    start : arrays (k,), (n,)
-        First unknowns and their residuals.
-    slopes : callable
-        ``slopes(at, residuals) -> derivatives`` (n, k).
-    steps : int
-        Most steps.
-    least_gain : float
-        Share of the sum of squares: a step that lowers it by less is the last.
+    `misfit`: ``misfit(at) -> residuals``; may be nan where a motion exceeds all bounds: such points are never taken.
+    `start` (k,), (n,): First unknowns and their residuals. `slopes`: ``slopes(at, residuals) -> derivatives`` (n, k).
+    `steps`: Most steps. `least_gain`: Share of the sum of squares: a step that lowers it by less is the last.
     """
 
     def move(point: _Residuals, J: Array, damping: float) -> _Residuals:

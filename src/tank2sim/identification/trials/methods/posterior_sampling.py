@@ -24,10 +24,9 @@ from scipy.linalg import eigh
 
 from tank2sim.arrays import Array
 from tank2sim.errors import ArgumentError
-from tank2sim.identification.trials.methods.posterior import scaled_prior
-from tank2sim.identification.trials.methods.shooting import Shooting, cut, whitened, whitening_transposed
+from tank2sim.identification.trials.methods.output_error import Shooting, cut, whitened, whitening_transposed
 from tank2sim.identification.trials.options import DRAWS_OF_CHAIN, Sampler
-from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
+from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, scaled_prior
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 from tank2sim.notices import Notice, caution
 from tank2sim.simulation.rows import Chain
@@ -61,28 +60,15 @@ LEAST_LIKELY = 1e8
 
 @dataclass(frozen=True, eq=False)
 class PosteriorSamples:
-    """Samples of the posterior.
+    """Samples of the posterior."""
 
-    Parameters
-    ----------
-    free : tuple of str
-        The k parameters.
-    values : array (chains, draws, k)
-        In the units of the model's parameters.
-    r_hat, effective : array (k,)
-        Rank-normalised split R-hat, and bulk effective sample size (Vehtari et al. 2021).
-    sampler : str
-        One of :data:`.options.Sampler`.
-    simulations : int
-        Simulations of all trials; one with its adjoint is one.
-    """
-
-    free: tuple[str, ...]
-    values: Array
+    free: tuple[str, ...]  # The k parameters
+    values: Array  # (chains, draws, k): In the units of the model's parameters
+    # `r_hat`, `effective`: (k,): Rank-normalised split R-hat, and bulk effective sample size (Vehtari et al. 2021).
     r_hat: Array
     effective: Array
-    sampler: Sampler
-    simulations: int
+    sampler: Sampler  # One of :data:`.options.Sampler`
+    simulations: int  # Simulations of all trials; one with its adjoint is one
 
     @property
     def flat(self) -> Array:
@@ -132,26 +118,18 @@ class LogPosterior:
     The parameters are the estimate + root @ z, reflected at the model's bounds: the folded density is the truncated
     one, and its trajectories do not end at a bound.
 
-    Parameters
-    ----------
-    problem : Problem
-        k free parameters.
-    estimate : Estimate
-        By output error, with its `motion`.
-    robust : bool
-        Stretch the trials' density to the curvature of the estimate's covariance.
+    `problem`: k free parameters. `estimate`: By output error, with its `motion`. `robust`: Stretch the trials' density
+    to the curvature of the estimate's covariance.
     """
 
     def __init__(self, problem: Problem, estimate: Estimate, *, robust: bool = True):
         assert estimate.motion is not None
         self.problem, self.estimate = problem, estimate
         self.center = estimate.values
-        self.prior = problem.prior_precision(scaled_prior(problem, estimate.prior_scale))
-        tank = problem.captive.normal(problem.parameters(self.center))[0] if problem.captive else 0 * self.prior
-        self.stretch = np.eye(len(self.center))
-        if robust:
-            self.stretch = _stretch(estimate, self.prior + tank)
-        curvature = self.stretch.T @ estimate.information @ self.stretch + self.prior + tank
+        self.errors = scaled_prior(problem, estimate.prior_scale)  # before the trials
+        known = problem.before(self.center, self.errors)[0]
+        self.stretch = _stretch(estimate, known) if robust else np.eye(len(self.center))
+        curvature = self.stretch.T @ estimate.information @ self.stretch + known
         self.root = np.linalg.cholesky(np.linalg.inv(curvature))  # a first one, for the differences of the exact one
         self.lowest, self.highest = problem.bounds
         shooting = Shooting(problem)
@@ -178,7 +156,8 @@ class LogPosterior:
         away = values - self.center
         at = self.center + self.stretch @ away
         next(self._count)
-        return -0.5 * (self._before(values)[0] + float(self.level @ away) + sum(run.cost(at) for run in self.runs))
+        before = self.problem.before(values, self.errors)[2]
+        return -0.5 * (before + float(self.level @ away) + sum(run.cost(at) for run in self.runs))
 
     def with_gradient(self, z: Array) -> tuple[float, Array]:
         """Log density and its gradient by `z`; where the motion leaves all bounds, very small with gradient 0."""
@@ -186,8 +165,8 @@ class LogPosterior:
         away = values - self.center
         at = self.center + self.stretch @ away
         next(self._count)
-        cost, pull = self._before(values)
-        cost, pull = cost + float(self.level @ away), pull + self.level
+        _, pull, cost = self.problem.before(values, self.errors)
+        cost, pull = cost + float(self.level @ away), 2 * pull + self.level
         for run in self.runs:
             run_cost, by = run.cost_and_gradient(at)
             cost, pull = cost + run_cost, pull + self.stretch.T @ by
@@ -202,15 +181,6 @@ class LogPosterior:
         curvature = -np.array(slopes) / (2 * DIFFERENCE)
         size, vectors = np.linalg.eigh((curvature + curvature.T) / 2)
         return np.asarray((vectors * np.maximum(size, LEAST_CURVATURE)) @ vectors.T)
-
-    def _before(self, values: Array) -> tuple[float, Array]:
-        """Twice the negative log density without the trials, and its gradient (k,)."""
-        distance = values - self.problem.prior_mean
-        cost, pull = float(distance @ self.prior @ distance), 2 * self.prior @ distance
-        if self.problem.captive is None:
-            return cost, pull
-        _, tank, tank_cost = self.problem.captive.normal(self.problem.parameters(values))
-        return cost + tank_cost, pull + 2 * tank
 
     def _reflected(self, values: Array) -> tuple[Array, Array]:
         """Values within the bounds, reflected at them, and the sign of their derivative."""
@@ -321,22 +291,11 @@ def sample_posterior(
 ) -> PosteriorSamples:
     """Sample the posterior about an estimate of output error.
 
-    Parameters
-    ----------
-    problem, estimate, robust
-        As for :class:`LogPosterior`.
-    sampler : str
-        "nuts": the no-U-turn sampler with exact gradients (Hoffman and Gelman 2014, J. Mach. Learn. Res. 15; library
-        nutpie); "ensemble": walkers that move along differences of others, without gradients (ter Braak 2006, Stat.
-        Comput. 16; library emcee).
-    draws : int
-        Kept draws of each chain; of each walker :data:`WALKER_SHARE` of it.
-    seed : int
-
-    Raises
-    ------
-    InputError
-        The library of the sampler is not installed.
+    `problem`, `estimate`, `robust`: As for :class:`LogPosterior`. `sampler`: "nuts": the no-U-turn sampler with exact
+    gradients (Hoffman and Gelman 2014, J. Mach. Learn. Res. 15; library nutpie); "ensemble": walkers that move along
+    differences of others, without gradients (ter Braak 2006, Stat. Comput. 16; library emcee). `draws`: Kept draws of
+    each chain; of each walker :data:`WALKER_SHARE` of it. Raises InputError: The library of the sampler is not
+    installed.
     """
     check_sampler(sampler)
     density = LogPosterior(problem, estimate, robust=robust)

@@ -6,6 +6,11 @@ For window w and equation i, with bump functions phi_w = (1 - s^2)^2 that half o
 
 over integral(phi_w) dt: a mean acceleration. Summation by parts makes the first term a sum of phi_w times the
 differences of q (Messenger and Bortz 2021, Multiscale Model. Simul. 19; the modulating functions of Shinbrot 1957).
+
+The measured motion of a run for equation error: velocities as measured, and smoothed states as regressors.
+
+Missing signals are derived where the measured ones determine them: yaw rate from heading, velocities through the water
+from positions or from velocities over the ground.
 """
 
 from __future__ import annotations
@@ -16,17 +21,208 @@ from itertools import pairwise
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
+from scipy.integrate import cumulative_trapezoid
+from scipy.signal import savgol_coeffs, savgol_filter
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.build import KEPT_MODELS
+from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Input, Model, same_symbol
+from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.estimation_problem import Problem
-from tank2sim.identification.trials.problem.measured_motion import MEASURED_STATES, MeasuredMotion, measured_motion
-from tank2sim.identification.trials.problem.sampled_runs import SampledRun, rudder_at_start
+from tank2sim.identification.trials.problem.sampled_runs import LONGEST_GAP, SampledRun, rudder_at_start
 from tank2sim.notices import Notice
+from tank2sim.simulation.recorded import SMOOTHING, drift_over_ground
 from tank2sim.simulation.rows import RowFunction
 from tank2sim.simulation.sensitivity import Sensitivity
+
+VELOCITIES = ("motion.u", "motion.v", "motion.r")
+POSITION = ("motion.psi", "motion.x", "motion.y")
+MEASURED_STATES = (*VELOCITIES, *POSITION)
+"""States that equation error takes from the record."""
+
+SMALL_NOISE = 1e-4
+"""A signal whose noise has less than this share of its variance is not smoothed: the noise pulls coefficients towards
+zero by that share (Fuller 1987, Measurement Error Models), and smoothing might do more harm."""
+
+_SPARSE = 0.5
+"""Share of known samples below which a signal is smoothed by its samples alone: straight lines between them would hide
+their noise (project choice)."""
+
+_LEAST_STRETCH = 2.4
+"""Stretch without gaps, in smoothing windows, below which a velocity is derived from heading and positions, if these
+have it: a window of the weak form is 2.33 of them."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredMotion:
+    """Measured motion of a run."""
+
+    # (n, 3): u, v (m/s), r (rad/s) as measured or derived, nan where they are unknown; straight lines between the
+    # samples of a signal that is slower than the run
+    velocities: Array
+    smooth: Array  # (n, 6): :data:`MEASURED_STATES`, smoothed against noise in the regressors, without gaps
+    noise: Array  # (3,): Standard deviation of the measurement of u, v, r
+    remaining_noise: Array  # (3,): The same after smoothing
+    notices: tuple[Notice, ...]  # One for each derived signal
+
+
+def measured_motion(problem: Problem, run: SampledRun) -> MeasuredMotion:
+    """Velocities and position of a run.
+
+    Raises InputError: Velocities are neither measured nor determined by heading and positions.
+    """
+    return _measured_motion(problem.model, _window(problem, run), run)
+
+
+@lru_cache(maxsize=16)  # the folds of a cross-validation share their runs
+def _measured_motion(model: Model, window: int, run: SampledRun) -> MeasuredMotion:
+    columns = {name: run.column(name) for name in MEASURED_STATES}
+    missing = {name for name, column in columns.items() if np.isnan(column).all()}
+    seldom = _seldom(columns, _LEAST_STRETCH * window)
+    missing |= seldom
+    columns |= {name: np.full(len(run.measured), np.nan) for name in seldom}
+    if len(run.measured) <= window:
+        raise InputError(run.origin, "", f"has only {len(run.measured)} steps", f"at least {window + 1} are needed")
+    notices = []
+    if seldom:
+        names = ", ".join(name[7:] for name in VELOCITIES if name in seldom)
+        notices.append(
+            Notice(f"{run.name}: the readings of {names} are too far apart, and heading and positions are not")
+        )
+    if "motion.r" in missing:
+        if "motion.psi" in missing:
+            raise InputError(run.origin, "header", "has neither yaw rate nor heading", "give r_degps or psi_deg")
+        columns["motion.r"] = _slope(columns["motion.psi"], window, run.step_s)
+        notices.append(Notice(f"{run.name}: the yaw rate is the slope of the smoothed heading"))
+    if "motion.psi" in missing:
+        columns["motion.psi"] = cumulative_trapezoid(_filled(columns["motion.r"]), dx=run.step_s, initial=0.0)
+    if derived := missing & {"motion.u", "motion.v"}:
+        velocities_of_track, source = _velocities(model, run, columns, window)
+        columns |= {name: velocities_of_track[name] for name in derived}
+        notices.append(Notice(f"{run.name}: {' and '.join(name[7:] for name in sorted(derived))} {source}"))
+    _complete_positions(columns, missing, run.step_s)
+    velocities = np.column_stack([_bridged(columns[name]) for name in VELOCITIES])
+    smooth, noise, remaining = zip(*(_smoothed(columns[name], window) for name in VELOCITIES), strict=True)
+    position = [_filled(columns[name]) for name in POSITION]
+    every = np.column_stack([*smooth, *position])
+    return MeasuredMotion(velocities, every, np.array(noise), np.array(remaining), tuple(notices))
+
+
+def _seldom(columns: dict[str, Array], least: float) -> set[str]:
+    """Velocities with readings that nowhere last for `least` steps, where heading and positions have them."""
+    lasting = {name for name, column in columns.items() if _longest(column) >= least}
+    seldom = {name for name in VELOCITIES if name not in lasting and not np.isnan(columns[name]).all()}
+    if "motion.psi" not in lasting:
+        return set()
+    return seldom if {"motion.x", "motion.y"} <= lasting else seldom & {"motion.r"}
+
+
+def _longest(column: Array) -> int:
+    """Steps of the longest stretch of a signal without gaps."""
+    if np.isnan(column).all():
+        return 0
+    known = np.concatenate([[0], (~np.isnan(_bridged(column))).astype(int), [0]])
+    edges = np.flatnonzero(np.diff(known))
+    return int(np.max(edges[1::2] - edges[::2]))
+
+
+def sensor_noise(problem: Problem, run: SampledRun) -> Array:
+    """Standard deviation of the part of each signal that is too fast for a ship (ny,), 0 for an unmeasured signal."""
+    window = _window(problem, run)
+    columns = [run.column(name) for name in run.seen]
+    return np.array([0.0 if np.isnan(column).all() else _smoothed(column, window)[1] for column in columns])
+
+
+def _window(problem: Problem, run: SampledRun) -> int:
+    return max(5, int(SMOOTHING * problem.ship_time / run.step_s) // 2 * 2 + 1)
+
+
+def _velocities(model: Model, run: SampledRun, columns: dict[str, Array], window: int) -> tuple[dict[str, Array], str]:
+    """u and v through the water from the motion over the ground, less the current of the model."""
+    psi = columns["motion.psi"]
+    ground = run.column("motion.u_ground"), run.column("motion.v_ground")
+    if np.isnan(ground[0]).all() or np.isnan(ground[1]).all():
+        if any(np.isnan(columns[name]).all() for name in ("motion.x", "motion.y")):
+            remedy = "give u_mps and v_mps, or x_m, y_m and psi_deg"
+            raise InputError(run.origin, "header", "has neither velocities nor positions", remedy)
+        north, east = (_slope(columns[name], window, run.step_s) for name in ("motion.x", "motion.y"))
+        source = "from the slope of the smoothed positions"
+    else:
+        north, east = _turned(*ground, psi)
+        source = "from the velocities over the ground"
+    drift = drift_over_ground(model, run.inputs, _filled(psi))
+    u, v = _turned(north - drift[:, 0], east - drift[:, 1], -psi)
+    return {"motion.u": u, "motion.v": v}, source
+
+
+def _complete_positions(columns: dict[str, Array], missing: set[str], step: float) -> None:
+    """Add unmeasured positions from the velocities: wind and banks need only their rough course."""
+    if missing & {"motion.x", "motion.y"}:
+        rates = _turned(*(_filled(columns[name]) for name in ("motion.u", "motion.v", "motion.psi")))
+        for name in missing & {"motion.x", "motion.y"}:
+            columns[name] = cumulative_trapezoid(rates[name == "motion.y"], dx=step, initial=0.0)
+
+
+def _turned(forward: Array, starboard: Array, angle: Array) -> tuple[Array, Array]:
+    """Components (n,) each after turning the axes back by `angle` (n,): those of the earth from those of the body."""
+    north, east = earth_velocity(*(ca.DM(values) for values in (forward, starboard, angle)))  # type: ignore[arg-type]
+    return np.array(north).ravel(), np.array(east).ravel()
+
+
+def _slope(column: Array, window: int, step: float) -> Array:
+    """Time derivative of a smoothed signal (Savitzky and Golay 1964), nan in gaps of more than its own step."""
+    slope: Array = savgol_filter(_filled(column), window, 3, deriv=1, delta=step)
+    slope[_in_gaps(column)] = np.nan
+    return slope
+
+
+def _bridged(column: Array) -> Array:
+    """A signal with straight lines between its samples, nan in gaps of more than its own step."""
+    bridged = _filled(column)
+    bridged[_in_gaps(column)] = np.nan
+    return bridged
+
+
+def _in_gaps(column: Array) -> NDArray[np.bool_]:
+    """Mask (n,) of the rows without a sample that lie in gaps longer than the usual distance between samples."""
+    known, missing = np.flatnonzero(~np.isnan(column)), np.isnan(column)
+    usual = np.median(np.diff(known)) if len(known) > 1 else 1.0
+    if usual <= 1:
+        return missing
+    rows = np.arange(len(column))
+    after = np.clip(np.searchsorted(known, rows), 1, len(known) - 1)
+    distance = known[after] - known[after - 1]
+    in_gaps: NDArray[np.bool_] = missing & ((distance > LONGEST_GAP * usual) | (rows < known[0]) | (rows > known[-1]))
+    return in_gaps
+
+
+def _smoothed(column: Array, window: int) -> tuple[Array, float, float]:
+    """A signal without gaps and noise; standard deviation of its noise before and after."""
+    known = ~np.isnan(column)
+    share = float(known.mean())
+    if share < _SPARSE:
+        fewer = max(5, int(share * window) // 2 * 2 + 1)
+        if known.sum() > fewer:
+            smooth_known, before, after = _smoothed(column[known], fewer)
+            spread = np.full(len(column), np.nan)
+            spread[known] = smooth_known
+            return _filled(spread), before, after
+    whole = _filled(column)
+    smooth: Array = savgol_filter(whole, window, 3)
+    gain = float(savgol_coeffs(window, 3)[window // 2])  # the sample's own weight: var(raw - smooth) = (1 - gain) var
+    noise = float(np.std(whole - smooth)) / np.sqrt(1 - gain)
+    if noise**2 < SMALL_NOISE * float(np.var(whole)):
+        return whole, noise, noise
+    return smooth, noise, noise * float(np.sqrt(gain))  # sum of squared weights = gain, for a projection
+
+
+def _filled(column: Array) -> Array:
+    known = np.flatnonzero(~np.isnan(column))
+    return np.interp(np.arange(len(column)), known, column[known])
+
 
 WIDTH = 0.7
 """Width of a window in L/u0 (project choice): short against a manoeuvre, long against noise and smoothing."""
@@ -36,18 +232,10 @@ WEAK_EQUATIONS = ("motion.udot", "motion.vdot", "motion.rdot")
 
 @dataclass(frozen=True, eq=False)
 class WeakWindows:
-    """The weak form of one run at given parameters.
+    """The weak form of all runs, one after the other, at given parameters."""
 
-    Parameters
-    ----------
-    residuals : array (windows, 3)
-        Measured less modelled mean acceleration, m/s2, m/s2, rad/s2.
-    jacobian : array (windows, 3, k)
-        Derivative of the *modelled* acceleration by the free parameters.
-    """
-
-    residuals: Array
-    jacobian: Array
+    residuals: Array  # (windows, 3): Measured less modelled mean acceleration, m/s2, m/s2, rad/s2
+    jacobian: Array  # (windows, 3, k): Derivative of the *modelled* acceleration by the free parameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,17 +260,8 @@ class _Prepared:
 class WeakForm:
     """Weak-form residuals of a problem's runs.
 
-    Parameters
-    ----------
-    problem : Problem
-        k free parameters.
-    width : float
-        Width of a window, in L/u0.
-
-    Raises
-    ------
-    InputError
-        A run lacks velocities and signals that determine them.
+    `problem`: k free parameters. `width`: Width of a window, in L/u0. Raises InputError: A run lacks velocities and
+    signals that determine them.
     """
 
     def __init__(self, problem: Problem, width: float = WIDTH):
@@ -92,18 +271,29 @@ class WeakForm:
         self._sensitivity = Sensitivity(self._hidden, problem.free, states) if states else None
         self.half = width * problem.ship_time / 2
         self.runs = tuple(self._prepared(run) for run in problem.runs)
+        self.change = np.concatenate([run.change for run in self.runs])
+        ends = np.cumsum([0, *(len(run.change) for run in self.runs)]).tolist()
+        self.spans = tuple(slice(begin, end) for begin, end in pairwise(ends))  # windows of each run
+        # Windows that follow each other without a gap.
+        self.pieces = tuple(
+            slice(begin + piece.start, begin + piece.stop)
+            for begin, run in zip(ends, self.runs, strict=False)
+            for piece in run.pieces
+        )
 
     @property
     def notices(self) -> tuple[Notice, ...]:
         """Notices of derived signals."""
         return tuple(notice for run in self.runs for notice in run.motion.notices)
 
-    def at(self, values: Array) -> list[WeakWindows]:
-        """The windows of each run at the free parameters `values` (k,)."""
+    def at(self, values: Array) -> WeakWindows:
+        """The windows at the free parameters `values` (k,)."""
         p = self.problem.parameters(values)
-        return [self._windows(run, p) for run in self.runs]
+        modelled, jacobian = map(np.concatenate, zip(*(self._windows(run, p) for run in self.runs), strict=True))
+        return WeakWindows(self.change - modelled, jacobian)
 
-    def _windows(self, run: _Prepared, p: Array) -> WeakWindows:
+    def _windows(self, run: _Prepared, p: Array) -> tuple[Array, Array]:
+        """Modelled accelerations (windows, 3) of a run, and their derivatives (windows, 3, k)."""
         k = len(self.problem.free)
         hidden, by_theta = (run.hidden, None) if run.hidden is not None else self._hidden_states(run.run, run.inputs, p)
         values, by_parameters, by_hidden = self._accelerations(hidden, run.inputs, p)
@@ -111,10 +301,7 @@ class WeakForm:
         if by_theta is not None:
             jacobian = jacobian + by_theta.transpose(0, 2, 1) @ by_hidden.reshape(len(by_parameters), -1, 3)
         mean = run.averaging @ jacobian.reshape(len(jacobian), -1)
-        return WeakWindows(
-            residuals=run.change - run.averaging @ values,
-            jacobian=mean.reshape(-1, k, 3).transpose(0, 2, 1),
-        )
+        return run.averaging @ values, mean.reshape(-1, k, 3).transpose(0, 2, 1)
 
     def _hidden_states(self, run: SampledRun, inputs: Array, p: Array) -> tuple[Array, Array | None]:
         """Simulated unmeasured states in the middle of steps (n, nz), and slopes by the parameters (n, nz, k)."""

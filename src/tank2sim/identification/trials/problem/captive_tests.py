@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
@@ -56,56 +57,29 @@ eight times."""
 
 @dataclass(frozen=True, eq=False)
 class CaptiveRuns:
-    """Reduced runs of a campaign, from which :func:`captive_tests` makes equations for any model of the ship.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    runs : tuple of ReducedRun
-        Means and harmonics of each run's forces.
-    """
+    """Reduced runs of a campaign, from which :func:`captive_tests` makes equations for any model of the ship."""
 
     campaign: Campaign
-    runs: tuple[ReducedRun, ...]
+    runs: tuple[ReducedRun, ...]  # Means and harmonics of each run's forces
 
 
 @dataclass(frozen=True, eq=False)
 class CaptiveTests:
-    """Equations of a campaign in the k free parameters of a model.
+    """Equations of a campaign in the k free parameters of a model."""
 
-    Parameters
-    ----------
-    forces : casadi.Function
-        ``forces(motion, p) -> (F, J, R)``: the water's X', Y', N' at one instant, their slopes by the free parameters,
-        and the rudder's part of them.
-    motion : array (9, instants)
-        u, v, r, rudder angle, dv/dt, dr/dt, propeller speed over its nominal one, and the run's scales of force and
-        moment (N, N m); ship size, SI.
-    projection : tuple of array
-        For each run (coefficients, instants): histories to mean and harmonics.
-    measured : array (m,)
-        Coefficients of X', Y', N' of all runs, run by run, force by force.
-    force : array of int (m,)
-        0, 1, 2 for X, Y, N.
-    mean : array of bool (m,)
-        True for a mean, False for a harmonic.
-    noise : array (3,)
-        Standard deviation of the residual of each force, prime.
-    columns : array of int (k,)
-        Columns of J that belong to the free parameters.
-    source : CaptiveRuns
-        What the equations were made from.
-    """
-
+    # ``forces(motion, p) -> (F, J, R)``: the water's X', Y', N' at one instant, their slopes by the free parameters,
+    # and the rudder's part of them
     forces: ca.Function
+    # (9, instants): u, v, r, rudder angle, dv/dt, dr/dt, propeller speed over its nominal one, and the run's scales of
+    # force and moment (N, N m); ship size, SI
     motion: Array
-    projection: tuple[Array, ...]
-    measured: Array
-    force: NDArray[np.int64]
-    mean: NDArray[np.bool_]
-    noise: Array
-    columns: NDArray[np.int64]
-    source: CaptiveRuns
+    projection: sparse.csr_matrix  # (m/3, instants): Histories of a force to means and harmonics, run by run
+    measured: Array  # (m,): Coefficients of all runs, of X', then of Y' and N'
+    force: NDArray[np.int64]  # (m,): 0, 1, 2 for X, Y, N
+    mean: NDArray[np.bool_]  # (m,): True for a mean, False for a harmonic
+    noise: Array  # (3,): Standard deviation of the residual of each force, prime
+    columns: NDArray[np.int64]  # (k,): Columns of J that belong to the free parameters
+    source: CaptiveRuns  # What the equations were made from
 
     def residuals(self, p: Array) -> tuple[Array, Array]:
         """Residuals (m,), model less measured, and their slopes (m, k), prime, at the model's parameters `p`."""
@@ -117,21 +91,16 @@ class CaptiveTests:
         instants = self.motion.shape[1]
         values, slopes, rudder = map(np.array, self.forces.map(instants)(self.motion, p))
         slopes = slopes.reshape(3, instants, -1)[:, :, self.columns]
-        predicted, jacobian, by_rudder, first = [], [], [], 0
-        for projection in self.projection:
-            rows = slice(first, first + projection.shape[1])
-            first = rows.stop
-            for place in range(3):
-                predicted.append(projection @ values[place, rows])
-                jacobian.append(projection @ slopes[place, rows])
-                by_rudder.append(projection @ rudder[place, rows])
-        forces = np.concatenate(predicted)
+        forces, jacobian, by_rudder = (
+            np.concatenate([self.projection @ of_force for of_force in of_forces])
+            for of_forces in (values, slopes, rudder)
+        )
         effects = [np.where(self.force == place, GAIN_ERROR * forces, 0.0) for place in range(3)]
         effects.append(np.where((self.force == 0) & self.mean, SURGE_OFFSET, 0.0))
         sway = np.zeros(len(forces))
         sway[self.force == 2] = forces[self.force == 1]  # the same coefficients of each run, in the same order
-        effects += [REFERENCE_ERROR * sway, RUDDER_GAIN_ERROR * np.concatenate(by_rudder)]
-        return forces - self.measured, np.vstack(jacobian), np.column_stack(effects)
+        effects += [REFERENCE_ERROR * sway, RUDDER_GAIN_ERROR * by_rudder]
+        return forces - self.measured, jacobian, np.column_stack(effects)
 
     def of(self, places: Sequence[int]) -> CaptiveTests:
         """The same equations in some of the free parameters."""
@@ -163,48 +132,33 @@ class CaptiveTests:
 def captive_tests(card: ManoeuvringCard, model: Model, free: Sequence[str], source: CaptiveRuns) -> CaptiveTests:
     """The equations of a campaign's runs in the free parameters of a model.
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-        Card of the ship, at the size of `model`.
-    model : Model
-        Driven by the rudder's angle or order.
-    free : sequence of str
-        Names of the k free parameters.
-    source : CaptiveRuns
-
-    Raises
-    ------
-    InputError
-        The campaign is of a ship of other proportions.
+    `card`: Card of the ship, at the size of `model`. `model`: Driven by the rudder's angle or order. `free`: Names of
+    the k free parameters. Raises InputError: The campaign is of a ship of other proportions.
     """
     campaign, runs = source.campaign, source.runs
     _refuse_other_form(card, campaign)
     ratio = card.ship.length_m / campaign.model.length_m
-    motions, projections, measured, force, mean = [], [], [], [], []
+    motions, projections, measured = [], [], []
     for run in runs:
         kept, projection = _thinned(run)
         motions.append(_motion(card, campaign, run, ratio)[:, kept])
         projections.append(projection)
-        inertial = rigid_body_force(campaign, run.motion)
-        for place, name in enumerate(FORCE_COLUMNS):
-            values = run.fits[name].coefficients[: run.regressed] + run.projected(inertial[name][:, None])[:, 0]
-            measured.append(values / campaign.scales_at(run.motion.mean_speed_mps).unit(name))
-            force.append(np.full(run.regressed, place))
-            mean.append(np.arange(run.regressed) == 0)
-    tests = CaptiveTests(
+        inertial, scales = rigid_body_force(campaign, run.motion), campaign.scales_at(run.motion.mean_speed_mps)
+        added = {name: run.projected(inertial[name][:, None])[:, 0] for name in FORCE_COLUMNS}
+        total = {name: run.fits[name].coefficients[: run.regressed] + added[name] for name in FORCE_COLUMNS}
+        measured.append([values / scales.unit(name) for name, values in total.items()])
+    every = np.concatenate(measured, axis=1)
+    return CaptiveTests(
         forces=_water_forces(model, free),
         motion=np.hstack(motions),
-        projection=tuple(projections),
-        measured=np.concatenate(measured),
-        force=np.concatenate(force),
-        mean=np.concatenate(mean),
-        noise=np.ones(3),
+        projection=sparse.block_diag(projections, format="csr"),
+        measured=every.ravel(),
+        force=np.repeat(np.arange(3), every.shape[1]),
+        mean=np.tile(np.concatenate([np.arange(run.regressed) == 0 for run in runs]), 3),
+        noise=0.02 * every.std(axis=1),
         columns=np.arange(len(free)),
         source=source,
     )
-    spread = [float(np.std(tests.measured[tests.force == place])) for place in range(3)]
-    return replace(tests, noise=0.02 * np.array(spread))
 
 
 def _refuse_other_form(card: ManoeuvringCard, campaign: Campaign) -> None:
@@ -266,26 +220,15 @@ def _water_forces(model: Model, free: Sequence[str]) -> ca.Function:
     inertia = model.symbol("ship.yaw_inertia")
     N = model.symbol("force.N") - yaw - (added["yaw_sway"] - lever) * vdot - (added["yaw"] - inertia) * rdot
     forces = ca.vertcat(X / force_scale, Y / force_scale, N / moment_scale)
-    by_rudder = [
-        model.symbol(f"rudder.{name}") / scale
-        for name, scale in (("X", force_scale), ("Y", force_scale), ("N", moment_scale))
-    ]
+    scales = {"X": force_scale, "Y": force_scale, "N": moment_scale}
+    by_rudder = [model.symbol(f"rudder.{name}") / scale for name, scale in scales.items()]
     both = model.expand(ca.vertcat(forces, *by_rudder))
-    both = ca.substitute(both, model.x, _states(model, u, v, r, delta, revolutions))
-    inputs = [ca.SX(variable.start) for variable in model.inputs]
-    for place, name in enumerate(model.input_names):
-        if name == "rudder.command":
-            inputs[place] = delta
-        elif name == "propeller.speed":
-            inputs[place] = revolutions * model.symbol("propulsion.nominal_speed")
-    forces, rudder = ca.vertsplit(ca.substitute(both, model.u, ca.vcat(inputs)), 3)
+    driven = {"motion.u": u, "motion.v": v, "motion.r": r, "rudder.angle": delta, "rudder.command": delta}
+    if "propulsion.nominal_speed" in model:
+        turning = revolutions * model.symbol("propulsion.nominal_speed")
+        driven |= {"propeller.speed": turning, "propeller.speed_actual": turning}
+    for symbols, variables in ((model.x, model.states), (model.u, model.inputs)):  # all others have their start values
+        both = ca.substitute(both, symbols, ca.vcat([driven.get(each.name, ca.SX(each.start)) for each in variables]))
+    forces, rudder = ca.vertsplit(both, 3)
     slopes = ca.jacobian(forces, ca.vcat([model.symbol(name) for name in free]))
     return ca.Function("captive", [motion, model.p], [forces, slopes, rudder], {"cse": True})
-
-
-def _states(model: Model, u: ca.SX, v: ca.SX, r: ca.SX, delta: ca.SX, revolutions: ca.SX) -> ca.SX:
-    """State vector of the model on the carriage; other states have their start values."""
-    driven = {"motion.u": u, "motion.v": v, "motion.r": r, "rudder.angle": delta}
-    if "propulsion.nominal_speed" in model:
-        driven["propeller.speed_actual"] = revolutions * model.symbol("propulsion.nominal_speed")
-    return ca.vcat([driven.get(state.name, ca.SX(state.start)) for state in model.states])

@@ -1,14 +1,24 @@
-"""The problem that an estimator of free-running trials solves, and its estimate: the same for every method."""
+"""The problem that an estimator of free-running trials solves, and its estimate: the same for every method.
+
+Standard errors of estimates with correlated residuals, and the width of the prior by its evidence.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
+import casadi as ca
 import numpy as np
+from scipy.linalg import eigh
 
 from tank2sim.arrays import Array
-from tank2sim.dynamics.model import Model
+from tank2sim.cards import ManoeuvringCard, parse_card
+from tank2sim.dynamics import build
+from tank2sim.dynamics.build import KEPT_MODELS
+from tank2sim.dynamics.kinematics import earth_velocity
+from tank2sim.dynamics.model import Model, Quantity, same_symbol
 from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise
 from tank2sim.identification.trials.problem.captive_tests import CaptiveTests
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
@@ -17,42 +27,107 @@ from tank2sim.notices import Notice
 LITTLE_KNOWN = 0.25
 """A standard error of at least this share of the value is not widened (project choice)."""
 
-LOOSE = 30.0
-"""Factor on the standard errors before the trials in the fit of the captive tests alone, from which their noise comes:
-the tests then determine all that they show (project choice)."""
 
-ROUNDS, STEPS = 6, 6
-"""Rounds of noise, and Gauss-Newton steps in each, of the fit of the captive tests alone: the noise of the KVLCC2's
-changes by less than 1 % in the last (project choice)."""
+def driven_model(card: ManoeuvringCard, driven_by: str) -> Model:
+    """The card's model, driven by the measured angle of the rudder (`driven_by` is ``angle``) or by its order."""
+    return _driven(build(card), driven_by)
+
+
+@lru_cache(maxsize=KEPT_MODELS)
+def _driven(ship: Model, driven_by: str) -> Model:
+    model = with_ground_velocities(ship)
+    return driven_by_angle(model) if driven_by == "angle" else model
+
+
+def driven_by_angle(model: Model) -> Model:
+    """The model without its steering gear: ``rudder.command`` is the angle of the rudder.
+
+    For trials in which the angle was measured: the record contains the action of the gear.
+    """
+    angle, order = model.symbol("rudder.angle"), model.symbol("rudder.command")
+    removed = {"rudder.rate", "rudder.angle"}
+    quantities = []
+    for quantity in model.quantities:
+        if quantity.name in removed:
+            continue
+        copy = replace(quantity, value=ca.substitute(quantity.value, angle, order))
+        quantities.append(same_symbol(quantity, copy))
+    return replace(
+        model,
+        states=tuple(state for state in model.states if state.name != "rudder.angle"),
+        quantities=tuple(quantities),
+        outputs=tuple(name for name in model.outputs if name not in removed),
+    )
+
+
+def with_ground_velocities(model: Model) -> Model:
+    """The model with ``motion.u_ground`` and ``motion.v_ground``, the velocity over the ground in body axes, m/s."""
+    north, east, psi = (model.symbol(name) for name in ("motion.xdot", "motion.ydot", "motion.psi"))
+    forward, starboard = earth_velocity(north, east, -psi)
+    return model.extend(
+        Quantity(name="motion.u_ground", unit="m/s", description="Velocity ahead over the ground", value=forward),
+        Quantity(
+            name="motion.v_ground", unit="m/s", description="Velocity to starboard over the ground", value=starboard
+        ),
+    )
+
+
+@dataclass(frozen=True)
+class DrivenShip:
+    """The text of a card, and the rudder signal that drives its model, ``angle`` or ``order``: a model cannot be sent
+    to other processes, because of its symbols, and is built there from its card."""
+
+    card: str
+    driven_by: str
+
+    @property
+    def model(self) -> Model:
+        """The model; built once in each process."""
+        return _model_of(self)
+
+
+@lru_cache(maxsize=8)
+def _model_of(ship: DrivenShip) -> Model:
+    card = parse_card(ship.card, "card")
+    assert isinstance(card, ManoeuvringCard)
+    return driven_model(card, ship.driven_by)
+
+
+def model_bounds(model: Model, names: Sequence[str]) -> tuple[Array, Array]:
+    """Least and largest value of parameters `names` (k,), infinite where the `model` states none."""
+    pairs = [(model[name].minimum, model[name].maximum) for name in names]
+    infinite = ((-np.inf if low is None else low, np.inf if high is None else high) for low, high in pairs)
+    lowest, highest = np.array(list(infinite), dtype=float).reshape(-1, 2).T
+    return lowest, highest
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Free parameters of a model, their prior, and the runs that determine them.
+    """Free parameters of a model, their prior, and the runs that determine them."""
 
-    Parameters
-    ----------
-    model : Model
-        Driven by the input that the runs recorded (:func:`.problem_from_card.driven_model`).
-    free : tuple of str
-        Names of the k parameters to estimate.
-    prior_mean, prior_error : array (k,)
-        Value and standard error before the trials, in the parameter's own unit; the error is positive.
-    runs : tuple of SampledRun
-        Each with the same `seen`.
-    captive : CaptiveTests, optional
-        Captive tests of the ship, which output error fits together with the runs.
-    prior_inverse : array (k, k), optional
-        Inverse of the correlations before the trials; None where the parameters are independent.
-    """
-
-    model: Model
-    free: tuple[str, ...]
+    model: Model  # Driven by the input that the runs recorded (:func:`driven_model`)
+    free: tuple[str, ...]  # Names of the k parameters to estimate
+    # `prior_mean`, `prior_error`: (k,): Value and standard error before the trials, in the parameter's own unit; the
+    # error is positive
     prior_mean: Array
     prior_error: Array
-    runs: tuple[SampledRun, ...]
-    captive: CaptiveTests | None = None
+    runs: tuple[SampledRun, ...]  # Each with the same `seen`
+    captive: CaptiveTests | None = None  # Captive tests of the ship, which output error fits together with the runs
+    # (k, k): Inverse of the correlations before the trials; None where the parameters are independent
     prior_inverse: Array | None = None
+    ship: DrivenShip | None = None  # Whose model it is: needed in other processes
+
+    def __getstate__(self) -> dict[str, object]:
+        """All but the model, which is built again."""
+        if self.ship is None:
+            raise TypeError("a problem without its ship is not for other processes")
+        return {**self.__dict__, "model": None}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        """The same problem, with a model of this process."""
+        ship = state["ship"]
+        assert isinstance(ship, DrivenShip)
+        self.__dict__.update(state, model=ship.model)
 
     @property
     def known(self) -> Array:
@@ -62,6 +137,16 @@ class Problem:
     def prior_precision(self, errors: Array) -> Array:
         """Information before the trials (k, k), with standard errors `errors` (k,)."""
         return np.asarray(self.known / np.outer(errors, errors), dtype=np.float64)
+
+    def before(self, values: Array, errors: Array) -> tuple[Array, Array, float]:
+        """Information (k, k), half the gradient (k,) and cost at `values` (k,) of what is known before the trials: the
+        prior with standard errors `errors` (k,), and captive tests."""
+        prior, away = self.prior_precision(errors), values - self.prior_mean
+        gradient, cost = prior @ away, float(away @ prior @ away)
+        if self.captive is None:
+            return prior, gradient, cost
+        tank, pull, tank_cost = self.captive.normal(self.parameters(values))
+        return prior + tank, gradient + pull, cost + tank_cost
 
     @property
     def groups(self) -> tuple[str, ...]:
@@ -91,11 +176,7 @@ class Problem:
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Least and largest value of each free parameter (k,), infinite where the model states none."""
-        parameters = [self.model[name] for name in self.free]
-        lowest = np.array([-np.inf if parameter.minimum is None else parameter.minimum for parameter in parameters])
-        return lowest, np.array(
-            [np.inf if parameter.maximum is None else parameter.maximum for parameter in parameters]
-        )
+        return model_bounds(self.model, self.free)
 
     def parameters(self, values: Array) -> Array:
         """The model's parameter vector with the free ones at `values` (k,)."""
@@ -118,63 +199,31 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class FittedMotion:
-    """Initial states and noise of a fit by output error.
+    """Initial states and noise of a fit by output error."""
 
-    Parameters
-    ----------
-    piece_s : float or None
-        Length of the pieces, s; None for whole runs.
-    starts : tuple of array (pieces, nx)
-        Initial states of the pieces of each run.
-    noise : tuple of ColouredNoise
-        Noise of each seen variable.
-    """
-
-    piece_s: float | None
-    starts: tuple[Array, ...]
-    noise: tuple[ColouredNoise, ...]
+    piece_s: float | None  # Length of the pieces, s; None for whole runs
+    starts: tuple[Array, ...]  # each (pieces, nx): Initial states of the pieces of each run
+    noise: tuple[ColouredNoise, ...]  # Noise of each seen variable
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Estimate of the free parameters by one method.
+    """Estimate of the free parameters by one method."""
 
-    Parameters
-    ----------
-    method : str
-        Name of the method.
-    free : tuple of str
-        The k parameters.
-    values : array (k,)
-        Estimates.
-    covariance : array (k, k)
-        Covariance of the estimates, for the residuals as they are (coloured, with model error), not as white noise.
-    information : array (k, k)
-        Information of the trials alone: the inverse covariance without the prior.
-    noise : mapping
-        Standard deviation of the residual by variable.
-    cost : tuple of float
-        Minimised function after each iteration.
-    prior_scale : mapping
-        Chosen factor on the prior's standard errors by group (:attr:`Problem.groups`).
-    notices : tuple of Notice
-        Messages for the user.
-    motion : FittedMotion, optional
-        What output error fitted in addition to the parameters.
-    samples : array (draws, k), optional
-        Samples of the posterior, where it was sampled: `values` and `covariance` are then theirs.
-    """
-
-    method: str
-    free: tuple[str, ...]
-    values: Array
+    method: str  # Name of the method
+    free: tuple[str, ...]  # The k parameters
+    values: Array  # (k,): Estimates
+    # (k, k): Covariance of the estimates, for the residuals as they are (coloured, with model error), not as white
+    # noise
     covariance: Array
-    information: Array
-    noise: Mapping[str, float] = field(default_factory=dict)
-    cost: tuple[float, ...] = ()
+    information: Array  # (k, k): Information of the trials alone: the inverse covariance without the prior
+    noise: Mapping[str, float] = field(default_factory=dict)  # Standard deviation of the residual by variable
+    cost: tuple[float, ...] = ()  # Minimised function after each iteration
+    # Chosen factor on the prior's standard errors by group (:attr:`Problem.groups`)
     prior_scale: Mapping[str, float] = field(default_factory=dict)
-    notices: tuple[Notice, ...] = ()
-    motion: FittedMotion | None = None
+    notices: tuple[Notice, ...] = ()  # Messages for the user
+    motion: FittedMotion | None = None  # What output error fitted in addition to the parameters
+    # (draws, k): Samples of the posterior, where it was sampled: `values` and `covariance` are then theirs
     samples: Array | None = None
 
     def draw(self, generator: np.random.Generator) -> Array:
@@ -197,20 +246,79 @@ def silent(stage: str, values: Array, cost: float) -> None:
     """Ignore progress."""
 
 
-def noise_alone(tests: CaptiveTests, problem: Problem) -> CaptiveTests:
-    """The equations with the noise that they have at the best fit of the captive tests alone.
+BLOCK = 5.0
+"""Residuals farther apart than this many ship lengths count as independent in standard errors (project choice: the
+memory of the flow and of a slow model error are of that order)."""
 
-    Fitted together with trials, the noise must not grow until tank and trials agree: it is what the tank's own scatter
-    and the structure of the model leave, with standard errors before the trials :data:`LOOSE` times those of `problem`.
-    Within one tank the uncertain parameters between tank and ship are none.
+MOST_FITTED = 2 / 3
+"""Largest assumed share of the residuals' variance that the fit absorbed: beyond it the blocks hardly outnumber the
+parameters, and the correction of their scatter would itself be scatter (project choice)."""
+
+
+def scaled_prior(problem: Problem, scale: Mapping[str, float]) -> Array:
+    """Standard errors before the trials (k,), those of :attr:`Problem.groups` times the scale of their group."""
+    return np.array([scale.get(group, 1.0) for group in problem.groups]) * problem.prior_error
+
+
+def evidence_scale(problem: Problem, information: Array, values: Array, scale: Mapping[str, float]) -> dict[str, float]:
+    """Factor on the prior's errors of each group that has the largest evidence, at least 1 (MacKay 1992, Neural
+    Computation 4): distance from the prior's mean over the number of parameters that the trials determine.
+
+    `problem`: k free parameters. `information` (k, k): Information of the trials alone. `values` (k,): Estimates.
+    `scale`: The factors of these estimates.
     """
-    values, prior = problem.prior_mean.copy(), problem.prior_precision(LOOSE * problem.prior_error)
-    for _ in range(ROUNDS):
-        for _ in range(STEPS):
-            residual, slopes = tests.residuals(problem.parameters(values))
-            weighted = slopes / tests.noise[tests.force][:, None] ** 2
-            gradient = weighted.T @ residual + prior @ (values - problem.prior_mean)
-            step = np.linalg.solve(weighted.T @ slopes + prior, gradient)
-            values = np.clip(values - step, *problem.bounds)
-        tests = tests.with_noise_at(problem.parameters(values))
-    return tests
+    prior = scaled_prior(problem, scale)
+    scaled = information * np.outer(prior, prior)
+    fixed = 1 - np.diag(np.linalg.solve(scaled + problem.known, problem.known))
+    distance = (values - problem.prior_mean) / problem.prior_error
+    groups = np.array(problem.groups)
+    factors = {}
+    for group in sorted(set(problem.groups) - {""}):
+        rows = np.flatnonzero(groups == group)
+        squares = float(distance[rows] @ problem.known[np.ix_(rows, rows)] @ distance[rows])
+        factors[group] = max(1.0, float(np.sqrt(squares / max(fixed[rows].sum(), 1.0))))
+    return factors
+
+
+def sandwich(information: Array, unit: Array, scores: Sequence[Array], before: Array) -> Array:
+    """Covariance (k, k) of estimates, robust to the true correlation of the residuals (Huber 1967; Newey and West
+    1987).
+
+    `information` (k, k): Information of the trials alone, under the noise model. `unit` (k,): Sizes of the parameters,
+    which scale the matrices: the prior's errors. `scores` each (blocks, k): Gradient of each run by blocks of
+    :data:`BLOCK` ship lengths, in the order of time. `before` (k, k): Information before the trials: of the prior, and
+    of captive tests that were fitted with them.
+    """
+    # In units of the prior's errors the matrices are well scaled: a parameter without trials has information 0 against
+    # 1.
+    size = np.outer(unit, unit)
+    scaled, known = information * size, before * size
+    bread = np.linalg.inv(scaled + known)
+    determined = float(np.trace(bread @ scaled))
+    spread = bread @ (_meat(scaled, [score * unit for score in scores], determined) + known) @ bread
+    return spread * size
+
+
+def _meat(information: Array, scores: Sequence[Array], determined: float) -> Array:
+    """Covariance of the gradient (k, k) from blocks of time and their neighbours (Newey and West 1987, one lag).
+
+    Model error correlates residuals far longer than the noise model; white-noise theory would make the intervals
+    several times too narrow. The result is at least that theory's `information` in every direction. The fit of the
+    `determined` parameters absorbs a share of the residuals: determined/B with B blocks of equal weight (Bell and
+    McCaffrey 2002, Survey Methodology 28).
+    """
+    total = np.zeros_like(information)
+    for score in scores:
+        lagged = score[1:].T @ score[:-1]
+        total += score.T @ score + 0.5 * (lagged + lagged.T)
+    count = sum(len(score) for score in scores)
+    total *= 1 / (1 - min(determined / max(count, 1), MOST_FITTED))
+    # To a diagonal of 1 at most: trials with hardly any noise have an information so large that the rounding of one
+    # parameter's exceeds all of another's. What is added is negligible: 1e-9 of the prior's, 1e-10 of its own.
+    size = 1 / np.sqrt(np.diag(information) + 1.0)
+    square = np.outer(size, size)
+    scaled = 0.5 * (information + information.T) * square
+    values, vectors = eigh(total * square, scaled + np.diag(1e-9 * size**2 + 1e-10))
+    root = scaled @ vectors
+    meat: Array = (root * np.maximum(values, 1.0)) @ root.T
+    return meat / square

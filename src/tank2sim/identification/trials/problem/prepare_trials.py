@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,7 +30,6 @@ SAME_LENGTH = 0.03
 FARTHEST_FROUDE = 2.5
 """A trial whose approach speed differs from the card's speed by more than this factor is at another scale."""
 
-
 FARTHEST_REVOLUTIONS = 10.0
 """A trial whose largest revolutions differ from the card's nominal ones by more than this factor, although the ship is
 near the card's speed, has them in another unit (project choice; of revolutions a second and a minute it is 60)."""
@@ -47,58 +46,41 @@ class RecordDoubt:
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """Trials at the size of the ship, and captive tests of a model of it where there are any.
-
-    Parameters
-    ----------
-    trials : tuple of Trial
-    driven_by : str
-        ``angle`` if the rudder's angle was measured in all of them, ``order`` if only its order is known.
-    notices : tuple of Notice
-        Repairs and scalings.
-    captive : CaptiveRuns, optional
-        Captive tests, at the size of their model.
-    doubts : tuple of RecordDoubt
-    """
+    """Trials at the size of the ship, and captive tests of a model of it where there are any."""
 
     trials: tuple[Trial, ...]
-    driven_by: str
-    notices: tuple[Notice, ...]
-    captive: CaptiveRuns | None = None
+    driven_by: str  # ``angle`` if the rudder's angle was measured in all of them, ``order`` if only its order is known
+    notices: tuple[Notice, ...]  # Repairs and scalings
+    captive: CaptiveRuns | None = None  # Captive tests, at the size of their model
     doubts: tuple[RecordDoubt, ...] = ()
 
 
 def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unused: bool = True) -> Measured:
     """Read trials, make the audit's safe repairs, and scale them to the card's ship.
 
-    Parameters
-    ----------
-    given : iterable
-        Files, or trials as they were read.
-    card : ManoeuvringCard
-        Card of the ship.
-    report_unused : bool
-        Whether a notice says that a wind or depth was measured which no effect of the card uses.
-
-    Raises
-    ------
-    InputError
-        A file has an error, the audit finds a fault that it cannot repair, two trials share a name or a record, a trial
-        is of another size without stating its scale, its revolutions and the card's are of different units, or the
-        rudder's angle is known in some trials and only its order in others.
+    `given`: Files, or trials as they were read. `card`: Card of the ship. `report_unused`: Whether a notice says that a
+    wind or depth was measured which no effect of the card uses. Raises InputError: A file has an error, the audit finds
+    a fault that it cannot repair, two trials share a name or a record, a trial is of another size without stating its
+    scale, its revolutions and the card's are of different units, or the rudder's angle is known in some trials and only
+    its order in others.
     """
-    trials, notices = [], []
+    trials: list[Trial] = []
+    notices: list[Notice] = []
     audited: dict[str, list[Finding]] = {}
     for item in given:
         trial, findings = audit_and_repair(item if isinstance(item, Trial) else read_trial_file(item))
         path = trial.path
-        for finding in findings:
-            _refuse_open(finding)
+        if wrong := next((finding for finding in findings if finding.open), None):  # not the quantity of its name
+            place = f"column{'s' * (len(wrong.columns) > 1)} {wrong.column}"
+            remedy = f"probably {wrong.likely_truth}: correct the file, or leave the column out"
+            raise InputError(wrong.source, place, wrong.what, remedy)
         audited[path.name] = list(findings)
         if not set(RUDDERS) & set(trial.signals):
             raise InputError(path, "column of the rudder", "has no usable reading", "give the rudder in more rows")
         notices += _unused(trial, card) if report_unused else []
-        notices += _gaps_of_rudder(trial)
+        if empty := int(np.isnan(trial.signals["delta_rad" if "delta_rad" in trial.signals else RUDDERS[1]]).sum()):
+            words = "taken as straight between its readings"
+            notices.append(Notice(f"{path.name}: the rudder is empty in {empty} rows: {words}"))
         scaled, factor = at_size_of(trial, card)
         _refuse_other_revolutions(scaled, card)
         if factor != 1:
@@ -146,33 +128,13 @@ def _of_audit(audited: Mapping[str, Sequence[Finding]]) -> list[Notice]:
     return notices
 
 
-def _refuse_open(finding: Finding) -> None:
-    """Refuse a trial with a column that does not hold the quantity of its name and cannot be repaired."""
-    if finding.open:
-        place = f"column{'s' * (len(finding.columns) > 1)} {finding.column}"
-        remedy = f"probably {finding.likely_truth}: correct the file, or leave the column out"
-        raise InputError(finding.source, place, finding.what, remedy)
-
-
-def _unused(trial: Trial, card: ManoeuvringCard) -> list[Notice]:
+def _unused(trial: Trial, card: ManoeuvringCard) -> Iterator[Notice]:
     """Notices of the signals of a trial that are not used."""
-    notices = []
     for name, effect in EFFECTS.items():
         signals = set(effect.measured_as.values())
         if signals and signals <= set(trial.signals) and all(entry.name != name for entry in card.effects):
-            notices.append(
-                Notice(f"{trial.path.name}: {name} was measured, and the card has no effect {name!r} that would use it")
-            )
-    return notices
-
-
-def _gaps_of_rudder(trial: Trial) -> list[Notice]:
-    """A notice of rows without a rudder."""
-    rudder = trial.signals.get("delta_rad", trial.signals.get("delta_order_rad"))
-    empty = 0 if rudder is None else int(np.isnan(rudder).sum())
-    if not empty:
-        return []
-    return [Notice(f"{trial.path.name}: the rudder is empty in {empty} rows: taken as straight between its readings")]
+            text = f"{trial.path.name}: {name} was measured, and the card has no effect {name!r} that would use it"
+            yield Notice(text)
 
 
 def _refuse_other_revolutions(trial: Trial, card: ManoeuvringCard) -> None:
@@ -195,38 +157,27 @@ def at_size_of(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
     """The trial at the size of the card's ship, and the factor on its lengths.
 
     A trial that states its scale may hold numbers of the model or of the ship, and the card may be of either: the
-    factor is the scale, one over it, or 1, whichever brings the approach speed nearest to the card's.
-
-    Raises
-    ------
-    InputError
-        No factor brings it near.
+    factor is the scale, one over it, or 1, whichever brings its stated length, else the approach speed, nearest to the
+    card's. Raises InputError: No factor brings it near.
     """
+    speed, scale = approach_speed(trial), trial.scale or 1.0
     if trial.length_m is not None:
-        return _at_length(trial, card)
-    speed = approach_speed(trial)
-    candidates = [1.0] if trial.scale is None else [1.0, trial.scale, 1 / trial.scale]
-    if speed is None:
+        ratio = card.ship.length_m / trial.length_m
+    elif speed is None:
         return trial, 1.0
-    if speed == 0:
+    elif speed == 0:
         raise InputError(trial.path, "", "the ship does not move in it", "leave it out: it holds no motion")
-    distances = [abs(math.log(speed * math.sqrt(factor) / card.model.speed_mps)) for factor in candidates]
-    factor = candidates[int(np.argmin(distances))]
-    if min(distances) > math.log(FARTHEST_FROUDE) and trial.scale is None:
+    else:
+        ratio = (card.model.speed_mps / speed) ** 2
+    factor = min((1.0, scale, 1 / scale), key=lambda candidate: abs(math.log(ratio / candidate)))
+    off = abs(math.log(ratio / factor))
+    if trial.length_m is not None and off > SAME_LENGTH:
+        problem = f"is of a ship or model of {trial.length_m:g} m, and the card of one of {card.ship.length_m:g} m"
+        raise InputError(trial.path, "", problem, f"neither is the other at 1:{scale:g}; give the card of that ship")
+    if trial.length_m is None and trial.scale is None and off > 2 * math.log(FARTHEST_FROUDE):
         problem = f"reaches {speed:.3g} m/s, and the card is of {card.model.speed_mps:.3g} m/s"
         remedy = "if one of the two is a model, add the comment '# scale: LAMBDA' (ship length over model length)"
         raise InputError(trial.path, "", problem, remedy)
-    return (trial if factor == 1 else froude_scaled(trial, factor)), factor
-
-
-def _at_length(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
-    """The same for a trial with a stated length of the ship or model: it must be that of the card or its model."""
-    assert trial.length_m is not None
-    ratio, scale = card.ship.length_m / trial.length_m, trial.scale or 1.0
-    factor = min((1.0, scale, 1 / scale), key=lambda candidate: abs(math.log(ratio / candidate)))
-    if abs(math.log(ratio / factor)) > SAME_LENGTH:
-        problem = f"is of a ship or model of {trial.length_m:g} m, and the card of one of {card.ship.length_m:g} m"
-        raise InputError(trial.path, "", problem, f"neither is the other at 1:{scale:g}; give the card of that ship")
     return (trial if factor == 1 else froude_scaled(trial, factor)), factor
 
 

@@ -44,31 +44,17 @@ LONGEST_GAP = 3
 
 @dataclass(frozen=True, eq=False)
 class SampledRun:
-    """One trial on equal steps.
+    """One trial on equal steps."""
 
-    Parameters
-    ----------
-    name : str
-        Name of the trial.
-    begin_s, step_s : float
-        Time of the first instant in the trial's own time, and the step, s.
-    inputs : array (n, nu)
-        Mean of each of the model's inputs from an instant to the next; the last row repeats the previous row.
-    measured : array (n, ny)
-        In the order of `seen`; nan where not measured.
-    seen : tuple of str
-        Names of the model's variables that are measured.
-    file : str
-        The trial's file, for messages; empty if it has none.
-    """
-
-    name: str
+    name: str  # Name of the trial
+    # `begin_s`, `step_s`: Time of the first instant in the trial's own time, and the step, s
     begin_s: float
     step_s: float
+    # (n, nu): Mean of each of the model's inputs from an instant to the next; the last row repeats the previous row
     inputs: Array
-    measured: Array
-    seen: tuple[str, ...]
-    file: str = ""
+    measured: Array  # (n, ny): In the order of `seen`; nan where not measured
+    seen: tuple[str, ...]  # Names of the model's variables that are measured
+    file: str = ""  # The trial's file, for messages; empty if it has none
 
     @property
     def origin(self) -> str:
@@ -88,11 +74,8 @@ class SampledRun:
 
     def part(self, begin: int, end: int) -> SampledRun:
         """The instants `begin` to `end` - 1."""
-        where = slice(begin, end)
-        begin_s = self.begin_s + begin * self.step_s
-        return SampledRun(
-            self.name, begin_s, self.step_s, self.inputs[where], self.measured[where], self.seen, self.file
-        )
+        inputs, measured = self.inputs[begin:end], self.measured[begin:end]
+        return replace(self, begin_s=self.begin_s + begin * self.step_s, inputs=inputs, measured=measured)
 
 
 def prepare(
@@ -105,7 +88,7 @@ def prepare(
     rudder: tuple[Array, Array] | None = None,
 ) -> SampledRun:
     """A trial on equal steps, for a model driven by the trial's rudder signal
-    (:func:`.problem_from_card.driven_model`).
+    (:func:`.estimation_problem.driven_model`).
 
     The step is a whole number of sampling steps near `step_s` (by default 1.5 times the model's own), or a whole part
     of one where `step_s` is shorter. Signals are averaged over a step, so that no measurement is lost. A rudder order
@@ -113,10 +96,7 @@ def prepare(
     With `orders_before` an order was given before the first row that shows it (:attr:`.MotionRecord.given_s`).
     `rudder` are times and angles of the rudder that take the place of the trial's (:class:`.sampled_runs`).
 
-    Raises
-    ------
-    InputError
-        The trial has fewer than ten steps, or none of the signals in `seen`.
+    Raises InputError: The trial has fewer than ten steps, or none of the signals in `seen`.
     """
     record = motion_record(model, trial, seen)
     sampling = float(np.median(np.diff(trial.time_s)))
@@ -162,12 +142,13 @@ def in_range(run: SampledRun, model: Model, speeds: tuple[float, float], least_s
 
     Speed is its mean over half of L/u0, because single readings jump. Without a measured speed the run is kept.
     """
-    speed = _speed(run)
+    columns = [run.column(name) for name in ("motion.u", "motion.u_ground", "motion.sog")]
+    speed = next((column for column in columns if np.count_nonzero(~np.isnan(column)) > 1), None)
     if speed is None:
         return (run,)
     p = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
     width = max(1, round(0.5 * p["ship.length"] / p["ship.speed"] / run.step_s))
-    smooth = uniform_filter1d(speed, width)
+    smooth = uniform_filter1d(straight_over_gaps(run.times, speed), width)
     inside = (smooth >= speeds[0]) & (smooth <= speeds[1])
     edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
     pairs = [(begin, end) for begin, end in zip(edges[::2], edges[1::2], strict=True) if end - begin > 1]
@@ -175,15 +156,6 @@ def in_range(run: SampledRun, model: Model, speeds: tuple[float, float], least_s
     if len(parts) == 1 and len(parts[0].measured) == len(run.measured):
         return (run,)
     return tuple(replace(part, name=f"{run.name} at {part.begin_s:.0f} s") for part in parts)
-
-
-def _speed(run: SampledRun) -> Array | None:
-    for name in ("motion.u", "motion.u_ground", "motion.sog"):
-        speed = run.column(name)
-        known = ~np.isnan(speed)
-        if np.count_nonzero(known) > 1:
-            return np.interp(run.times, run.times[known], speed[known])
-    return None
 
 
 def seen_in(model: Model, trials: Sequence[Trial]) -> tuple[str, ...]:
@@ -208,15 +180,12 @@ def _averaged(time: Array, values: Array, grid: Array, step: float, stride: int)
     mean: Array = interpolated.reshape(len(grid), stride).mean(axis=1)
     if signal_step > _SLOWER * step:
         nearest = np.rint((time[known] - grid[0]) / step).astype(int)
-        rare = np.ones(len(grid), dtype=bool)
-        rare[nearest[(nearest >= 0) & (nearest < len(grid))]] = False
-        mean[rare] = np.nan
+        mean[~np.isin(np.arange(len(grid)), nearest)] = np.nan
     return mean
 
 
 _PARTS_OF_LAG = 4.0
 """Steps in a time constant of the gear: Runge and Kutta's error is then below 1e-4 of a movement (project choice)."""
-
 
 _LONGEST_GAP = 20.0
 """Rows that may be missing between two, over which the gear is still followed in such steps (project choice)."""
@@ -224,21 +193,11 @@ _LONGEST_GAP = 20.0
 
 @dataclass(frozen=True, eq=False)
 class OrderedRudder:
-    """A steering gear alone.
+    """A steering gear alone."""
 
-    Parameters
-    ----------
-    chain : Chain
-        Angle (rad) after a step, from the angle before, and the order (rad) and length of the step (s).
-    lag_s : float
-        Time constant of the gear.
-    ship_time : float
-        L/u0, s.
-    """
-
-    chain: Chain
-    lag_s: float
-    ship_time: float
+    chain: Chain  # Angle (rad) after a step, from the angle before, and the order (rad) and length of the step (s)
+    lag_s: float  # Time constant of the gear
+    ship_time: float  # L/u0, s
 
     def angle(self, trial: Trial) -> tuple[Array, Array]:
         """Times (m,), s, and angle (m,), rad, of a trial's rudder by its orders.

@@ -39,6 +39,8 @@ SHARE_OF_ASYMMETRY = 0.02
 CUBIC_HULL = {force: tuple(f"{force}{powers}" for powers in ("vvv", "vvr", "vrr", "rrr")) for force in "YN"}
 ASYMMETRY = ("Y0", "N0", "Y0u", "N0u")
 TURNING = ("Xvv", "Xvr", "Xrr", "Xdd")
+_LINEAR = tuple(name for force in "XYN" for name in LINEAR_TERMS[force])
+_THIRD_ORDER = (*CUBIC_HULL["Y"], *CUBIC_HULL["N"], *ASYMMETRY, *TURNING)
 
 _LOADED_RUDDER = {"loading": (0.6, 0.15), "straightening": (0.55, 0.2), "lever": (-0.71, 0.3)}
 """Value and standard error before the trials. Values: the KVLCC2 of Yasukawa and Yoshimura (2015): its rudder's inflow
@@ -71,15 +73,6 @@ class ModelStructure:
     start: Callable[[ManoeuvringCard], ManoeuvringCard]
 
 
-def _linear(card: ManoeuvringCard) -> ManoeuvringCard:
-    wanted = [name for force in "XYN" for name in LINEAR_TERMS[force]]
-    return linear_card(with_terms(card, wanted))
-
-
-def _third_order(card: ManoeuvringCard) -> ManoeuvringCard:
-    return with_terms(card, [*CUBIC_HULL["Y"], *CUBIC_HULL["N"], *ASYMMETRY, *TURNING])
-
-
 def _cross_flow(card: ManoeuvringCard) -> ManoeuvringCard:
     """Linear hull with cross-flow drag in place of its cubic terms, and the rudder in the slipstream."""
     replaced = {
@@ -99,10 +92,10 @@ def _cross_flow(card: ManoeuvringCard) -> ManoeuvringCard:
 STRUCTURES: Registry[ModelStructure] = Registry(
     "tank2sim.structures",
     (
-        ModelStructure("linear", STRUCTURE_WORDS["linear"], _linear),
+        ModelStructure("linear", STRUCTURE_WORDS["linear"], lambda card: linear_card(with_terms(card, _LINEAR))),
         ModelStructure("card", STRUCTURE_WORDS["card"], lambda card: card),
         ModelStructure("cross_flow", STRUCTURE_WORDS["cross_flow"], _cross_flow),
-        ModelStructure("third_order", STRUCTURE_WORDS["third_order"], _third_order),
+        ModelStructure("third_order", STRUCTURE_WORDS["third_order"], lambda card: with_terms(card, _THIRD_ORDER)),
     ),
     ModelStructure,
     reserved=(AUTO, AVERAGE, BY_EVIDENCE),
@@ -160,13 +153,8 @@ def prior_of_absent(card: ManoeuvringCard, name: str, share: float = SHARE_OF_LI
 def with_terms(card: ManoeuvringCard, names: Sequence[str], share: float = SHARE_OF_LINEAR) -> ManoeuvringCard:
     """The card with terms: a missing one gets its value before the trials, one of asymmetry at least that error.
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-    names : sequence of str
-        Derivatives, as ``Nvvr``.
-    share : float
-        Standard error of a term that the card lacks, as a share of the linear force in a hard turn.
+    `names`: Derivatives, as ``Nvvr``. `share`: Standard error of a term that the card lacks, as a share of the linear
+    force in a hard turn.
     """
     new: dict[str, tuple[float, float]] = {}
     for name in names:
@@ -191,13 +179,8 @@ def _without(card: ManoeuvringCard, names: set[str]) -> ManoeuvringCard:
 def with_effect(card: ManoeuvringCard, name: str, parameters: Terms) -> ManoeuvringCard:
     """The card with an effect; an effect that it already has does not change.
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-    name : str
-        Name of the effect.
-    parameters : mapping
-        Parameter, as spelt in a card, to value and standard error before the trials.
+    `name`: Name of the effect. `parameters`: Parameter, as spelt in a card, to value and standard error before the
+    trials.
     """
     if any(entry.name == name for entry in card.effects):
         return card

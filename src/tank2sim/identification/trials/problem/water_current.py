@@ -37,21 +37,11 @@ _STRONGEST = next(each.maximum for each in CURRENT.parameters if each.name == "s
 
 @dataclass(frozen=True, eq=False)
 class WaterCurrent:
-    """A current.
+    """A current."""
 
-    Parameters
-    ----------
-    velocity : array (2,)
-        To north and east, m/s.
-    covariance : array (2, 2)
-        Covariance of both.
-    ship_speed_mps : float
-        Speed of the card.
-    """
-
-    velocity: Array
-    covariance: Array
-    ship_speed_mps: float
+    velocity: Array  # (2,): To north and east, m/s
+    covariance: Array  # (2, 2): Covariance of both
+    ship_speed_mps: float  # Speed of the card
 
     @property
     def speed_mps(self) -> float:
@@ -125,6 +115,7 @@ def with_current(problem: Problem) -> Problem:
         prior_mean=np.append(problem.prior_mean, [0.0, 0.0]),
         prior_error=np.append(problem.prior_error, [CURRENT_ERROR, CURRENT_ERROR]),
         prior_inverse=inverse,
+        ship=None,
     )
 
 
@@ -136,11 +127,7 @@ def current_alone(problem: Problem) -> Problem:
 def without_current(estimate: Estimate, card: ManoeuvringCard) -> tuple[Estimate, WaterCurrent]:
     """An estimate with a free current as that of the other parameters (current eliminated), and the current.
 
-    Parameters
-    ----------
-    estimate : Estimate
-    card : ManoeuvringCard
-        Card of the problem; its current is added.
+    `card`: Card of the problem; its current is added.
     """
     part = [estimate.free.index(name) for name in CURRENT_PARAMETERS]
     kept = [place for place in range(len(estimate.free)) if place not in part]
@@ -163,12 +150,10 @@ def without_current(estimate: Estimate, card: ManoeuvringCard) -> tuple[Estimate
 
 def current_of(card: ManoeuvringCard) -> Array:
     """Velocity of the current of a card to north and east (2,), m/s; 0 without one."""
-    for entry in card.effects:
-        if entry.name == CURRENT.name:
-            given = entry.parameters
-            speed, direction = given["speed_mps"], given["direction_rad"]
-            return speed * np.array([math.cos(direction), math.sin(direction)])
-    return np.zeros(2)
+    still = {"speed_mps": 0.0, "direction_rad": 0.0}
+    given = next((entry.parameters for entry in card.effects if entry.name == CURRENT.name), still)
+    direction = given["direction_rad"]
+    return given["speed_mps"] * np.array([math.cos(direction), math.sin(direction)])
 
 
 def card_in(card: ManoeuvringCard, current: WaterCurrent) -> ManoeuvringCard:
