@@ -39,20 +39,23 @@ engine_untouched = true
 [form]
 ship_type = "dry cargo"
 """
-APPROACH_S = 150.0
+APPROACH_S, REVERSALS = 150.0, 5
 
 
 def orders(kind: str, side: float, ship: t2s.Ship, neutral_deg: float) -> tuple[dict[str, list[float]], float]:
-    """Orders of the rudder over time, and the duration: the approach, then the manoeuvre of the ship itself."""
-    times, rudders = [0.0, APPROACH_S], [neutral_deg, 35.0 * side]
+    """Orders of the rudder over time, and the duration: the approach, then a turn, or a zigzag of five reversals."""
+    angle = 35.0 if kind == "turn" else float(kind)
+    given = {"t_s": [0.0, APPROACH_S], "delta_order_deg": [neutral_deg, angle * side]}
     if kind == "turn":
-        return {"t_s": times, "delta_order_deg": rudders}, APPROACH_S + 1000.0
-    angle = float(kind)
-    figures = ship.zigzag(side * angle, angle).figures
-    executes = [value for name, value in figures.items() if name.startswith("execute_time_")]
-    times += [APPROACH_S + time for time in executes]
-    rudders = [neutral_deg, *(side * angle * (-1) ** number for number in range(len(executes) + 1))]
-    return {"t_s": times, "delta_order_deg": rudders}, APPROACH_S + executes[-1] + 60.0
+        return given, APPROACH_S + 1000.0
+    for _ in range(REVERSALS):
+        run = ship.steer(given, duration_s=given["t_s"][-1] + 100.0).df
+        course_deg = np.interp(APPROACH_S, run["t_s"], run["psi_deg"])
+        swung = np.sign(given["delta_order_deg"][-1]) * (run["psi_deg"] - course_deg)
+        reached = run["t_s"][(run["t_s"] > given["t_s"][-1]) & (swung >= angle)]
+        given["t_s"].append(float(reached.iloc[0]))
+        given["delta_order_deg"].append(-given["delta_order_deg"][-1])
+    return given, given["t_s"][-1] + 60.0
 
 
 def main(folder: Path) -> None:

@@ -192,12 +192,13 @@ def _zigzag(run: Trajectory, zigzag: Zigzag, length: float) -> Figures:
     ]
     returns = run.crossings("motion.psi", "motion.r", course)
     returns = returns[returns > executes[0]] if len(executes) else returns[:0]
-    distance = math.hypot(*execute.place(float(executes[0]))) if len(executes) else None
+    arrival = _first_heading(run, zigzag, executes, course) if len(executes) else None
+    distance = None if arrival is None else math.hypot(*execute.place(arrival))
     return {
         "overshoots_deg": overshoots,
         "overshoot_times_s": [float(peak - time) for peak, time in zip(peaks, executes, strict=False)],
         "execute_times_s": [float(time) for time in executes],
-        "initial_turning_time_s": _first(executes),
+        "initial_turning_time_s": arrival,
         "initial_turning_distance_m": distance,
         "initial_turning_lengths": distance and distance / length,
         "reach_s": _first(returns),
@@ -205,6 +206,16 @@ def _zigzag(run: Trajectory, zigzag: Zigzag, length: float) -> Figures:
         "speed_loss_percent": _speed_loss(run, float(run["motion.speed"].min())),
         **_largest_heel(run),
     }
+
+
+def _first_heading(run: Trajectory, zigzag: Zigzag, executes: Array, course: float) -> float:
+    """Time at which a zigzag's first heading is reached, s: its first reversal, unless that came early or late."""
+    if zigzag.lag_s or zigzag.course is not None:
+        heading = course + math.copysign(zigzag.heading, zigzag.rudder)
+        reached = run.crossings("motion.psi", "motion.r", heading)
+        if len(reached):
+            return float(reached[0])
+    return float(executes[0])
 
 
 def _pull_out(run: Trajectory, rudder: float) -> Figures:

@@ -106,12 +106,12 @@ def sheet_data(
 
     check_orders(orders)
     loaded = ship.manoeuvring()
-    first, second = replace(bridge_of(loaded, orders), basis=basis), None
+    first, second = bridge_of(loaded, orders, basis), None
     notices: tuple[Notice, ...] = ()
     if ballast is not None:
         light = as_vessel(ballast).manoeuvring()
         notices = _check_ballast(loaded, light)
-        second = replace(bridge_of(light, orders), basis=ballast_basis)
+        second = bridge_of(light, orders, ballast_basis)
     text = "the card has no [propulsion]: stops and speeds by revolutions are blank"
     missing = () if loaded.propulsion else (Notice(text),)
     said = dict.fromkeys((*notices, *first.notices, *(second.notices if second else ()), *missing))

@@ -10,21 +10,25 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import casadi as ca
 import numpy as np
 from scipy.optimize import brentq
 
 from tank2sim.analysis.linearisation import straight_course
 from tank2sim.analysis.stability.imo import TRIAL_RUDDER
 from tank2sim.analysis.validation.ship_track import ShipTrack, TrackMark, TrackStudy, circle_track, stop_track
-from tank2sim.analysis.validation.standard_trials import TrialShip, ship_of
+from tank2sim.analysis.validation.standard_trials import TrialShip
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.examination import doubts
+from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.effects.depth import LARGEST_DEPTH_FROUDE, barrass_squat, icorels_squat
 from tank2sim.dynamics.effects.loading import mean_draught
+from tank2sim.dynamics.hull import VALIDITY_FACTOR
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.notices import Notice
 from tank2sim.simulation.card_range import NOTHING_READ, CardRangeReading
+from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import COASTING_END, FULL_ASTERN, Stop, Turn, Zigzag
 from tank2sim.simulation.run import Run
 
@@ -97,11 +101,15 @@ class Squat:
 
 @dataclass(frozen=True)
 class DataBasis:
-    """Where the data of a loading condition are from: draughts (m), and words for "Trial / estimated"."""
+    """Where the data of a loading condition are from: draughts (m), and words for "Trial / estimated".
+
+    A trial has shown the effects `checked` to hold in this condition, whatever their ``validity`` says.
+    """
 
     forward_m: float
     aft_m: float
     words: str
+    checked: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,7 +209,9 @@ class BridgeStudy:
     ballast: BridgeStudy | None = None
 
 
-def bridge_of(card: ManoeuvringCard, orders: Mapping[str, float] | None = None) -> Bridge:
+def bridge_of(
+    card: ManoeuvringCard, orders: Mapping[str, float] | None = None, basis: DataBasis | None = None
+) -> Bridge:
     """Run the manoeuvres of the bridge data.
 
     Parameters
@@ -209,6 +219,8 @@ def bridge_of(card: ManoeuvringCard, orders: Mapping[str, float] | None = None) 
     card : ManoeuvringCard
     orders : mapping, optional
         Order of the telegraph to its revolutions, rpm; by default shares of the nominal ones, without names.
+    basis : DataBasis, optional
+        Where the data are from.
 
     Raises
     ------
@@ -216,7 +228,7 @@ def bridge_of(card: ManoeuvringCard, orders: Mapping[str, float] | None = None) 
         The revolutions of an order are beyond :data:`_LARGEST_SHARE` of the nominal ones.
     """
     _check_orders(card, orders or {})
-    ship = ship_of(card)
+    ship = _checked_ship(card, basis.checked if basis else ())
     depths = _depths(ship)
     rudder = _rudder(card)
     circles, circle_notes = _circles(ship, rudder, depths)
@@ -237,8 +249,18 @@ def bridge_of(card: ManoeuvringCard, orders: Mapping[str, float] | None = None) 
         hard_over_s=2 * largest / rate if largest and rate else None,
         neutral_deg=_neutral(ship),
         squat=squat_of(card),
+        basis=basis,
         notices=tuple(dict.fromkeys((*doubts(card), *circle_notes, *troubles))),
     )
+
+
+def _checked_ship(card: ManoeuvringCard, checked: Sequence[str]) -> TrialShip:
+    """The ship ready to run, its range without the limits of effects that a trial has shown to hold."""
+    model = build(card)
+    for name in (f"{VALIDITY_FACTOR}{effect}" for effect in checked):
+        if name in model.outputs:
+            model = model.redefine(name, lambda _: ca.SX(1.0))
+    return TrialShip(card, model, Integrator(model))
 
 
 def squat_of(card: ManoeuvringCard) -> tuple[Squat, ...]:

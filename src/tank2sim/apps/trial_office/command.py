@@ -92,6 +92,7 @@ def trial_office(
     given = TrialNotes() if notes is None else read_notes(notes)
     given = notes_with(
         given,
+        "trials" if notes is None else notes,
         draught_fore_m=draught_fore_m,
         draught_aft_m=draught_aft_m,
         full_load_draught_m=full_load_draught_m,

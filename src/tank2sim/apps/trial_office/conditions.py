@@ -11,7 +11,7 @@ import numpy as np
 
 from tank2sim.apps.trial_office.notes import TrialNotes
 from tank2sim.apps.trial_office.tried import Tried
-from tank2sim.simulation.manoeuvres import Stop, Turn
+from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag
 from tank2sim.simulation.recorded import straight_over_gaps
 
 DEPTH_OVER_DRAUGHT = 4.0
@@ -64,6 +64,8 @@ class TrialState:
         The trim is by the stern.
     length_m : float
     largest_rudder_rad : float
+    draughts_recorded : bool
+        False where the draughts of the trial are not known: they are then taken to be those of the card.
     wind_speed_mps, wind_from_rad : float or None
         By the records, else by the notes.
     """
@@ -73,6 +75,7 @@ class TrialState:
     full_load_draught_m: float
     length_m: float
     largest_rudder_rad: float
+    draughts_recorded: bool
     wind_speed_mps: float | None
     wind_from_rad: float | None
 
@@ -91,7 +94,7 @@ def trial_conditions(state: TrialState, notes: TrialNotes, trials: Sequence[Trie
     state : TrialState
     notes : TrialNotes
     trials : sequence of Tried
-        As run.
+        Without the current: the test speed is a speed through the water.
     """
     turns = [one for one in trials if isinstance(one.manoeuvre, Turn) and one.record is not None]
     speeds = [one.speed_mps for one in trials if one.trial is not None]
@@ -99,11 +102,15 @@ def trial_conditions(state: TrialState, notes: TrialNotes, trials: Sequence[Trie
     stated = notes.speed_85_mcr_mps
     test = stated and slowest and slowest / stated
     depth = notes.depth_m and notes.depth_m / state.draught_m
-    turned = min((one.drift.turned_deg if one.drift else 0.0 for one in turns), default=None)
+    turned = min((angle for one in turns if (angle := one.turned_deg) is not None), default=None)
     rudder = min((abs(one.manoeuvre.rudder) for one in turns if not isinstance(one.manoeuvre, Stop)), default=None)
-    kinds = {type(one.manoeuvre) for one in trials} - {Stop}
-    both = [{one.side for one in trials if type(one.manoeuvre) is kind} == {"port", "starboard"} for kind in kinds]
-    away = state.draught_m / state.full_load_draught_m - 1
+    sides: dict[tuple[int, ...], set[str]] = {}
+    for one in trials:
+        if not isinstance(one.manoeuvre, Stop):
+            sides.setdefault(_to_five_degrees(one.manoeuvre), set()).add(one.side)
+    both = all(len(each) == 2 for each in sides.values()) if sides else None
+    away, trim = state.draught_m / state.full_load_draught_m - 1, state.trim_m
+    shown = (100 * away, trim) if state.draughts_recorded else (None, None)
     circular, standards, iso = "MSC/Circ.1053", "MSC.137(76)", "ISO 13643-2"
     approaches = [_approach(one) for one in trials]
     known = [one for one in approaches if one is not None]
@@ -121,9 +128,9 @@ def trial_conditions(state: TrialState, notes: TrialNotes, trials: Sequence[Trie
         _judged("sea state", f"up to sea state {HIGHEST_SEA_STATE}", notes.sea_state, "sea state {:d}", circular).when(
             notes.sea_state is not None and notes.sea_state <= HIGHEST_SEA_STATE
         ),
-        _judged("draught", "full load within 5 %", 100 * away, "{:+.1f} %", circular).when(abs(away) <= DRAUGHT_SHARE),
-        _judged("trim by the stern", "even keel", state.trim_m, "{:+.2f} m", standards).when(
-            abs(state.trim_m) <= DRAUGHT_SHARE * state.draught_m
+        _judged("draught", "full load within 5 %", shown[0], "{:+.1f} %", circular).when(abs(away) <= DRAUGHT_SHARE),
+        _judged("trim by the stern", "even keel", shown[1], "{:+.2f} m", standards).when(
+            abs(trim) <= DRAUGHT_SHARE * state.draught_m
         ),
         _judged("test speed", "at least 90 % of that at 85 % MCR", test and 100 * test, "{:.0f} %", standards).when(
             bool(test and test >= TEST_SPEED_SHARE)
@@ -137,9 +144,7 @@ def trial_conditions(state: TrialState, notes: TrialNotes, trials: Sequence[Trie
         _judged(
             "rudder of the turns", "35 deg, or the largest", rudder and math.degrees(rudder), "{:.1f} deg", standards
         ).when(bool(rudder and rudder >= _RUDDER_SHARE * state.largest_rudder_rad)),
-        _judged(
-            "both sides", "each manoeuvre to port and starboard", all(both) if both else None, "{}", standards
-        ).when(bool(both) and all(both)),
+        _judged("both sides", "each manoeuvre to port and starboard", both, "{}", standards).when(bool(both)),
         _judged("engine", "its setting left alone", notes.engine_untouched, "{}", iso).when(
             bool(notes.engine_untouched)
         ),
@@ -164,6 +169,12 @@ class _judged:
             words = {True: "yes", False: "no"}.get(self.value) if isinstance(self.value, bool) else None
             found, verdict = words or self.form.format(self.value), Met.MET if met else Met.NOT_MET
         return TrialCondition(name=self.name, required=self.required, found=found, met=verdict, source=self.source)
+
+
+def _to_five_degrees(manoeuvre: Turn | Zigzag) -> tuple[int, ...]:
+    """Rudder and heading of a manoeuvre without its side, in steps of 5 deg."""
+    angles = (manoeuvre.rudder,) if isinstance(manoeuvre, Turn) else (manoeuvre.rudder, manoeuvre.heading)
+    return tuple(round(abs(math.degrees(angle)) / 5) for angle in angles)
 
 
 def _approach(one: Tried) -> float | None:

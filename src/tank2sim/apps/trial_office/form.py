@@ -56,7 +56,7 @@ def form_boxes(study: TrialOffice) -> tuple[Box, ...]:
         "Propeller type": words.propeller_type,
         "Number of propellers": words.propellers,
         "Engine type": words.engine_type,
-        "Trim, m by the stern": state.trim_m,
+        "Trim, m by the stern": state.trim_m if study.tested_at_full_load else 0.0,
         "Ballast condition": words.ballast_condition,
     }
     depth = study.depth_m and study.depth_m / state.draught_m
@@ -66,13 +66,13 @@ def form_boxes(study: TrialOffice) -> tuple[Box, ...]:
         "Wind: Beaufort number": None if wind is None else sum(wind >= least for least in BEAUFORT),
         "Wave: sea state": study.sea_state,
     }
-    tested = study.tested_at_full_load
+    ticks: tuple[str | None, str | None] = ("[x]", "[ ]") if study.tested_at_full_load else ("[ ]", "[x]")
+    if not state.draughts_recorded:
+        ticks = None, None
+    loadings = "Tested at full load", "Tested at partial load and corrected"
     condition = Box(
         "Manoeuvring data: loading condition",
-        (
-            Row("Tested at full load", ("[x]" if tested else "[ ]",)),
-            Row("Tested at partial load and corrected", ("[ ]" if tested else "[x]",)),
-        ),
+        tuple(Row(label, (tick,)) for label, tick in zip(loadings, ticks, strict=True)),
     )
     data = Box("Manoeuvring data", tuple(_data_rows(study)), ("PORT", "STBD", "Criterion"))
     return (
@@ -114,14 +114,24 @@ def _data_rows(study: TrialOffice) -> list[Row]:
 
 def _remarks(study: TrialOffice) -> list[Row]:
     """What the form has no row for: current, wind, correction, and uncertainty."""
-    rows = []
+    rows, state = [], study.state
+    if state.draughts_recorded:
+        half_trim = state.trim_m / 2
+        fore, aft = (format_number(state.draught_m + part, 4) for part in (-half_trim, half_trim))
+        rows.append(Row("Draughts of the trial", (f"{fore} m forward, {aft} m aft",)))
+    if study.conditions_not_met:
+        rows.append(Row("Conditions not met", (study.conditions_not_met,)))
     if study.current is not None:
         text = f"{study.current.speed_mps:.2f} m/s towards {study.current.towards_deg:.0f} deg, taken off"
-        rows.append(Row("Current", (text,)))
-    if study.state.wind_speed_mps is not None:
-        rows.append(Row("Wind", (f"{study.state.wind_speed_mps:.1f} m/s, by the model",)))
+        rows.append(Row("Current", (text if study.current.separated else f"{text} with any wind",)))
+    if state.wind_speed_mps is not None and state.wind_from_rad is not None:
+        origin = math.degrees(state.wind_from_rad) % 360
+        rows.append(Row("Wind", (f"{state.wind_speed_mps:.1f} m/s from {origin:.0f} deg, taken off by the model",)))
     if not study.tested_at_full_load:
         rows.append(Row("Correction to full load", ("R = T F/B (MSC/Circ.1053), F and B simulated; annex",)))
+    if study.not_certified:
+        names = "; ".join(one.name for one in study.not_certified)
+        rows.append(Row("Not certified: EXTRAPOLATED to full load", (names,)))
     if not study.applies:
         rows.append(Row("Application", ("L < 100 m: MSC.137(76) does not bind",)))
     return rows

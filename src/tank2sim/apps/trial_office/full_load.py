@@ -14,6 +14,7 @@ from tank2sim.apps.trial_office.tried import Tried, calm_run, simulated
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
+from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
 from tank2sim.dynamics.effects.loading import BY_REGRESSION, LOADING
 from tank2sim.dynamics.effects.particulars import model_particular
 from tank2sim.dynamics.effects.surroundings import WIND
@@ -77,7 +78,8 @@ def tried_ships(card: ManoeuvringCard, state: TrialState, count: int) -> tuple[T
         Integrator(models["full"]),
         tuple(both(*numbered) for numbered in enumerate(drawn)),
     )
-    return ships, list(messages)
+    assumed = joint_errors(card, card_parameters(card, study_model(card))).in_words if count else []
+    return ships, [*messages, *assumed]
 
 
 def _with_formula_errors(values: Mapping[str, float], model: Model, errors: Array, change: float) -> dict[str, float]:

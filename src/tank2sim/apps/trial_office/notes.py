@@ -95,22 +95,30 @@ def read_notes(path: str | Path) -> TrialNotes:
     return _checked(parsed_toml(read_text(Path(path)), path), path)
 
 
-def notes_with(notes: TrialNotes, **options: object) -> TrialNotes:
+def notes_with(notes: TrialNotes, source: str | Path, **options: object) -> TrialNotes:
     """Return notes with the options that are given (not None) in place of theirs.
 
     Parameters
     ----------
     notes : TrialNotes
+    source : str or path
+        Where the notes are from.
     **options
         Values by the names of fields.
 
     Raises
     ------
     InputError
-        One is out of its bounds, or contradicts the notes.
+        One is out of its bounds, or one of a pair is known without the other.
     """
     given = {name: value for name, value in options.items() if value is not None}
-    return _checked({**notes.model_dump(exclude_unset=True), **given}, "trials")
+    together = _checked({**notes.model_dump(exclude_unset=True), **given}, "trials")
+    for pair in _PAIRS:
+        for one, other in (pair, pair[::-1]):
+            if getattr(together, one) is not None and getattr(together, other) is None:
+                where = "trials" if one in given else source
+                raise InputError(where, other, f"is missing next to {one}", "give both, or neither")
+    return together
 
 
 def _checked(content: dict[str, Any], source: str | Path) -> TrialNotes:
@@ -118,10 +126,6 @@ def _checked(content: dict[str, Any], source: str | Path) -> TrialNotes:
         notes = TrialNotes.model_validate(content)
     except ValidationError as fault:
         raise form_fault(fault, source, {}, form=TrialNotes, what="notes of a trial") from None
-    for given, missing in _PAIRS:
-        for one, other in ((given, missing), (missing, given)):
-            if getattr(notes, one) is not None and getattr(notes, other) is None:
-                raise InputError(source, other, f"is missing next to {one}", "give both, or neither")
     for words in notes.figures:
         try:
             known = isinstance(parse_manoeuvre(words), Turn | Zigzag | Stop)
@@ -130,9 +134,12 @@ def _checked(content: dict[str, Any], source: str | Path) -> TrialNotes:
         if not known:
             remedy = "give turn:35, zigzag:10/10 or stop, with - before the rudder for port"
             raise InputError(source, f"figures.{words}", "is not a turn, a zigzag or a stop", remedy)
-        for name in notes.figures[words]:
+        for name, value in notes.figures[words].items():
+            place = f"figures.{words}.{name}"
             if name not in REPORTED:
-                raise InputError(source, f"figures.{words}.{name}", "is not a figure", close_name(name, REPORTED))
+                raise InputError(source, place, "is not a figure", close_name(name, REPORTED))
+            if value <= 0 and name != "side_reach_m" and not (name.startswith("overshoot") and value == 0):
+                raise InputError(source, place, f"is {value:g}", "give a number above 0, for either side")
     return notes
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import unicodedata
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from tank2sim.apps.trial_office.study import TrialOffice
 
 _WIDTH_MM = 180.0
+_PLAIN = dict(zip("–—−‘’“”≤≥…•", ["-", "-", "-", "'", "'", '"', '"', "<=", ">=", "...", "-"], strict=True))
 
 
 def report_pdf(result: Result[TrialOffice]) -> bytes:
@@ -80,6 +82,7 @@ def _section(pdf: FPDF, section: Section) -> None:
         ]
         _table(pdf, one.heads, rows)
     for illustration in section.charts:
+        pdf.ln(1.5)  # the picture is white, and would cover the last line of a table
         pdf.image(io.BytesIO(chart_picture(illustration.chart, ".png")), w=0.8 * _WIDTH_MM)
 
 
@@ -92,18 +95,24 @@ def _heading(pdf: FPDF, text: str, size: float) -> None:
 def _text(pdf: FPDF, text: str) -> None:
     if text:
         pdf.set_font("Helvetica", size=8.5)
-        pdf.multi_cell(0, 4, _latin(text), new_x="LMARGIN", new_y="NEXT")
+        pdf.multi_cell(0, 4, _latin(text), align="L", new_x="LMARGIN", new_y="NEXT")
 
 
 def _table(pdf: FPDF, heads: Sequence[str], rows: Sequence[Sequence[str]], shares: Sequence[float] = ()) -> None:
     pdf.set_font("Helvetica", size=7.5)
     columns = max(len(heads), *(len(row) for row in rows)) if rows else len(heads)
     widths = tuple(shares) or None
-    with pdf.table(width=_WIDTH_MM, col_widths=widths, line_height=4, first_row_as_headings=any(heads)) as drawn:
+    with pdf.table(
+        width=_WIDTH_MM, col_widths=widths, line_height=4, first_row_as_headings=any(heads), text_align="LEFT"
+    ) as drawn:
         for cells in ([heads] if any(heads) else []) + list(rows):
             drawn.row([_latin(cell) for cell in (*cells, *[""] * (columns - len(cells)))])
 
 
 def _latin(text: str) -> str:
-    """The text in the letters of the standard fonts of PDF."""
-    return text.encode("latin-1", "replace").decode("latin-1")
+    """The text in the letters of the standard fonts of PDF: accents that they lack are dropped, others are ?."""
+    plain = (
+        letter if ord(letter) < 256 else unicodedata.normalize("NFKD", _PLAIN.get(letter, letter)) for letter in text
+    )
+    known = (letter for letter in "".join(plain) if not unicodedata.combining(letter))
+    return "".join(known).encode("latin-1", "replace").decode("latin-1")

@@ -10,13 +10,21 @@ from typing import TYPE_CHECKING, ClassVar
 from tank2sim.answer.charts.motion import TrackData, track_chart
 from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.answer.result import Result
-from tank2sim.apps.trial_office.study import TrialOffice
-from tank2sim.apps.trial_office.verdict import CriterionVerdict
+from tank2sim.apps.trial_office.study import CURRENT_CHANGES, TrialOffice
+from tank2sim.apps.trial_office.verdict import LOADING_HOLDS, CriterionVerdict
+from tank2sim.dynamics.effects.loading import LOADING
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
     from tank2sim.apps.bridge.study import DataBasis
     from tank2sim.cards.card import ManoeuvringCard
+
+MODEL_AGREES = 0.8
+"""Share of the figures of the trial that the model follows within its errors, from which the sheets of the bridge may
+use it in that loading condition. Project choice: intervals of 95 % of a right model leave out a few of twenty."""
+
+_LONGEST = 24
+"""Letters of the name of a record in the legend; of a longer one the last, by which records mostly differ."""
 
 _VERDICTS = {"pass": Verdict.PASSED, "fail": Verdict.FAILED}
 
@@ -53,18 +61,20 @@ class TrialOfficeResult(Result[TrialOffice]):
     def headline(self) -> tuple[str, ...]:
         """Verdicts at full load, and the corrections."""
         study = self.study
-        tried = [one for one in study.criteria if one.as_run is not None]
-        passed = sum(one.verdict == "pass" for one in tried)
-        failed = [one for one in tried if one.verdict.startswith("fail")]
-        open_ones = [one for one in tried if one.verdict.startswith("undecided")]
-        lines = [
-            f"At full load in calm water, {passed} of {len(tried)} criteria of MSC.137(76) that were tried are met."
-        ]
+        failed = [one for one in study.tried if one.verdict.startswith("fail")]
+        open_ones = [one for one in study.tried if one.verdict.startswith("undecided")]
+        lines = [self._first_line]
         for words, ones in (("Not met", failed), ("Undecided", open_ones)):
             if ones:
                 lines.append(f"{words}: {'; '.join(_named(one) for one in ones)}.")
+        if study.conditions_not_met:
+            lines.append(f"Conditions not met: {study.conditions_not_met}.")
         if (current := study.current) is not None:
             how = f"separated from the wind {current.separated}" if current.separated else "together with any wind"
+            if any(one.measured.spread_mps is None for one in study.drifts):
+                how += ", by a circle in a moving frame (a turn of less than 540 deg)"
+            if (spread := current.spread_mps or 0.0) > CURRENT_CHANGES:
+                how += f"; it changes during a turn (spread {spread:.3f} m/s)"
             lines.append(f"Current {current.speed_mps:.2f} m/s towards {current.towards_deg:.0f} deg, {how}.")
         known = self._agreements
         if known and not study.tested_at_full_load:
@@ -72,6 +82,21 @@ class TrialOfficeResult(Result[TrialOffice]):
         if not study.applies:
             lines.append("The ship is shorter than 100 m: the standards do not bind it.")
         return tuple(lines)
+
+    @property
+    def _first_line(self) -> str:
+        """How many criteria are met, or that they are not certified."""
+        study = self.study
+        if not study.tried:
+            return "No criterion of MSC.137(76) was tried."
+        if study.not_certified == study.tried:
+            return "No criterion is certified: full load is EXTRAPOLATED from the condition of the trial."
+        passed = sum(one.verdict == "pass" for one in study.tried)
+        share = f"{passed} of {len(study.tried)}"
+        text = f"At full load in calm water, {share} criteria of MSC.137(76) that were tried are met"
+        if study.not_certified:
+            text += f", and {len(study.not_certified)} not certified (EXTRAPOLATED)"
+        return f"{text}."
 
     @property
     def key_figures(self) -> Sequence[KeyFigure]:
@@ -85,8 +110,7 @@ class TrialOfficeResult(Result[TrialOffice]):
                 verdict=_VERDICTS.get(one.verdict, Verdict.CAUTION),
                 note=_chance(one),
             )
-            for one in self.study.criteria
-            if one.as_run is not None
+            for one in self.study.tried
         ]
 
     @property
@@ -123,7 +147,7 @@ class TrialOfficeResult(Result[TrialOffice]):
         heads = ("condition", "required", "found", "met", "source")
         return Section(
             heading="Conditions of the trial",
-            text="A condition that is not met refuses nothing. It belongs in the report.",
+            text="A trial is reported whether or not its conditions were met.",
             tables=[table("Conditions", heads, rows)],
         )
 
@@ -133,9 +157,10 @@ class TrialOfficeResult(Result[TrialOffice]):
         for one in study.drifts:
             spread, residual = one.measured.spread_mps, one.measured.residual_m
             wind = one.by_wind_north_mps, one.by_wind_east_mps
-            rows.append([one.trial, one.measured.north_mps, one.measured.east_mps, spread, residual, *wind])
+            drift = one.measured.north_mps, one.measured.east_mps
+            rows.append([one.trial, one.measured.method, *drift, spread, residual, *wind])
         heads = [
-            *("turn", "north (m/s)", "east (m/s)", "spread (m/s)", "residual of the circle (m)"),
+            *("turn", "method", "north (m/s)", "east (m/s)", "spread (m/s)", "residual of the circle (m)"),
             *("by wind, north (m/s)", "by wind, east (m/s)"),
         ]
         charts = []
@@ -143,10 +168,11 @@ class TrialOfficeResult(Result[TrialOffice]):
             tracks = [
                 data
                 for one in study.tracks
+                for name in [one.trial if len(one.trial) <= _LONGEST else f"…{one.trial[1 - _LONGEST :]}"]
                 for data in (
-                    TrackData(label=f"{one.trial}, as run", x_m=one.x_m, y_m=one.y_m, measured=True),
+                    TrackData(label=f"{name}, as run", x_m=one.x_m, y_m=one.y_m, measured=True),
                     TrackData(
-                        label=f"{one.trial}, without current", x_m=one.x_without_current_m, y_m=one.y_without_current_m
+                        label=f"{name}, without current", x_m=one.x_without_current_m, y_m=one.y_without_current_m
                     ),
                 )
             ]
@@ -253,9 +279,11 @@ class TrialOfficeResult(Result[TrialOffice]):
         checked = f"estimated; {sum(known)} of {len(known)} agree with the trial" if known else "estimated"
         full = checked if self.study.tested_at_full_load else "estimated"
         half_trim = state.trim_m / 2
+        agrees = bool(known) and sum(known) >= MODEL_AGREES * len(known)
+        holds = (LOADING.name,) if agrees and self.study.loading_validity >= LOADING_HOLDS else ()
         return (
             DataBasis(state.full_load_draught_m, state.full_load_draught_m, full),
-            DataBasis(state.draught_m - half_trim, state.draught_m + half_trim, checked),
+            DataBasis(state.draught_m - half_trim, state.draught_m + half_trim, checked, holds),
         )
 
     @property
@@ -268,7 +296,9 @@ def _share(probability: float | None) -> float | None:
 
 
 def _named(one: CriterionVerdict) -> str:
-    return f"{one.name} ({_chance(one)})"
+    """A criterion with its chance, and the reason why it is not certified."""
+    _, _, reason = _chance(one).partition(", ")
+    return f"{one.name} ({reason or 'no figure at full load'})"
 
 
 def _chance(one: CriterionVerdict) -> str:

@@ -15,10 +15,11 @@ from tank2sim.analysis.stability.imo import (
 from tank2sim.analysis.validation.standard_trials import SEED
 from tank2sim.apps.guess.study import OVERSHOOT_ERROR_DEG, TRIAL_ERROR
 from tank2sim.apps.trial_office.conditions import Met, TrialCondition, TrialState, trial_conditions
-from tank2sim.apps.trial_office.drift import CircleDrift, circle_drift
+from tank2sim.apps.trial_office.drift import LEAST_ARC, STEADY_FROM, CircleDrift, circle_drift
 from tank2sim.apps.trial_office.full_load import (
     SMALLEST,
     Prediction,
+    TriedShips,
     loading_validity,
     model_agrees,
     prediction,
@@ -26,7 +27,7 @@ from tank2sim.apps.trial_office.full_load import (
 )
 from tank2sim.apps.trial_office.notes import REPORTED, FormWords, TrialNotes
 from tank2sim.apps.trial_office.tried import Tried, current_removed, tried
-from tank2sim.apps.trial_office.verdict import LOADING_HOLDS, CriterionVerdict, judge_criteria
+from tank2sim.apps.trial_office.verdict import EXTRAPOLATED, LOADING_HOLDS, CriterionVerdict, judge_criteria
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
@@ -34,12 +35,21 @@ from tank2sim.dynamics.effects.particulars import model_particular
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.assessment.model_selection import hard_rudder
+from tank2sim.identification.trials.assessment.other_ship import evidence_of_other_ship
+from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
 from tank2sim.notices import Notice, caution
 from tank2sim.records.signals.statistics import mean_and_deviation
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag, parse_manoeuvre
 from tank2sim.simulation.recorded import repeat, steerable
+
+WIND_SHOWS = 0.04
+"""Half the difference of the drifts of both sides, m/s, from which a wind must have acted; 10 m/s of wind give 0.18 for
+a Mariner. Project choice: above the error of the drift of two turns."""
+
+CURRENT_CHANGES = 0.01
+"""Spread of the pairs of a turn, m/s, from which the first lines say it. Project choice: noise gives 0.004."""
 
 _TRACK_POINTS = 400
 """Points of a track in the JSON."""
@@ -203,6 +213,22 @@ class TrialOffice:
     applies: bool
     notices: tuple[Notice, ...]
 
+    @property
+    def tried(self) -> tuple[CriterionVerdict, ...]:
+        """Criteria of which a trial was made."""
+        return tuple(one for one in self.criteria if one.as_run is not None)
+
+    @property
+    def not_certified(self) -> tuple[CriterionVerdict, ...]:
+        """Criteria that were tried in a loading condition from which full load is extrapolated."""
+        return tuple(one for one in self.tried if one.verdict.endswith(EXTRAPOLATED))
+
+    @property
+    def conditions_not_met(self) -> str:
+        """The conditions that were not met, with the values found."""
+        broken = [one for one in self.conditions if one.met is Met.NOT_MET]
+        return ", ".join(one.name if one.found == "no" else f"{one.name} ({one.found})" for one in broken)
+
 
 def study_trials(
     card: ManoeuvringCard, trials: Sequence[Trial], notes: TrialNotes, count: int
@@ -223,11 +249,8 @@ def study_trials(
         There is nothing to report, or the card lacks something that a loading condition needs.
     """
     plain = build(steerable(card))
-    as_run, messages = _recognised(trials, notes, plain)
-    if not as_run:
-        remedy = "give records of turns, zigzags or stops with heading and positions, or their figures in the notes"
-        raise InputError(trials[0].path if trials else "trials", "", "holds no manoeuvre of a sea trial", remedy)
-    state = _state(card, trials, notes)
+    given, as_run, messages = _manoeuvres(card, trials, notes, plain)
+    state = _state(card, given.trials, notes)
     ships, more = tried_ships(card, state, count)
     winds = [_wind(one, state, ships.tried) for one in as_run]
     drifts = tuple(
@@ -240,10 +263,12 @@ def study_trials(
     predicted = [
         prediction(one, ships, wind, at_full_load=state.at_full_load) for one, wind in zip(still, winds, strict=True)
     ]
-    conditions = trial_conditions(state, notes, as_run)
+    conditions = trial_conditions(state, notes, still)
     validity = 1.0 if state.at_full_load else loading_validity(ships)
     stable = [stability_chance(one, count) for one in (ships.as_tried, ships.full_load)]
     unstable = _of_stability(*stable)
+    messages += _of_other_ship(ships, given)
+    doubts = [*_of_records(given), *messages, *more, *_cautions(state, current, as_run, validity, count), *unstable]
     study = TrialOffice(
         ship=card.ship.name,
         source=card.source,
@@ -266,18 +291,38 @@ def study_trials(
         depth_m=notes.depth_m,
         sea_state=notes.sea_state,
         applies=card.ship.length_m >= SHORTEST_SHIP_M,
-        notices=tuple(dict.fromkeys([*messages, *more, *_cautions(state, current, conditions, validity), *unstable])),
+        notices=tuple(dict.fromkeys(doubts)),
     )
     return study, ships.as_tried, ships.full_load
 
 
-def _recognised(trials: Sequence[Trial], notes: TrialNotes, model: Model) -> tuple[list[Tried], list[Notice]]:
-    """The manoeuvres of records and of notes, and notices on records without one."""
-    found, messages = [], []
+def _manoeuvres(
+    card: ManoeuvringCard, trials: Sequence[Trial], notes: TrialNotes, plain: Model
+) -> tuple[Measured, list[Tried], list[Notice]]:
+    """Audited records at the size of the ship, manoeuvres of these and of the notes, and notices on other records."""
+    given = measured(trials, card, report_unused=False) if trials else Measured((), "angle", ())
+    as_run, unknown = _recognised(given.trials, notes, plain)
+    if not as_run:
+        remedy = "give records of turns, zigzags or stops with heading and positions, or their figures in the notes"
+        problem = ": ".join(["holds no manoeuvre of a sea trial", *list(unknown.values())[:1]])
+        raise InputError(trials[0].path if trials else "trials", "", problem, remedy)
+    messages = [caution(f"left out, for it holds no turn, zigzag or stop: {why}").of(n) for n, why in unknown.items()]
+    return given, as_run, messages
+
+
+def _of_other_ship(ships: TriedShips, given: Measured) -> list[Notice]:
+    """A caution where the records are not of the ship as tried."""
+    evidence = evidence_of_other_ship(ships.as_tried, given) if given.trials else ()
+    return [caution(f"these look like trials of another ship: {'; '.join(evidence)}")] if evidence else []
+
+
+def _recognised(trials: Sequence[Trial], notes: TrialNotes, model: Model) -> tuple[list[Tried], dict[str, str]]:
+    """The manoeuvres of records and of notes, and by name why other records hold none."""
+    found, unknown = [], {}
     for trial in trials:
         one = tried(trial, model)
         if isinstance(one, str):
-            messages.append(Notice(f"no turn, zigzag or stop, for {one}: it is left out").of(trial.name))
+            unknown[trial.name] = one
         else:
             found.append(one)
     speed = float(model.parameter_values()[model.parameter_names.index("ship.speed")])
@@ -289,7 +334,7 @@ def _recognised(trials: Sequence[Trial], notes: TrialNotes, model: Model) -> tup
             for name, value in figures.items()
         }
         found.append(Tried(None, manoeuvre, None, 0.0, speed, dict(figures), errors))
-    return found, messages
+    return found, unknown
 
 
 def _state(card: ManoeuvringCard, trials: Sequence[Trial], notes: TrialNotes) -> TrialState:
@@ -307,6 +352,7 @@ def _state(card: ManoeuvringCard, trials: Sequence[Trial], notes: TrialNotes) ->
         full_load_draught_m=own if notes.full_load_draught_m is None else notes.full_load_draught_m,
         length_m=card.ship.length_m,
         largest_rudder_rad=hard_rudder(card),
+        draughts_recorded=fore is not None and aft is not None,
         wind_speed_mps=speed,
         wind_from_rad=direction,
     )
@@ -499,13 +545,21 @@ def _track(raw: Tried, still: Tried) -> OfficeTrack:
     )
 
 
+def _of_records(given: Measured) -> list[Notice]:
+    """Notices on the records, without a current that the audit suspects: the report finds it itself."""
+    currents = [one.likely_truth for one in given.doubts if one.likely_truth.startswith("a current")]
+    return [notice for notice in given.notices if not any(words in notice for words in currents)]
+
+
 def _cautions(
-    state: TrialState, current: SiteCurrent | None, conditions: Sequence[TrialCondition], validity: float
+    state: TrialState, current: SiteCurrent | None, trials: Sequence[Tried], validity: float, count: int
 ) -> list[Notice]:
     found = []
-    broken = [one.name for one in conditions if one.met is Met.NOT_MET]
-    if broken:
-        found.append(Notice(f"conditions not met: {', '.join(broken)}"))
+    if not state.draughts_recorded:
+        taken = f"the trial is taken to be at the draught of the card, {state.draught_m:.3g} m on even keel"
+        found.append(caution(f"DRAUGHTS ARE NOT RECORDED: {taken}; give draught_fore_m and draught_aft_m"))
+    if not count and not state.at_full_load:
+        found.append(caution("without members, intervals and probabilities hold the errors of reading alone"))
     if current is not None and not current.separated:
         found.append(
             caution(
@@ -513,8 +567,21 @@ def _cautions(
                 "taken off holds both"
             )
         )
-    if current is None:
-        found.append(Notice("no turn is long enough to show a current: none is taken off"))
+    if (
+        current is not None
+        and (apart := current.wind_share_mps or 0.0) > WIND_SHOWS
+        and "model" not in current.separated
+    ):
+        found.append(
+            caution(
+                f"WIND IS NOT TAKEN OFF: turns to port and starboard drift apart by {2 * apart:.2f} m/s, which a wind "
+                "does that nobody recorded; figures hold its effect: give wind_speed_mps and wind_from_deg"
+            )
+        )
+    if current is None and any(one.trial is not None for one in trials):
+        least = math.degrees(STEADY_FROM + LEAST_ARC)
+        reason = f"no record is of a turn of {least:.0f} deg or more, which would show it"
+        found.append(caution(f"NO CURRENT IS TAKEN OFF: {reason}; figures hold any current and wind of the trial"))
     if validity < LOADING_HOLDS:
         found.append(
             caution(

@@ -79,6 +79,16 @@ class Tried:
         return self.trial is not None and isinstance(self.manoeuvre, Turn)
 
     @property
+    def turned_deg(self) -> float | None:
+        """Largest change of heading of a recorded turn; None of other manoeuvres."""
+        if self.trial is None or not isinstance(self.manoeuvre, Turn) or self.record is None:
+            return None
+        time = self.trial.time_s
+        rows = (time >= self.begin_s) & (time <= self.record.end_s)
+        psi = straight_over_gaps(time, self.trial.signals["psi_rad"])[rows]
+        return math.degrees(float(np.max(np.abs(psi - psi[0]))))
+
+    @property
     def drift(self) -> CircleDrift | None:
         """The drift of a turn; None of a short one, and of other manoeuvres."""
         if self.trial is None or not isinstance(self.manoeuvre, Turn) or self.record is None:
@@ -100,11 +110,11 @@ def tried(trial: Trial, model: Model) -> Tried | str:
         Model of the ship.
     """
     stop = _stop(trial, model)
-    if stop is not None:
+    if isinstance(stop, Tried):
         return stop
     found = recognise(trial, model)
     if isinstance(found, str):
-        return found
+        return stop or found
     figures, noise = single_figures(found.figures), record_noise(trial)
     errors = {}
     for name in figures:
@@ -191,19 +201,24 @@ def calm_run(one: Tried, integrator: Integrator, speed_mps: float, values: Mappi
     return simulate(integrator.model, manoeuvre, parameters=known, integrator=integrator)
 
 
-def _stop(trial: Trial, model: Model) -> Tried | None:
-    """A stop in a record: from the change of the revolutions until the ship does not move ahead any more."""
+def _stop(trial: Trial, model: Model) -> Tried | str:
+    """A stop in a record: from the change of the revolutions until the ship does not move ahead any more.
+
+    In words why it is none, where the engine was stopped; else an empty text.
+    """
     signals = trial.signals
     if not {"n_radps", "x_m", "y_m", "psi_rad"} <= set(signals):
-        return None
+        return ""
     time = trial.time_s
     revolutions, psi, *place = (
         straight_over_gaps(time, signals[name]) for name in ("n_radps", "psi_rad", "x_m", "y_m")
     )
     approach = float(np.median(revolutions[: max(3, len(revolutions) // 50)]))
     slow = np.flatnonzero(revolutions < REVERSED * approach)
-    if approach <= 0 or not len(slow) or slow[0] == 0:
-        return None
+    if approach <= 0 or (len(slow) and slow[0] == 0):
+        return "the engine is stopped or astern in its first rows, before which an approach is needed"
+    if not len(slow):
+        return ""
     begin = int(slow[0])
     velocity = [np.gradient(values, time) for values in place]
     ahead = velocity[0] * np.cos(psi) + velocity[1] * np.sin(psi)
@@ -213,7 +228,7 @@ def _stop(trial: Trial, model: Model) -> Tried | None:
     speed = float(np.median(ahead[max(0, begin - 5) : begin + 1]))
     still = np.flatnonzero(uniform_filter1d(ahead, steps)[begin:] <= _AT_REST * speed)
     if not len(still):
-        return None
+        return "the ship still moves ahead at its end, after the engine was stopped or reversed"
     end = begin + int(still[0])
     t, north, east = (values[begin : end + 1] for values in (time, *place))
     cos, sin = math.cos(psi[begin]), math.sin(psi[begin])

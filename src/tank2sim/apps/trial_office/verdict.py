@@ -23,6 +23,9 @@ LOADING_HOLDS = 0.5
 """``validity`` of the loading below which its formulas do not carry the verdict. Project choice: halfway between where
 they hold and where they do not, before the ballast of a tanker."""
 
+EXTRAPOLATED = "EXTRAPOLATED"
+"""Last word of a verdict that the formulas for the loading do not carry."""
+
 _NEARLY_OVER = math.radians(30.0)
 """Least rudder of a turning circle of the criteria: 35 deg, or the largest of the gear. Project choice."""
 
@@ -162,7 +165,7 @@ def _judged(
     probability = _probability(math.log(limit) - middle, spread)
     words = _verdict(probability)
     if validity < LOADING_HOLDS:
-        words = f"{'undecided' if words == 'pass' else words}, EXTRAPOLATED"
+        words = f"{'undecided' if words == 'pass' else words}, {EXTRAPOLATED}"
     at_load = max(centre for centre, _ in known) / scale
     return replace(judged, full_load=at_load, probability=probability, verdict=words)
 
