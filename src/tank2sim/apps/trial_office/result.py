@@ -199,7 +199,7 @@ class TrialOfficeResult(Result[TrialOffice]):
             name = f"{words} ({unit})"
             rows.append([one.trial, name, one.as_run, one.full_load, one.low, one.high])
             by_step.append(
-                [one.trial, one.manoeuvre, one.side, name, one.without_current, one.error, one.calm],
+                [one.trial, one.manoeuvre, one.side, name, one.without_current, one.error or None, one.calm],
             )
             if one.model_as_tried is not None:
                 agrees = None if one.model_agrees is None else "yes" if one.model_agrees else "no"
@@ -291,8 +291,11 @@ class TrialOfficeResult(Result[TrialOffice]):
         return [one.model_agrees for one in self.study.figures if one.model_agrees is not None]
 
 
-def _share(probability: float | None) -> float | None:
-    return None if probability is None else round(probability, 3)
+def _share(probability: float | None) -> str | None:
+    """A probability as it can be said: never 0 or 1."""
+    if probability is None:
+        return None
+    return "< 0.01" if probability < 0.01 else "> 0.99" if probability > 0.99 else f"{probability:.2f}"
 
 
 def _named(one: CriterionVerdict) -> str:
@@ -302,7 +305,6 @@ def _named(one: CriterionVerdict) -> str:
 
 
 def _chance(one: CriterionVerdict) -> str:
-    if one.probability is None:
+    if (shown := _share(one.probability)) is None:
         return one.verdict
-    shown = "< 0.01" if one.probability < 0.01 else "> 0.99" if one.probability > 0.99 else f"= {one.probability:.2f}"
-    return f"{one.verdict}, P {shown}"
+    return f"{one.verdict}, P {shown if shown[0] in '<>' else f'= {shown}'}"
