@@ -54,55 +54,33 @@ _FORCE_COLUMNS = {"X": "X_N", "Y": "Y_N", "N": "N_Nm"}
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CaptiveRun:
-    """One captive run.
+    """One captive run."""
 
-    Parameters
-    ----------
-    name : str
-        Its file's name, or ``captive.csv line 12`` for a row of averages.
-    type : str
-        One of :data:`tank2sim.records.campaign_form.RUN_TYPES`.
-    sheet : RunSheet
-        What the test sheet says (SI, rudder to starboard); None where it is silent.
-    time_s : array, (rows,)
-        Rising; a single 0 for a row of averages.
-    v_mps, r_radps, speed_mps, delta_rad : array, (rows,)
-        Sway velocity, yaw rate, speed U through the water, rudder angle.
-    y_m, psi_rad : array, (rows,), or None
-        Sideways position in the tank and heading against its axis.
-    X_N, Y_N, N_Nm : array, (rows,)
-        Forces and moment in the hydrodynamic sense (see the module), about midships.
-    propeller_radps : float or None
-        Revolutions: the mean of the record, or those of the sheet.
-    thrust_N, rudder_normal_force_N : array, (rows,), or None
-        Thrust of the propeller, positive forward; force of the water on the rudder, positive to port.
-    torque_Nm : array, (rows,), or None
-        That the propeller takes.
-    heel_rad : float
-        At which the model is held, positive to starboard.
-    force_delay_s : float
-        By how much the forces lag the motion.
-    """
-
-    name: str
-    type: RunType
-    sheet: RunSheet
-    time_s: Array
+    name: str  # Its file's name, or ``captive.csv line 12`` for a row of averages
+    type: RunType  # One of :data:`tank2sim.records.campaign_form.RUN_TYPES`
+    sheet: RunSheet  # What the test sheet says (SI, rudder to starboard); None where it is silent
+    time_s: Array  # (rows,): Rising; a single 0 for a row of averages
+    # `v_mps`, `r_radps`, `speed_mps`, `delta_rad`: (rows,): Sway velocity, yaw rate, speed U through the water, rudder
+    # angle
     v_mps: Array
     r_radps: Array
     speed_mps: Array
     delta_rad: Array
+    # `X_N`, `Y_N`, `N_Nm`: (rows,): Forces and moment in the hydrodynamic sense (see the module), about midships
     X_N: Array
     Y_N: Array
     N_Nm: Array
+    # `y_m`, `psi_rad`: (rows,): Sideways position in the tank and heading against its axis
     y_m: Array | None = None
     psi_rad: Array | None = None
-    propeller_radps: float | None = None
+    propeller_radps: float | None = None  # Revolutions: the mean of the record, or those of the sheet
+    # `thrust_N`, `rudder_normal_force_N`: (rows,): Thrust of the propeller, positive forward; force of the water on the
+    # rudder, positive to port
     thrust_N: Array | None = None
     rudder_normal_force_N: Array | None = None
-    torque_Nm: Array | None = None
-    heel_rad: float = 0.0
-    force_delay_s: float = 0.0
+    torque_Nm: Array | None = None  # (rows,): That the propeller takes
+    heel_rad: float = 0.0  # At which the model is held, positive to starboard
+    force_delay_s: float = 0.0  # By how much the forces lag the motion
 
     @property
     def is_average(self) -> bool:
@@ -128,31 +106,19 @@ class CaptiveRun:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Campaign:
-    """A captive campaign with one model.
+    """A captive campaign with one model."""
 
-    Parameters
-    ----------
-    path : Path
-        Its ``campaign.toml``.
-    model, test, tank, uncertainty, full_scale
-        Sections of the file, SI and radians (:mod:`tank2sim.records.campaign_form`). ``full_scale`` may be None.
-    runs : tuple of CaptiveRun
-        In the order of the file.
-    faults : tuple of InputError
-        Runs that could not be read and were left out, because that was asked for.
-    remarks : tuple of Notice
-        What was done on reading and should know.
-    """
-
-    path: Path
+    path: Path  # Its ``campaign.toml``
+    # `model`, `test`, `tank`, `uncertainty`, `full_scale`: Sections of the file, SI and radians
+    # (:mod:`tank2sim.records.campaign_form`). ``full_scale`` may be None
     model: ModelSection
     test: TankTest
     tank: TankSection
     uncertainty: UncertaintySection
     full_scale: FullScaleSection | None
-    runs: tuple[CaptiveRun, ...]
-    faults: tuple[InputError, ...] = ()
-    remarks: tuple[Notice, ...] = field(default=())
+    runs: tuple[CaptiveRun, ...]  # In the order of the file
+    faults: tuple[InputError, ...] = ()  # Runs that could not be read and were left out, because that was asked for
+    remarks: tuple[Notice, ...] = field(default=())  # What was done on reading and should know
 
     @property
     def inertia_removed(self) -> bool:
@@ -176,18 +142,11 @@ class Campaign:
 def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
     """Read a campaign and all its runs.
 
-    Parameters
-    ----------
-    path : path
-        ``campaign.toml``; the names of files in it are relative to its folder.
-    keep_going : bool
-        Leave out runs that cannot be read (a missing file, text in a number column) and list them in ``faults``.
+    `path`: ``campaign.toml``; the names of files in it are relative to its folder; `keep_going`: Leave out runs that
+    cannot be read (a missing file, text in a number column) and list them in ``faults``.
 
-    Raises
-    ------
-    InputError
-        The campaign's file is at fault; or a run is, and `keep_going` is not asked for: then all such runs are
-        reported.
+    Raises InputError: The campaign's file is at fault; or a run is, and `keep_going` is not asked for: then all such
+    runs are reported.
     """
     path = Path(path)
     form, spelt = read_campaign_file(path)
@@ -300,10 +259,7 @@ def _refuse_doubled_names(form: CampaignFile, path: Path) -> None:
 def read_campaign_form(path: Path | str) -> CampaignFile:
     """The checked content of ``campaign.toml``, without the files of its runs.
 
-    Raises
-    ------
-    InputError
-        The file is missing or at fault.
+    Raises InputError: The file is missing or at fault.
     """
     path = Path(path)
     return read_campaign_file(path)[0]
@@ -314,23 +270,11 @@ def read_captive_run(
 ) -> CaptiveRun:
     """Read one captive run from its file.
 
-    Parameters
-    ----------
-    path : Path
-        The file, of any layout (:func:`tank2sim.records.run_tables.read_run_table`).
-    sheet : RunSheet
-        What the test sheet says of it.
-    test : TankTest
-        Signs, speed and delay.
-    columns : mapping
-        Column of the file to its quantity.
-    files : FilesSection
-        Layout of text files.
+    `path`: The file, of any layout (:func:`tank2sim.records.run_tables.read_run_table`); `sheet`: What the test sheet
+    says of it; `test`: Signs, speed and delay; `columns`: Column of the file to its quantity; `files`: Layout of text
+    files.
 
-    Raises
-    ------
-    InputError
-        The file cannot be read, or lacks a column.
+    Raises InputError: The file cannot be read, or lacks a column.
     """
     table = read_run_table(path, columns, files)
     time = table.increasing("t_s") - float(table.column("t_s")[0])

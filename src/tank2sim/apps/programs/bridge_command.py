@@ -72,16 +72,10 @@ engines, which are `PropSpace` (m) apart."""
 def bridge_command_files(card: Card) -> ProgramFiles:
     """The folder of an own ship of Bridge Command 5.11: ``boat.ini`` and its mesh ``box.x``.
 
-    Parameters
-    ----------
-    card : Card
-        Card of a ship with a rudder (polynomial or MMG, one screw or two, with or without roll), or of a craft with a
-        fixed thruster at either side.
+    `card`: Card of a ship with a rudder (polynomial or MMG, one screw or two, with or without roll), or of a craft with
+    a fixed thruster at either side.
 
-    Raises
-    ------
-    InputError
-        The vessel has neither, the card lacks beam or draught, or the ship does not turn.
+    Raises InputError: The vessel has neither, the card lacks beam or draught, or the ship does not turn.
     """
     ship = card.steered()
     beam, draught = (_particular(ship, name) for name in ("beam_m", "draught_m"))
@@ -204,12 +198,7 @@ def _number(value: float) -> str:
 
 
 def box_mesh(length_m: float, beam_m: float, height_m: float) -> str:
-    """A box as DirectX text: x to starboard, y up from the keel, z to the bow, origin midships; faces turn outwards.
-
-    Parameters
-    ----------
-    length_m, beam_m, height_m : float
-    """
+    """A box as DirectX text: x to starboard, y up from the keel, z to the bow, origin midships; faces turn outwards."""
     corners = list(product((-0.5, 0.5), (0.0, 1.0), (-0.5, 0.5)))
     rows = [f"{_number(x * beam_m)};{_number(y * height_m)};{_number(z * length_m)};" for x, y, z in corners]
     faces = []

@@ -65,15 +65,7 @@ class CraftNumbers:
 def craft_numbers(card: SteeredCard, model: Model) -> CraftNumbers:
     """The numbers of a craft that follow its straight runs, spins and turns best.
 
-    Parameters
-    ----------
-    card : SteeredCard
-    model : Model
-
-    Raises
-    ------
-    InputError
-        Its thrusters are not two fixed ones of a size, one at either side, that push ahead.
+    Raises InputError: Its thrusters are not two fixed ones of a size, one at either side, that push ahead.
     """
     spacing, thruster = _spacing(card), card.thrusters[0]
     most, least, force = thruster.max_radps, -thruster.lowest_radps, thruster.largest_thrust_N

@@ -82,11 +82,7 @@ class SurgeNumbers:
 def straight_runs(surge: SurgeNumbers, speed_mps: float) -> Runs:
     """Figures of straight runs in Bridge Command.
 
-    Parameters
-    ----------
-    surge : SurgeNumbers
-    speed_mps : float
-        Speed at full ahead, from which the ship stops and to whose parts it gathers way.
+    `speed_mps`: Speed at full ahead, from which the ship stops and to whose parts it gathers way.
     """
     found = {(name, "final_speed_mps"): surge.speed(lever) for name, lever in _LEVERS.items()}
     for name, lever, first, last, keys in (
@@ -116,14 +112,7 @@ def straight_runs_of_card(model: Model) -> Runs:
 
     A lever is a share of the thrust: the order of the engine goes with its root.
 
-    Parameters
-    ----------
-    model : Model
-
-    Raises
-    ------
-    InputError
-        A run leaves all bounds.
+    Raises InputError: A run leaves all bounds.
     """
     speed = start_values(model)["ship.speed"]
     run = _held(model, 0.5 * speed, None).trajectory()
@@ -148,12 +137,8 @@ def straight_runs_of_card(model: Model) -> Runs:
 def fitted_surge(wanted: Runs, speed_mps: float, mass_kg: float) -> SurgeNumbers:
     """The numbers that follow the straight runs of a card best, with exactly its speed at full ahead.
 
-    Parameters
-    ----------
-    wanted : mapping
-        As of :func:`straight_runs_of_card`, without the change of heading.
-    speed_mps, mass_kg : float
-        Speed at full ahead; mass with the added mass in surge.
+    `wanted`: As of :func:`straight_runs_of_card`, without the change of heading; `speed_mps`, `mass_kg`: Speed at full
+    ahead; mass with the added mass in surge.
     """
     from scipy.optimize import least_squares  # slow to import
 

@@ -31,15 +31,9 @@ def c99_files(card: Card) -> ProgramFiles:
     The figures of standard manoeuvres by the compiled files in double precision are the changes; what float changes of
     them is among the losses. Without a C compiler, or for a card without standard manoeuvres, there are neither.
 
-    Parameters
-    ----------
-    card : Card
-        Of any kind that has a model.
+    `card`: Of any kind that has a model.
 
-    Raises
-    ------
-    InputError
-        The card names what no model knows.
+    Raises InputError: The card names what no model knows.
     """
     made = plain_ship(card)
     model = with_simulator_interface(build(card))
@@ -113,10 +107,7 @@ class PlainIntegrator(Integrator):
     def rollout(self, x: Array, u: Array, p: Array, h: float, n: int, *, every: int = 1) -> Array:
         """As of any integrator.
 
-        Raises
-        ------
-        InputError
-            The states leave all bounds.
+        Raises InputError: The states leave all bounds.
         """
         self._x[:], self._u[:], self._p[:] = x, u, p
         place = self._instance.ctypes.data

@@ -210,12 +210,7 @@ class ConventionResult(Result[ConventionStudy]):
 
 
 def same_in_practice(first: ReadingFound, second: ReadingFound) -> bool:
-    """Whether two readings are one ship in practice: both stable or neither, and every simulated figure within 5 %.
-
-    Parameters
-    ----------
-    first, second : ReadingFound
-    """
+    """Whether two readings are one ship in practice: both stable or neither, and every simulated figure within 5 %."""
     if (first.C_prime > 0) != (second.C_prime > 0):
         return False
     names = ("advance_lengths", "tactical_diameter_lengths", "overshoot_1_deg")

@@ -65,22 +65,10 @@ def converted(
 ) -> tuple[ConvertedText, tuple[Notice, ...]]:
     """A card in another language, and notices.
 
-    Parameters
-    ----------
-    card : Card
-    to : str
-        Language, as of ``convert``.
-    wanted : Conventions
-        Of the new card.
-    scatter : float, optional
-        Spread of the motions of a fit about standard manoeuvres.
-    added_mass : str, optional
-        Where Gazebo and VRX have it: :func:`.place_of_added_mass`.
+    `to`: Language, as of ``convert``; `wanted`: Of the new card; `scatter`: Spread of the motions of a fit about
+    standard manoeuvres; `added_mass`: Where Gazebo and VRX have it: :func:`.place_of_added_mass`.
 
-    Raises
-    ------
-    InputError
-        The card cannot be had in that language.
+    Raises InputError: The card cannot be had in that language.
     """
     if FORMS[to].writer:
         return _of_several_files(card, to, wanted, scatter, added_mass)

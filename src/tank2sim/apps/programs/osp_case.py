@@ -46,16 +46,10 @@ _STILL_PUSH = 1e-3
 def osp_files(card: Card) -> ProgramFiles:
     """The folder of a ship in the case dp-ship: FMU, groups of variables, and the system of the whole case.
 
-    Parameters
-    ----------
-    card : Card
-        Card of a ship or craft that moves in the plane.
+    `card`: Card of a ship or craft that moves in the plane.
 
-    Raises
-    ------
-    InputError
-        The ship does not lie still without orders, its hull does not damp motions at low speed, or there is no
-        compiler.
+    Raises InputError: The ship does not lie still without orders, its hull does not damp motions at low speed, or a
+    compiler is missing.
     """
     ship = card.steered()
     model, (mass, inertia) = hull_model(ship), _inertia(ship)
@@ -83,13 +77,7 @@ def osp_files(card: Card) -> ProgramFiles:
 
 
 def resting_model(card: SteeredCard, name: str) -> Model:
-    """The model of a card, named so, that starts at rest at the origin with stopped engines.
-
-    Parameters
-    ----------
-    card : SteeredCard
-    name : str
-    """
+    """The model of a card, named so, that starts at rest at the origin with stopped engines."""
     model = build(card)
     starts = [one for one in model.parameter_names if one.startswith("initial.") and one != "initial.trim"]
     model = replace(model.with_values(dict.fromkeys(starts, 0.0)), name=name)
@@ -99,12 +87,7 @@ def resting_model(card: SteeredCard, name: str) -> Model:
 
 
 def hull_model(card: SteeredCard) -> Model:
-    """The model of a card at rest with the case's names: ``Thrust_d[1..3]``, ``input[1..2]``, ``q[1..3]``.
-
-    Parameters
-    ----------
-    card : SteeredCard
-    """
+    """The model of a card at rest with the case's names: ``Thrust_d[1..3]``, ``input[1..2]``, ``q[1..3]``."""
     model = resting_model(card, HULL)
     scale = card.ship.length_m / CASE_LENGTH_M
     force = card.scales.mass * 1e-3
@@ -151,16 +134,9 @@ def _inertia(card: SteeredCard) -> tuple[float, float]:
 def low_speed_damping(card: SteeredCard, model: Model) -> tuple[float, float]:
     """Damping of sway and yaw in calm water at 0.3 m/s (of yaw at the ends), 1/s.
 
-    Parameters
-    ----------
-    card : SteeredCard
-    model : Model
-        Of :func:`resting_model`.
+    `model`: Of :func:`resting_model`.
 
-    Raises
-    ------
-    InputError
-        There is none, or the ship pushes itself at rest.
+    Raises InputError: There is none, or the ship pushes itself at rest.
     """
     model = in_calm(model)
     length, draught = card.ship.length_m, card.ship.draught_m

@@ -44,15 +44,9 @@ _OUTPUTS = {
 def gunnerus_files(card: Card) -> ProgramFiles:
     """The hull of the case gunnerus-dp: FMU and groups of variables.
 
-    Parameters
-    ----------
-    card : Card
-        Card of a ship or craft that moves in the plane.
+    `card`: Card of a ship or craft that moves in the plane.
 
-    Raises
-    ------
-    InputError
-        As :func:`.osp_files`.
+    Raises InputError: As :func:`.osp_files`.
     """
     ship = card.steered()
     model = gunnerus_model(ship)
@@ -77,12 +71,7 @@ def gunnerus_files(card: Card) -> ProgramFiles:
 
 
 def gunnerus_model(card: SteeredCard) -> Model:
-    """The model of a card at rest with the names of the case.
-
-    Parameters
-    ----------
-    card : SteeredCard
-    """
+    """The model of a card at rest with the names of the case."""
     model = resting_model(card, VESSEL)
     inputs = {
         f"{name}[{place}]": Input(
@@ -124,12 +113,7 @@ def gunnerus_model(card: SteeredCard) -> Model:
 
 
 def gunnerus_groups(described: Interface) -> tuple[Group, ...]:
-    """The groups of the case: six variables each, and of the outputs those of the plane, too.
-
-    Parameters
-    ----------
-    described : Interface
-    """
+    """The groups of the case: six variables each, and of the outputs those of the plane, too."""
 
     def group(variable: str, name: str, kinds: tuple[str, str], places: tuple[int, ...]) -> Group:
         parts = {"linear": [one for one in places if one < 4], "angular": [one for one in places if one > 3]}

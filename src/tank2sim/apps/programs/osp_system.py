@@ -49,12 +49,8 @@ def case_system(
 ) -> tuple[list[CasePart], list[CaseJoint]]:
     """Simulators of the case with their values for a ship, and connections.
 
-    Parameters
-    ----------
-    hull : str
-        File of the ship's FMU.
-    length_m, mass_kg, inertia_kgm2 : float
-        Of the ship: mass in sway and inertia in yaw with added masses.
+    `hull`: File of the ship's FMU; `length_m`, `mass_kg`, `inertia_kgm2`: Of the ship: mass in sway and inertia in yaw
+    with added masses.
     """
     length, by_mass, by_inertia = length_m / CASE_LENGTH_M, mass_kg / CASE_INERTIA[0], inertia_kgm2 / CASE_INERTIA[1]
     gains = {name: value * by_mass for name, value in _GAINS.items()}

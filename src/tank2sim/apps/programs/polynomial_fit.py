@@ -59,26 +59,14 @@ _SLOWEST = 0.05  # of u0
 
 @dataclass(frozen=True)
 class PolynomialFit:
-    """A third-order polynomial in place of an MMG ship.
+    """A third-order polynomial in place of an MMG ship."""
 
-    Parameters
-    ----------
-    derivatives : mapping
-        Name to prime value, rudder positive to starboard.
-    Xnn : float
-        Effect of revolutions, prime.
-    residuals : mapping
-        Force to the root mean square of the residual over that of the force.
-    ranges : mapping
-        ``u`` (over u0), ``drift_deg``, ``yaw_rate_prime``, ``rudder_deg`` to lowest and highest value that was fitted.
-    covariance : array (k, k), optional
-        Covariance of `derivatives`, in their order, by the errors of the MMG card; None if it states none.
-    """
-
-    derivatives: Mapping[str, float]
-    Xnn: float
-    residuals: Mapping[str, float]
+    derivatives: Mapping[str, float]  # Name to prime value, rudder positive to starboard
+    Xnn: float  # Effect of revolutions, prime
+    residuals: Mapping[str, float]  # Force to the root mean square of the residual over that of the force
+    # ``u`` (over u0), ``drift_deg``, ``yaw_rate_prime``, ``rudder_deg`` to lowest and highest value that was fitted
     ranges: Mapping[str, tuple[float, float]]
+    # (k, k): Covariance of `derivatives`, in their order, by the errors of the MMG card; None if it states none
     covariance: Array | None = None
 
 
@@ -101,19 +89,7 @@ def scattered_motions(
 ) -> Array:
     """Motions about those of manoeuvres, within the rudder's limits and ahead of rest.
 
-    Parameters
-    ----------
-    model : Model
-    motions : array (n, 4)
-        u, v, r, rudder, SI.
-    scatter : float
-        Over :data:`SPREADS`.
-    samples : int
-        Number of motions to return.
-
-    Returns
-    -------
-    array (`samples`, 4)
+    `motions` (n, 4): u, v, r, rudder, SI; `scatter`: Over :data:`SPREADS`; `samples`: Number of motions to return.
     """
     values = {parameter.name: parameter.start for parameter in model.parameters}
     u0, length = values["ship.speed"], values["ship.length"]
@@ -138,10 +114,7 @@ def scattered_motions(
 def fit_polynomial(card: MmgCard, model: Model, motions: Array) -> PolynomialFit:
     """The polynomial by least squares over motions u, v, r, rudder (n, 4), SI.
 
-    Raises
-    ------
-    InputError
-        The motions do not determine the terms.
+    Raises InputError: The motions do not determine the terms.
     """
     forces, primes = _hydrodynamic_primes(card, model, motions)
     kept = [*ACCELERATION_TERMS, *(name for name in card.derivatives if _of_heeling(name))]
@@ -265,10 +238,7 @@ def _effect_of_revolutions(card: MmgCard, model: Model) -> float:
 def polynomial_card(card: MmgCard, fit: PolynomialFit) -> ManoeuvringCard:
     """The polynomial as a card, with particulars, gear and effects of the MMG card.
 
-    Raises
-    ------
-    InputError
-        An effect of the card is none of a polynomial.
+    Raises InputError: An effect of the card is none of a polynomial.
     """
     document = tomlkit.parse(card.text.lstrip("\ufeff"))
     for section in ("model", "rigid_body", "derivatives", "uncertainty", "propeller", "rudder", "propulsion"):
@@ -325,15 +295,9 @@ def _effects_last(document: tomlkit.TOMLDocument) -> tomlkit.TOMLDocument:
 
 @dataclass(frozen=True)
 class FigureChange:
-    """A figure of a manoeuvre before and after a conversion; None where the run was too short for it.
+    """A figure of a manoeuvre before and after a conversion; None where the run was too short for it."""
 
-    Parameters
-    ----------
-    manoeuvre, figure : str
-        ``turn:35`` and ``advance_m``.
-    before, after : float or None
-    """
-
+    # `manoeuvre`, `figure`: ``turn:35`` and ``advance_m``
     manoeuvre: str
     figure: str
     before: float | None

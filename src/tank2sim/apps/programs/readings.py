@@ -80,14 +80,9 @@ over L, 0.34 to 0.50 on the bundled ships, and standard deviation. Project choic
 
 @dataclass(frozen=True)
 class Reading:
-    """Conventions by which a table may be read.
+    """Conventions by which a table may be read."""
 
-    Parameters
-    ----------
-    rudder_sign, scaling, yaw_rate_terms, origin : str
-        One each of :data:`.STATED_CONVENTIONS`.
-    """
-
+    # `rudder_sign`, `scaling`, `yaw_rate_terms`, `origin`: One each of :data:`.STATED_CONVENTIONS`
     rudder_sign: str
     scaling: str
     yaw_rate_terms: str
@@ -96,50 +91,26 @@ class Reading:
 
 @dataclass(frozen=True)
 class ReadShip:
-    """A ship as a reading of a table has it: prime system, midships, without inertia, rudder to starboard.
+    """A ship as a reading of a table has it: prime system, midships, without inertia, rudder to starboard."""
 
-    Parameters
-    ----------
-    derivatives : mapping
-        Name to value.
-    body : RigidBody
-    vanished : tuple of str
-        Derivatives that became zero to the printed digits.
-    """
-
-    derivatives: Mapping[str, float]
+    derivatives: Mapping[str, float]  # Name to value
     body: RigidBody
-    vanished: tuple[str, ...]
+    vanished: tuple[str, ...]  # Derivatives that became zero to the printed digits
 
 
 @dataclass(frozen=True)
 class RankedReading:
-    """A reading with its ship and its probability.
-
-    Parameters
-    ----------
-    reading : Reading
-    ship : ReadShip
-    weight : float
-        Natural logarithm of prior times density of the table.
-    probability : float
-        Among all readings.
-    criterion : float
-        C' of straight-line stability, positive if stable.
-    turning_index : float or None
-        Norrbin's P: heading by rudder after one ship's length, positive if it turns to the side of the rudder; None
-        without rudder forces.
-    against : tuple of str
-        What speaks against it, the strongest first.
-    """
+    """A reading with its ship and its probability."""
 
     reading: Reading
     ship: ReadShip
-    weight: float
-    probability: float
-    criterion: float
+    weight: float  # Natural logarithm of prior times density of the table
+    probability: float  # Among all readings
+    criterion: float  # C' of straight-line stability, positive if stable
+    # Norrbin's P: heading by rudder after one ship's length, positive if it turns to the side of the rudder; None
+    # without rudder forces
     turning_index: float | None
-    against: tuple[str, ...]
+    against: tuple[str, ...]  # What speaks against it, the strongest first
 
 
 def possible_readings(table: CoefficientTable) -> list[Reading]:
@@ -172,10 +143,6 @@ def scaled_with_nominal_speed(table: CoefficientTable) -> bool | None:
 
     A lift goes with u v, u r and u^2 delta. Scaled with u0, so that u = u0 (1 + Du'), this is Y_vu = Y_v, Y_ru = Y_r,
     Y_du = 2 Y_d, Y_duu = Y_d, N alike; scaled with the speed at any time, all of these are about zero.
-
-    Parameters
-    ----------
-    table : CoefficientTable
     """
     known = table.derivatives
     shares = [
@@ -387,12 +354,7 @@ def _filled(table: CoefficientTable, ship: ReadShip) -> dict[str, float]:
 def linear_figures(derivatives: Mapping[str, float], body: RigidBody) -> tuple[float, float, float | None]:
     """C', growth of the faster mode of sway and yaw (U/L), and Norrbin's P (None without rudder forces).
 
-    Parameters
-    ----------
-    derivatives : mapping
-        Prime, about the origin of `body`, without inertia, rudder to starboard.
-    body : RigidBody
-        Prime.
+    `derivatives`: Prime, about the origin of `body`, without inertia, rudder to starboard; `body`: Prime.
     """
     d = {name: derivatives.get(name, 0.0) for name in ("Yv", "Yr", "Nv", "Nr", "Yd", "Nd")}
     a = {name: derivatives.get(name, 0.0) for name in ("Yvdot", "Yrdot", "Nvdot", "Nrdot")}
@@ -425,11 +387,7 @@ def with_probabilities(readings: Sequence[RankedReading]) -> list[RankedReading]
 def with_diameter(ranked: RankedReading, diameter_lengths: float | None) -> RankedReading:
     """A reading whose weight takes the tactical diameter at 35 deg into account.
 
-    Parameters
-    ----------
-    ranked : RankedReading
-    diameter_lengths : float or None
-        Over L; None if the ship never turned so far.
+    `diameter_lengths`: Over L; None if the ship never turned so far.
     """
     if diameter_lengths is None:
         words = "does not turn through 180 deg at 35 deg of rudder"

@@ -68,10 +68,7 @@ def gazebo_name(name: str) -> str:
 def coriolis_products(derivatives: Mapping[str, float]) -> dict[str, float]:
     """-C_A nu (:func:`.added_mass_forces`) as coefficients of products of velocities: ``xVR``, ``yUR``, ``nUV``, ...
 
-    Parameters
-    ----------
-    derivatives : mapping
-        ``Xudot Yvdot Yrdot Nvdot``, kg and kg m; absent means 0.
+    `derivatives`: ``Xudot Yvdot Yrdot Nvdot``, kg and kg m; absent means 0.
     """
     known = {name: derivatives.get(name, 0.0) for name in CRAFT_ADDED_MASSES}
     products: dict[str, float] = {}
@@ -100,10 +97,6 @@ def growth_per_step(card: SteeredCard) -> float:
     The largest root z of ``z^2 I - z (I - dt M^-1 D - M^-1 A) - M^-1 A = 0``, with the rigid mass M and the added mass
     A about the origin of the link, and the slope D of the damping at the highest speed of the card. Without damping it
     is the largest eigenvalue of M^-1 A, or 1; above 1 the velocity has no bound, at any step dt.
-
-    Parameters
-    ----------
-    card : SteeredCard
     """
     body, known = card.rigid_body, card.derivatives
     lever = body.mass * body.x_G
@@ -127,15 +120,7 @@ def growth_per_step(card: SteeredCard) -> float:
 def place_of_added_mass(card: SteeredCard, wanted: AddedMass | None) -> AddedMass:
     """Where the added mass of a craft goes: as `wanted`, by default into the plugin where that is stable.
 
-    Parameters
-    ----------
-    card : SteeredCard
-    wanted : str, optional
-
-    Raises
-    ------
-    InputError
-        It is wanted in the plugin, and an error would grow there.
+    Raises InputError: It is wanted in the plugin, and an error would grow there.
     """
     growth = growth_per_step(card)
     if wanted == "plugin" and growth >= 1:
@@ -164,11 +149,7 @@ def _inertial(card: SteeredCard) -> list[str]:
 def gazebo_text(card: SteeredCard, added_mass: AddedMass | None = None) -> str:
     """SDF of the plugins of a craft for Gazebo: hydrodynamics, and one thruster each.
 
-    Parameters
-    ----------
-    card : SteeredCard
-    added_mass : str, optional
-        As of :func:`place_of_added_mass`.
+    `added_mass`: As of :func:`place_of_added_mass`.
     """
     derivatives, in_plugin = card.derivatives, place_of_added_mass(card, added_mass) == "plugin"
     hull = {
@@ -218,11 +199,7 @@ def _joint(thruster: ThrusterSection) -> str:
 def vrx_text(card: SteeredCard, added_mass: AddedMass | None = None) -> str:
     """SDF of VRX's SimpleHydrodynamics for a craft.
 
-    Parameters
-    ----------
-    card : SteeredCard
-    added_mass : str, optional
-        As of :func:`place_of_added_mass`.
+    `added_mass`: As of :func:`place_of_added_mass`.
     """
     in_plugin = place_of_added_mass(card, added_mass) == "plugin"
     masses = {VRX_MASSES[name]: -card.derivatives.get(name, 0.0) if in_plugin else 0.0 for name in VRX_MASSES}
@@ -253,11 +230,7 @@ def _head(card: SteeredCard, where: str) -> list[str]:
 def vrx_model(card: SteeredCard, added_mass: AddedMass | None = None) -> Model:
     """The model of a craft with the terms of VRX's plugin: six of damping, no effects, and C_A with the inertia alone.
 
-    Parameters
-    ----------
-    card : SteeredCard
-    added_mass : str, optional
-        As of :func:`place_of_added_mass`.
+    `added_mass`: As of :func:`place_of_added_mass`.
     """
     inertial = place_of_added_mass(card, added_mass) == "inertial"
     kept = {*VRX_TERMS, *(CRAFT_ADDED_MASSES if inertial else VRX_MASSES)}

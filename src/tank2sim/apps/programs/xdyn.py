@@ -46,14 +46,7 @@ _ON_LINE = 1e-9
 def xdyn_files(card: Card) -> ProgramFiles:
     """A ship or craft as files of xdyn: ``ship.yml``, and ``turn_commands.yml`` and ``zigzag_commands.yml`` of a ship.
 
-    Parameters
-    ----------
-    card : Card
-
-    Raises
-    ------
-    InputError
-        The card is none of a ship or craft that manoeuvres, or an effect has no expression in xdyn.
+    Raises InputError: The card is none of a ship or craft that manoeuvres, or an effect has no expression in xdyn.
     """
     given = card.steered()
     model = build(given)

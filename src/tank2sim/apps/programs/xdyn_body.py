@@ -38,31 +38,17 @@ _ROLL_RADIUS = 0.05
 
 @dataclass(frozen=True)
 class XdynBody:
-    """Equations of a body in the plane, as xdyn has them.
+    """Equations of a body in the plane, as xdyn has them."""
 
-    Parameters
-    ----------
-    rigid, added : array (6, 6)
-        Mass matrices in the order u v w p q r about midships, kg, kg m, kg m2.
-    texts : mapping
-        Name to expression, each in names before it; X to N are the forces (N, N m), 0 where they are missing.
-    data : mapping
-        Name to the model's variable and its value.
-    commands : mapping
-        Name to the variable that is a command.
-    density : float
-        kg/m3; ``rho`` in the expressions.
-    blocked : str
-        States that are held at zero.
-    """
-
+    # `rigid`, `added`: (6, 6): Mass matrices in the order u v w p q r about midships, kg, kg m, kg m2
     rigid: Array
     added: Array
+    # Name to expression, each in names before it; X to N are the forces (N, N m), 0 where they are missing
     texts: Mapping[str, str]
-    data: Mapping[str, tuple[Variable, float]]
-    commands: Mapping[str, Variable]
-    density: float
-    blocked: str
+    data: Mapping[str, tuple[Variable, float]]  # Name to the model's variable and its value
+    commands: Mapping[str, Variable]  # Name to the variable that is a command
+    density: float  # kg/m3; ``rho`` in the expressions
+    blocked: str  # States that are held at zero
 
 
 def values_at(model: Model, names: Sequence[str], run: Trajectory) -> Array:

@@ -37,23 +37,12 @@ XDYN_STATES = {f"motion.{name}": f"{name}(t)" for name in "x y psi u v r phi p".
 
 @dataclass(frozen=True)
 class XdynTerm:
-    """An expression as text.
-
-    Parameters
-    ----------
-    text : str
-    level : int
-        How tightly its last operation binds: 0 sum, 1 product, 2 power, 3 name, number or call.
-    weight : int
-        Number of operations.
-    opposite : XdynTerm, optional
-        If the text is ``0 - a``: a.
-    """
+    """An expression as text."""
 
     text: str
-    level: int = _ATOM
-    weight: int = 0
-    opposite: XdynTerm | None = None
+    level: int = _ATOM  # How tightly its last operation binds: 0 sum, 1 product, 2 power, 3 name, number or call
+    weight: int = 0  # Number of operations
+    opposite: XdynTerm | None = None  # If the text is ``0 - a``: a
 
     def within(self, level: int) -> str:
         """The text, in brackets if it binds less tightly than `level`."""
@@ -144,18 +133,10 @@ _TRUTHS = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP_O
 
 @dataclass
 class Definitions:
-    """Named expressions in an order in which each uses only those before it.
+    """Named expressions in an order in which each uses only those before it."""
 
-    Parameters
-    ----------
-    taken : set of str
-        Names that are in use.
-    texts : dict
-        Name to expression.
-    """
-
-    taken: set[str] = field(default_factory=lambda: set(RESERVED))
-    texts: dict[str, str] = field(default_factory=dict)
+    taken: set[str] = field(default_factory=lambda: set(RESERVED))  # Names that are in use
+    texts: dict[str, str] = field(default_factory=dict)  # Name to expression
 
     def new_name(self, wanted: str) -> str:
         """A name of letters, digits and underscores that resembles `wanted` and is not in use, which it then is."""
@@ -257,19 +238,10 @@ class Definitions:
     ) -> None:
         """Define expressions of `symbols`, which are spelt `spelt`; parts that are used often get names, too.
 
-        Parameters
-        ----------
-        symbols : sequence of casadi.SX
-        spelt : sequence of str
-        wanted : mapping
-            Name to expression; each may hold symbols that are spelt as a name before it.
-        numbers : mapping
-            Spelling of constants to their value: longer terms of these alone become numbers.
+        `wanted`: Name to expression; each may hold symbols that are spelt as a name before it; `numbers`: Spelling of
+        constants to their value: longer terms of these alone become numbers.
 
-        Raises
-        ------
-        ValueError
-            An operation has no spelling in xdyn.
+        Raises ValueError: An operation has no spelling in xdyn.
         """
         function = ca.Function("f", [ca.vcat(symbols)], list(wanted.values()), {"cse": True})
         nodes, names = _nodes(function), list(wanted)
@@ -359,12 +331,8 @@ def _nodes(function: ca.Function) -> list[_Node]:
 def read_expressions(texts: Mapping[str, str], known: Mapping[str, Any]) -> dict[str, ca.SX]:
     """The values of written expressions, read back: each in names of `known` or of those before it.
 
-    Parameters
-    ----------
-    texts : mapping
-        Name to expression.
-    known : mapping
-        ``u`` and the other states to a function of time, commands and numbers to their symbol or value.
+    `texts`: Name to expression; `known`: ``u`` and the other states to a function of time, commands and numbers to
+    their symbol or value.
     """
     functions = {"cos": ca.cos, "sin": ca.sin, "exp": ca.exp, "abs": ca.fabs, "log": ca.log, "sqrt": ca.sqrt}
     values: dict[str, Any] = {"__builtins__": {}, **functions, **known}

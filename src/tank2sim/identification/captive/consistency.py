@@ -44,10 +44,7 @@ def contradicted(campaign: Campaign, runs: Sequence[ReducedRun]) -> dict[str, In
     and its small scatter may even give it the greatest weight. Therefore each run is compared with the others at equal
     weights, and the worst is removed before the next comparison.
 
-    Parameters
-    ----------
-    runs : sequence of ReducedRun
-        The runs used for the derivatives.
+    `runs`: The runs used for the derivatives.
     """
     found: dict[str, InputError] = {}
     for force in FORCE_COLUMNS:
@@ -97,21 +94,13 @@ def _levelled(runs: Sequence[ReducedRun], force: str) -> list[ReducedRun]:
 
 @dataclass(frozen=True, kw_only=True)
 class Asymmetry:
-    """Test of the symmetry of (3.8) for one force.
+    """Test of the symmetry of (3.8) for one force."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        Terms of the opposite parity that the campaign excites.
-    values, standard_errors : tuple of float
-        Prime, with all of them in addition to the terms of the result.
-    chance : float
-        Probability of values as large as these together if the symmetry holds (Wald's test); 1 without terms.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # Terms of the opposite parity that the campaign excites
+    # `values`, `standard_errors`: Prime, with all of them in addition to the terms of the result
     values: tuple[float, ...]
     standard_errors: tuple[float, ...]
+    # Probability of values as large as these together if the symmetry holds (Wald's test); 1 without terms
     chance: float
 
 
@@ -151,21 +140,11 @@ _RELATIVE = 0.02
 
 @dataclass(frozen=True, kw_only=True)
 class Repeats:
-    """Repeats of one campaign.
+    """Repeats of one campaign."""
 
-    Parameters
-    ----------
-    groups : tuple of tuple of str
-        Names of the runs of the same test.
-    deviation : mapping
-        Force to the standard deviation of a run's mean within the groups, prime.
-    freedom : int
-        Degrees of freedom of the deviations.
-    """
-
-    groups: tuple[tuple[str, ...], ...]
-    deviation: Mapping[str, float]
-    freedom: int
+    groups: tuple[tuple[str, ...], ...]  # Names of the runs of the same test
+    deviation: Mapping[str, float]  # Force to the standard deviation of a run's mean within the groups, prime
+    freedom: int  # Degrees of freedom of the deviations
 
 
 def repeats(campaign: Campaign, runs: Sequence[ReducedRun]) -> Repeats | None:

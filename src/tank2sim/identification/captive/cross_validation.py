@@ -22,41 +22,26 @@ _UNLIKELY = 1e-4
 
 @dataclass(frozen=True, kw_only=True)
 class LeftOut:
-    """Prediction of a run from all other runs.
+    """Prediction of a run from all other runs."""
 
-    Parameters
-    ----------
-    run, type : str
-        Its name and type.
-    measured, predicted : float
-        The water's force, by 1/2 rho L^2 u0^2 (N: L^3): mean in a steady run, part in phase with the velocity in an
-        oscillating run; predicted with the derivatives of all other runs.
-    error, standard_error : float
-        Predicted less measured, and its standard error.
-    chance : float
-        Probability of at least this misfit of all coefficients.
-    misfit : float
-        Root mean square misfit of all coefficients, in standard errors.
-    gap, size : float
-        Norm of that misfit, and the larger norm of the coefficients measured and predicted; units as `measured`.
-    influence : float
-        Largest change of a derivative without the run, in standard errors.
-    moved : str
-        Name of that derivative.
-    """
-
+    # `run`, `type`: Its name and type
     run: str
     type: str
+    # `measured`, `predicted`: The water's force, by 1/2 rho L^2 u0^2 (N: L^3): mean in a steady run, part in phase with
+    # the velocity in an oscillating run; predicted with the derivatives of all other runs
     measured: float
     predicted: float
+    # `error`, `standard_error`: Predicted less measured, and its standard error
     error: float
     standard_error: float
-    chance: float
-    misfit: float
+    chance: float  # Probability of at least this misfit of all coefficients
+    misfit: float  # Root mean square misfit of all coefficients, in standard errors
+    # `gap`, `size`: Norm of that misfit, and the larger norm of the coefficients measured and predicted; units as
+    # `measured`
     gap: float
     size: float
-    influence: float
-    moved: str
+    influence: float  # Largest change of a derivative without the run, in standard errors
+    moved: str  # Name of that derivative
 
     @property
     def unlikely(self) -> bool:

@@ -48,45 +48,21 @@ def candidate_terms(force: str, *, heeled: bool = False) -> tuple[Term, ...]:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CampaignEquations:
-    """Weighted equations of one force over a campaign: rows are coefficients of runs, columns are terms.
+    """Weighted equations of one force over a campaign: rows are coefficients of runs, columns are terms."""
 
-    Parameters
-    ----------
-    force : str
-        ``X``, ``Y`` or ``N``.
-    names : tuple of str
-        Names of the columns.
-    design : array, (rows, columns)
-        Each run's block is multiplied by the inverse root of its within-run covariance.
-    values : array, (rows,)
-        The water's force, weighted in the same way.
-    zero : array, (rows,)
-        Effect of a zero error of 1 common to a run, weighted.
-    gauge : array, (rows,)
-        The gauge's force, with the reaction of the body's inertia, weighted: the effect of a gain error of 1 common to
-        a run.
-    run_of_row : array of int, (rows,)
-        Index of each row's run in `runs`.
-    runs : tuple of ReducedRun
-        The runs.
-    unit : float
-        Force or moment by which rows are made non-dimensional before weighting, N or N m.
-    roots : tuple of array
-        Cholesky root of each run's within-run covariance, in `unit`.
-    prior : mapping
-        Term to the standard deviation (prime) of its prior about zero; other terms are free.
-    """
-
-    force: str
-    names: tuple[str, ...]
-    design: Array
-    values: Array
-    zero: Array
+    force: str  # ``X``, ``Y`` or ``N``
+    names: tuple[str, ...]  # Names of the columns
+    design: Array  # (rows, columns): Each run's block is multiplied by the inverse root of its within-run covariance
+    values: Array  # (rows,): The water's force, weighted in the same way
+    zero: Array  # (rows,): Effect of a zero error of 1 common to a run, weighted
+    # (rows,): The gauge's force, with the reaction of the body's inertia, weighted: the effect of a gain error of 1
+    # common to a run
     gauge: Array
-    run_of_row: NDArray[np.int64]
-    runs: tuple[ReducedRun, ...]
-    unit: float
-    roots: tuple[Array, ...]
+    run_of_row: NDArray[np.int64]  # (rows,): Index of each row's run in `runs`
+    runs: tuple[ReducedRun, ...]  # The runs
+    unit: float  # Force or moment by which rows are made non-dimensional before weighting, N or N m
+    roots: tuple[Array, ...]  # Cholesky root of each run's within-run covariance, in `unit`
+    # Term to the standard deviation (prime) of its prior about zero; other terms are free
     prior: Mapping[str, float] = field(default_factory=dict)
 
     def held(self, prior: Mapping[str, float]) -> CampaignEquations:
@@ -147,10 +123,7 @@ def campaign_equations(
 ) -> CampaignEquations:
     """The equations of a force for the named terms (or trend terms, ``Yv w2``).
 
-    Raises
-    ------
-    InputError
-        The inertia of a yaw run must be removed and the campaign does not give it.
+    Raises InputError: The inertia of a yaw run must be removed and the campaign does not give it.
     """
     scales = campaign.scales
     unit = scales.unit(force)

@@ -31,43 +31,28 @@ _FEW_PERIODS = 2.5
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CaptiveMotion:
-    """Smooth motion of a run over whole periods; SI, radians, rudder to starboard.
+    """Smooth motion of a run over whole periods; SI, radians, rudder to starboard."""
 
-    Parameters
-    ----------
-    kept : slice
-        Rows of the record used.
-    time_s : array, (rows,)
-        Of those rows, less the delay of the forces behind the motion; in an oscillating run counted from a moment at
-        which the leading velocity (v in pure sway, else r) is greatest, so that it is cos(omega t) and its acceleration
-        is -sin(omega t).
-    frequency_radps : float
-        omega; 0 in a steady run.
-    periods : int
-        Whole periods kept; 0 in a steady run.
-    v_mps, r_radps, speed_mps, delta_rad, vdot_mps2, rdot_radps2 : array, (rows,)
-        ``speed_mps`` is U through the water.
-    heel_rad : float
-        At which the model is held.
-    projections : dict
-        What :mod:`tank2sim.identification.captive.equations` has projected on the harmonics of this motion, kept
-        because a campaign's equations are set up several times.
-    erring : dict
-        The same of this motion with an error, by its kind and size.
-    """
-
-    kept: slice
+    kept: slice  # Rows of the record used
+    # (rows,): Of those rows, less the delay of the forces behind the motion; in an oscillating run counted from a
+    # moment at which the leading velocity (v in pure sway, else r) is greatest, so that it is cos(omega t) and its
+    # acceleration is -sin(omega t)
     time_s: Array
-    frequency_radps: float
-    periods: int
+    frequency_radps: float  # omega; 0 in a steady run
+    periods: int  # Whole periods kept; 0 in a steady run
+    # `v_mps`, `r_radps`, `speed_mps`, `delta_rad`, `vdot_mps2`, `rdot_radps2`: (rows,): ``speed_mps`` is U through the
+    # water
     v_mps: Array
     r_radps: Array
     speed_mps: Array
     delta_rad: Array
     vdot_mps2: Array
     rdot_radps2: Array
-    heel_rad: float = 0.0
+    heel_rad: float = 0.0  # At which the model is held
+    # What :mod:`tank2sim.identification.captive.equations` has projected on the harmonics of this motion, kept because
+    # a campaign's equations are set up several times
     projections: dict[Hashable, Array] = field(init=False, repr=False, default_factory=dict)
+    # The same of this motion with an error, by its kind and size
     erring: dict[tuple[str, float], dict[Hashable, Array]] = field(init=False, repr=False, default_factory=dict)
 
     @cached_property
@@ -119,10 +104,7 @@ def leading(run: CaptiveRun) -> Array:
 def run_motion(run: CaptiveRun) -> CaptiveMotion:
     """The motion of a run.
 
-    Raises
-    ------
-    InputError
-        An oscillating run has no oscillation, less than one whole period, or too few readings a period.
+    Raises InputError: An oscillating run has no oscillation, less than one whole period, or too few readings a period.
     """
     return _oscillating(run) if run.oscillates else _steady(run)
 

@@ -41,24 +41,15 @@ def _nothing() -> Array:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ForceSeries:
-    """One force against an angle or an amplitude.
+    """One force against an angle or an amplitude."""
 
-    Parameters
-    ----------
-    label : str
-        Name of the series, such as ``pure sway, 0.45 rad/s``.
-    x, value : array (n,)
-        Measured points.
-    half_width : array (n,), optional
-        Half the 95 % interval of each point, in its unit.
-    fit_x, fit_value, fit_half_width : array (m,), optional
-        The fit and half its 95 % band; a fit without half widths has no band.
-    """
-
-    label: str
+    label: str  # Name of the series, such as ``pure sway, 0.45 rad/s``
+    # `x`, `value`: (n,): Measured points
     x: Array = field(default_factory=_nothing)
     value: Array = field(default_factory=_nothing)
-    half_width: Array | None = None
+    half_width: Array | None = None  # (n,): Half the 95 % interval of each point, in its unit
+    # `fit_x`, `fit_value`, `fit_half_width`: (m,): The fit and half its 95 % band; a fit without half widths has no
+    # band
     fit_x: Array = field(default_factory=_nothing)
     fit_value: Array = field(default_factory=_nothing)
     fit_half_width: Array | None = None
@@ -66,26 +57,13 @@ class ForceSeries:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ForceLoop:
-    """Forces over the motion in one run, in the order of time.
+    """Forces over the motion in one run, in the order of time."""
 
-    Parameters
-    ----------
-    label : str
-        Name of the run.
-    motion : array (n,)
-        Sway velocity or yaw rate.
-    forces : dict
-        Name of a force to its values (n,).
-    fitted_motion : array (m,)
-    fitted : dict
-        Name of a force to the values (m,) of the fit.
-    """
-
-    label: str
-    motion: Array
-    forces: Columns
-    fitted_motion: Array = field(default_factory=_nothing)
-    fitted: Columns = field(default_factory=dict)
+    label: str  # Name of the run
+    motion: Array  # (n,): Sway velocity or yaw rate
+    forces: Columns  # Name of a force to its values (n,)
+    fitted_motion: Array = field(default_factory=_nothing)  # (m,)
+    fitted: Columns = field(default_factory=dict)  # Name of a force to the values (m,) of the fit
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -89,111 +89,54 @@ class ReductionOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class Derivative:
-    """A derivative (prime).
+    """A derivative (prime)."""
 
-    Parameters
-    ----------
-    value, standard_error : float
-        ``standard_error`` combines both types.
-    type_a : float
-        Standard error from the scatter of the campaign.
-    type_b : mapping
-        Source to standard error, of stated uncertainties and of systematic errors that the campaign shows.
-    found_in : tuple of str
-        Types of run that determine it in the paper's order; empty if that order does not give it.
-    """
-
+    # `value`, `standard_error`: ``standard_error`` combines both types
     value: float
     standard_error: float
-    type_a: float
+    type_a: float  # Standard error from the scatter of the campaign
+    # Source to standard error, of stated uncertainties and of systematic errors that the campaign shows
     type_b: Mapping[str, float] = field(default_factory=dict)
-    found_in: str = ""
+    found_in: str = ""  # Types of run that determine it in the paper's order; empty if that order does not give it
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ForceResult:
-    """Result of a campaign for one force.
+    """Result of a campaign for one force."""
 
-    Parameters
-    ----------
-    selection : Selection
-        Chosen terms and equations; its ``choices`` state the decision on every candidate.
-    solution : Solution
-        The weighted regression over the whole campaign (Type A errors).
-    stepwise : Stepwise
-        The paper's order.
-    disagreements : tuple
-        Terms on which the two differ.
-    trends : tuple
-        Trends with frequency, and values extrapolated to zero frequency.
-    left_out : tuple
-        Each run predicted from all other runs.
-    asymmetry : Asymmetry or None
-        The test of the opposite parity, on request.
-    systematic : tuple
-        Errors common to many runs that the campaign shows in this force.
-    unchecked : tuple of str
-        Types of run whose derivatives no other type gives: an error of the gauge in them alone would not show.
-    timing_s : float
-        Delay of the forces that may be left, one standard deviation; 0 if it is stated, corrected or unknown.
-    alignment_rad : float
-        Zero of the drift angle that the campaign shows; 0 if it is stated or none is shown.
-    """
-
-    selection: Selection
-    solution: Solution
-    stepwise: Stepwise
-    disagreements: tuple[Disagreement, ...]
-    trends: tuple[Trend, ...]
-    left_out: tuple[LeftOut, ...]
-    asymmetry: Asymmetry | None = None
-    systematic: tuple[SystematicError, ...] = ()
+    selection: Selection  # Chosen terms and equations; its ``choices`` state the decision on every candidate
+    solution: Solution  # The weighted regression over the whole campaign (Type A errors)
+    stepwise: Stepwise  # The paper's order
+    disagreements: tuple[Disagreement, ...]  # Terms on which the two differ
+    trends: tuple[Trend, ...]  # Trends with frequency, and values extrapolated to zero frequency
+    left_out: tuple[LeftOut, ...]  # Each run predicted from all other runs
+    asymmetry: Asymmetry | None = None  # The test of the opposite parity, on request
+    systematic: tuple[SystematicError, ...] = ()  # Errors common to many runs that the campaign shows in this force
+    # Types of run whose derivatives no other type gives: an error of the gauge in them alone would not show
     unchecked: tuple[str, ...] = ()
+    # Delay of the forces that may be left, one standard deviation; 0 if it is stated, corrected or unknown
     timing_s: float = 0.0
-    alignment_rad: float = 0.0
+    alignment_rad: float = 0.0  # Zero of the drift angle that the campaign shows; 0 if it is stated or none is shown
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Reduction:
-    """Result of a reduction.
+    """Result of a reduction."""
 
-    Parameters
-    ----------
-    campaign : Campaign
-        As read.
-    options : ReductionOptions
-        The options used.
-    runs : tuple of ReducedRun
-        The runs used.
-    not_used : mapping
-        Name of an omitted run to the reason.
-    faults : tuple of InputError
-        Faults of runs omitted with `keep_going`.
-    forces : mapping
-        ``X``, ``Y``, ``N`` to its result.
-    derivatives : mapping
-        Derivatives by name.
-    oscillations, cubics
-        Evaluation of single oscillation tests.
-    missing : tuple of str
-        Names in :data:`ESSENTIAL` that the campaign does not give.
-    delay : DelayEstimate or None
-        Delay of the forces as recorded, less ``[test] force_delay_s``; None without oscillations at two frequencies.
-    alignment : AlignmentEstimate or None
-        The zero of the drift angle by Y0 and N0; None if the campaign does not give them.
-    """
-
-    campaign: Campaign
-    options: ReductionOptions
-    runs: tuple[ReducedRun, ...]
-    not_used: Mapping[str, str]
-    faults: tuple[InputError, ...]
-    forces: Mapping[str, ForceResult]
-    derivatives: Mapping[str, Derivative]
+    campaign: Campaign  # As read
+    options: ReductionOptions  # The options used
+    runs: tuple[ReducedRun, ...]  # The runs used
+    not_used: Mapping[str, str]  # Name of an omitted run to the reason
+    faults: tuple[InputError, ...]  # Faults of runs omitted with `keep_going`
+    forces: Mapping[str, ForceResult]  # ``X``, ``Y``, ``N`` to its result
+    derivatives: Mapping[str, Derivative]  # Derivatives by name
+    # `oscillations`, `cubics`: Evaluation of single oscillation tests
     oscillations: tuple[OscillationDerivatives, ...]
     cubics: tuple[CubicByTwoWays, ...]
-    missing: tuple[str, ...]
+    missing: tuple[str, ...]  # Names in :data:`ESSENTIAL` that the campaign does not give
+    # Delay of the forces as recorded, less ``[test] force_delay_s``; None without oscillations at two frequencies
     delay: DelayEstimate | None = None
+    # The zero of the drift angle by Y0 and N0; None if the campaign does not give them
     alignment: AlignmentEstimate | None = None
 
     @property
@@ -205,11 +148,8 @@ class Reduction:
 def reduce_campaign(campaign: Campaign, options: ReductionOptions | None = None) -> Reduction:
     """Derivatives from a campaign.
 
-    Raises
-    ------
-    InputError
-        Runs have faults without `keep_going` (all are reported), no run remains, a necessary key is missing, or a
-        number of ``[model]`` or the sign of the resistance is impossible.
+    Raises InputError: Runs have faults without `keep_going` (all are reported), no run remains, a necessary key is
+    missing, or a number of ``[model]`` or the sign of the resistance is impossible.
     """
     with threadpool_limits(limits=1, user_api="blas"):  # several threads take four times as long
         return _reduction(campaign, options or ReductionOptions())

@@ -45,27 +45,14 @@ _CLEARLY = 0.05
 
 @dataclass(frozen=True)
 class Spread:
-    """Scatter of the runs of a campaign.
+    """Scatter of the runs of a campaign."""
 
-    Parameters
-    ----------
-    noise : float
-        Factor on the within-run covariances; 1 if they are complete.
-    zero_variance : float
-        Variance of the zero error from run to run, in ``Equations.unit`` squared.
-    by_type : mapping
-        Type of run to its own variance, where the types differ; it includes the misfit of (3.8).
-    gain_variance : float
-        Variance of the gauge's relative gain from run to run.
-    weights : Spread or None
-        Spread that weights the runs, if different.
-    """
-
-    noise: float
-    zero_variance: float
+    noise: float  # Factor on the within-run covariances; 1 if they are complete
+    zero_variance: float  # Variance of the zero error from run to run, in ``Equations.unit`` squared
+    # Type of run to its own variance, where the types differ; it includes the misfit of (3.8)
     by_type: Mapping[str, float] = field(default_factory=dict)
-    gain_variance: float = 0.0
-    weights: Spread | None = None
+    gain_variance: float = 0.0  # Variance of the gauge's relative gain from run to run
+    weights: Spread | None = None  # Spread that weights the runs, if different
 
     def zeros(self, equations: CampaignEquations) -> Array:
         """Variance of the zero error of each run, (runs,)."""
@@ -116,30 +103,14 @@ class Spread:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Derivatives of one force from a set of equations.
+    """Derivatives of one force from a set of equations."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        Names of the terms.
-    values : array, (terms,)
-        Prime.
-    covariance : array, (terms, terms)
-        Covariance of the values.
-    spread : Spread
-        With which they were weighted.
-    condition : float
-        Scaled condition number of the weighted design.
-    inflation : array, (terms,)
-        Variance inflation factors: variance of a term over its variance as the only term.
-    """
-
-    names: tuple[str, ...]
-    values: Array
-    covariance: Array
-    spread: Spread
-    condition: float
-    inflation: Array
+    names: tuple[str, ...]  # Names of the terms
+    values: Array  # (terms,): Prime
+    covariance: Array  # (terms, terms): Covariance of the values
+    spread: Spread  # With which they were weighted
+    condition: float  # Scaled condition number of the weighted design
+    inflation: Array  # (terms,): Variance inflation factors: variance of a term over its variance as the only term
 
     @property
     def standard_errors(self) -> Array:
@@ -284,25 +255,14 @@ class _ZeroLikelihood:
 
     Along the zero error the coefficients of a run have the variance s_i = noise + zero_i z_i' z_i, across it the noise
     alone: there all runs together are one triangular system, which holds for every spread.
-
-    Parameters
-    ----------
-    along : array, (runs, columns + 1)
-        Design and right-hand side of each run along its zero error.
-    across : array, (columns + 1, columns + 1)
-        Design and right-hand side of all runs across their zero errors, as a triangle.
-    prior : array, (terms, columns + 1)
-    sizes : array, (runs,)
-        z_i' z_i.
-    count : int
-        Equations across.
     """
 
-    along: Array
+    along: Array  # (runs, columns + 1): Design and right-hand side of each run along its zero error
+    # (columns + 1, columns + 1): Design and right-hand side of all runs across their zero errors, as a triangle
     across: Array
-    prior: Array
-    sizes: Array
-    count: int
+    prior: Array  # (terms, columns + 1)
+    sizes: Array  # (runs,): z_i' z_i
+    count: int  # Equations across
 
     @classmethod
     def of(cls, equations: CampaignEquations) -> _ZeroLikelihood:

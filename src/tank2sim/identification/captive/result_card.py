@@ -24,43 +24,24 @@ FILLS: Mapping[str, str] = {"clarke1983": CLARKE}
 
 @dataclass(frozen=True, kw_only=True)
 class Contents:
-    """Contents of the card.
+    """Contents of the card."""
 
-    Parameters
-    ----------
-    entries : mapping
-        Name to value, standard error (prime) and origin, in the canonical order.
-    estimated : tuple of str
-        Names of the estimates.
-    missing : tuple of str
-        Names of essential derivatives that are neither measured nor estimated.
-    mass, yaw_inertia, x_G : float
-        Prime.
-    inertia_source : str
-        Source of the yaw inertia.
-    """
-
-    entries: Mapping[str, DerivativeEntry]
-    estimated: tuple[str, ...]
-    missing: tuple[str, ...]
+    entries: Mapping[str, DerivativeEntry]  # Name to value, standard error (prime) and origin, in the canonical order
+    estimated: tuple[str, ...]  # Names of the estimates
+    missing: tuple[str, ...]  # Names of essential derivatives that are neither measured nor estimated
+    # `mass`, `yaw_inertia`, `x_G`: Prime
     mass: float
     yaw_inertia: float
     x_G: float
-    inertia_source: str
+    inertia_source: str  # Source of the yaw inertia
 
 
 def card_contents(reduction: Reduction, fill: str | None = None) -> Contents:
     """Contents of the card of a reduction.
 
-    Parameters
-    ----------
-    fill : str, optional
-        Key of :data:`FILLS`: the source of derivatives that the campaign does not give.
+    `fill`: Key of :data:`FILLS`: the source of derivatives that the campaign does not give.
 
-    Raises
-    ------
-    InputError
-        The estimate needs beam and draught, and the campaign lacks them.
+    Raises InputError: The estimate needs beam and draught, and the campaign lacks them.
     """
     campaign = reduction.campaign
     model, scales = campaign.model, campaign.scales
@@ -261,14 +242,7 @@ def heel_notices(reduction: Reduction) -> list[Notice]:
 def fill_notices(card: Contents, fill: str | None, ratio: float | None, campaign: Campaign) -> list[Notice]:
     """Notices on what the card has from estimates, lacks, and takes from another size.
 
-    Parameters
-    ----------
-    card : Contents
-    fill : str or None
-        Published estimate.
-    ratio : float or None
-        Length of the card's ship over the model's.
-    campaign : Campaign
+    `fill`: Published estimate; `ratio`: Length of the card's ship over the model's.
     """
     notices = []
     if card.estimated:

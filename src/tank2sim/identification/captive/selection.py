@@ -56,26 +56,14 @@ Nvvv/Nv 6.2, Nvvd/Nd 3.5, Yvvd/Yd 4.3, Yddd/Yd 0.32). Other terms are free."""
 
 @dataclass(frozen=True)
 class Choice:
-    """Decision on a candidate term.
+    """Decision on a candidate term."""
 
-    Parameters
-    ----------
-    name : str
-        The term.
-    kept : bool
-        True for a reported term.
-    reason : str
-        ``linear``, ``determined``, ``asked for``, ``not excited``, ``collinear``, ``not determined``, ``trend``.
-    explanation : str
-        The reason in a sentence, with its figures.
-    inflation, ratio : float or None
-        Variance inflation factor, and value over standard error, at the decision.
-    """
-
-    name: str
-    kept: bool
+    name: str  # The term
+    kept: bool  # True for a reported term
+    # ``linear``, ``determined``, ``asked for``, ``not excited``, ``collinear``, ``not determined``, ``trend``
     reason: str
-    explanation: str
+    explanation: str  # The reason in a sentence, with its figures
+    # `inflation`, `ratio`: Variance inflation factor, and value over standard error, at the decision
     inflation: float | None = None
     ratio: float | None = None
 
@@ -117,15 +105,9 @@ class Selection:
 def select(campaign: Campaign, runs: Sequence[ReducedRun], force: str, *, all_terms: bool = False) -> Selection:
     """Choose the terms of one force.
 
-    Parameters
-    ----------
-    all_terms : bool
-        Report terms that the tests do not determine, too.
+    `all_terms`: Report terms that the tests do not determine, too.
 
-    Raises
-    ------
-    InputError
-        As :func:`tank2sim.identification.captive.equations.campaign_equations`.
+    Raises InputError: As :func:`tank2sim.identification.captive.equations.campaign_equations`.
     """
     choices: dict[str, Choice] = {}
     used = distinguishable_equations(campaign, runs, force, choices)
@@ -236,26 +218,16 @@ def usual_zero(full: CampaignEquations) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Trend:
-    """Trend of one term with frequency.
+    """Trend of one term with frequency."""
 
-    Parameters
-    ----------
-    name : str
-        The term.
-    slope, standard_error : float
-        Change of its prime value by (omega L/U)^2.
-    at_zero, error_at_zero : float
-        Its value extrapolated to zero frequency, with this slope in the regression.
-    used : bool
-        True for a significant slope: the result's value is that at zero frequency.
-    """
-
-    name: str
+    name: str  # The term
+    # `slope`, `standard_error`: Change of its prime value by (omega L/U)^2
     slope: float
     standard_error: float
+    # `at_zero`, `error_at_zero`: Its value extrapolated to zero frequency, with this slope in the regression
     at_zero: float
     error_at_zero: float
-    used: bool
+    used: bool  # True for a significant slope: the result's value is that at zero frequency
 
 
 def trends(campaign: Campaign, selection: Selection) -> tuple[Selection, tuple[Trend, ...]]:

@@ -203,18 +203,10 @@ def study_runs(
 ) -> tuple[CaptiveRunStudy, tuple[ReducedRun, ...]]:
     """Reduce runs, each by itself, and compare repeats.
 
-    Parameters
-    ----------
-    runs : sequence of CaptiveRun
-    campaign : Campaign or None
-        Model and test; without them no inertia is removed and no derivatives are given.
-    remarks : sequence of Notice
-        Notices on the records.
+    `campaign`: Model and test; without them no inertia is removed and no derivatives are given; `remarks`: Notices on
+    the records.
 
-    Raises
-    ------
-    InputError
-        As of :func:`single_run`.
+    Raises InputError: As of :func:`single_run`.
     """
     single, reduced = zip(*(single_run(run, campaign) for run in runs), strict=True)
     alike = len(runs) > 1 and same_test(single)
@@ -244,16 +236,9 @@ def study_runs(
 def single_run(run: CaptiveRun, campaign: Campaign | None) -> tuple[SingleRun, ReducedRun]:
     """Reduce one run.
 
-    Parameters
-    ----------
-    run : CaptiveRun
-    campaign : Campaign or None
-        Model and test; without them no inertia is removed and no derivatives are given.
+    `campaign`: Model and test; without them no inertia is removed and no derivatives are given.
 
-    Raises
-    ------
-    InputError
-        An oscillating run has no whole period or too few readings a period, or no carriage moves so.
+    Raises InputError: An oscillating run has no whole period or too few readings a period, or no carriage moves so.
     """
     for fault in motion_faults(run):
         raise fault
@@ -306,12 +291,7 @@ def averaged_cycle(run: ReducedRun, force: str) -> AveragedCycle:
     The mean of a bin is the value of the harmonics at its middle plus the mean residual inside it: the curvature of
     the force over the bin does not bias it, and a trend of the zero does not widen it.
 
-    Parameters
-    ----------
-    run : ReducedRun
-        An oscillating run.
-    force : str
-        ``X``, ``Y`` or ``N``.
+    `run`: An oscillating run; `force`: ``X``, ``Y`` or ``N``.
     """
     fit, left = run.fits[force], run.residual(force)
     waves = [place for place, label in enumerate(run.labels) if label != "trend"]

@@ -37,22 +37,13 @@ _LEAST_SPREAD = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Stepwise:
-    """Result of the paper's order for one force.
+    """Result of the paper's order for one force."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        Terms in the order of their estimation.
-    values, standard_errors : array, (terms,)
-        Prime.
-    found_in : tuple of str
-        Type of run that gave each term.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # Terms in the order of their estimation
+    # `values`, `standard_errors`: (terms,): Prime
     values: Array
     standard_errors: Array
-    found_in: tuple[str, ...]
+    found_in: tuple[str, ...]  # Type of run that gave each term
 
 
 @dataclass(frozen=True)

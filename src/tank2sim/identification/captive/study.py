@@ -309,15 +309,8 @@ def study_reduction(
 ) -> ReductionStudy:
     """The study of a reduction.
 
-    Parameters
-    ----------
-    reduction : Reduction
-    card : Contents
-        Contents of its card.
-    notices : tuple of Notice
-        Messages for the user, in sentences.
-    card_scale : float, optional
-        As of :class:`ReductionStudy`.
+    `card`: Contents of its card; `notices`: Messages for the user, in sentences; `card_scale`: As of
+    :class:`ReductionStudy`.
     """
     campaign, forces, found = reduction.campaign, reduction.forces, reduction.derivatives
     resistance = ["X0"] if is_resistance(campaign) and "X0" in found else []

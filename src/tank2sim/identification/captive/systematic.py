@@ -56,31 +56,17 @@ _MOTIONS = {"sway": ("pure_sway",), "yaw": ("pure_yaw", "yaw_with_drift")}
 
 @dataclass(frozen=True, kw_only=True)
 class SystematicError:
-    """An error common to many runs.
+    """An error common to many runs."""
 
-    Parameters
-    ----------
-    source : str
-        ``force_delay``, or ``gain of Y in static_drift``.
-    force : str
-        The gauges concerned: ``Y``, ``N``, or ``XYN``.
-    runs : str
-        Type of the runs concerned; empty for all oscillating runs.
-    or_runs : tuple of str
-        Other types of run whose error would explain the data nearly as well.
-    size, standard_error : float
-        Delay in s, positive if the forces lag the motion; relative gain, positive if the gauge reads too much.
-    corrected : bool
-        It is taken out of the results, and only its standard error is left in theirs.
-    """
-
-    source: str
-    force: str
-    runs: str
+    source: str  # ``force_delay``, or ``gain of Y in static_drift``
+    force: str  # The gauges concerned: ``Y``, ``N``, or ``XYN``
+    runs: str  # Type of the runs concerned; empty for all oscillating runs
+    # `size`, `standard_error`: Delay in s, positive if the forces lag the motion; relative gain, positive if the gauge
+    # reads too much
     size: float
     standard_error: float
-    or_runs: tuple[str, ...] = ()
-    corrected: bool = False
+    or_runs: tuple[str, ...] = ()  # Other types of run whose error would explain the data nearly as well
+    corrected: bool = False  # It is taken out of the results, and only its standard error is left in theirs
 
     @property
     def message(self) -> str:
@@ -133,31 +119,16 @@ class ChannelDelay:
 
 @dataclass(frozen=True, kw_only=True)
 class DelayEstimate:
-    """The delay of the forces behind the motion by all channels that show it.
+    """The delay of the forces behind the motion by all channels that show it."""
 
-    Parameters
-    ----------
-    size, standard_error : float
-        Weighted mean of the channels, s, positive if the forces lag.
-    channels : tuple of ChannelDelay
-        Gauges and motions.
-    chance : float
-        Probability of so large a scatter of the channels about one common delay.
-    alike : bool
-        The channels have one delay; if not, they differ as memory of the flow does.
-    supported : bool
-        Sway and yaw show it each by itself: it is not the memory of one of the motions.
-    corrected : bool
-        It is taken out of the results.
-    """
-
+    # `size`, `standard_error`: Weighted mean of the channels, s, positive if the forces lag
     size: float
     standard_error: float
-    channels: tuple[ChannelDelay, ...]
-    chance: float
-    alike: bool
-    supported: bool
-    corrected: bool = False
+    channels: tuple[ChannelDelay, ...]  # Gauges and motions
+    chance: float  # Probability of so large a scatter of the channels about one common delay
+    alike: bool  # The channels have one delay; if not, they differ as memory of the flow does
+    supported: bool  # Sway and yaw show it each by itself: it is not the memory of one of the motions
+    corrected: bool = False  # It is taken out of the results
 
     @property
     def possible_s(self) -> float:
@@ -169,10 +140,7 @@ class DelayEstimate:
 def delay_estimate(forces: Mapping[str, CampaignEquations]) -> DelayEstimate | None:
     """The common delay by oscillations at several frequencies; None if there are none.
 
-    Parameters
-    ----------
-    forces : mapping
-        ``Y`` and ``N`` to their equations, without trends with frequency, which would absorb the delay.
+    `forces`: ``Y`` and ``N`` to their equations, without trends with frequency, which would absorb the delay.
     """
     channels = tuple(
         ChannelDelay(force=force, motion=motion, size=size, standard_error=error)
@@ -208,12 +176,7 @@ def force_delays(
 ) -> tuple[SystematicError, ...]:
     """The delay of all gauges behind the motion, or of one, that oscillations at several frequencies show.
 
-    Parameters
-    ----------
-    forces : mapping
-        As :func:`delay_estimate` has them.
-    estimate : DelayEstimate or None
-        The common delay.
+    `forces`: As :func:`delay_estimate` has them; `estimate`: The common delay.
     """
     if estimate is None:
         return ()
@@ -254,14 +217,8 @@ def gauge_gains(
     """The kind of run in which a gauge departs most from the prediction of all other kinds, if any; and the kinds that
     cannot be checked, because no other kind gives their derivatives.
 
-    Parameters
-    ----------
-    equations : CampaignEquations
-        Without trends with frequency.
-    spread : Spread
-        Spread of the runs within each kind.
-    rival : float
-        Largest ratio of a trend with frequency to its standard error: a gain must explain the runs better.
+    `equations`: Without trends with frequency; `spread`: Spread of the runs within each kind; `rival`: Largest ratio of
+    a trend with frequency to its standard error: a gain must explain the runs better.
     """
     predicted = _predicted(equations, spread)
     kinds = np.array([run.run.type for run in equations.runs])[equations.run_of_row]

@@ -235,10 +235,7 @@ def trim(trim_m: float | None, length_m: float) -> Iterator[Caution]:
 def similarity(model: Mapping[str, float | None], ship: Mapping[str, float | None]) -> Iterator[Caution]:
     """Differences of m', J_z', x_G', z_G' between model and ship; a missing number is reported.
 
-    Parameters
-    ----------
-    model, ship : mapping
-        Numbers by the names of :data:`SIMILARITY`, prime system, x_G' and z_G' in lengths.
+    `model`, `ship`: Numbers by the names of :data:`SIMILARITY`, prime system, x_G' and z_G' in lengths.
     """
     keys = {"m'": "mass_kg", "J_z'": "yaw_inertia_kgm2", "x_G'": "x_G_m", "z_G'": "z_G_m"}
     for name, (limit, kind) in SIMILARITY.items():

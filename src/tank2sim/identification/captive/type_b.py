@@ -43,14 +43,7 @@ def type_b_shifts(campaign: Campaign, used: CampaignEquations, solution: Solutio
 def with_common_error(campaign: Campaign, used: CampaignEquations, source: str, size: float) -> CampaignEquations:
     """The equations with an error common to the campaign.
 
-    Parameters
-    ----------
-    campaign : Campaign
-    used : CampaignEquations
-    source : str
-        A key of ``[uncertainty]``.
-    size : float
-        In the unit of the key.
+    `source`: A key of ``[uncertainty]``; `size`: In the unit of the key.
     """
     if source == "force_delay_s":
         return correct_delay(used, size)
@@ -94,25 +87,14 @@ def _scaled(run: ReducedRun, factor: float) -> ReducedRun:
 
 @dataclass(frozen=True, kw_only=True)
 class AlignmentEstimate:
-    """The angle by which the true drift exceeds the recorded one, rad.
+    """The angle by which the true drift exceeds the recorded one, rad."""
 
-    Parameters
-    ----------
-    angle_rad, standard_error_rad : float
-        Weighted mean of that by Y0 and that by N0.
-    by_force : mapping
-        ``Y`` and ``N`` to angle and standard error.
-    chance : float
-        Probability of so large a difference of the two.
-    shown : bool
-        The angle is not zero, and Y0 and N0 agree on it.
-    """
-
+    # `angle_rad`, `standard_error_rad`: Weighted mean of that by Y0 and that by N0
     angle_rad: float
     standard_error_rad: float
-    by_force: Mapping[str, tuple[float, float]]
-    chance: float
-    shown: bool
+    by_force: Mapping[str, tuple[float, float]]  # ``Y`` and ``N`` to angle and standard error
+    chance: float  # Probability of so large a difference of the two
+    shown: bool  # The angle is not zero, and Y0 and N0 agree on it
 
 
 def alignment_estimate(
@@ -125,11 +107,7 @@ def alignment_estimate(
     recorded drift and solving again. Y0 and N0 then give the same angle. A single screw or a bent hull has another
     ratio of Y0 and N0, except by chance.
 
-    Parameters
-    ----------
-    campaign : Campaign
-    equations, solutions : mapping
-        ``Y`` and ``N`` to the equations of that force and their solution.
+    `equations`, `solutions`: ``Y`` and ``N`` to the equations of that force and their solution.
     """
     found: dict[str, tuple[float, float]] = {}
     for force in "YN":

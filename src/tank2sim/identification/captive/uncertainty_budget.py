@@ -51,23 +51,15 @@ _SOURCE_OF = {
 
 @dataclass(frozen=True, kw_only=True)
 class BudgetRow:
-    """The budget of one derivative, prime.
-
-    Parameters
-    ----------
-    name : str
-    value : float
-    combined, expanded : float
-        Standard uncertainty, and :data:`COVERAGE_FACTOR` times that.
-    parts, shares : mapping
-        Source, a key of :data:`BUDGET_SOURCES`, to its standard uncertainty, and to its share of the variance; the
-        shares add up to 1.
-    """
+    """The budget of one derivative, prime."""
 
     name: str
     value: float
+    # `combined`, `expanded`: Standard uncertainty, and :data:`COVERAGE_FACTOR` times that
     combined: float
     expanded: float
+    # `parts`, `shares`: Source, a key of :data:`BUDGET_SOURCES`, to its standard uncertainty, and to its share of the
+    # variance; the shares add up to 1
     parts: Mapping[str, float]
     shares: Mapping[str, float]
 
@@ -108,12 +100,7 @@ def regression_parts(selection: Selection, solution: Solution) -> dict[str, Arra
     The estimate is C X' S S b with the weights S; b has the covariance noise I + zero z z' + gain g g'. All parts are
     widened alike for the finite number of runs (Student's t).
 
-    Parameters
-    ----------
-    selection : Selection
-        Its equations.
-    solution : Solution
-        Solution of these equations.
+    `selection`: Its equations; `solution`: Solution of these equations.
     """
     equations, spread = selection.equations, solution.spread
     weights = spread.weights or spread

@@ -73,14 +73,7 @@ def cautions_of_test(
 ) -> tuple[Caution, ...]:
     """Cautions on the test conditions of a campaign, without its forces.
 
-    Parameters
-    ----------
-    campaign : Campaign
-        As read.
-    runs : tuple of OscillationMotion
-        Its oscillating runs, with frequencies as measured.
-    ship : ManoeuvringCard, optional
-        The ship of the model.
+    `campaign`: As read; `runs`: Its oscillating runs, with frequencies as measured; `ship`: The ship of the model.
     """
     model, test = campaign.model, campaign.test
     gravity, speed, length = test.gravity_mps2, test.speed_mps, model.length_m
@@ -159,15 +152,9 @@ def force_convention(
 ) -> Iterator[Caution]:
     """Added masses that no body has, and whether the opposite sign of the forces would correct them.
 
-    Parameters
-    ----------
-    derivatives : mapping
-        Prime values; Yvdot and Nrdot are checked.
-    mass_prime, inertia_prime : float
-        m' and J_z'. With forces of the wrong sign Y_vdot comes out as 2 m' - Y_vdot and N_rdot as 2 J_z' - N_rdot,
-        by (4.4) of paper 2 and its equivalent for yaw.
-    convention : str
-        ``force_convention`` of the campaign.
+    `derivatives`: Prime values; Yvdot and Nrdot are checked; `mass_prime`, `inertia_prime`: m' and J_z'. With forces of
+    the wrong sign Y_vdot comes out as 2 m' - Y_vdot and N_rdot as 2 J_z' - N_rdot, by (4.4) of paper 2 and its
+    equivalent for yaw; `convention`: ``force_convention`` of the campaign.
     """
     inertias = ((mass_prime, "mass"), (inertia_prime, "yaw inertia"))
     for name, (inertia, what) in zip(ADDED_MASSES, inertias, strict=True):
@@ -184,16 +171,9 @@ def foreign_units(
 ) -> Iterator[Caution]:
     """Other units of force and moment, with which derivatives that no ship has become those of one, in deep water.
 
-    Parameters
-    ----------
-    derivatives : mapping
-        Prime values; with a unit that is k newtons Y_v is k times as large, Y_vdot is m' - k (m' - Y_vdot).
-    mass_prime, inertia_prime : float
-        m' and J_z', None if unknown.
-    removed : bool
-        The forces were recorded without the inertia of the model.
-    body : CarriedBody
-        Its length, beam and draught scale the estimates.
+    `derivatives`: Prime values; with a unit that is k newtons Y_v is k times as large, Y_vdot is m' - k (m' - Y_vdot);
+    `mass_prime`, `inertia_prime`: m' and J_z', None if unknown; `removed`: The forces were recorded without the inertia
+    of the model; `body`: Its length, beam and draught scale the estimates.
     """
     hull = _HullShares.of(derivatives, mass_prime, inertia_prime, removed, body)
     force, moment = "", ""

@@ -36,13 +36,8 @@ MASS_KEYS = {"Xudot": "mx", "Yvdot": "my", "Nrdot": "Jz"}
 def mmg_card_text(tests: SteadyTests, values: Mapping[str, float], errors: Mapping[str, float], note: str) -> str:
     """The text of a card.
 
-    Parameters
-    ----------
-    tests : SteadyTests
-    values, errors : mapping
-        Coefficients of hull (prime II, by 1/2 rho L d U^2), propeller and rudder by name, and their standard errors.
-    note : str
-        Sentence that says where the numbers are from.
+    `values`, `errors`: Coefficients of hull (prime II, by 1/2 rho L d U^2), propeller and rudder by name, and their
+    standard errors; `note`: Sentence that says where the numbers are from.
     """
     form = tests.form
     model = form.model
@@ -112,10 +107,8 @@ def _coefficients(
 def tested_card(tests: SteadyTests, values: Mapping[str, float], errors: Mapping[str, float], note: str) -> MmgCard:
     """The card of :func:`mmg_card_text`, with the same `tests`, `values`, `errors` and `note`.
 
-    Raises
-    ------
-    InputError
-        The coefficients are not those of a ship; it names the campaign, and the columns that give the one at fault.
+    Raises InputError: The coefficients are not those of a ship; it names the campaign, and the columns that give the
+    one at fault.
     """
     try:
         card = parse_card(mmg_card_text(tests, values, errors, note), "the reduced card")

@@ -58,12 +58,7 @@ def _impossible_sizes(form: CampaignFile) -> Iterator[tuple[str, str, str]]:
 def refuse_other_curve(points: Array, path: Path) -> None:
     """Raise InputError for open-water points that are not K_T of a propeller.
 
-    Parameters
-    ----------
-    points : array, (points, 2 or more)
-        J, K_T.
-    path : Path
-        File of the campaign, for the message.
+    `points` (points, 2 or more): J, K_T; `path`: File of the campaign, for the message.
     """
     J, K_T = points[:, :2].T
     remedy = "name the column of K_T = T/(rho n² D⁴), positive ahead"
@@ -82,15 +77,8 @@ def refuse_other_curve(points: Array, path: Path) -> None:
 def refuse_astern(form: CampaignFile, path: Path, revolutions: Array, thrusts: dict[str, Array]) -> None:
     """Raise InputError if the propeller turns, or pushes, astern in most conditions.
 
-    Parameters
-    ----------
-    form : CampaignFile
-    path : Path
-        File of the campaign, for the message.
-    revolutions : array, (conditions,)
-        rad/s.
-    thrusts : mapping
-        ``thrust``, and ``thrust_left`` of two, to its values, N, (conditions,).
+    `path`: File of the campaign, for the message; `revolutions` (conditions,): rad/s; `thrusts`: ``thrust``, and
+    ``thrust_left`` of two, to its values, N, (conditions,).
     """
     for key, values in {"propeller": revolutions, **thrusts}.items():
         if not np.median(values) > 0:

@@ -37,33 +37,18 @@ factor of three away; 10 K_Q is."""
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SteadyTests:
-    """Steady conditions of one campaign and the open-water curve of its propeller.
+    """Steady conditions of one campaign and the open-water curve of its propeller."""
 
-    Parameters
-    ----------
-    path : Path
-        File of the campaign.
-    form : CampaignFile
-        What it states.
-    names : tuple of str, (conditions,)
-        File of each condition, and line in a table of averages.
-    motion : array, (conditions, 5)
-        u, v (m/s), r (rad/s), rudder angle (rad, positive to starboard), revolutions (rad/s).
-    readings : array, (conditions, 5 to 7)
-        :attr:`channels`, as a gauge on the model shows them: of the water, and of the body's own inertia in turning.
-    open_water : array, (points, 2 or 3)
-        J, K_T, and K_Q if the torque was measured.
-    remarks : tuple of Notice
-        Remarks from reading the files.
-    """
-
-    path: Path
-    form: CampaignFile
-    names: tuple[str, ...]
+    path: Path  # File of the campaign
+    form: CampaignFile  # What it states
+    names: tuple[str, ...]  # File of each condition, and line in a table of averages
+    # (conditions, 5): u, v (m/s), r (rad/s), rudder angle (rad, positive to starboard), revolutions (rad/s)
     motion: Array
+    # (conditions, 5 to 7): :attr:`channels`, as a gauge on the model shows them: of the water, and of the body's own
+    # inertia in turning
     readings: Array
-    open_water: Array
-    remarks: tuple[Notice, ...]
+    open_water: Array  # (points, 2 or 3): J, K_T, and K_Q if the torque was measured
+    remarks: tuple[Notice, ...]  # Remarks from reading the files
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -85,11 +70,8 @@ class SteadyTests:
 def read_steady_tests(path: Path) -> SteadyTests:
     """The conditions of a campaign with thrust and normal force: rows of ``[averages]``, or means of steady runs.
 
-    Raises
-    ------
-    InputError
-        A file is at fault, or the campaign lacks what the MMG method needs: thrust, normal force, revolutions, the
-        open-water curve, and the sizes of model, propeller and rudder.
+    Raises InputError: A file is at fault, or the campaign lacks what the MMG method needs: thrust, normal force,
+    revolutions, the open-water curve, and the sizes of model, propeller and rudder.
     """
     form, spelt = read_campaign_file(path)
     _refuse_missing(form, path)

@@ -121,10 +121,7 @@ class MmgStudy:
 def study_mmg(fit: MmgFit) -> MmgStudy:
     """The study of a fit.
 
-    Raises
-    ------
-    InputError
-        The method does not describe a channel: its sign, unit or scale is another.
+    Raises InputError: The method does not describe a channel: its sign, unit or scale is another.
     """
     tests, channels = fit.tests, fit.tests.channels
     left = np.sqrt(np.mean(fit.residuals**2, axis=0) / np.mean(tests.readings**2, axis=0))
@@ -245,10 +242,7 @@ def mmg_coefficients(fit: MmgFit) -> dict[str, MmgCoefficient]:
 def mmg_card(fit: MmgFit) -> Card:
     """The MMG card of a fit, with the covariance of its coefficients.
 
-    Raises
-    ------
-    InputError
-        No ship has these coefficients.
+    Raises InputError: No ship has these coefficients.
     """
     values = {name: mean for name, (mean, _) in ORDINARY.items()} | dict(
         zip(fit.names, map(float, fit.values), strict=True)
