@@ -27,7 +27,7 @@ from tank2sim.identification.captive.single_runs import (
     RepeatedCoefficient,
     SingleRun,
 )
-from tank2sim.records.campaigns import FORCE_COLUMNS
+from tank2sim.records.captive_record import FORCE_COLUMNS
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -19,7 +19,8 @@ from tank2sim.identification.captive.regression import Spread, solve
 from tank2sim.identification.captive.selection import Selection, distinguishable_equations, usual_zero, with_prior
 from tank2sim.identification.conditioning import COLLINEAR
 from tank2sim.records.campaign_form import OSCILLATING
-from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign
+from tank2sim.records.campaigns import Campaign
+from tank2sim.records.captive_record import FORCE_COLUMNS
 
 _TIMES_USUAL = 8.0
 """Least misfit of a contradicted run, in those usual in the campaign. Sound runs of synthetic campaigns reach 6 with

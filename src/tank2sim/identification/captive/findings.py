@@ -18,7 +18,7 @@ from tank2sim.identification.captive.systematic import can_show_delay, correct_d
 from tank2sim.identification.captive.tank_conditions import Tank, tank_resonance, tank_size
 from tank2sim.identification.captive.warnings import OscillationMotion, cautions_of_result, cautions_of_test
 from tank2sim.notices import Notice, caution
-from tank2sim.records.campaigns import FORCE_COLUMNS
+from tank2sim.records.captive_record import FORCE_COLUMNS
 
 _SHEET = 0.05
 _DRIFT = 0.02

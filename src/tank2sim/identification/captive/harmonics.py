@@ -18,7 +18,7 @@ from scipy.special import digamma, polygamma
 
 from tank2sim.arrays import Array
 from tank2sim.identification.captive.motion import CaptiveMotion, harmonic_basis, run_motion
-from tank2sim.records.campaigns import FORCE_COLUMNS, CaptiveRun
+from tank2sim.records.captive_record import FORCE_COLUMNS, CaptiveRun
 
 FORCE_HARMONICS = 5
 """Harmonics of the forces that are fitted."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.records.campaigns import CaptiveRun
+from tank2sim.records.captive_record import CaptiveRun
 
 MOTION_HARMONICS = 3
 """Number of harmonics of the mechanism's motion."""

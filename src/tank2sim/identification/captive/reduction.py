@@ -52,7 +52,8 @@ from tank2sim.identification.captive.type_b import (
     with_common_error,
 )
 from tank2sim.identification.captive.warnings import body_of
-from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, together
+from tank2sim.records.campaigns import Campaign, together
+from tank2sim.records.captive_record import FORCE_COLUMNS
 
 DISAGREEMENT_LIMIT = 3.5
 """Standard errors from which a difference between the methods is reported."""

@@ -16,7 +16,8 @@ from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.motion import leading
-from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, CaptiveRun
+from tank2sim.records.campaigns import Campaign
+from tank2sim.records.captive_record import FORCE_COLUMNS, CaptiveRun
 
 _FASTEST_SWAY = 0.95
 """Largest sideways velocity as a share of the speed: a drift angle of 70 deg."""

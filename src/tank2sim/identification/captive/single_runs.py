@@ -23,7 +23,8 @@ from tank2sim.identification.captive.motion import harmonic_basis
 from tank2sim.identification.captive.oscillation import OscillationDerivatives, oscillations
 from tank2sim.identification.captive.run_faults import motion_faults, record_faults, reduced_faults
 from tank2sim.notices import Notice, caution
-from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, CaptiveRun
+from tank2sim.records.campaigns import Campaign
+from tank2sim.records.captive_record import FORCE_COLUMNS, CaptiveRun
 from tank2sim.records.thinning import drawn_columns
 
 CYCLE_BINS = 72

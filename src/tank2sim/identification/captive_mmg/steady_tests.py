@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -20,9 +21,10 @@ from tank2sim.identification.captive_mmg.contradicted_tests import (
     refuse_other_curve,
 )
 from tank2sim.notices import Notice
-from tank2sim.records.averages import Condition, read_averages, read_columns
+from tank2sim.records.averages import read_columns
 from tank2sim.records.campaign_form import CampaignFile
-from tank2sim.records.campaigns import CaptiveRun, read_campaign, read_campaign_file, together
+from tank2sim.records.campaigns import Campaign, read_campaign, read_campaign_form, together
+from tank2sim.records.captive_record import FORCE_COLUMNS, CaptiveRun
 
 CHANNELS = ("X", "Y", "N", "T", "F_N")
 """Surge and sway force (N), yaw moment (N m), thrust (N), normal force of the rudder (N, positive to port)."""
@@ -73,29 +75,28 @@ def read_steady_tests(path: Path) -> SteadyTests:
     Raises InputError: A file is at fault, or the campaign lacks what the MMG method needs: thrust, normal force,
     revolutions, the open-water curve, and the sizes of model, propeller and rudder.
     """
-    form, spelt = read_campaign_file(path)
+    form = read_campaign_form(path)
     _refuse_missing(form, path)
     refuse_impossible_sizes(form, path)
-    if form.averages:
-        _refuse_impossible_rows(path)
-    conditions, remarks = read_averages(form, spelt, path) if form.averages else _averaged_runs(form, path)
-    with_torque = all(condition.torque_Nm is not None for condition in conditions)
-    if not with_torque and any(condition.torque_Nm is not None for condition in conditions):
-        first = next(condition.name for condition in conditions if condition.torque_Nm is None)
-        raise InputError(path, "runs", f"{first} has no torque, and others have", "record it in all runs, or in none")
-    if heeled := next((condition.name for condition in conditions if condition.heel_rad), ""):
-        remedy = "reduce such tests to a polynomial, without --mmg"
-        raise InputError(
-            path, "averages.columns.heel_rad", f"{heeled} has a heel; the method is of an upright hull", remedy
-        )
+    campaign = read_campaign(path)
+    steady = [run for run in campaign.runs if not run.oscillates]
+    if faults := [fault for run in steady for fault in islice(_faults(campaign, run), 1)]:
+        raise together(faults, can_leave_out=False)
+    without_torque = [run.name for run in steady if run.torque_Nm is None]
+    if 0 < len(without_torque) < len(steady):
+        problem = f"{without_torque[0]} has no torque, and others have"
+        raise InputError(path, "runs", problem, "record it in all runs, or in none")
+    if heeled := next((run.name for run in steady if run.heel_rad), ""):
+        problem = f"{heeled} has a heel; the method is of an upright hull"
+        raise InputError(path, "averages.columns.heel_rad", problem, "reduce such tests to a polynomial, without --mmg")
     tests = SteadyTests(
         path=path,
         form=form,
-        names=tuple(condition.name for condition in conditions),
-        motion=np.array([_motion(condition) for condition in conditions]),
-        readings=np.array([_readings(condition, form) for condition in conditions]),
-        open_water=_open_water(form, path, with_torque=with_torque),
-        remarks=tuple(remarks),
+        names=tuple(run.name for run in steady),
+        motion=np.array([_motion(run) for run in steady]),
+        readings=np.array([_readings(run, form) for run in steady]),
+        open_water=_open_water(form, path, with_torque=not without_torque),
+        remarks=(*campaign.remarks, *_oscillating(campaign)),
     )
     thrusts = {"T": "thrust", "T_left": "thrust_left"}
     refuse_astern(
@@ -107,11 +108,19 @@ def read_steady_tests(path: Path) -> SteadyTests:
     return tests
 
 
-def _refuse_impossible_rows(path: Path) -> None:
-    """Refuse averages that cannot be, as the polynomial reduction does."""
-    campaign = read_campaign(path)
-    if faults := [fault for run in campaign.runs for fault in list(record_faults(campaign, run))[:1]]:
-        raise together(faults, can_leave_out=False)
+def _faults(campaign: Campaign, run: CaptiveRun) -> Iterator[InputError]:
+    """Faults of a steady run; those that only its reduction shows come last."""
+    if not run.is_average:
+        yield from _lacking(run)
+    yield from record_faults(campaign, run)
+    if not run.is_average:
+        yield from reduced_faults(reduced_run(run))
+
+
+def _oscillating(campaign: Campaign) -> Iterator[Notice]:
+    """A notice of the runs that the method does not take."""
+    if names := [run.name for run in campaign.runs if run.oscillates]:
+        yield Notice(f"Left out, because MMG takes steady tests: {len(names)} oscillating runs, {names[0]} first.")
 
 
 def _refuse_missing(form: CampaignFile, path: Path) -> None:
@@ -171,24 +180,6 @@ def _needed_of_two(form: CampaignFile, path: Path) -> dict[str, tuple[object, st
     }
 
 
-def _averaged_runs(form: CampaignFile, path: Path) -> tuple[list[Condition], list[Notice]]:
-    """Means of the steady runs; oscillating ones are left out and named, all runs with faults are refused together."""
-    campaign = read_campaign(path)
-    steady = [run for run in campaign.runs if not run.oscillates]
-    faults = []
-    for run in steady:
-        found = [*_lacking(run), *record_faults(campaign, run)]
-        faults += (found or [*reduced_faults(reduced_run(run))])[:1]
-    if faults:
-        raise together(faults, can_leave_out=False)
-    oscillating = [run.name for run in campaign.runs if run.oscillates]
-    remarks = []
-    if oscillating:
-        runs = f"{len(oscillating)} oscillating runs, {oscillating[0]} first"
-        remarks = [Notice(f"Left out, because MMG takes steady tests: {runs}.")]
-    return [_condition(run, form) for run in steady], [*campaign.remarks, *remarks]
-
-
 def _lacking(run: CaptiveRun) -> Iterator[InputError]:
     """What a steady run must have for the MMG method and does not."""
     remedy = "record it, or name its column in [columns]"
@@ -201,45 +192,27 @@ def _lacking(run: CaptiveRun) -> Iterator[InputError]:
         yield InputError(run.name, "header", "there are no revolutions, which the MMG method needs", remedy)
 
 
-def _condition(run: CaptiveRun, form: CampaignFile) -> Condition:
-    """Means of a steady run; forces in the sense of the file again, as those of a table."""
-    assert run.thrust_N is not None and run.rudder_normal_force_N is not None
-    speed, sense = float(np.mean(run.speed_mps)), form.test.sense
-    return Condition(
-        name=run.name,
-        drift_rad=float(-np.arcsin(np.clip(np.mean(run.v_mps) / speed, -1.0, 1.0))),
-        rudder_rad=float(np.mean(run.delta_rad)),
-        speed_mps=speed,
-        X_N=sense * float(np.mean(run.X_N)),
-        Y_N=sense * float(np.mean(run.Y_N)),
-        N_Nm=sense * float(np.mean(run.N_Nm)),
-        propeller_radps=run.propeller_radps,
-        yaw_rate_radps=float(np.mean(run.r_radps)),
-        thrust_N=float(np.mean(run.thrust_N)),
-        rudder_normal_force_N=float(np.mean(run.rudder_normal_force_N)),
-        heel_rad=run.heel_rad,
-        torque_Nm=None if run.torque_Nm is None else float(np.mean(run.torque_Nm)),
-    )
+def _motion(run: CaptiveRun) -> tuple[float, ...]:
+    """u, v (m/s), r (rad/s), rudder (rad), revolutions (rad/s) of a steady run."""
+    assert run.propeller_radps is not None
+    speed, drift = float(np.mean(run.speed_mps)), run.sheet.drift_rad
+    if not run.is_average or drift is None:
+        drift = float(-np.arcsin(np.clip(np.mean(run.v_mps) / speed, -1.0, 1.0)))
+    u, v = speed * np.cos(drift), -speed * np.sin(drift)
+    return u, v, float(np.mean(run.r_radps)), float(np.mean(run.delta_rad)), run.propeller_radps
 
 
-def _motion(condition: Condition) -> tuple[float, ...]:
-    u, v = condition.speed_mps * np.cos(condition.drift_rad), -condition.speed_mps * np.sin(condition.drift_rad)
-    assert condition.propeller_radps is not None
-    return u, v, condition.yaw_rate_radps, condition.rudder_rad, condition.propeller_radps
-
-
-def _readings(condition: Condition, form: CampaignFile) -> tuple[float, ...]:
-    """Readings as the force of the model on its gauge, positive as the water pushes it."""
-    forces = form.test.sense * np.array([condition.X_N, condition.Y_N, condition.N_Nm])
+def _readings(run: CaptiveRun, form: CampaignFile) -> tuple[float, ...]:
+    """Means as the force of the model on its gauge, positive as the water pushes it."""
+    forces = np.array([np.mean(run.force(force)) for force in FORCE_COLUMNS])
     if form.test.force_convention == "hydrodynamic":
-        u, v, r, _, _ = _motion(condition)
+        u, v, r, _, _ = _motion(run)
         forces += inertial_forces(form.model.mass_kg, form.model.x_G_m, u, v, r)
-    assert condition.thrust_N is not None and condition.rudder_normal_force_N is not None
-    others: tuple[float, ...] = () if condition.torque_Nm is None else (condition.torque_Nm,)
+    others = [run.thrust_N, run.rudder_normal_force_N]
     if form.propeller.number == 2:
-        assert condition.thrust_left_N is not None and condition.rudder_normal_force_left_N is not None
-        others = condition.thrust_left_N, condition.rudder_normal_force_left_N
-    return *map(float, forces), condition.thrust_N, condition.rudder_normal_force_N, *others
+        others += [run.thrust_left_N, run.rudder_normal_force_left_N]
+    others.append(run.torque_Nm)
+    return *map(float, forces), *(float(np.mean(values)) for values in others if values is not None)
 
 
 def _open_water(form: CampaignFile, path: Path, *, with_torque: bool) -> Array:
