@@ -15,7 +15,7 @@ from tank2sim.identification.captive.oscillation import cubic_findings
 from tank2sim.identification.captive.reduction import ForceResult, Reduction, is_resistance
 from tank2sim.identification.captive.regression import moved_terms
 from tank2sim.identification.captive.systematic import can_show_delay, correct_delay
-from tank2sim.identification.captive.tank_conditions import Tank, tank_resonance, tank_size
+from tank2sim.identification.captive.tank_conditions import tank_resonance, tank_size
 from tank2sim.identification.captive.warnings import OscillationMotion, cautions_of_result, cautions_of_test
 from tank2sim.notices import Notice, caution
 from tank2sim.records.captive_record import FORCE_COLUMNS
@@ -62,7 +62,7 @@ def implausible(reduction: Reduction) -> tuple[Notice, ...]:
     campaign, resonant = reduction.campaign, [run for each in _resonances(reduction) for run in each.runs]
     if reduction.systematic and resonant:
         found.append(f"standing waves of the tank would do the same to {_listed(resonant)}: compare without them.")
-    found += [each.message for each in tank_size(Tank(campaign.tank.breadth_m, campaign.tank.depth_m))]
+    found += [each.message for each in tank_size(campaign.tank)]
     return tuple(map(caution, found))
 
 
@@ -128,8 +128,8 @@ def _oscillating(reduction: Reduction) -> tuple[OscillationMotion, ...]:
 
 
 def _resonances(reduction: Reduction) -> Iterator[Caution]:
-    tank, gravity = reduction.campaign.tank, reduction.campaign.test.gravity_mps2
-    return tank_resonance(_oscillating(reduction), Tank(tank.breadth_m, tank.depth_m), gravity)
+    campaign = reduction.campaign
+    return tank_resonance(_oscillating(reduction), campaign.tank, campaign.test.gravity_mps2)
 
 
 def _physics(reduction: Reduction) -> Iterator[Notice]:

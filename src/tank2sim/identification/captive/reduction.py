@@ -51,7 +51,6 @@ from tank2sim.identification.captive.type_b import (
     type_b_shifts,
     with_common_error,
 )
-from tank2sim.identification.captive.warnings import body_of
 from tank2sim.records.campaigns import Campaign, together
 from tank2sim.records.captive_record import FORCE_COLUMNS
 
@@ -158,7 +157,8 @@ def reduce_campaign(campaign: Campaign, options: ReductionOptions | None = None)
 
 def _reduction(campaign: Campaign, options: ReductionOptions) -> Reduction:
     """Derivatives from a campaign, on one thread."""
-    _refuse_impossible_body(campaign)
+    for key, problem in impossible_body(campaign.model, campaign.test.water_density_kgpm3):
+        raise InputError(campaign.path, f"model.{key}", problem, "correct the unit of one of these numbers")
     runs, faults = _credible_runs(campaign, options)
     used, not_used = _used_runs(campaign, moderated(runs), options)
     if not used:
@@ -213,11 +213,6 @@ def _advanced(run: ReducedRun, delay_s: float) -> ReducedRun:
     if not run.run.oscillates:
         return run
     return reduced_run(replace(run.run, force_delay_s=run.run.force_delay_s + delay_s))
-
-
-def _refuse_impossible_body(campaign: Campaign) -> None:
-    for key, problem in impossible_body(body_of(campaign)):
-        raise InputError(campaign.path, f"model.{key}", problem, "correct the unit of one of these numbers")
 
 
 def _refuse_thrust(campaign: Campaign, derivatives: Mapping[str, Derivative]) -> None:
