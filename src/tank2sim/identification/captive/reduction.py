@@ -97,7 +97,6 @@ class Derivative:
     type_a: float  # Standard error from the scatter of the campaign
     # Source to standard error, of stated uncertainties and of systematic errors that the campaign shows
     type_b: Mapping[str, float] = field(default_factory=dict)
-    found_in: str = ""  # Types of run that determine it in the paper's order; empty if that order does not give it
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -114,9 +113,10 @@ class ForceResult:
     systematic: tuple[SystematicError, ...] = ()  # Errors common to many runs that the campaign shows in this force
     # Types of run whose derivatives no other type gives: an error of the gauge in them alone would not show
     unchecked: tuple[str, ...] = ()
-    # Delay of the forces that may be left, one standard deviation; 0 if it is stated, corrected or unknown
-    timing_s: float = 0.0
-    alignment_rad: float = 0.0  # Zero of the drift angle that the campaign shows; 0 if it is stated or none is shown
+    # Error common to many runs to the change of each term (prime), with its sign, that it makes: stated errors (Type B)
+    # of one standard deviation, the delay of the forces that may be left, and the full errors (delays, gains, the zero
+    # of the drift angle) that the campaign shows and that are not corrected
+    shifts: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -165,31 +165,28 @@ def _reduction(campaign: Campaign, options: ReductionOptions) -> Reduction:
         messages = [*map(str, faults), *(f"{name}, for {reason}" for name, reason in not_used.items())]
         remedy = f"the first was left out: {messages[0]}" if messages else "give it runs"
         raise InputError(campaign.path, "runs", "no run can be used", remedy)
-    selections = {force: select(campaign, used, force, all_terms=options.all_terms) for force in FORCE_COLUMNS}
+    selections = _selections(campaign, used, options)
     equations = {force: selection.equations for force, selection in selections.items()}
     delay = delay_estimate(equations)
     delays = force_delays(equations, delay)
-    if any(error.corrected for error in delays):
+    if any(error.corrected for error in delays):  # the forces of oscillating runs are taken a time earlier
         runs = [_advanced(run, delays[0].size) for run in runs]
         used, not_used = _used_runs(campaign, moderated(runs), options)
-        selections = {force: select(campaign, used, force, all_terms=options.all_terms) for force in FORCE_COLUMNS}
-    stated_keys = campaign.uncertainty.model_fields_set
-    stated = "force_delay_s" in stated_keys
-    timing = 0.0 if delays or stated or delay is None or not delay.alike else delay.possible_s
-    forces = {
-        force: replace(_force_result(campaign, selection, delays, options), timing_s=timing)
-        for force, selection in selections.items()
-    }
+        selections = _selections(campaign, used, options)
+    forces = {force: _force_result(campaign, selection, delays, options) for force, selection in selections.items()}
     alignment = alignment_estimate(
         campaign,
         {force: forces[force].selection.equations for force in "YN"},
         {force: forces[force].solution for force in "YN"},
     )
-    if alignment is not None and alignment.shown and "alignment_rad" not in stated_keys:
-        forces = {force: replace(result, alignment_rad=alignment.angle_rad) for force, result in forces.items()}
-    derivatives = {
-        name: found for force in FORCE_COLUMNS for name, found in _derivatives(campaign, forces[force]).items()
+    stated = campaign.uncertainty.model_fields_set
+    possible_s = 0.0 if delays or "force_delay_s" in stated or delay is None or not delay.alike else delay.possible_s
+    angle_rad = alignment.angle_rad if alignment and alignment.shown and "alignment_rad" not in stated else 0.0
+    forces = {
+        force: replace(result, shifts=_common_shifts(campaign, result, possible_s, angle_rad))
+        for force, result in forces.items()
     }
+    derivatives = {name: found for result in forces.values() for name, found in _derivatives(result).items()}
     _refuse_thrust(campaign, derivatives)
     alone = oscillations(campaign, runs)
     return Reduction(
@@ -206,6 +203,10 @@ def _reduction(campaign: Campaign, options: ReductionOptions) -> Reduction:
         delay=delay,
         alignment=alignment,
     )
+
+
+def _selections(campaign: Campaign, used: Sequence[ReducedRun], options: ReductionOptions) -> dict[str, Selection]:
+    return {force: select(campaign, used, force, all_terms=options.all_terms) for force in FORCE_COLUMNS}
 
 
 def _advanced(run: ReducedRun, delay_s: float) -> ReducedRun:
@@ -265,7 +266,8 @@ def _used_runs(
 ) -> tuple[list[ReducedRun], dict[str, str]]:
     used: list[ReducedRun] = []
     not_used: dict[str, str] = {}
-    usual = _usual_revolutions(campaign)
+    # Most runs have these revolutions: the polynomial has no term in them, and load-variation tests have others.
+    usual = float(np.median([run.propeller_radps or 0.0 for run in campaign.runs]))
     for run in runs:
         turning = run.run.propeller_radps or 0.0
         speed, fast = run.motion.mean_speed_mps, run_frequency_parameter(campaign, run)
@@ -281,11 +283,6 @@ def _used_runs(
         else:
             used.append(run)
     return used, not_used
-
-
-def _usual_revolutions(campaign: Campaign) -> float:
-    """Revolutions of most runs, rad/s: the polynomial has no term in them, and load-variation tests have others."""
-    return float(np.median([run.propeller_radps or 0.0 for run in campaign.runs]))
 
 
 def _force_result(
@@ -319,36 +316,32 @@ def _force_result(
     )
 
 
-def _derivatives(campaign: Campaign, result: ForceResult) -> dict[str, Derivative]:
-    solution, steps = result.solution, result.stepwise
-    sources = common_shifts(campaign, result)
-    found = {}
+def _derivatives(result: ForceResult) -> dict[str, Derivative]:
+    """Reported derivatives; a trend with frequency is none."""
+    solution, found = result.solution, {}
     for name, value, error in zip(solution.names, solution.values, solution.standard_errors, strict=True):
         if name not in result.selection.reported or " " in name:
-            continue  # not reported, or a trend with frequency, which is not a derivative
-        type_b = {source: abs(shifts.get(name, 0.0)) for source, shifts in sources.items()}
+            continue
+        type_b = {source: abs(shifts.get(name, 0.0)) for source, shifts in result.shifts.items()}
         found[name] = Derivative(
             value=float(value),
             standard_error=float(np.sqrt(error**2 + sum(size**2 for size in type_b.values()))),
             type_a=float(error),
             type_b=type_b,
-            found_in=steps.found_in[steps.names.index(name)] if name in steps.names else "",
         )
     return found
 
 
-def common_shifts(campaign: Campaign, result: ForceResult) -> dict[str, dict[str, float]]:
-    """Change of each term of a force (prime), with its sign, by each error common to many runs: source to changes.
-
-    Stated errors (Type B) of one standard deviation, the delay of the forces that may be left, and the full errors
-    (delays, gains, the zero of the drift angle) that the campaign shows and that are not corrected.
-    """
+def _common_shifts(
+    campaign: Campaign, result: ForceResult, delay_s: float, alignment_rad: float
+) -> dict[str, dict[str, float]]:
+    """As :attr:`ForceResult.shifts`; the delay and the angle are 0 where they are stated, corrected or unknown."""
     used, solution = result.selection.equations, result.solution
     shown = {error.source: error.shifts(used, solution) for error in result.systematic}
-    if result.timing_s:
-        shown["force_delay"] = moved_terms(correct_delay(used, result.timing_s), solution)
-    if result.alignment_rad:
-        turned = with_common_error(campaign, used, "alignment_rad", result.alignment_rad)
+    if delay_s:
+        shown["force_delay"] = moved_terms(correct_delay(used, delay_s), solution)
+    if alignment_rad:
+        turned = with_common_error(campaign, used, "alignment_rad", alignment_rad)
         shown["alignment"] = moved_terms(turned, solution)
     return type_b_shifts(campaign, used, solution) | shown
 
@@ -379,7 +372,7 @@ def reduction_covariance(reduction: Reduction, names: Sequence[str]) -> Array:
         columns = [place for place, name in enumerate(solution.names) if name in places]
         rows = [places[solution.names[place]] for place in columns]
         covariance[np.ix_(rows, rows)] += solution.covariance[np.ix_(columns, columns)]
-        for source, moved in common_shifts(reduction.campaign, result).items():
+        for source, moved in result.shifts.items():
             shift = shifts.setdefault(source, np.zeros(len(names)))
             for name, by in moved.items():
                 if name in places:

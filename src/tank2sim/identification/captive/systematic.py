@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import chdtrc
@@ -24,6 +25,7 @@ from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.oscillation import distinct
 from tank2sim.identification.captive.regression import Solution, Spread, fitted_spread, moved_terms, solve
 from tank2sim.identification.conditioning import SINGULAR_CONDITION
+from tank2sim.records.campaign_form import OSCILLATING
 
 _SHOWN = 4.0
 """Standard errors of a reported error: with some 20 possible errors, chance exceeds it in one of 800 campaigns."""
@@ -150,24 +152,19 @@ def delay_estimate(forces: Mapping[str, CampaignEquations]) -> DelayEstimate | N
     )
     if not channels:
         return None
-    mean, error, chance = _mean_delay([(channel.size, channel.standard_error) for channel in channels])
-    apart = [
-        abs(channel.size - mean) > max(_SHOWN * channel.standard_error, _NEARLY * abs(mean)) for channel in channels
-    ]
+    mean = _mean_delay([(channel.size, channel.standard_error) for channel in channels])
     by_motion = [
         _mean_delay([(channel.size, channel.standard_error) for channel in channels if channel.motion == motion])
         for motion in dict.fromkeys(channel.motion for channel in channels)
     ]
-    supported = len(by_motion) > 1 and all(
-        size * math.copysign(1.0, mean) > _SUPPORT * error for size, error, _ in by_motion
-    )
+    sign = math.copysign(1.0, mean.size)
     return DelayEstimate(
-        size=mean,
-        standard_error=error,
+        size=mean.size,
+        standard_error=mean.standard_error,
         channels=channels,
-        chance=chance,
-        alike=chance >= _ALIKE or not any(apart),
-        supported=supported,
+        chance=mean.chance,
+        alike=mean.alike,
+        supported=len(by_motion) > 1 and all(sign * one.size > _SUPPORT * one.standard_error for one in by_motion),
     )
 
 
@@ -181,28 +178,32 @@ def force_delays(
     if estimate is None:
         return ()
     fastest = max((run.motion.frequency_radps for used in forces.values() for run in used.runs), default=0.0)
+
+    def common(delays: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
+        """The common value of delays and its standard error, s; None if it is not significant."""
+        if not delays:
+            return None
+        mean = _mean_delay(delays)
+        least = max(_SHOWN * mean.standard_error, LEAST_PHASE_RAD / max(fastest, 1e-12))
+        return (mean.size, mean.standard_error) if abs(mean.size) >= least and mean.alike else None
+
     found = {
         force: [(channel.size, channel.standard_error) for channel in estimate.channels if channel.force == force]
         for force in "YN"
     }
-    shown = {force: _common_delay(delays, fastest) for force, delays in found.items()}
-    common = _common_delay([delay for delays in found.values() for delay in delays], fastest)
-    if common is None and (alone := [delay for delay in shown.values() if delay is not None])[1:]:
-        common = _common_delay(alone, fastest)
-    if common is not None and all(found.values()):
-        error = SystematicError(
-            source="force_delay",
-            force="XYN",
-            runs="",
-            size=common[0],
-            standard_error=common[1],
-            corrected=estimate.supported,
-        )
-        return (error,)
+    shown = {force: delay for force, delays in found.items() if (delay := common(delays)) is not None}
+    of_all = common([delay for delays in found.values() for delay in delays])
+    if of_all is None and len(shown) > 1:
+        of_all = common([*shown.values()])
+    supported = False
+    if of_all is not None and all(found.values()):
+        shown, supported = {"XYN": of_all}, estimate.supported
     return tuple(
-        SystematicError(source="force_delay", force=force, runs="", size=delay[0], standard_error=delay[1])
-        for force, delay in shown.items()
-        if delay is not None and len(found[force]) > 1
+        SystematicError(
+            source="force_delay", force=force, runs="", size=size, standard_error=error, corrected=supported
+        )
+        for force, (size, error) in shown.items()
+        if force == "XYN" or len(found[force]) > 1
     )
 
 
@@ -220,7 +221,8 @@ def gauge_gains(
     `equations`: Without trends with frequency; `spread`: Spread of the runs within each kind; `rival`: Largest ratio of
     a trend with frequency to its standard error: a gain must explain the runs better.
     """
-    predicted = _predicted(equations, spread)
+    # The gauge's coefficients as predicted by the derivatives, without noise.
+    predicted = equations.gauge - (equations.values - equations.design @ solve(equations, spread).values)
     kinds = np.array([run.run.type for run in equations.runs])[equations.run_of_row]
     gains: dict[str, tuple[float, float]] = {}
     unknown = []
@@ -252,10 +254,12 @@ def gauge_gains(
     return (found,), tuple(unknown)
 
 
-def correct_delay(equations: CampaignEquations, delay_s: float) -> CampaignEquations:
-    """The equations with the forces of the oscillating runs corrected for a delay."""
+def correct_delay(
+    equations: CampaignEquations, delay_s: float, kinds: Sequence[str] = OSCILLATING
+) -> CampaignEquations:
+    """The equations with the forces of the oscillating runs of some `kinds` corrected for a delay."""
     change = np.zeros_like(equations.gauge)
-    for rows, run, root in _oscillating(equations):
+    for rows, run, root in _runs_of(equations, kinds):
         turn = _phase_shift(len(root), run.motion.frequency_radps * delay_s)
         change[rows] = np.linalg.solve(root, turn @ root @ equations.gauge[rows]) - equations.gauge[rows]
     return replace(equations, values=equations.values + change, gauge=equations.gauge + change)
@@ -268,25 +272,23 @@ def _correct_gain(equations: CampaignEquations, kind: str, gain: float) -> Campa
     return replace(equations, values=equations.values + change, gauge=equations.gauge + change)
 
 
-def _common_delay(delays: Sequence[tuple[float, float]], fastest_radps: float) -> tuple[float, float] | None:
-    """The common value of delays (value, standard error) and its standard error, s; None if it is not significant."""
-    if not delays:
-        return None
-    mean, error, chance = _mean_delay(delays)
-    if abs(mean) < max(_SHOWN * error, LEAST_PHASE_RAD / max(fastest_radps, 1e-12)):
-        return None
-    apart = [abs(value - mean) > max(_SHOWN * error_of, _NEARLY * abs(mean)) for value, error_of in delays]
-    if chance < _ALIKE and any(apart):
-        return None
-    return mean, error
+class _MeanDelay(NamedTuple):
+    """Weighted mean of delays, s, the probability of their scatter, and whether they are one delay."""
+
+    size: float
+    standard_error: float
+    chance: float
+    alike: bool
 
 
-def _mean_delay(delays: Sequence[tuple[float, float]]) -> tuple[float, float, float]:
-    """Weighted mean of delays, its standard error, and the probability of their scatter."""
-    values, weights = np.array([value for value, _ in delays]), np.array([error**-2.0 for _, error in delays])
+def _mean_delay(delays: Sequence[tuple[float, float]]) -> _MeanDelay:
+    """Weighted mean of delays (value, standard error)."""
+    values, errors = np.array(delays).T
+    weights = np.array([error**-2.0 for _, error in delays])
     mean, error = float(weights @ values / weights.sum()), float(weights.sum() ** -0.5)
     chance = float(chdtrc(len(values) - 1, weights @ (values - mean) ** 2)) if len(values) > 1 else 1.0
-    return mean, error, chance
+    apart = np.abs(values - mean) > np.maximum(_SHOWN * errors, _NEARLY * abs(mean))
+    return _MeanDelay(mean, error, chance, chance >= _ALIKE or not apart.any())
 
 
 def _delays(equations: CampaignEquations) -> dict[str, tuple[float, float]]:
@@ -321,36 +323,23 @@ def _with_slopes(
     equations: CampaignEquations, motions: Mapping[str, Sequence[str]], delays: Mapping[str, float]
 ) -> CampaignEquations:
     """The equations corrected for a delay of each motion, with a small further delay of each as unknown."""
-    corrected = equations
     for motion, kinds in motions.items():
-        corrected = _advance_kinds(corrected, kinds, delays[motion])
-    return _with_unknowns(corrected, {motion: _slope(corrected, kinds) for motion, kinds in motions.items()})
-
-
-def _advance_kinds(equations: CampaignEquations, kinds: Sequence[str], delay_s: float) -> CampaignEquations:
-    affected = np.array([run.run.type in kinds for run in equations.runs])[equations.run_of_row]
-    whole = correct_delay(equations, delay_s)
-    return replace(
-        equations,
-        values=np.where(affected, whole.values, equations.values),
-        gauge=np.where(affected, whole.gauge, equations.gauge),
-    )
+        equations = correct_delay(equations, delays[motion], kinds)
+    return _with_unknowns(equations, {motion: _slope(equations, kinds) for motion, kinds in motions.items()})
 
 
 def _slope(equations: CampaignEquations, kinds: Sequence[str]) -> Array:
     """Effect on the equations of a gauge delay of 1 s in some kinds of run: minus the rate of change, (rows,)."""
     column = np.zeros_like(equations.gauge)
-    for rows, run, root in _oscillating(equations):
-        if run.run.type in kinds:
-            column[rows] = -np.linalg.solve(
-                root, _rate(len(root), run.motion.frequency_radps) @ root @ equations.gauge[rows]
-            )
+    for rows, run, root in _runs_of(equations, kinds):
+        rate = _rate(len(root), run.motion.frequency_radps)
+        column[rows] = -np.linalg.solve(root, rate @ root @ equations.gauge[rows])
     return column
 
 
-def _oscillating(equations: CampaignEquations) -> Iterator[tuple[slice, ReducedRun, Array]]:
+def _runs_of(equations: CampaignEquations, kinds: Sequence[str]) -> Iterator[tuple[slice, ReducedRun, Array]]:
     for rows, run, root in zip(equations.rows, equations.runs, equations.roots, strict=True):
-        if run.run.oscillates:
+        if run.run.type in kinds:
             yield rows, run, root
 
 
@@ -380,9 +369,3 @@ def _with_unknowns(equations: CampaignEquations, columns: Mapping[str, Array]) -
         names=(*equations.names, *columns),
         design=np.column_stack([equations.design, *columns.values()]),
     )
-
-
-def _predicted(equations: CampaignEquations, spread: Spread) -> Array:
-    """The gauge's coefficients as predicted by the derivatives, without noise, (rows,)."""
-    residual: Array = equations.values - equations.design @ solve(equations, spread).values
-    return equations.gauge - residual
