@@ -26,8 +26,7 @@ from tank2sim.apps.programs.bridge_command_yaw import (
     moment_astern,
     sailed,
 )
-from tank2sim.apps.programs.polynomial_fit import FigureChange
-from tank2sim.apps.programs.program_files import ProgramFiles
+from tank2sim.apps.programs.program_files import FigureChange, ProgramFiles
 from tank2sim.cards.card import Card, MmgCard, SteeredCard
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.effects import EFFECTS

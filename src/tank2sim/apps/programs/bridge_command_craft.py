@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tank2sim.apps.programs.bridge_command_surge import SurgeNumbers
-from tank2sim.apps.programs.polynomial_fit import FigureChange
+from tank2sim.apps.programs.program_files import FigureChange
 from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.small_craft import cruising_revolutions

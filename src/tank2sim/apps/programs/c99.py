@@ -7,9 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tank2sim.apps.programs.polynomial_fit import FigureChange, figure_changes
-from tank2sim.apps.programs.program_files import ProgramFiles
-from tank2sim.apps.programs.robotics import craft_changes
+from tank2sim.apps.programs.program_files import FigureChange, ProgramFiles, figure_changes
 from tank2sim.arrays import Array
 from tank2sim.cards import Card, SteeredBy, SteeredCard
 from tank2sim.dynamics import build
@@ -42,17 +40,11 @@ def c99_files(card: Card) -> ProgramFiles:
         why = "the card has no standard manoeuvres" if find_compiler() else "no C compiler was found"
         sentence = f"how far float changes manoeuvres was not measured ({why}); self_test.c allows {TOLERANCES[1]:g}"
         return ProgramFiles(files=made.files, use=made.use, losses=(sentence, *geodetic))
-    changes = _changes(card, model, PlainIntegrator(model, made))
-    in_float = _changes(card, model, PlainIntegrator(model, made, single=True))
-    return ProgramFiles(
-        files=made.files, use=made.use, losses=(_loss_of_float(in_float), *geodetic), changes=tuple(changes)
+    before = model if card.steered_by is SteeredBy.RUDDER else build(card)
+    changes, in_float = (
+        figure_changes(card, before, model, PlainIntegrator(model, made, single=single)) for single in (False, True)
     )
-
-
-def _changes(card: SteeredCard, model: Model, integrator: Integrator) -> tuple[FigureChange, ...]:
-    if card.steered_by is SteeredBy.RUDDER:
-        return figure_changes(model, model, (None, integrator))
-    return craft_changes(card, model, integrator)
+    return ProgramFiles(files=made.files, use=made.use, losses=(_loss_of_float(in_float), *geodetic), changes=changes)
 
 
 def _loss_of_float(changes: Sequence[FigureChange]) -> str:

@@ -11,8 +11,8 @@ from typing import ClassVar
 from tank2sim.answer.parts import Cell, Section, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.programs.forms import FORMS
-from tank2sim.apps.programs.languages import ConvertedText
 from tank2sim.apps.programs.program_code import program_name
+from tank2sim.apps.programs.program_files import ProgramFiles
 from tank2sim.cards import Card
 from tank2sim.errors import InputError
 from tank2sim.escaping import one_line
@@ -79,7 +79,7 @@ class ConversionResult(Result[ConversionStudy]):
     Parameters
     ----------
     study : ConversionStudy
-    made : ConvertedText, optional
+    made : ProgramFiles, optional
         None if the result was read from its JSON.
     card : Card, optional
         The card that was made; None for a file of another program. ``ship`` is its ship.
@@ -88,7 +88,7 @@ class ConversionResult(Result[ConversionStudy]):
     """
 
     study: ConversionStudy
-    made: ConvertedText | None = None
+    made: ProgramFiles | None = None
     card: Card | None = None
     source: str = ""
     command: ClassVar[str] = "convert"
@@ -99,7 +99,7 @@ class ConversionResult(Result[ConversionStudy]):
         return self._made.text
 
     @property
-    def _made(self) -> ConvertedText:
+    def _made(self) -> ProgramFiles:
         if self.made is None:
             raise LookupError("the JSON of a conversion does not hold its file")
         return self.made
@@ -119,13 +119,13 @@ class ConversionResult(Result[ConversionStudy]):
         """
         path, made, form = Path(path), self._made, FORMS[self.study.to]
         if not names_folder(path):
-            if made.program is not None:
+            if made.files:
                 raise InputError(path, "", f"is one file, and {self.study.to} has several", "give a folder")
             return {path: made.text} if made.card is None else made.card.files(path)
-        if made.program is not None:
+        if made.files:
             return {
-                **{path / name: content for name, content in made.program.files.items()},
-                path / "README.md": self._readme(made.program.use),
+                **{path / name: content for name, content in made.files.items()},
+                path / "README.md": self._readme(made.use),
             }
         main = path / f"{program_name(self.study.ship)}{form.ending}"
         return {**self.files(main), path / "README.md": self._readme(form.use.replace("NAME", main.stem))}

@@ -13,14 +13,15 @@ Cov(theta) = S Cov(p) S^T, S = A dF/dp, at held revolutions.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
 import tomlkit
 
 from tank2sim.apps.programs.conventions import roll_in_file
+from tank2sim.apps.programs.program_files import PolynomialFit, standard_manoeuvres
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard, MmgCard
 from tank2sim.cards.covariance import Covariance, not_referring
@@ -33,12 +34,7 @@ from tank2sim.dynamics.card_parameters import JointErrors, card_parameters, join
 from tank2sim.dynamics.mmg.ship import is_symmetric
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import inertial_forces
-from tank2sim.simulation.integrator import Integrator
-from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.run import simulate
-
-TURNS_DEG, ZIGZAGS_DEG = (10.0, 20.0, 35.0), (10.0, 20.0)
-"""Rudders of the turning circles and of the zigzags, to both sides, in whose motions the polynomial is fitted."""
 
 SCATTER = 0.3
 """Share of :data:`SPREADS` by which each motion is scattered: project choice. With 0.3 the KVLCC2's tactical diameters
@@ -57,27 +53,10 @@ _STATES = ("motion.u", "motion.v", "motion.r", "rudder.angle")
 _SLOWEST = 0.05  # of u0
 
 
-@dataclass(frozen=True)
-class PolynomialFit:
-    """A third-order polynomial in place of an MMG ship."""
-
-    derivatives: Mapping[str, float]  # Name to prime value, rudder positive to starboard
-    Xnn: float  # Effect of revolutions, prime
-    residuals: Mapping[str, float]  # Force to the root mean square of the residual over that of the force
-    # ``u`` (over u0), ``drift_deg``, ``yaw_rate_prime``, ``rudder_deg`` to lowest and highest value that was fitted
-    ranges: Mapping[str, tuple[float, float]]
-    # (k, k): Covariance of `derivatives`, in their order, by the errors of the MMG card; None if it states none
-    covariance: Array | None = None
-
-
 def manoeuvre_motions(model: Model) -> Array:
     """u, v, r, rudder (n, 4), SI, of the standard manoeuvres of a ship, :data:`_ROWS` of each."""
-    largest = {p.name: p.start for p in model.parameters}.get("steering.max_angle", math.pi / 2)
-    turns = [Turn(side * min(math.radians(angle), largest)) for angle in TURNS_DEG for side in (1, -1)]
-    zigzags = [Zigzag(side * math.radians(angle), math.radians(angle)) for angle in ZIGZAGS_DEG for side in (1, -1)]
     found = []
-    manoeuvres: list[Turn | Zigzag] = [*turns, *zigzags]
-    for manoeuvre in manoeuvres:
+    for manoeuvre in standard_manoeuvres(model):
         run = simulate(model, manoeuvre).trajectory
         rows = np.linspace(0, len(run.t) - 1, _ROWS).astype(int)
         found.append(np.column_stack([run[name][rows] for name in _STATES]))
@@ -291,52 +270,3 @@ def _effects_last(document: tomlkit.TOMLDocument) -> tomlkit.TOMLDocument:
         if name in document:
             document[name] = document.pop(name)
     return document
-
-
-@dataclass(frozen=True)
-class FigureChange:
-    """A figure of a manoeuvre before and after a conversion; None where the run was too short for it."""
-
-    # `manoeuvre`, `figure`: ``turn:35`` and ``advance_m``
-    manoeuvre: str
-    figure: str
-    before: float | None
-    after: float | None
-
-
-_OF_TURN = ("advance_m", "transfer_m", "tactical_diameter_m", "steady_diameter_m")
-_OVERSHOOTS = ("overshoot_1_deg", "overshoot_2_deg")
-
-
-def figure_changes(
-    before: Model, after: Model, integrators: Sequence[Integrator | None] = (None, None)
-) -> tuple[FigureChange, ...]:
-    """Figures of the standard manoeuvres of one ship by two models, each by its integrator if it is given."""
-    largest = {p.name: p.start for p in before.parameters}.get("steering.max_angle", math.pi / 2)
-    asked: list[tuple[str, Turn | Zigzag, Sequence[str]]] = []
-    for angle in TURNS_DEG:
-        for side in (1, -1):
-            rudder = side * min(math.radians(angle), largest)
-            asked.append((f"turn:{math.degrees(rudder):.4g}", Turn(rudder), _OF_TURN))
-    for angle in ZIGZAGS_DEG:
-        for side in (1, -1):
-            words = f"zigzag:{side * angle:g}/{angle:g}"
-            asked.append((words, Zigzag(side * math.radians(angle), math.radians(angle)), _OVERSHOOTS))
-    found = []
-    for words, manoeuvre, names in asked:
-        runs = zip((before, after), integrators, strict=True)
-        figures = [simulate(model, manoeuvre, integrator=integrator).figures for model, integrator in runs]
-        for name in names:
-            first, second = (_number(each, name) for each in figures)
-            found.append(FigureChange(words, name, first, second))
-    return tuple(found)
-
-
-def _number(figures: Mapping[str, object], name: str) -> float | None:
-    if name in _OVERSHOOTS:
-        overshoots = figures["overshoots_deg"]
-        assert isinstance(overshoots, list)
-        place = _OVERSHOOTS.index(name)
-        return float(overshoots[place]) if place < len(overshoots) else None
-    value = figures.get(name)
-    return float(value) if isinstance(value, int | float) else None

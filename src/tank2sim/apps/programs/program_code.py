@@ -82,23 +82,9 @@ def operations(model: Model, spelt: Spelling, first: int) -> list[str]:
 _LONGEST_NAME = 60  # MATLAB takes 63 letters
 
 _MATLAB_WORDS = (
-    *(
-        "break",
-        "case",
-        "catch",
-        "classdef",
-        "continue",
-        "do",
-        "else",
-        "elseif",
-        "end",
-        "for",
-        "function",
-        "global",
-        "if",
-    ),
-    *("otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "until", "while"),
-)
+    "break case catch classdef continue do else elseif end for function global if otherwise parfor persistent return "
+    "spmd switch try until while"
+).split()
 
 
 def program_name(ship: str, code: Iterable[str] = ()) -> str:

@@ -25,20 +25,14 @@ from typing import Literal
 
 import numpy as np
 
-from tank2sim.apps.programs.polynomial_fit import FigureChange
 from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.craft_terms import CRAFT_ADDED_MASSES, VELOCITY_TERMS
 from tank2sim.cards.form import ThrusterSection
-from tank2sim.cards.small_craft import cruising_revolutions
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import added_mass_forces
-from tank2sim.errors import ArgumentError, InputError
+from tank2sim.errors import ArgumentError
 from tank2sim.escaping import xml_comment
-from tank2sim.simulation.card_range import single_figures
-from tank2sim.simulation.integrator import Integrator
-from tank2sim.simulation.run import simulate
-from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, Spin, StraightRun
 
 VRX_TERMS = {"Xu": "xU", "Xuabsu": "xUU", "Yv": "yV", "Yvabsv": "yVV", "Nr": "nR", "Nrabsr": "nRR"}
 """Derivative to its name in VRX, where it is positive for damping."""
@@ -46,9 +40,6 @@ VRX_TERMS = {"Xu": "xU", "Xuabsu": "xUU", "Yv": "yV", "Yvabsv": "yVV", "Nr": "nR
 VRX_MASSES = {"Xudot": "xDotU", "Yvdot": "yDotV", "Nrdot": "nDotR"}
 
 _NUMBER = "{:.10g}"
-_DIFFERENCE, _SPIN = 0.3, 0.7
-"""Difference of a turn and revolutions of a spin, over the cruising revolutions, with which forms are compared: a wide
-turn and a spin within the reach of any craft (project choice)."""
 
 
 def gazebo_name(name: str) -> str:
@@ -248,23 +239,3 @@ def vrx_model(card: SteeredCard, added_mass: AddedMass | None = None) -> Model:
 def gazebo_model(card: SteeredCard, _: AddedMass | None = None) -> Model:
     """The model of a craft with what Gazebo's plugin has of it: the whole hull, without effects."""
     return build(replace(card, effects=()))
-
-
-def craft_changes(card: SteeredCard, model: Model, integrator: Integrator | None = None) -> tuple[FigureChange, ...]:
-    """Figures of a straight run, a turn and a spin of a card, and of another `model` of the same craft."""
-    n = cruising_revolutions(card)
-    before = build(card)
-    found = []
-    for manoeuvre in (StraightRun(n), DifferenceTurn(_DIFFERENCE * n), Spin(_SPIN * n)):
-        try:
-            runs = [
-                simulate(before, manoeuvre).figures,
-                simulate(model, manoeuvre, integrator=integrator).figures,
-            ]
-        except InputError:
-            continue  # thrusters that are not on both sides, or do not reverse as far
-        first, second = map(single_figures, runs)
-        for name, value in first.items():
-            if not name.endswith(("_lengths", "_percent")):
-                found.append(FigureChange(manoeuvre.words, name, value, second.get(name)))
-    return tuple(found)

@@ -283,7 +283,7 @@ class _MeanDelay(NamedTuple):
 
 def _mean_delay(delays: Sequence[tuple[float, float]]) -> _MeanDelay:
     """Weighted mean of delays (value, standard error)."""
-    values, errors = np.array(delays).T
+    values, errors = (np.array(column) for column in zip(*delays, strict=True))
     weights = np.array([error**-2.0 for _, error in delays])
     mean, error = float(weights @ values / weights.sum()), float(weights.sum() ** -0.5)
     chance = float(chdtrc(len(values) - 1, weights @ (values - mean) ** 2)) if len(values) > 1 else 1.0
