@@ -31,40 +31,23 @@ _WORDS = {
 
 @dataclass(frozen=True, kw_only=True)
 class ReadingFound:
-    """A reading of a table.
+    """A reading of a table."""
 
-    Parameters
-    ----------
-    rudder_sign, scaling, yaw_rate_terms, origin : str
-        Conventions, as a card states them.
-    probability : float
-        Among all readings.
-    C_prime : float
-        C' of straight-line stability, positive if stable.
-    turning_index : float or None
-        Norrbin's P: heading by rudder after one ship's length; None without rudder forces.
-    advance_lengths, tactical_diameter_lengths : float or None
-        Turn with 35 deg (or the gear's largest rudder), over L; None where it was not simulated or not reached.
-    overshoot_1_deg : float or None
-        First overshoot of the 10/10 zigzag.
-    vanished : tuple of str
-        Terms that vanish to the printed digits.
-    against : tuple of str
-        What speaks against the reading, the strongest first.
-    """
-
+    # `rudder_sign`, `scaling`, `yaw_rate_terms`, `origin`: Conventions, as a card states them
     rudder_sign: str
     scaling: str
     yaw_rate_terms: str
     origin: str
-    probability: float
-    C_prime: float
-    turning_index: float | None
+    probability: float  # Among all readings
+    C_prime: float  # C' of straight-line stability, positive if stable
+    turning_index: float | None  # Norrbin's P: heading by rudder after one ship's length; None without rudder forces
+    # `advance_lengths`, `tactical_diameter_lengths`: Turn with 35 deg (or the gear's largest rudder), over L; None
+    # where it was not simulated or not reached
     advance_lengths: float | None
     tactical_diameter_lengths: float | None
-    overshoot_1_deg: float | None
-    vanished: tuple[str, ...]
-    against: tuple[str, ...]
+    overshoot_1_deg: float | None  # First overshoot of the 10/10 zigzag
+    vanished: tuple[str, ...]  # Terms that vanish to the printed digits
+    against: tuple[str, ...]  # What speaks against the reading, the strongest first
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,17 +23,10 @@ from tank2sim.version import __version__
 
 @dataclass(frozen=True)
 class PolynomialRange:
-    """A polynomial fitted to an MMG ship.
+    """A polynomial fitted to an MMG ship."""
 
-    Parameters
-    ----------
-    residuals_percent : dict
-        Force to the root mean square of its residual, % of its own.
-    ranges : dict
-        ``u`` (over u0), ``drift_deg``, ``yaw_rate_prime``, ``rudder_deg`` to lowest and highest value that was fitted.
-    """
-
-    residuals_percent: dict[str, float]
+    residuals_percent: dict[str, float]  # Force to the root mean square of its residual, % of its own
+    # ``u`` (over u0), ``drift_deg``, ``yaw_rate_prime``, ``rudder_deg`` to lowest and highest value that was fitted
     ranges: dict[str, tuple[float, float]]
 
 

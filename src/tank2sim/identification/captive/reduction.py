@@ -64,27 +64,14 @@ ESSENTIAL = ("Xudot", "Yvdot", "Yrdot", "Nvdot", "Nrdot", "Yv", "Nv", "Yr", "Nr"
 
 @dataclass(frozen=True, kw_only=True)
 class ReductionOptions:
-    """Options of a reduction.
+    """Options of a reduction."""
 
-    Parameters
-    ----------
-    keep_going : bool
-        Omit runs with faults instead of refusing the campaign.
-    keep_fast : bool
-        Use runs with omega U/g of 0.1 and more, too.
-    off_speed : bool
-        Use runs away from the test speed, and at other revolutions of the propeller, too, and find terms in Du.
-    all_terms : bool
-        Keep terms that the tests do not determine.
-    test_symmetry : bool
-        Test terms of the opposite parity, which (3.8) lacks.
-    """
-
-    keep_going: bool = False
-    keep_fast: bool = False
+    keep_going: bool = False  # Omit runs with faults instead of refusing the campaign
+    keep_fast: bool = False  # Use runs with omega U/g of 0.1 and more, too
+    # Use runs away from the test speed, and at other revolutions of the propeller, too, and find terms in Du
     off_speed: bool = False
-    all_terms: bool = False
-    test_symmetry: bool = False
+    all_terms: bool = False  # Keep terms that the tests do not determine
+    test_symmetry: bool = False  # Test terms of the opposite parity, which (3.8) lacks
 
 
 @dataclass(frozen=True, kw_only=True)

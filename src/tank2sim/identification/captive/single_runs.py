@@ -38,106 +38,67 @@ REPEATS_DIFFER = 0.01
 
 @dataclass(frozen=True, kw_only=True)
 class FourierCoefficient:
-    """A Fourier coefficient of a run.
+    """A Fourier coefficient of a run."""
 
-    Parameters
-    ----------
-    signal : str
-        ``X``, ``Y``, ``N`` as measured (hydrodynamic sense), ``X_water`` ... without the body's inertia, or ``v``,
-        ``r``, ``speed``, ``delta``.
-    unit : str
-        ``N``, ``N m``, ``m/s``, ``rad/s`` or ``rad``.
-    order : int
-        0 for the mean.
-    cosine, sine : float
-        For order 0 ``cosine`` is the mean, and ``sine`` is 0.
-    cosine_error, sine_error : float
-        Standard errors; 0 for motions, which are fitted as the mechanism makes them.
-    amplitude, amplitude_error : float
-        Amplitude (for order 0 the size of the mean), and its standard error to first order.
-    phase_rad, phase_error_rad : float
-        Phase by which it lags the leading velocity, a cos(n omega t - phase), and its standard error to first order;
-        pi without an amplitude.
-    """
-
+    # ``X``, ``Y``, ``N`` as measured (hydrodynamic sense), ``X_water`` ... without the body's inertia, or ``v``, ``r``,
+    # ``speed``, ``delta``
     signal: str
-    unit: str
-    order: int
+    unit: str  # ``N``, ``N m``, ``m/s``, ``rad/s`` or ``rad``
+    order: int  # 0 for the mean
+    # `cosine`, `sine`: For order 0 ``cosine`` is the mean, and ``sine`` is 0
     cosine: float
     sine: float
+    # `cosine_error`, `sine_error`: Standard errors; 0 for motions, which are fitted as the mechanism makes them
     cosine_error: Number
     sine_error: Number
+    # `amplitude`, `amplitude_error`: Amplitude (for order 0 the size of the mean), and its standard error to first
+    # order
     amplitude: float
     amplitude_error: Number
+    # `phase_rad`, `phase_error_rad`: Phase by which it lags the leading velocity, a cos(n omega t - phase), and its
+    # standard error to first order; pi without an amplitude
     phase_rad: float
     phase_error_rad: Number
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AveragedCycle:
-    """A force over the phase of the motion, averaged over the periods of a run.
+    """A force over the phase of the motion, averaged over the periods of a run."""
 
-    Parameters
-    ----------
-    phase_rad : array, (bins,)
-        Middle of each bin, from the greatest leading velocity.
-    mean, deviation, fit : array, (bins,)
-        Mean, standard deviation between readings of the bin, and the harmonics; N or N m. nan in an empty bin.
-    count : array, (bins,)
-        Readings.
-    """
-
-    phase_rad: Array
+    phase_rad: Array  # (bins,): Middle of each bin, from the greatest leading velocity
+    # `mean`, `deviation`, `fit`: (bins,): Mean, standard deviation between readings of the bin, and the harmonics; N or
+    # N m. nan in an empty bin
     mean: Array
     deviation: Array
     fit: Array
-    count: Array
+    count: Array  # (bins,): Readings
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SingleRun:
-    """One run reduced by itself.
-
-    Parameters
-    ----------
-    name, type : str
-    speed_mps, frequency_radps : float
-        Mean speed; frequency of the oscillation, 0 in a steady run.
-    periods, readings : int
-        Whole periods that are used, and their readings.
-    coefficients : tuple of FourierCoefficient
-    cycles : dict
-        ``X``, ``Y``, ``N`` to the averaged cycle; empty for a steady run.
-    residual_rms : dict
-        Force to the root mean square of record less harmonics and trend, N or N m.
-    derivatives : OscillationDerivatives or None
-        Derivatives of an oscillating run whose model is known, by its first and third harmonics.
-    history : dict
-        Columns ``t_s``, and record, fit and residual of each force (``X_N``, ``X_fit_N``, ``X_residual_N``), to draw.
-    faults : tuple of str
-        Contradictions in the record.
-    """
+    """One run reduced by itself."""
 
     name: str
     type: str
+    # `speed_mps`, `frequency_radps`: Mean speed; frequency of the oscillation, 0 in a steady run
     speed_mps: float
     frequency_radps: float
+    # `periods`, `readings`: Whole periods that are used, and their readings
     periods: int
     readings: int
     coefficients: tuple[FourierCoefficient, ...]
-    cycles: dict[str, AveragedCycle]
-    residual_rms: dict[str, float]
+    cycles: dict[str, AveragedCycle]  # ``X``, ``Y``, ``N`` to the averaged cycle; empty for a steady run
+    residual_rms: dict[str, float]  # Force to the root mean square of record less harmonics and trend, N or N m
+    # Derivatives of an oscillating run whose model is known, by its first and third harmonics
     derivatives: OscillationDerivatives | None
+    # Columns ``t_s``, and record, fit and residual of each force (``X_N``, ``X_fit_N``, ``X_residual_N``), to draw
     history: Columns
-    faults: tuple[str, ...]
+    faults: tuple[str, ...]  # Contradictions in the record
 
     def coefficient(self, signal: str, order: int) -> FourierCoefficient:
         """The coefficient of a signal and order.
 
-        Raises
-        ------
-        KeyError
-            There is none.
+        Raises KeyError: There is none.
         """
         for found in self.coefficients:
             if (found.signal, found.order) == (signal, order):
@@ -147,31 +108,19 @@ class SingleRun:
 
 @dataclass(frozen=True, kw_only=True)
 class RepeatedCoefficient:
-    """A Fourier coefficient in repeats of a run.
+    """A Fourier coefficient in repeats of a run."""
 
-    Parameters
-    ----------
-    signal, unit, order, part
-        ``part`` is ``mean``, ``cos`` or ``sin``.
-    values : tuple of float
-        In the order of the runs.
-    mean, deviation : float
-        Over the runs; the standard deviation of one run.
-    expected : float
-        Deviation that the noise within the runs explains.
-    chance : float
-        Probability of a larger scatter by that noise alone.
-    """
-
+    # `signal`, `unit`, `order`, `part`: ``part`` is ``mean``, ``cos`` or ``sin``
     signal: str
     unit: str
     order: int
     part: str
-    values: tuple[float, ...]
+    values: tuple[float, ...]  # In the order of the runs
+    # `mean`, `deviation`: Over the runs; the standard deviation of one run
     mean: float
     deviation: float
-    expected: Number
-    chance: Number
+    expected: Number  # Deviation that the noise within the runs explains
+    chance: Number  # Probability of a larger scatter by that noise alone
 
     @property
     def differs(self) -> bool:

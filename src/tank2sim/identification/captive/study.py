@@ -50,28 +50,13 @@ class Stepped(PrimeValue):
 
 @dataclass(frozen=True, kw_only=True)
 class ReducedDerivative(PrimeValue):
-    """A derivative, prime.
+    """A derivative, prime."""
 
-    Parameters
-    ----------
-    value, standard_error : float
-    origin : str
-        ``measured`` or ``estimated``.
-    source : str
-        Source of an estimate.
-    type_a : float, optional
-        Standard error from the scatter of the campaign.
-    type_b : dict
-        Source of a stated uncertainty or a systematic error to its standard error.
-    paper_order : Stepped, optional
-        The same by the paper's order; None if it does not give it.
-    """
-
-    origin: str
-    source: str = ""
-    type_a: float | None = None
-    type_b: dict[str, float]
-    paper_order: Stepped | None = None
+    origin: str  # ``measured`` or ``estimated``
+    source: str = ""  # Source of an estimate
+    type_a: float | None = None  # Standard error from the scatter of the campaign
+    type_b: dict[str, float]  # Source of a stated uncertainty or a systematic error to its standard error
+    paper_order: Stepped | None = None  # The same by the paper's order; None if it does not give it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,51 +81,28 @@ class ReducedBody:
 
 @dataclass(frozen=True, kw_only=True)
 class UncertaintyBudget:
-    """The uncertainty budget after ITTC 7.5-02-06-04, prime.
-
-    Parameters
-    ----------
-    coverage_factor : float
-    sources : dict
-        Source to its words.
-    not_stated : tuple of str
-        Keys of ``[uncertainty]`` that the campaign does not state.
-    blockage_speed_relative : float, optional
-        Relative increase of the speed past the model by the walls; None if a size is missing.
-    derivatives : dict
-        Derivative to its budget.
-    """
+    """The uncertainty budget after ITTC 7.5-02-06-04, prime."""
 
     coverage_factor: float
-    sources: dict[str, str]
-    not_stated: tuple[str, ...]
+    sources: dict[str, str]  # Source to its words
+    not_stated: tuple[str, ...]  # Keys of ``[uncertainty]`` that the campaign does not state
+    # Relative increase of the speed past the model by the walls; None if a size is missing
     blockage_speed_relative: float | None
-    derivatives: dict[str, BudgetRow]
+    derivatives: dict[str, BudgetRow]  # Derivative to its budget
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WeightedRegression:
-    """The regression of one force over the whole campaign, prime.
+    """The regression of one force over the whole campaign, prime."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        Terms.
-    values, standard_errors, variance_inflation : array (terms,)
-    covariance : array (terms, terms)
-    condition : float
-        Scaled condition number.
-    held_within : dict
-        Term to the standard deviation of its prior about zero.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # Terms
+    # `values`, `standard_errors`, `variance_inflation`: (terms,)
     values: Array
     standard_errors: Array
-    covariance: Array
-    condition: Unbounded
+    covariance: Array  # (terms, terms)
+    condition: Unbounded  # Scaled condition number
     variance_inflation: Array
-    held_within: dict[str, float]
+    held_within: dict[str, float]  # Term to the standard deviation of its prior about zero
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -154,61 +116,30 @@ class ForceMethods:
 
 @dataclass(frozen=True, kw_only=True)
 class RunSpread:
-    """Scatter of the runs of one force.
+    """Scatter of the runs of one force."""
 
-    Parameters
-    ----------
-    noise_factor : float
-        Variance of the noise within runs over its estimate from each run.
-    zero_error_prime, zero_error_si : float
-        Zero error from run to run, prime and in N or N m.
-    gain_error : float
-        Relative gain error from run to run.
-    by_type : dict
-        Type of run to its further zero error, prime.
-    """
-
-    noise_factor: float
+    noise_factor: float  # Variance of the noise within runs over its estimate from each run
+    # `zero_error_prime`, `zero_error_si`: Zero error from run to run, prime and in N or N m
     zero_error_prime: float
     zero_error_si: float
-    gain_error: float
-    by_type: dict[str, float]
+    gain_error: float  # Relative gain error from run to run
+    by_type: dict[str, float]  # Type of run to its further zero error, prime
 
 
 @dataclass(frozen=True, kw_only=True)
 class PredictionError:
-    """Error of the runs of a type, each predicted from the others, prime.
-
-    Parameters
-    ----------
-    rms, largest : float
-    range : float
-        Range of the measured force in these runs.
-    relative : float
-        Root mean square over range; NaN without a range.
-    runs : int
-    """
+    """Error of the runs of a type, each predicted from the others, prime."""
 
     rms: float
     largest: float
-    range: float
-    relative: Number
+    range: float  # Range of the measured force in these runs
+    relative: Number  # Root mean square over range; NaN without a range
     runs: int
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunSummary:
-    """A run with its motion and its harmonics, prime with its own speed.
-
-    Parameters
-    ----------
-    name, type : str
-    speed_mps, frequency_radps : float
-    periods : int
-    v_amplitude_mps, r_amplitude_radps, v_mean_mps, rudder_rad : float
-    harmonics : dict
-        Force to harmonic to value.
-    """
+    """A run with its motion and its harmonics, prime with its own speed."""
 
     name: str
     type: str
@@ -219,7 +150,7 @@ class RunSummary:
     r_amplitude_radps: float
     v_mean_mps: float
     rudder_rad: float
-    harmonics: dict[str, dict[str, PrimeValue]]
+    harmonics: dict[str, dict[str, PrimeValue]]  # Force to harmonic to value
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

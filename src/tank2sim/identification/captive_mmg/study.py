@@ -41,23 +41,11 @@ _UNITS = {"X": "N", "Y": "N", "N": "N.m", "T": "N", "F_N": "N", "T_left": "N", "
 
 @dataclass(frozen=True, kw_only=True)
 class MmgCoefficient(PrimeValue):
-    """One coefficient of the method.
+    """A coefficient: of the hull by 1/2 rho L d U^2 (prime II), R0 positive aft; others as the method has them."""
 
-    Parameters
-    ----------
-    value, standard_error : float
-        Hull: by 1/2 rho L d U^2 (prime II), R0 positive aft; others as the method has them.
-    origin : str
-        ``measured``, ``estimated`` (m_x, m_y by a published formula) or ``open`` (taken from ordinary ships).
-    type_a : float
-        Standard error by the scatter of the tests alone.
-    type_b : dict
-        Key of ``[uncertainty]`` to the standard error by it.
-    """
-
-    origin: str
-    type_a: float
-    type_b: dict[str, float]
+    origin: str  # ``measured``, ``estimated`` (m_x, m_y by a published formula) or ``open`` (taken from ordinary ships)
+    type_a: float  # Standard error by the scatter of the tests alone
+    type_b: dict[str, float]  # Key of ``[uncertainty]`` to the standard error by it
 
 
 @dataclass(frozen=True, kw_only=True)
