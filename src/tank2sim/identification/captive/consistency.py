@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import chdtrc
@@ -82,15 +82,7 @@ def _worst(campaign: Campaign, runs: Sequence[ReducedRun], force: str) -> tuple[
 def _levelled(runs: Sequence[ReducedRun], force: str) -> list[ReducedRun]:
     """The runs with the campaign's median noise, because small scatter does not make a run more credible."""
     usual = float(np.median(np.concatenate([run.fits[force].density for run in runs])))
-    levelled = []
-    for run in runs:
-        fit = run.fits[force]
-        ratio = np.sqrt(usual / fit.density)
-        same = replace(
-            fit, density=np.full_like(fit.density, usual), covariance=fit.covariance * np.outer(ratio, ratio)
-        )
-        levelled.append(replace(run, fits={**run.fits, force: same}))
-    return levelled
+    return [run.with_density(force, np.full_like(run.fits[force].density, usual)) for run in runs]
 
 
 @dataclass(frozen=True, kw_only=True)

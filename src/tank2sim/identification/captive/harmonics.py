@@ -70,6 +70,13 @@ class ReducedRun:
         """Record less fit, (rows,), N or N m."""
         return self.run.force(force)[self.motion.kept] - self.fitted(force)
 
+    def with_density(self, force: str, density: Array) -> ReducedRun:
+        """The run with another density of the noise of a force, (columns,)."""
+        fit = self.fits[force]
+        ratio = np.sqrt(density / fit.density)
+        changed = replace(fit, density=density, covariance=fit.covariance * np.outer(ratio, ratio))
+        return replace(self, fits={**self.fits, force: changed})
+
     def projected(self, histories: Array) -> Array:
         """Coefficients (regressed, n) of the given histories (rows, n); exactly linear."""
         if not self.run.oscillates:
@@ -141,9 +148,7 @@ def moderated(runs: Sequence[ReducedRun]) -> tuple[ReducedRun, ...]:
                 density = np.full(len(density), usual)
             elif weight > 0:
                 density = (weight * usual + fit.freedom * fit.density) / (weight + fit.freedom)
-            ratio = np.sqrt(density / fit.density)
-            changed = replace(fit, density=density, covariance=fit.covariance * np.outer(ratio, ratio))
-            result[place] = replace(result[place], fits={**result[place].fits, force: changed})
+            result[place] = result[place].with_density(force, density)
     return tuple(result)
 
 

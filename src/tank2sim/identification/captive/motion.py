@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -71,24 +71,9 @@ class CaptiveMotion:
         """True for a sway velocity, and for a yaw rate, that changes."""
         return bool(np.any(self.vdot_mps2)), bool(np.any(self.rdot_radps2))
 
-    def with_error(
-        self,
-        source: str,
-        size: float,
-        *,
-        v_mps: Array | None = None,
-        speed_mps: Array | None = None,
-        delta_rad: Array | None = None,
-    ) -> CaptiveMotion:
-        """The motion with other histories, by an error of a kind and size; what is projected of it is kept here."""
-        changed = replace(
-            self,
-            v_mps=self.v_mps if v_mps is None else v_mps,
-            speed_mps=self.speed_mps if speed_mps is None else speed_mps,
-            delta_rad=self.delta_rad if delta_rad is None else delta_rad,
-        )
-        kept = self.erring.setdefault((source, size), changed.projections)
-        object.__setattr__(changed, "projections", kept)
+    def with_error(self, source: str, size: float, changed: CaptiveMotion) -> CaptiveMotion:
+        """This motion `changed` by an error of a kind and size; what is projected of it is kept here."""
+        object.__setattr__(changed, "projections", self.erring.setdefault((source, size), changed.projections))
         return changed
 
     def amplitude(self, values: Array) -> float:

@@ -19,14 +19,7 @@ from tank2sim.identification.captive.selection import Choice, Trend
 from tank2sim.identification.captive.stepwise import Disagreement, Stepwise
 from tank2sim.identification.captive.systematic import DelayEstimate, SystematicError
 from tank2sim.identification.captive.type_b import AlignmentEstimate
-from tank2sim.identification.captive.uncertainty_budget import (
-    BUDGET_SOURCES,
-    COVERAGE_FACTOR,
-    BudgetRow,
-    blockage_speed,
-    sources_not_stated,
-    uncertainty_budget,
-)
+from tank2sim.identification.captive.uncertainty_budget import UncertaintyBudget, uncertainty_budget
 from tank2sim.notices import Notice
 from tank2sim.records.campaigns import Campaign
 
@@ -77,18 +70,6 @@ class ReducedBody:
     mass: float
     yaw_inertia: float
     x_G: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class UncertaintyBudget:
-    """The uncertainty budget after ITTC 7.5-02-06-04, prime."""
-
-    coverage_factor: float
-    sources: dict[str, str]  # Source to its words
-    not_stated: tuple[str, ...]  # Keys of ``[uncertainty]`` that the campaign does not state
-    # Relative increase of the speed past the model by the walls; None if a size is missing
-    blockage_speed_relative: float | None
-    derivatives: dict[str, BudgetRow]  # Derivative to its budget
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -258,7 +239,7 @@ def study_reduction(
             name: _measured(reduction, name, found[name].value, found[name].standard_error)
             for name in terms_of_heel(reduction)
         },
-        uncertainty_budget=_budget(reduction),
+        uncertainty_budget=uncertainty_budget(reduction),
         missing=card.missing,
         notices=notices,
         methods={force: _methods(result) for force, result in forces.items()},
@@ -301,17 +282,6 @@ def prediction_errors(reduction: Reduction) -> dict[str, dict[str, PredictionErr
                 runs=len(rows),
             )
     return found
-
-
-def _budget(reduction: Reduction) -> UncertaintyBudget:
-    campaign = reduction.campaign
-    return UncertaintyBudget(
-        coverage_factor=COVERAGE_FACTOR,
-        sources=BUDGET_SOURCES,
-        not_stated=sources_not_stated(reduction),
-        blockage_speed_relative=blockage_speed(campaign.model, campaign.tank, campaign.test),
-        derivatives={row.name: row for row in uncertainty_budget(reduction)},
-    )
 
 
 def _derivative(reduction: Reduction, card: Contents, name: str) -> ReducedDerivative:

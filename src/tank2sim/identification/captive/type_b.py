@@ -47,37 +47,27 @@ def with_common_error(campaign: Campaign, used: CampaignEquations, source: str, 
     """
     if source == "force_delay_s":
         return correct_delay(used, size)
-    changed, altered = _with_altered_data(campaign, used.runs, source, size)
-    return campaign_equations(changed, altered, used.force, used.names).held(used.prior)
-
-
-def _with_altered_data(
-    campaign: Campaign, runs: Sequence[ReducedRun], source: str, size: float
-) -> tuple[Campaign, list[ReducedRun]]:
-    """Campaign and runs with an error of one standard deviation."""
-    if source == "mass_relative":
-        return _model(campaign, "mass_kg", 1 + size), list(runs)
-    if source == "yaw_inertia_relative":
-        return _model(campaign, "yaw_inertia_kgm2", 1 + size), list(runs)
-    if source == "calibration_relative":
-        return campaign, [_scaled(run, 1 + size) for run in runs]
-    return campaign, [replace(run, motion=_erring(run.motion, source, size)) for run in runs]
+    runs: Sequence[ReducedRun] = used.runs
+    key = {"mass_relative": "mass_kg", "yaw_inertia_relative": "yaw_inertia_kgm2"}.get(source)
+    if key and (value := getattr(campaign.model, key)) is not None:
+        campaign = replace(campaign, model=campaign.model.model_copy(update={key: value * (1 + size)}))
+    elif source == "calibration_relative":
+        runs = [_scaled(run, 1 + size) for run in runs]
+    elif not key:
+        runs = [replace(run, motion=_erring(run.motion, source, size)) for run in runs]
+    return campaign_equations(campaign, runs, used.force, used.names).held(used.prior)
 
 
 def _erring(motion: CaptiveMotion, source: str, size: float) -> CaptiveMotion:
+    """A motion with an error of the recorded drift, rudder or speed."""
     if source == "alignment_rad":
-        return motion.with_error(source, size, v_mps=motion.v_mps - motion.speed_mps * np.sin(size))
-    if source == "rudder_rad":
-        return motion.with_error(source, size, delta_rad=motion.delta_rad + size)
-    assert source in ("speed_relative", "blockage_relative")
-    return motion.with_error(source, size, speed_mps=motion.speed_mps * (1 + size))
-
-
-def _model(campaign: Campaign, key: str, factor: float) -> Campaign:
-    value = getattr(campaign.model, key)
-    if value is None:
-        return campaign
-    return replace(campaign, model=campaign.model.model_copy(update={key: value * factor}))
+        changed = replace(motion, v_mps=motion.v_mps - motion.speed_mps * np.sin(size))
+    elif source == "rudder_rad":
+        changed = replace(motion, delta_rad=motion.delta_rad + size)
+    else:
+        assert source in ("speed_relative", "blockage_relative")
+        changed = replace(motion, speed_mps=motion.speed_mps * (1 + size))
+    return motion.with_error(source, size, changed)
 
 
 def _scaled(run: ReducedRun, factor: float) -> ReducedRun:

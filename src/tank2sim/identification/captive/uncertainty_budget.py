@@ -64,9 +64,21 @@ class BudgetRow:
     shares: Mapping[str, float]
 
 
-def uncertainty_budget(reduction: Reduction) -> tuple[BudgetRow, ...]:
+@dataclass(frozen=True, kw_only=True)
+class UncertaintyBudget:
+    """The uncertainty budget after ITTC 7.5-02-06-04, prime."""
+
+    coverage_factor: float
+    sources: dict[str, str]  # Source to its words
+    not_stated: tuple[str, ...]  # Keys of ``[uncertainty]`` that the campaign does not state
+    # Relative increase of the speed past the model by the walls; None if a size is missing
+    blockage_speed_relative: float | None
+    derivatives: dict[str, BudgetRow]  # Derivative to its budget
+
+
+def uncertainty_budget(reduction: Reduction) -> UncertaintyBudget:
     """The budget of each derivative that the campaign gives."""
-    rows = []
+    campaign, derivatives = reduction.campaign, {}
     for result in reduction.forces.values():
         parts = regression_parts(result.selection, result.solution)
         for place, name in enumerate(result.solution.names):
@@ -80,17 +92,21 @@ def uncertainty_budget(reduction: Reduction) -> tuple[BudgetRow, ...]:
                 variances[_SOURCE_OF.get(source, "calibration")] += size**2
             total = sum(variances.values())
             combined = float(np.sqrt(total))
-            rows.append(
-                BudgetRow(
-                    name=name,
-                    value=found.value,
-                    combined=combined,
-                    expanded=COVERAGE_FACTOR * combined,
-                    parts={source: float(np.sqrt(variance)) for source, variance in variances.items()},
-                    shares={source: variance / total if total else 0.0 for source, variance in variances.items()},
-                )
+            derivatives[name] = BudgetRow(
+                name=name,
+                value=found.value,
+                combined=combined,
+                expanded=COVERAGE_FACTOR * combined,
+                parts={source: float(np.sqrt(variance)) for source, variance in variances.items()},
+                shares={source: variance / total if total else 0.0 for source, variance in variances.items()},
             )
-    return tuple(rows)
+    return UncertaintyBudget(
+        coverage_factor=COVERAGE_FACTOR,
+        sources=BUDGET_SOURCES,
+        not_stated=sources_not_stated(reduction),
+        blockage_speed_relative=blockage_speed(campaign.model, campaign.tank, campaign.test),
+        derivatives=derivatives,
+    )
 
 
 def regression_parts(selection: Selection, solution: Solution) -> dict[str, Array]:
