@@ -87,6 +87,6 @@ needs NumPy alone. The comments of the file list states, inputs and parameters."
         writer="bridge_command:bridge_command_files",
     ),
     "osp": Form("a folder with the hull and the system of OSP's case dp-ship", writer="osp_case:osp_files"),
-    "osp_gunnerus": Form("a folder with the hull of OSP's case gunnerus-dp", writer="osp_gunnerus:gunnerus_files"),
+    "osp_gunnerus": Form("a folder with the hull of OSP's case gunnerus-dp", writer="osp_case:gunnerus_files"),
 }
 """Name on the command line to the form."""

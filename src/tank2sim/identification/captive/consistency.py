@@ -12,10 +12,9 @@ from scipy.special import chdtrc
 
 from tank2sim.cards.terms import parse_term
 from tank2sim.errors import InputError
-from tank2sim.identification.captive.cross_validation import LeftOut, leave_one_out
 from tank2sim.identification.captive.equations import campaign_equations, excited
 from tank2sim.identification.captive.harmonics import ReducedRun
-from tank2sim.identification.captive.regression import Spread, solve
+from tank2sim.identification.captive.regression import LeftOut, Spread, leave_one_out, solve
 from tank2sim.identification.captive.selection import Selection, distinguishable_equations, usual_zero, with_prior
 from tank2sim.identification.conditioning import COLLINEAR
 from tank2sim.records.campaign_form import OSCILLATING

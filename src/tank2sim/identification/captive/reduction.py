@@ -16,7 +16,6 @@ from threadpoolctl import threadpool_limits
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.consistency import Asymmetry, asymmetry, contradicted
-from tank2sim.identification.captive.cross_validation import LeftOut, leave_one_out
 from tank2sim.identification.captive.equations import HEEL_TERMS, SPEED_RANGE
 from tank2sim.identification.captive.harmonics import ReducedRun, moderated, reduced_run
 from tank2sim.identification.captive.oscillation import (
@@ -26,7 +25,7 @@ from tank2sim.identification.captive.oscillation import (
     oscillations,
     run_frequency_parameter,
 )
-from tank2sim.identification.captive.regression import Solution, efficient_solution, moved_terms
+from tank2sim.identification.captive.regression import LeftOut, Solution, efficient_solution, leave_one_out, moved_terms
 from tank2sim.identification.captive.run_faults import record_faults, reduced_faults
 from tank2sim.identification.captive.selection import Selection, Trend, select, trends
 from tank2sim.identification.captive.stepwise import (
@@ -37,20 +36,18 @@ from tank2sim.identification.captive.stepwise import (
     stepwise,
 )
 from tank2sim.identification.captive.systematic import (
+    AlignmentEstimate,
     DelayEstimate,
     SystematicError,
+    alignment_estimate,
     correct_delay,
     delay_estimate,
     force_delays,
     gauge_gains,
-)
-from tank2sim.identification.captive.tank_conditions import LARGEST_FREQUENCY_PARAMETER, impossible_body
-from tank2sim.identification.captive.type_b import (
-    AlignmentEstimate,
-    alignment_estimate,
     type_b_shifts,
     with_common_error,
 )
+from tank2sim.identification.captive.tank_conditions import LARGEST_FREQUENCY_PARAMETER, impossible_body
 from tank2sim.records.campaigns import Campaign, together
 from tank2sim.records.captive_record import FORCE_COLUMNS
 

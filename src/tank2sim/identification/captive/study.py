@@ -9,16 +9,15 @@ import numpy as np
 
 from tank2sim.arrays import Array, Number, Unbounded
 from tank2sim.identification.captive.consistency import Asymmetry, Repeats, repeats
-from tank2sim.identification.captive.cross_validation import LeftOut
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.oscillation import CubicByTwoWays, OscillationDerivatives
 from tank2sim.identification.captive.plot_data import ForcePlot, HarmonicsPlot, LoopPlot, reduction_plots
 from tank2sim.identification.captive.reduction import ForceResult, Reduction, is_resistance, terms_of_heel
+from tank2sim.identification.captive.regression import LeftOut
 from tank2sim.identification.captive.result_card import Contents
 from tank2sim.identification.captive.selection import Choice, Trend
 from tank2sim.identification.captive.stepwise import Disagreement, Stepwise
-from tank2sim.identification.captive.systematic import DelayEstimate, SystematicError
-from tank2sim.identification.captive.type_b import AlignmentEstimate
+from tank2sim.identification.captive.systematic import AlignmentEstimate, DelayEstimate, SystematicError
 from tank2sim.identification.captive.uncertainty_budget import UncertaintyBudget, uncertainty_budget
 from tank2sim.notices import Notice
 from tank2sim.records.campaigns import Campaign

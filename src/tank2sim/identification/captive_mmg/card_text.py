@@ -14,8 +14,7 @@ from tank2sim.dynamics.mmg.hull import HULL_TERMS
 from tank2sim.errors import InputError
 from tank2sim.escaping import one_line
 from tank2sim.identification.captive.result_card import model_particulars, model_yaw_inertia
-from tank2sim.identification.captive_mmg.contradicted_tests import place_of_column
-from tank2sim.identification.captive_mmg.steady_tests import SteadyTests
+from tank2sim.identification.captive_mmg.steady_tests import SteadyTests, place_of_column
 
 _CAUSES = {
     "derivatives.Y": ("Y", "drift"),

@@ -17,8 +17,8 @@ from tank2sim.errors import InputError
 from tank2sim.identification.captive.study import PrimeValue
 from tank2sim.identification.captive.uncertainty_budget import blockage_speed
 from tank2sim.identification.captive_mmg.card_text import MASS_KEYS, tested_card
-from tank2sim.identification.captive_mmg.contradicted_tests import place_of_column
 from tank2sim.identification.captive_mmg.regression import ORDINARY, MmgFit
+from tank2sim.identification.captive_mmg.steady_tests import place_of_column
 from tank2sim.notices import Notice, caution
 
 _UNEXPLAINED = 0.5
