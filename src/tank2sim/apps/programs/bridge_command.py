@@ -79,7 +79,12 @@ def bridge_command_files(card: Card) -> ProgramFiles:
     ship = card.steered()
     beam, draught = (_particular(ship, name) for name in ("beam_m", "draught_m"))
     model, length = in_calm(build(ship)), ship.ship.length_m
-    numbers, changes, losses = (_of_craft if ship.thrusters else _of_ship)(ship, model)
+    if ship.thrusters:
+        made = craft_numbers(ship, model)
+        numbers, changes = dict(made.keys), [*made.changes]
+        losses = ["a turning craft neither drifts nor loses speed"]
+    else:
+        numbers, changes, losses = _of_ship(ship, model)
     numbers["DynamicsSpeedA"] = max(0.0, numbers["DynamicsSpeedA"] - _AIR_DRAG * beam * _FREEBOARD * length)
     return ProgramFiles(
         files={
@@ -147,12 +152,6 @@ def _screw_offset(card: SteeredCard) -> float:
     if isinstance(card, MmgCard):
         return card.ship.length_m * (card.propeller.y_P or 0.0) if card.propeller.number == 2 else 0.0
     return sum(one.parameters.get("place_m", 0.0) for one in card.effects if one.name == TWIN_ORDERS.name)
-
-
-def _of_craft(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[FigureChange], list[str]]:
-    """Numbers of a craft with two thrusters, figures before and after, and losses."""
-    made = craft_numbers(card, model)
-    return dict(made.keys), list(made.changes), ["a turning craft neither drifts nor loses speed"]
 
 
 def _seen(length_m: float, draught_m: float) -> dict[str, float]:

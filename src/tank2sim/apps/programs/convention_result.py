@@ -52,33 +52,15 @@ class ReadingFound:
 
 @dataclass(frozen=True, kw_only=True)
 class ConventionStudy:
-    """Readings of a table.
+    """Readings of a table."""
 
-    Parameters
-    ----------
-    source : str
-        The table.
-    stated : dict
-        Conventions that the table states.
-    readings : tuple of ReadingFound
-        The most probable first.
-    assumed : dict
-        Sizes that the table lacks, by key, and the values taken.
-    left_out : tuple of str
-        Numbers that were not read.
-    scaled_with_nominal_speed : bool or None
-        Whether terms by the speed count it once; None if the table lacks them.
-    speed_scale : str or None
-        As the table states it.
-    """
-
-    source: str
-    stated: dict[str, str]
-    readings: tuple[ReadingFound, ...]
-    assumed: dict[str, float]
-    left_out: tuple[str, ...]
-    scaled_with_nominal_speed: bool | None
-    speed_scale: str | None
+    source: str  # The table
+    stated: dict[str, str]  # Conventions that the table states
+    readings: tuple[ReadingFound, ...]  # The most probable first
+    assumed: dict[str, float]  # Sizes that the table lacks, by key, and the values taken
+    left_out: tuple[str, ...]  # Numbers that were not read
+    scaled_with_nominal_speed: bool | None  # Whether terms by the speed count it once; None if the table lacks them
+    speed_scale: str | None  # As the table states it
     notices: tuple[Notice, ...] = ()
 
 

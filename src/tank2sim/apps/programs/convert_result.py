@@ -43,23 +43,13 @@ class ConvertedFigure:
 
 @dataclass(frozen=True, kw_only=True)
 class ConversionStudy:
-    """A ship in another language.
+    """A ship in another language."""
 
-    Parameters
-    ----------
-    ship, from_kind, to : str
-        Name of the ship, kind of its card, and the language.
-    made : str
-        The language in words.
-    fit : PolynomialRange or None
-    figures : tuple of ConvertedFigure
-    notices : tuple of Notice
-    """
-
+    # `ship`, `from_kind`, `to`: Name of the ship, kind of its card, and the language
     ship: str
     from_kind: str
     to: str
-    made: str
+    made: str  # The language in words
     fit: PolynomialRange | None
     figures: tuple[ConvertedFigure, ...]
     notices: tuple[Notice, ...]

@@ -98,7 +98,8 @@ def fit_polynomial(card: MmgCard, model: Model, motions: Array) -> PolynomialFit
     forces, primes = _hydrodynamic_primes(card, model, motions)
     kept = [*ACCELERATION_TERMS, *(name for name in card.derivatives if _of_heeling(name))]
     derivatives = {name: card.derivatives[name] for name in kept if name in card.derivatives}
-    errors = joint_errors(card, card_parameters(card, study_model(card))) if _states_errors(card) else None
+    states_errors = card.uncertainty or card.interaction_errors or read_covariance(card) is not None
+    errors = joint_errors(card, card_parameters(card, study_model(card))) if states_errors else None
     numbers = [] if errors is None else [p.name for p in errors.parameters if p.name in model.parameter_names]
     slopes = _force_slopes(card, model, motions, numbers)
     sensitivity = [[float(number == f"derivatives.{name}") for number in numbers] for name in derivatives]
@@ -127,10 +128,6 @@ def fit_polynomial(card: MmgCard, model: Model, motions: Array) -> PolynomialFit
     ranges = {name: (float(np.quantile(v, 0.005)), float(np.quantile(v, 0.995))) for name, v in visited.items()}
     covariance = None if errors is None else _carried(np.array(sensitivity), errors, numbers)
     return PolynomialFit(derivatives, _effect_of_revolutions(card, model), residuals, ranges, covariance)
-
-
-def _states_errors(card: MmgCard) -> bool:
-    return bool(card.uncertainty or card.interaction_errors) or read_covariance(card) is not None
 
 
 def _carried(sensitivity: Array, errors: JointErrors, numbers: Sequence[str]) -> Array:

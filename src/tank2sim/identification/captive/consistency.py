@@ -152,7 +152,10 @@ def repeats(campaign: Campaign, runs: Sequence[ReducedRun]) -> Repeats | None:
     for force in FORCE_COLUMNS:
         total = 0.0
         for group in groups:
-            means = [_mean(campaign, run, force) for run in group]
+            means = [
+                float(run.fits[force].coefficients[0] / campaign.scales_at(run.motion.mean_speed_mps).unit(force))
+                for run in group
+            ]
             centre = sum(means) / len(means)
             total += sum((mean - centre) ** 2 for mean in means)
         deviation[force] = math.sqrt(total / freedom)
@@ -181,7 +184,3 @@ def _test(campaign: Campaign, run: ReducedRun) -> tuple[object, ...]:
         heel,
         *(round(math.log(step) / _RELATIVE) for step in steps if step > 0),
     )
-
-
-def _mean(campaign: Campaign, run: ReducedRun, force: str) -> float:
-    return float(run.fits[force].coefficients[0] / campaign.scales_at(run.motion.mean_speed_mps).unit(force))

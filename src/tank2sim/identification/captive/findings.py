@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from tank2sim.cards.plausibility import Caution
 from tank2sim.identification.captive.consistency import repeats
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.oscillation import cubic_findings
@@ -39,7 +38,10 @@ def reduction_findings(reduction: Reduction) -> tuple[Notice, ...]:
         *_omitted_runs(reduction),
         *reduction.campaign.remarks,
         *_missing(reduction),
-        *_physics(reduction),
+        *(
+            Notice(f"{doubt.message}{f' Runs: {_listed(doubt.runs)}.' if doubt.runs else ''}")
+            for doubt in cautions_of_test(reduction.campaign, _oscillating(reduction))
+        ),
         *_conventions(reduction),
         *_alignment(reduction),
         *_unchecked(reduction),
@@ -59,7 +61,9 @@ def implausible(reduction: Reduction) -> tuple[Notice, ...]:
     cautions = cautions_of_result(values, errors, reduction.campaign)
     found = [error.message for error in reduction.systematic] + [each.message for each in cautions]
     found += [*drifting_zeros(reduction.runs)]
-    campaign, resonant = reduction.campaign, [run for each in _resonances(reduction) for run in each.runs]
+    campaign = reduction.campaign
+    resonances = tank_resonance(_oscillating(reduction), campaign.tank, campaign.test.gravity_mps2)
+    resonant = [run for each in resonances for run in each.runs]
     if reduction.systematic and resonant:
         found.append(f"standing waves of the tank would do the same to {_listed(resonant)}: compare without them.")
     found += [each.message for each in tank_size(campaign.tank)]
@@ -125,16 +129,6 @@ def _oscillating(reduction: Reduction) -> tuple[OscillationMotion, ...]:
         OscillationMotion(row.run, "sway" if row.letter == "v" else "yaw", row.frequency_radps)
         for row in reduction.oscillations
     )
-
-
-def _resonances(reduction: Reduction) -> Iterator[Caution]:
-    campaign = reduction.campaign
-    return tank_resonance(_oscillating(reduction), campaign.tank, campaign.test.gravity_mps2)
-
-
-def _physics(reduction: Reduction) -> Iterator[Notice]:
-    for doubt in cautions_of_test(reduction.campaign, _oscillating(reduction)):
-        yield Notice(f"{doubt.message}{f' Runs: {_listed(doubt.runs)}.' if doubt.runs else ''}")
 
 
 def _conventions(reduction: Reduction) -> Iterator[Notice]:

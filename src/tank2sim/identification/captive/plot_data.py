@@ -184,7 +184,7 @@ def _motion_of(run: ReducedRun, letter: str, length_m: float = 1.0) -> float:
 
 def _coefficient(reduction: Reduction, force: str, run: ReducedRun) -> tuple[float, float]:
     """Mean coefficient of the water's force in a steady run, and its standard error with the run's zero error."""
-    unit = _unit(reduction, force, run)
+    unit = float(reduction.campaign.scales_at(run.motion.mean_speed_mps).unit(force))
     result = reduction.forces[force].selection
     place = result.equations.runs.index(run)
     root = result.spread.run_roots(result.equations)[place] * result.equations.unit
@@ -192,11 +192,6 @@ def _coefficient(reduction: Reduction, force: str, run: ReducedRun) -> tuple[flo
     return (float(run.fits[force].coefficients[0]) + float(np.mean(inertia))) / unit, float(
         np.linalg.norm(root[0])
     ) / unit
-
-
-def _unit(reduction: Reduction, force: str, run: ReducedRun) -> float:
-    campaign = reduction.campaign
-    return float(campaign.scales_at(run.motion.mean_speed_mps).unit(force))
 
 
 def _regressors(result: ForceResult, v: Array, r: Array, rudder: Array) -> Array:

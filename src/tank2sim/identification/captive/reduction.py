@@ -154,7 +154,11 @@ def _reduction(campaign: Campaign, options: ReductionOptions) -> Reduction:
     delay = delay_estimate(equations)
     delays = force_delays(equations, delay)
     if any(error.corrected for error in delays):  # the forces of oscillating runs are taken a time earlier
-        runs = [_advanced(run, delays[0].size) for run in runs]
+        later_s = delays[0].size
+        runs = [
+            reduced_run(replace(run.run, force_delay_s=run.run.force_delay_s + later_s)) if run.run.oscillates else run
+            for run in runs
+        ]
         used, not_used = _used_runs(campaign, moderated(runs), options)
         selections = _selections(campaign, used, options)
     forces = {force: _force_result(campaign, selection, delays, options) for force, selection in selections.items()}
@@ -191,13 +195,6 @@ def _reduction(campaign: Campaign, options: ReductionOptions) -> Reduction:
 
 def _selections(campaign: Campaign, used: Sequence[ReducedRun], options: ReductionOptions) -> dict[str, Selection]:
     return {force: select(campaign, used, force, all_terms=options.all_terms) for force in FORCE_COLUMNS}
-
-
-def _advanced(run: ReducedRun, delay_s: float) -> ReducedRun:
-    """A run reduced again with its forces a time earlier."""
-    if not run.run.oscillates:
-        return run
-    return reduced_run(replace(run.run, force_delay_s=run.run.force_delay_s + delay_s))
 
 
 def _refuse_thrust(campaign: Campaign, derivatives: Mapping[str, Derivative]) -> None:

@@ -130,21 +130,12 @@ class RepeatedCoefficient:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CaptiveRunStudy:
-    """Captive runs reduced by themselves.
-
-    Parameters
-    ----------
-    runs : tuple of SingleRun
-    repeats : tuple of RepeatedCoefficient
-        Scatter of the coefficients between the runs; empty for a single one and for runs of different tests.
-    inertia_removed : bool
-        Whether the model is known, and its inertia removed.
-    notices : tuple of Notice
-    """
+    """Captive runs reduced by themselves."""
 
     runs: tuple[SingleRun, ...]
+    # Scatter of the coefficients between the runs; empty for a single one and for runs of different tests
     repeats: tuple[RepeatedCoefficient, ...]
-    inertia_removed: bool
+    inertia_removed: bool  # Whether the model is known, and its inertia removed
     notices: tuple[Notice, ...]
 
 

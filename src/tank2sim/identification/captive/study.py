@@ -135,79 +135,41 @@ class RunSummary:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ReductionStudy:
-    """A reduced campaign: prime, instantaneous, "hydrodynamic", starboard-positive, expanded at the test speed.
+    """A reduced campaign: prime, instantaneous, "hydrodynamic", starboard-positive, expanded at the test speed."""
 
-    Parameters
-    ----------
-    campaign : str
-        File of the campaign.
-    model, test : dict
-        Keys of these sections of the file to values.
-    card_scale : float, optional
-        Length of the card's ship over the length of the model; None: the card is of the model.
-    conventions : DerivativeConventions
-    rigid_body : ReducedBody
-    derivatives : dict
-        Derivatives of the card.
-    heel_derivatives : dict
-        Derivatives of the heel, which the card does not have.
-    uncertainty_budget : UncertaintyBudget
-    missing : tuple of str
-        Essential derivatives that are neither measured nor estimated.
-    notices : tuple of Notice
-    methods, selection, spread, symmetry, leave_one_out : dict
-        By force: methods, choice of terms, scatter of the runs, test of the symmetry (on request), predicted runs.
-    systematic_errors : tuple of SystematicError
-        Errors common to many runs that the campaign shows.
-    force_delay : DelayEstimate, optional
-    alignment : AlignmentEstimate, optional
-    trends : tuple of Trend
-        Trends with frequency.
-    prediction_errors : dict
-        Type of run to force to error.
-    oscillations : tuple of OscillationDerivatives
-    third_order : tuple of CubicByTwoWays
-    runs : tuple of RunSummary
-        Runs that are used.
-    not_used : dict
-        Run to the reason.
-    faults : tuple of str
-    repeats : Repeats, optional
-    resistance : dict
-        ``X0``, if it is the resistance of a model without a propeller and so not on the card.
-    plots : dict
-        Data of the charts by name.
-    """
-
-    campaign: str
+    campaign: str  # File of the campaign
+    # `model`, `test`: Keys of these sections of the file to values
     model: _SectionValues
     test: _SectionValues
-    card_scale: float | None
+    card_scale: float | None  # Length of the card's ship over the length of the model; None: the card is of the model
     conventions: DerivativeConventions
     rigid_body: ReducedBody
-    derivatives: dict[str, ReducedDerivative]
-    heel_derivatives: dict[str, ReducedDerivative]
+    derivatives: dict[str, ReducedDerivative]  # Derivatives of the card
+    heel_derivatives: dict[str, ReducedDerivative]  # Derivatives of the heel, which the card does not have
     uncertainty_budget: UncertaintyBudget
-    missing: tuple[str, ...]
+    missing: tuple[str, ...]  # Essential derivatives that are neither measured nor estimated
     notices: tuple[Notice, ...]
+    # `methods`, `selection`, `spread`, `symmetry`, `leave_one_out`: By force: methods, choice of terms, scatter of the
+    # runs, test of the symmetry (on request), predicted runs
     methods: dict[str, ForceMethods]
     selection: dict[str, tuple[Choice, ...]]
     spread: dict[str, RunSpread]
-    systematic_errors: tuple[SystematicError, ...]
+    systematic_errors: tuple[SystematicError, ...]  # Errors common to many runs that the campaign shows
     force_delay: DelayEstimate | None
     alignment: AlignmentEstimate | None
-    trends: tuple[Trend, ...]
+    trends: tuple[Trend, ...]  # Trends with frequency
     symmetry: dict[str, Asymmetry]
     leave_one_out: dict[str, tuple[LeftOut, ...]]
-    prediction_errors: dict[str, dict[str, PredictionError]]
+    prediction_errors: dict[str, dict[str, PredictionError]]  # Type of run to force to error
     oscillations: tuple[OscillationDerivatives, ...]
     third_order: tuple[CubicByTwoWays, ...]
-    runs: tuple[RunSummary, ...]
-    not_used: dict[str, str]
+    runs: tuple[RunSummary, ...]  # Runs that are used
+    not_used: dict[str, str]  # Run to the reason
     faults: tuple[str, ...]
     repeats: Repeats | None
+    # ``X0``, if it is the resistance of a model without a propeller and so not on the card
     resistance: dict[str, PrimeValue]
-    plots: dict[str, ForcePlot | HarmonicsPlot | LoopPlot]
+    plots: dict[str, ForcePlot | HarmonicsPlot | LoopPlot]  # Data of the charts by name
 
     @property
     def choices(self) -> list[Choice]:

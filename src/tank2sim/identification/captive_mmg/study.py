@@ -68,39 +68,20 @@ class ChannelReadings:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MmgStudy:
-    """Coefficients of the MMG method from steady tests.
+    """Coefficients of the MMG method from steady tests."""
 
-    Parameters
-    ----------
-    campaign, model : str
-        File of the campaign, and name of the model.
-    coefficients : dict
-        By the names of an MMG card: R0 = -X0, mx = -Xudot, my = -Yvdot.
-    yaw_arm : PrimeValue
-        x_R' + a_H x_H', which tests show better than x_H' itself.
-    rudder_angle_of_no_force_deg : float, optional
-        Positive to starboard, straight ahead; None if the tests do not show it.
-    channels : dict
-        Channel (``X``, ``Y``, ``N``, ``T``, ``F_N`` ...) to its residual.
-    open_water_points : int
-    open_water : dict
-        ``K_T``, and with torque ``K_Q``, to the residual of the open-water points.
-    readings : dict
-        Channel to its readings.
-    conditions, not_excited : tuple of str
-        Names of the conditions, and of the terms that none of them shows.
-    notices : tuple of Notice
-    """
-
+    # `campaign`, `model`: File of the campaign, and name of the model
     campaign: str
     model: str
-    coefficients: dict[str, MmgCoefficient]
-    yaw_arm: PrimeValue
+    coefficients: dict[str, MmgCoefficient]  # By the names of an MMG card: R0 = -X0, mx = -Xudot, my = -Yvdot
+    yaw_arm: PrimeValue  # x_R' + a_H x_H', which tests show better than x_H' itself
+    # Positive to starboard, straight ahead; None if the tests do not show it
     rudder_angle_of_no_force_deg: float | None
-    channels: dict[str, ChannelFit]
+    channels: dict[str, ChannelFit]  # Channel (``X``, ``Y``, ``N``, ``T``, ``F_N`` ...) to its residual
     open_water_points: int
-    open_water: dict[str, ChannelFit]
-    readings: dict[str, ChannelReadings]
+    open_water: dict[str, ChannelFit]  # ``K_T``, and with torque ``K_Q``, to the residual of the open-water points
+    readings: dict[str, ChannelReadings]  # Channel to its readings
+    # `conditions`, `not_excited`: Names of the conditions, and of the terms that none of them shows
     conditions: tuple[str, ...]
     not_excited: tuple[str, ...]
     notices: tuple[Notice, ...]
