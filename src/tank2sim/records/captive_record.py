@@ -23,6 +23,7 @@ from tank2sim.records.run_tables import read_run_table
 
 FORCE_COLUMNS = {"X": "X_N", "Y": "Y_N", "N": "N_Nm"}
 """Force to its column in a run."""
+FORCE_UNITS_SI = {"X": "N", "Y": "N", "N": "N m"}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -145,8 +145,6 @@ def residual_chart(residuals: Sequence[Residual], *, title: str = "") -> ChartSp
     """What the fit leaves, over its standard error, by run: one panel a force, a colour a type of run.
 
     Dotted lines mark two standard errors, within which nineteen of twenty should lie.
-
-    `residuals`: Runs are in the order of their first appearance.
     """
     runs = list(dict.fromkeys(residual.run for residual in residuals))
     kinds = list(dict.fromkeys(residual.kind for residual in residuals))

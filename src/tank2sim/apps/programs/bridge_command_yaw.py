@@ -127,10 +127,7 @@ def heading_astern(yaw: YawNumbers, moment: float, time_s: float) -> float:
 
 
 def moment_astern(yaw: YawNumbers, heading_rad: float, time_s: float) -> float:
-    """The constant moment over the inertia (1/s2) that changes the heading so far while the ship stops.
-
-    `yaw`: Of one ship.
-    """
+    """The constant moment over the inertia (1/s2) that changes the heading so far while the ship stops."""
     from scipy.optimize import brentq
 
     if not heading_rad:

@@ -29,8 +29,6 @@ def c99_files(card: Card) -> ProgramFiles:
     The figures of standard manoeuvres by the compiled files in double precision are the changes; what float changes of
     them is among the losses. Without a C compiler, or for a card without standard manoeuvres, there are neither.
 
-    `card`: Of any kind that has a model.
-
     Raises InputError: The card names what no model knows.
     """
     made = plain_ship(card)
@@ -65,21 +63,8 @@ def _loss_of_float(changes: Sequence[FigureChange]) -> str:
 
 
 class PlainIntegrator(Integrator):
-    """Takes a model's steps by its files of C99, compiled here; outputs are evaluated by the model.
-
-    Parameters
-    ----------
-    model : Model
-        With the interface of a simulator.
-    made : PlainShip
-        Its files.
-    single : bool
-        In single precision.
-
-    Raises
-    ------
-    InputError
-        There is no C compiler that works.
+    """Takes the steps of a model with a simulator's interface by its files of C99, compiled here, in `single` precision
+    or double; outputs are evaluated by the model. Raises InputError: There is no C compiler that works.
     """
 
     def __init__(self, model: Model, made: PlainShip, *, single: bool = False):

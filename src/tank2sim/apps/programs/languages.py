@@ -21,7 +21,6 @@ from tank2sim.apps.programs.robotics import (
     VRX_MASSES,
     VRX_TERMS,
     AddedMass,
-    gazebo_model,
     gazebo_text,
     growth_per_step,
     place_of_added_mass,
@@ -124,11 +123,12 @@ def _of_craft(card: SteeredCard, to: str, wanted: Conventions, added_mass: Added
         return ProgramFiles(text=made.text, card=made)
     if wanted.scaling is not None:
         raise ArgumentError("to", to, "has conventions of its own", "leave the scaling out")
-    text, model = (gazebo_text, gazebo_model) if to == "gazebo" else (vrx_text, vrx_model)
+    place = place_of_added_mass(card, added_mass)
+    after = build(replace(card, effects=())) if to == "gazebo" else vrx_model(card, place)  # Gazebo has the whole hull
     return ProgramFiles(
-        text=text(card, added_mass),
-        losses=tuple(_lost_by(card, to, place_of_added_mass(card, added_mass))),
-        changes=figure_changes(card, build(card), model(card, added_mass)),
+        text=gazebo_text(card, place) if to == "gazebo" else vrx_text(card, place),
+        losses=tuple(_lost_by(card, to, place)),
+        changes=figure_changes(card, build(card), after),
     )
 
 

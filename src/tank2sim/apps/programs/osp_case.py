@@ -131,8 +131,6 @@ _STILL_PUSH = 1e-3
 def osp_files(card: Card) -> ProgramFiles:
     """The folder of a ship in the case dp-ship: FMU, groups of variables, and the system of the whole case.
 
-    `card`: Card of a ship or craft that moves in the plane.
-
     Raises InputError: The ship does not lie still without orders, its hull does not damp motions at low speed, or a
     compiler is missing.
     """
@@ -218,8 +216,6 @@ def _inertia(card: SteeredCard) -> tuple[float, float]:
 
 def low_speed_damping(card: SteeredCard, model: Model) -> tuple[float, float]:
     """Damping of sway and yaw in calm water at 0.3 m/s (of yaw at the ends), 1/s.
-
-    `model`: Of :func:`resting_model`.
 
     Raises InputError: There is none, or the ship pushes itself at rest.
     """
@@ -318,8 +314,6 @@ _OUTPUTS = {
 
 def gunnerus_files(card: Card) -> ProgramFiles:
     """The hull of the case gunnerus-dp: FMU and groups of variables.
-
-    `card`: Card of a ship or craft that moves in the plane.
 
     Raises InputError: As :func:`.osp_files`.
     """

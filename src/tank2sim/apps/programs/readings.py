@@ -255,6 +255,10 @@ class _Evidence:
         if weight < expected - 3.0:
             self.against.append((expected - weight, words))
 
+    def compare(self, z: float, words: str) -> None:
+        """Add the density of a number `z` standard deviations from what ships have."""
+        self.add(_log_density(z), _log_density(0), words)
+
 
 def weigh(table: CoefficientTable, reading: Reading) -> RankedReading:
     """A reading with the log of its weight; its probability, which takes all readings, is 0 yet."""
@@ -290,20 +294,20 @@ def _weigh_coefficients(found: _Evidence, table: CoefficientTable, reading: Read
         factor = abs(file_factor(known_term(name), scales, rudder_to_port=False))
         z = (value - about.value) / error
         words = f"{name} = {value:.3g}, {abs(z):.0f} standard errors from {about.source.partition(',')[0]}"
-        found.add(_log_density(z), _log_density(0), words)
+        found.compare(z, words)
         found.total -= math.log(error * factor)
     of_length = scales.length if scales else 1.0
     if table.body.get("mass", 0.0) > 0:
         z = math.log(ship.body.mass / _mass(table)) / (_ASSUMED_MASS_ERROR if table.assumed else _MASS_ERROR)
-        found.add(_log_density(z), _log_density(0), f"mass {ship.body.mass / _mass(table):.3g} times the displacement")
+        found.compare(z, f"mass {ship.body.mass / _mass(table):.3g} times the displacement")
     if table.body.get("yaw_inertia", 0.0) > 0:
         radius = math.sqrt(max(ship.body.yaw_inertia / ship.body.mass, 1e-12))
         z = math.log(radius / 0.25) / 0.1
-        found.add(_log_density(z), _log_density(0), f"radius of gyration {radius:.3g} L")
+        found.compare(z, f"radius of gyration {radius:.3g} L")
     if table.body.get("x_G") and table.centre_of_gravity_m is None:
         centre = table.body["x_G"] / of_length
         z = centre / _CENTRE_ERROR
-        found.add(_log_density(z), _log_density(0), f"x_G = {centre:.3g} L")
+        found.compare(z, f"x_G = {centre:.3g} L")
         found.total -= math.log(_CENTRE_ERROR * of_length)
     _weigh_rudder(found, table, ship)
 
@@ -316,17 +320,13 @@ def _weigh_rudder(found: _Evidence, table: CoefficientTable, ship: ReadShip) -> 
         if Yd > 0:
             found.add(_WRONG_SIDE, 0.0, "a rudder to starboard pushes the stern to starboard")
         z = math.log(abs(Yd) / side) / _RUDDER_ERROR
-        found.add(
-            _log_density(z),
-            _log_density(0),
-            f"Yd = {Yd:.3g}, {abs(Yd) / side:.2g} of a rudder by the rules",
-        )
+        found.compare(z, f"Yd = {Yd:.3g}, {abs(Yd) / side:.2g} of a rudder by the rules")
     if Nd and not Yd:
         z = math.log(abs(Nd) / (side * _LEVER)) / _RUDDER_ERROR
-        found.add(_log_density(z), _log_density(0), f"Nd = {Nd:.3g}")
+        found.compare(z, f"Nd = {Nd:.3g}")
     if Yd and Nd:
         z = (-Nd / Yd - _LEVER) / _LEVER_ERROR
-        found.add(_log_density(z), _log_density(0), f"the rudder acts {Nd / Yd:.2g} L from midships")
+        found.compare(z, f"the rudder acts {Nd / Yd:.2g} L from midships")
 
 
 def _mass(table: CoefficientTable) -> float:

@@ -137,12 +137,9 @@ def _inertial(card: SteeredCard) -> list[str]:
     ]
 
 
-def gazebo_text(card: SteeredCard, added_mass: AddedMass | None = None) -> str:
-    """SDF of the plugins of a craft for Gazebo: hydrodynamics, and one thruster each.
-
-    `added_mass`: As of :func:`place_of_added_mass`.
-    """
-    derivatives, in_plugin = card.derivatives, place_of_added_mass(card, added_mass) == "plugin"
+def gazebo_text(card: SteeredCard, place: AddedMass) -> str:
+    """SDF of the plugins of a craft for Gazebo: hydrodynamics, and one thruster each."""
+    derivatives, in_plugin = card.derivatives, place == "plugin"
     hull = {
         gazebo_name(name): value
         for name, value in derivatives.items()
@@ -187,12 +184,9 @@ def _joint(thruster: ThrusterSection) -> str:
     return f"x {thruster.x_m:g}, y {-thruster.y_m + 0.0:g} m (to port), axis of the joint {axis}"
 
 
-def vrx_text(card: SteeredCard, added_mass: AddedMass | None = None) -> str:
-    """SDF of VRX's SimpleHydrodynamics for a craft.
-
-    `added_mass`: As of :func:`place_of_added_mass`.
-    """
-    in_plugin = place_of_added_mass(card, added_mass) == "plugin"
+def vrx_text(card: SteeredCard, place: AddedMass) -> str:
+    """SDF of VRX's SimpleHydrodynamics for a craft."""
+    in_plugin = place == "plugin"
     masses = {VRX_MASSES[name]: -card.derivatives.get(name, 0.0) if in_plugin else 0.0 for name in VRX_MASSES}
     damping = {VRX_TERMS[name]: 0.0 - card.derivatives.get(name, 0.0) for name in VRX_TERMS}
     lines = [
@@ -218,12 +212,9 @@ def _head(card: SteeredCard, where: str) -> list[str]:
     ]
 
 
-def vrx_model(card: SteeredCard, added_mass: AddedMass | None = None) -> Model:
-    """The model of a craft with the terms of VRX's plugin: six of damping, no effects, and C_A with the inertia alone.
-
-    `added_mass`: As of :func:`place_of_added_mass`.
-    """
-    inertial = place_of_added_mass(card, added_mass) == "inertial"
+def vrx_model(card: SteeredCard, place: AddedMass) -> Model:
+    """The model of a craft with the terms of VRX's plugin: six of damping, no effects; C_A with the inertia alone."""
+    inertial = place == "inertial"
     kept = {*VRX_TERMS, *(CRAFT_ADDED_MASSES if inertial else VRX_MASSES)}
     derivatives = {name: value for name, value in card.derivatives.items() if name in kept}
     model = build(replace(card, derivatives=derivatives, effects=()))
@@ -234,8 +225,3 @@ def vrx_model(card: SteeredCard, added_mass: AddedMass | None = None) -> Model:
     for force, value in zip("XYN", added_mass_forces(added, *motion), strict=True):
         model = model.redefine(f"force.{force}", lambda old, value=value: old - value)  # type: ignore[misc]
     return model
-
-
-def gazebo_model(card: SteeredCard, _: AddedMass | None = None) -> Model:
-    """The model of a craft with what Gazebo's plugin has of it: the whole hull, without effects."""
-    return build(replace(card, effects=()))

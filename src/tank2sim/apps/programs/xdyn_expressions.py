@@ -12,9 +12,11 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
+
+from tank2sim.native.operations import FUNCTIONS, instructions
 
 _ADD, _MUL, _POW, _ATOM = range(4)
 _INLINE = 3
@@ -106,17 +108,8 @@ _UNARY: Mapping[int, Callable[[XdynTerm], XdynTerm]] = {
     ca.OP_SQ: lambda a: _power(a, _TWO),
     ca.OP_TWICE: lambda a: _product(_TWO, a),
     ca.OP_INV: lambda a: _quotient(_ONE, a),
-    **{
-        op: _called(word)
-        for op, word in (
-            (ca.OP_COS, "cos"),
-            (ca.OP_SIN, "sin"),
-            (ca.OP_EXP, "exp"),
-            (ca.OP_FABS, "abs"),
-            (ca.OP_LOG, "log"),
-            (ca.OP_SQRT, "sqrt"),
-        )
-    },
+    **{op: _called(FUNCTIONS[op]) for op in (ca.OP_COS, ca.OP_SIN, ca.OP_EXP, ca.OP_LOG, ca.OP_SQRT)},
+    ca.OP_FABS: _called("abs"),
 }
 _BINARY: Mapping[int, Callable[[XdynTerm, XdynTerm], XdynTerm]] = {
     ca.OP_ADD: _sum,
@@ -260,7 +253,7 @@ class Definitions:
                 term = XdynTerm(spelt[node.place])
                 fixed = term.text in numbers
             elif node.op == ca.OP_CONST:
-                term = number_term(function.instruction_constant(k))
+                term = number_term(node.constant)
             else:
                 before = len(self.texts)
                 term = self._operation(nodes, k, stem, into)
@@ -297,34 +290,31 @@ class Definitions:
         return number_term(float(read_expressions({**parts, "folded value": term.text}, numbers)["folded value"]))
 
 
-@dataclass(frozen=True)
-class _Node:
+class _Node(NamedTuple):
     """An instruction of a function: its operation, its sources and the output for which it is, all by their number."""
 
     op: int
     sources: tuple[int, ...]
     place: int
     output: int
+    constant: float
 
 
 def _nodes(function: ca.Function) -> list[_Node]:
     """The instructions of a function of one vector."""
-    outputs, following = [], 0
-    for k in reversed(range(function.n_instructions())):
-        if function.instruction_id(k) == ca.OP_OUTPUT:
-            following = function.instruction_output(k)[0]
-        outputs.append(following)
+    steps = list(instructions(function))
+    outputs, following = [0] * len(steps), 0
+    for k in reversed(range(len(steps))):
+        following = steps[k].to[0] if steps[k].operation == ca.OP_OUTPUT else following
+        outputs[k] = following
     nodes: list[_Node] = []
     made: dict[int, int] = {}
-    for k, output in enumerate(reversed(outputs)):
-        op, out, into = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
-        if op in (ca.OP_INPUT, ca.OP_CONST):
-            sources: tuple[int, ...] = ()
-        else:
-            sources = tuple(made[place] for place in (into[:1] if op == ca.OP_OUTPUT else into))
+    for k, (op, to, given, constant) in enumerate(steps):
+        known = () if op in (ca.OP_INPUT, ca.OP_CONST) else given[:1] if op == ca.OP_OUTPUT else given
+        sources = tuple(made[place] for place in known)
         if op != ca.OP_OUTPUT:
-            made[out[0]] = k
-        nodes.append(_Node(op, sources, into[1] if op == ca.OP_INPUT else 0, output))
+            made[to[0]] = k
+        nodes.append(_Node(op, sources, given[1] if op == ca.OP_INPUT else 0, outputs[k], constant))
     return nodes
 
 

@@ -43,8 +43,6 @@ def contradicted(campaign: Campaign, runs: Sequence[ReducedRun]) -> dict[str, In
     A dead gauge with noise, or a wrong unit or sign in a single run, distorts the least squares of the whole campaign,
     and its small scatter may even give it the greatest weight. Therefore each run is compared with the others at equal
     weights, and the worst is removed before the next comparison.
-
-    `runs`: The runs used for the derivatives.
     """
     found: dict[str, InputError] = {}
     for force in FORCE_COLUMNS:

@@ -17,7 +17,7 @@ from tank2sim.identification.captive.systematic import can_show_delay, correct_d
 from tank2sim.identification.captive.tank_conditions import tank_resonance, tank_size
 from tank2sim.identification.captive.warnings import OscillationMotion, cautions_of_result, cautions_of_test
 from tank2sim.notices import Notice, caution
-from tank2sim.records.captive_record import FORCE_COLUMNS
+from tank2sim.records.captive_record import FORCE_COLUMNS, FORCE_UNITS_SI
 
 _SHEET = 0.05
 _DRIFT = 0.02
@@ -82,10 +82,9 @@ def drifting_zeros(runs: Sequence[ReducedRun]) -> Iterator[str]:
         middle, size = float(np.median(drifts)), float(np.sqrt(np.mean(np.square(means))))
         scatter = float(np.std(drifts)) / math.sqrt(len(drifts))
         if abs(middle) > max(2 * _DRIFT * size, _SURE * scatter):
-            unit = "N m" if force == "N" else "N"
             yield (
-                f"the zero of the {force} gauge drifts by {abs(middle):.3g} {unit} within a run (median of {len(runs)}"
-                f"), {100 * abs(middle) / size:.2g} % of the mean force: take the zeros before and after each run and "
+                f"the zero of the {force} gauge drifts by {abs(middle):.3g} {FORCE_UNITS_SI[force]} within a run (median of "
+                f"{len(runs)}), {100 * abs(middle) / size:.2g} % of the mean force: take the zeros before and after each run and "
                 "correct the records; standard errors do not hold it."
             )
 

@@ -105,8 +105,6 @@ class Selection:
 def select(campaign: Campaign, runs: Sequence[ReducedRun], force: str, *, all_terms: bool = False) -> Selection:
     """Choose the terms of one force.
 
-    `all_terms`: Report terms that the tests do not determine, too.
-
     Raises InputError: As :func:`tank2sim.identification.captive.equations.campaign_equations`.
     """
     choices: dict[str, Choice] = {}

@@ -24,7 +24,7 @@ from tank2sim.identification.captive.oscillation import OscillationDerivatives, 
 from tank2sim.identification.captive.run_faults import motion_faults, record_faults, reduced_faults
 from tank2sim.notices import Notice, caution
 from tank2sim.records.campaigns import Campaign
-from tank2sim.records.captive_record import FORCE_COLUMNS, CaptiveRun
+from tank2sim.records.captive_record import FORCE_COLUMNS, FORCE_UNITS_SI, CaptiveRun
 from tank2sim.records.thinning import drawn_columns
 
 CYCLE_BINS = 72
@@ -186,18 +186,14 @@ def single_run(run: CaptiveRun, campaign: Campaign | None) -> tuple[SingleRun, R
     reduced = reduced_run(run)
     faults = [*(record_faults(campaign, run) if campaign else ()), *reduced_faults(reduced)]
     coefficients = [*_motion_coefficients(reduced)]
-    for force in FORCE_COLUMNS:
-        fit = reduced.fits[force]
-        errors = np.sqrt(np.diag(fit.covariance))
-        coefficients += _pairs(force, _unit_of(force), fit.coefficients, errors)
-    if campaign is not None:
-        inertial = rigid_body_force(campaign, reduced.motion)
+    inertial = {} if campaign is None else rigid_body_force(campaign, reduced.motion)
+    for part, water in (("", False), ("_water", True))[: 1 if campaign is None else 2]:
         for force in FORCE_COLUMNS:
             fit = reduced.fits[force]
-            water = fit.coefficients.copy()
-            water[: reduced.regressed] += reduced.projected(inertial[force][:, None])[:, 0]
-            errors = np.sqrt(np.diag(fit.covariance))
-            coefficients += _pairs(f"{force}_water", _unit_of(force), water, errors)
+            values, errors = fit.coefficients.copy(), np.sqrt(np.diag(fit.covariance))
+            if water:
+                values[: reduced.regressed] += reduced.projected(inertial[force][:, None])[:, 0]
+            coefficients += _pairs(f"{force}{part}", FORCE_UNITS_SI[force], values, errors)
     motion = reduced.motion
     return SingleRun(
         name=run.name,
@@ -220,7 +216,11 @@ def _history(reduced: ReducedRun) -> Columns:
     kept = reduced.motion.kept
     columns = {"t_s": reduced.run.time_s[kept]}
     for force in FORCE_COLUMNS:
-        record, fit, unit = reduced.run.force(force)[kept], reduced.fitted(force), _unit_of(force).replace(" ", "")
+        record, fit, unit = (
+            reduced.run.force(force)[kept],
+            reduced.fitted(force),
+            FORCE_UNITS_SI[force].replace(" ", ""),
+        )
         named = {force: record, f"{force}_fit": fit, f"{force}_residual": record - fit}
         columns |= {f"{name}_{unit}": values for name, values in named.items()}
     return drawn_columns(columns)
@@ -231,8 +231,6 @@ def averaged_cycle(run: ReducedRun, force: str) -> AveragedCycle:
 
     The mean of a bin is the value of the harmonics at its middle plus the mean residual inside it: the curvature of
     the force over the bin does not bias it, and a trend of the zero does not widen it.
-
-    `run`: An oscillating run; `force`: ``X``, ``Y`` or ``N``.
     """
     fit, left = run.fits[force], run.residual(force)
     waves = [place for place, label in enumerate(run.labels) if label != "trend"]
@@ -302,10 +300,6 @@ def repeated_coefficients(runs: Sequence[SingleRun]) -> tuple[RepeatedCoefficien
                 )
             )
     return tuple(found)
-
-
-def _unit_of(force: str) -> str:
-    return "N m" if force == "N" else "N"
 
 
 def _motion_coefficients(run: ReducedRun) -> list[FourierCoefficient]:

@@ -115,8 +115,6 @@ def regression_parts(selection: Selection, solution: Solution) -> dict[str, Arra
 
     The estimate is C X' S S b with the weights S; b has the covariance noise I + zero z z' + gain g g'. All parts are
     widened alike for the finite number of runs (Student's t).
-
-    `selection`: Its equations; `solution`: Solution of these equations.
     """
     equations, spread = selection.equations, solution.spread
     weights = spread.weights or spread
