@@ -219,7 +219,7 @@ def _history(reduced: ReducedRun) -> Columns:
         record, fit, unit = (
             reduced.run.force(force)[kept],
             reduced.fitted(force),
-            FORCE_UNITS_SI[force].replace(" ", ""),
+            FORCE_COLUMNS[force][2:],
         )
         named = {force: record, f"{force}_fit": fit, f"{force}_residual": record - fit}
         columns |= {f"{name}_{unit}": values for name, values in named.items()}
