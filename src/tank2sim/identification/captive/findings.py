@@ -84,8 +84,8 @@ def drifting_zeros(runs: Sequence[ReducedRun]) -> Iterator[str]:
         if abs(middle) > max(2 * _DRIFT * size, _SURE * scatter):
             yield (
                 f"the zero of the {force} gauge drifts by {abs(middle):.3g} {FORCE_UNITS_SI[force]} within a run "
-                f"(median of {len(runs)}), {100 * abs(middle) / size:.2g} % of the mean force: take the zeros before and "
-                "after each run and correct the records; standard errors do not hold it."
+                f"(median of {len(runs)}), {100 * abs(middle) / size:.2g} % of the mean force: take the zeros before "
+                "and after each run and correct the records; standard errors do not hold it."
             )
 
 
