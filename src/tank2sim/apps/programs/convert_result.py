@@ -45,7 +45,6 @@ class ConvertedFigure:
 class ConversionStudy:
     """A ship in another language."""
 
-    # `ship`, `from_kind`, `to`: Name of the ship, kind of its card, and the language
     ship: str
     from_kind: str
     to: str

@@ -219,27 +219,33 @@ def polynomial_card(card: MmgCard, fit: PolynomialFit) -> ManoeuvringCard:
     document = tomlkit.parse(card.text.lstrip("\ufeff"))
     for section in ("model", "rigid_body", "derivatives", "uncertainty", "propeller", "rudder", "propulsion"):
         document.pop(section, None)
-    model, body, propulsion, derivatives = (tomlkit.table() for _ in range(4))
     low, high = card.model.speed_range_mps
-    model["kind"], model["speed_mps"], model["scaling"] = "abkowitz", card.model.speed_mps, "prime"
-    model["speed_scale"], model["yaw_rate_terms"] = "instantaneous", "hydrodynamic"
-    model["rudder_sign"] = "starboard"
-    model["valid_speed_mps"] = [round(max(low, fit.ranges["u"][0] * card.model.speed_mps), 4), round(high, 4)]
-    model["low_speed_below_mps"] = card.model.low_speed_bound_mps
-    for key, name in (("valid_drift_deg", "drift_deg"), ("valid_rudder_deg", "rudder_deg")):
-        model[key] = float(f"{max(map(abs, fit.ranges[name])):.3g}")
-    model["valid_yaw_rate_prime"] = float(f"{max(map(abs, fit.ranges['yaw_rate_prime'])):.3g}")
-    for key in ("mass", "yaw_inertia", "x_G"):
-        body[key] = float(f"{getattr(card.rigid_body, key):.12g}")
-    propulsion["nominal_radps"] = card.propulsion.nominal_radps if card.propulsion else 1.0
-    propulsion["Xnn"] = float(f"{fit.Xnn:.10g}")
-    for name, value in fit.derivatives.items():
-        derivatives[name] = float(f"{value:.10g}")
+    reach = {name: float(f"{max(map(abs, fit.ranges[name])):.3g}") for name in fit.ranges}
+    tables: dict[str, dict[str, object]] = {
+        "model": {
+            "kind": "abkowitz",
+            "speed_mps": card.model.speed_mps,
+            "scaling": "prime",
+            "speed_scale": "instantaneous",
+            "yaw_rate_terms": "hydrodynamic",
+            "rudder_sign": "starboard",
+            "valid_speed_mps": [round(max(low, fit.ranges["u"][0] * card.model.speed_mps), 4), round(high, 4)],
+            "low_speed_below_mps": card.model.low_speed_bound_mps,
+            "valid_drift_deg": reach["drift_deg"],
+            "valid_rudder_deg": reach["rudder_deg"],
+            "valid_yaw_rate_prime": reach["yaw_rate_prime"],
+        },
+        "rigid_body": {key: float(f"{getattr(card.rigid_body, key):.12g}") for key in ("mass", "yaw_inertia", "x_G")},
+        "propulsion": {
+            "nominal_radps": card.propulsion.nominal_radps if card.propulsion else 1.0,
+            "Xnn": float(f"{fit.Xnn:.10g}"),
+        },
+        "derivatives": {name: float(f"{value:.10g}") for name, value in fit.derivatives.items()},
+    }
     errors = {} if fit.covariance is None else dict(zip(fit.derivatives, np.sqrt(np.diag(fit.covariance)), strict=True))
     uncertain = [name for name, error in errors.items() if error > 0]
-    uncertainty = tomlkit.table()
-    for name in uncertain:
-        uncertainty[name] = float(f"{errors[name]:.3g}")
+    if uncertain:
+        tables["uncertainty"] = {name: float(f"{errors[name]:.3g}") for name in uncertain}
     if card.roll is not None:
         # The rudder's moment about the longitudinal axis is in the terms of K.
         document.pop("roll", None)
@@ -248,9 +254,11 @@ def polynomial_card(card: MmgCard, fit: PolynomialFit) -> ManoeuvringCard:
     ship = document["ship"]
     assert isinstance(ship, dict)
     ship["source"] = f"{card.ship.source}; fitted by tank2sim convert to the MMG card {card.ship.name}"
-    tables = {"model": model, "rigid_body": body, "propulsion": propulsion, "derivatives": derivatives}
-    document.update(tables | ({"uncertainty": uncertainty} if uncertain else {}))
-    text = not_referring(tomlkit.dumps(_effects_last(document)))
+    document.update(tables)
+    for name in ("effects", "fitted_trials"):  # TOML wants lists of tables at the end
+        if name in document:
+            document[name] = document.pop(name)
+    text = not_referring(tomlkit.dumps(document))
     new = parse_card(text, card.source)
     assert isinstance(new, ManoeuvringCard)
     build(new)
@@ -259,11 +267,3 @@ def polynomial_card(card: MmgCard, fit: PolynomialFit) -> ManoeuvringCard:
     rows = [list(errors).index(name) for name in uncertain]
     names = tuple(f"derivatives.{name}" for name in uncertain)
     return replace(new, covariance=Covariance(names, fit.covariance[np.ix_(rows, rows)]))
-
-
-def _effects_last(document: tomlkit.TOMLDocument) -> tomlkit.TOMLDocument:
-    """The same with its lists of tables at the end, where TOML wants them."""
-    for name in ("effects", "fitted_trials"):
-        if name in document:
-            document[name] = document.pop(name)
-    return document

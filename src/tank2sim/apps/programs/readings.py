@@ -403,34 +403,29 @@ def read_card_text(table: CoefficientTable, ranked: RankedReading) -> str:
     Accelerations that the table lacks are the estimates of :mod:`tank2sim.cards.estimates`, and said so.
     """
     filled, ship = _filled(table, ranked.ship), ranked.ship
-    third = any(
-        name in filled and sum(known_term(name).powers.values()) > 1 and known_term(name).force != "X"
-        for name in filled
-    )
+    third = any(sum(known_term(name).powers.values()) > 1 and known_term(name).force != "X" for name in filled)
     read = ", ".join(f"{key} {value}" for key, value in vars(ranked.reading).items())
+    sizes = {key: getattr(table, key) for key in ("length_m", "beam_m", "draught_m", "displacement_kg")}
+    if table.rudder_area_m2 is not None:
+        sizes["rudder_area_m2"] = table.rudder_area_m2
+    source = f"{Path(table.source).name}, read as: {read} (probability {ranked.probability:.2g})"
+    derivatives = {name: tomlkit.item(float(f"{value:.8g}")) for name, value in filled.items() if value}
+    for name in derivatives.keys() - table.derivatives.keys() - ship.derivatives.keys():
+        derivatives[name].comment("ESTIMATED: the table has none")
     document = tomlkit.document()
-    document["format"] = "tank2sim-ship/1"
-    particulars = tomlkit.table()
-    particulars["name"] = f"{Path(table.source).stem}"
-    for key in ("length_m", "beam_m", "draught_m", "displacement_kg", "rudder_area_m2"):
-        if (value := getattr(table, key)) is not None:
-            particulars[key] = value
-    particulars["source"] = f"{Path(table.source).name}, read as: {read} (probability {ranked.probability:.2g})"
-    environment = tomlkit.table()
-    environment["water_density_kgpm3"] = table.environment.water_density_kgpm3
-    model = tomlkit.table()
-    model["kind"], model["speed_mps"], model["scaling"] = "abkowitz" if third else "linear", table.speed_mps, "prime"
-    model["speed_scale"] = _speed_scale(table)
-    model["yaw_rate_terms"] = "hydrodynamic"
-    model["rudder_sign"] = "starboard"
-    body, derivatives = tomlkit.table(), tomlkit.table()
-    for key, value in ship.body.model_dump().items():
-        body[key] = float(f"{value:.8g}")
-    for name, value in filled.items():
-        if value:
-            derivatives[name] = float(f"{value:.8g}")
-            if name not in table.derivatives and name not in ship.derivatives:
-                derivatives[name].comment("ESTIMATED: the table has none")
-    document |= {"ship": particulars, "environment": environment, "model": model}
-    document |= {"rigid_body": body, "derivatives": derivatives}
+    document |= {
+        "format": "tank2sim-ship/1",
+        "ship": {"name": Path(table.source).stem, **sizes, "source": source},
+        "environment": {"water_density_kgpm3": table.environment.water_density_kgpm3},
+        "model": {
+            "kind": "abkowitz" if third else "linear",
+            "speed_mps": table.speed_mps,
+            "scaling": "prime",
+            "speed_scale": _speed_scale(table),
+            "yaw_rate_terms": "hydrodynamic",
+            "rudder_sign": "starboard",
+        },
+        "rigid_body": {key: float(f"{value:.8g}") for key, value in ship.body.model_dump().items()},
+        "derivatives": derivatives,
+    }
     return tomlkit.dumps(document)

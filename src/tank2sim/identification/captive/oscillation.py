@@ -30,7 +30,6 @@ _DISTINCT = 0.02
 class OscillationDerivatives:
     """One run's derivatives by (4.4), prime and "hydrodynamic"."""
 
-    # `run`, `type`: Name and type of the run
     run: str
     type: str
     letter: str  # ``v`` in pure sway, else ``r``

@@ -114,7 +114,6 @@ class Reduction:
     faults: tuple[InputError, ...]  # Faults of runs omitted with `keep_going`
     forces: Mapping[str, ForceResult]  # ``X``, ``Y``, ``N`` to its result
     derivatives: Mapping[str, Derivative]  # Derivatives by name
-    # `oscillations`, `cubics`: Evaluation of single oscillation tests
     oscillations: tuple[OscillationDerivatives, ...]
     cubics: tuple[CubicByTwoWays, ...]
     missing: tuple[str, ...]  # Names in :data:`ESSENTIAL` that the campaign does not give

@@ -342,7 +342,6 @@ _UNLIKELY = 1e-4
 class LeftOut:
     """Prediction of a run from all other runs."""
 
-    # `run`, `type`: Its name and type
     run: str
     type: str
     # `measured`, `predicted`: The water's force, by 1/2 rho L^2 u0^2 (N: L^3): mean in a steady run, part in phase with

@@ -40,7 +40,6 @@ class Stepwise:
     """Result of the paper's order for one force."""
 
     names: tuple[str, ...]  # Terms in the order of their estimation
-    # `values`, `standard_errors`: (terms,): Prime
     values: Array
     standard_errors: Array
     found_in: tuple[str, ...]  # Type of run that gave each term

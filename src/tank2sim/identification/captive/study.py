@@ -76,7 +76,6 @@ class WeightedRegression:
     """The regression of one force over the whole campaign, prime."""
 
     names: tuple[str, ...]  # Terms
-    # `values`, `standard_errors`, `variance_inflation`: (terms,)
     values: Array
     standard_errors: Array
     covariance: Array  # (terms, terms)

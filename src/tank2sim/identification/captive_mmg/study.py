@@ -70,7 +70,6 @@ class ChannelReadings:
 class MmgStudy:
     """Coefficients of the MMG method from steady tests."""
 
-    # `campaign`, `model`: File of the campaign, and name of the model
     campaign: str
     model: str
     coefficients: dict[str, MmgCoefficient]  # By the names of an MMG card: R0 = -X0, mx = -Xudot, my = -Yvdot
