@@ -42,6 +42,12 @@ def full_ahead_order(model: Model) -> float | None:
     return float(model.input_values()[names.index("propeller.speed")]) if "propeller.speed" in names else None
 
 
+def steady_speed(force: float, quadratic: float, linear: float) -> float:
+    """Steady speed (or rate of turn) at a positive force (or moment) against quadratic and linear drag."""
+    root = math.sqrt(linear**2 + 4 * quadratic * force) + linear  # without cancellation where the quadratic is small
+    return 2 * force / root if root else math.inf
+
+
 @dataclass(frozen=True)
 class SurgeNumbers:
     """Numbers of surge: A (N s2/m2), B (N s/m), thrust of all engines (N), thrust astern over ahead, mass (kg)."""
@@ -64,10 +70,7 @@ class SurgeNumbers:
 
     def speed(self, lever: float) -> float:
         """Steady speed at a lever, m/s."""
-        thrust = lever * self.thrust_N
-        return (
-            2 * thrust / (math.sqrt(self.B**2 + 4 * self.A * thrust) + self.B)
-        )  # without cancellation where A is small
+        return steady_speed(lever * self.thrust_N, self.A, self.B)
 
     def run(self, lever: float, first_mps: float, last_mps: float) -> tuple[float, float]:
         """Time (s) and way (m) between two speeds at a lever."""

@@ -73,13 +73,13 @@ def mmg_card_text(tests: SteadyTests, values: Mapping[str, float], errors: Mappi
 
 def _coefficients(
     tests: SteadyTests, values: Mapping[str, float], errors: Mapping[str, float]
-) -> dict[str, tomlkit.items.Table]:
+) -> dict[str, dict[str, object]]:
     """Tables of derivatives, propeller, rudder and standard errors."""
     form, rudder = tests.form, tests.form.rudder
     assert rudder is not None
-    derivatives, uncertainty = tomlkit.table(), tomlkit.table()
-    of_hull = [name for names in HULL_TERMS.values() for name in names if name in values]
-    for name in of_hull:
+    derivatives: dict[str, object] = {}
+    uncertainty: dict[str, object] = {}
+    for name in (name for names in HULL_TERMS.values() for name in names if name in values):
         key, sign = ("R0", -1.0) if name == "X0" else (name, 1.0)
         derivatives[key] = _rounded(sign * values[name])
         if name in errors:
@@ -88,14 +88,12 @@ def _coefficients(
         number = tomlkit.item(_rounded(-values.get(name, value)))
         derivatives[MASS_KEYS[name]] = number.comment("ESTIMATED, not from steady tests")
         uncertainty[MASS_KEYS[name]] = _rounded(errors.get(name, error), 3)
-    propeller, of_rudder = tomlkit.table(), tomlkit.table()
-    propeller["x_P"] = form.propeller.x_P
-    of_rudder["height_m"] = rudder.height_m
-    of_rudder["f_alpha"] = rudder.f_alpha or _rounded(fujii(rudder.aspect_ratio or 0.0))
-    of_rudder["x_R"] = rudder.x_R
+    propeller: dict[str, object] = {"x_P": form.propeller.x_P}
+    f_alpha = rudder.f_alpha or _rounded(fujii(rudder.aspect_ratio or 0.0))
+    of_rudder: dict[str, object] = {"height_m": rudder.height_m, "f_alpha": f_alpha, "x_R": rudder.x_R}
     if form.propeller.number == 2:
-        propeller["number"] = of_rudder["number"] = 2
-        propeller["y_P"], of_rudder["y_R"] = form.propeller.y_P, rudder.y_R
+        propeller |= {"number": 2, "y_P": form.propeller.y_P}
+        of_rudder |= {"number": 2, "y_R": rudder.y_R}
     for name in (name for name in values if name in PROPELLER_COEFFICIENTS or name in RUDDER_COEFFICIENTS):
         (propeller if name in PROPELLER_COEFFICIENTS else of_rudder)[name] = _rounded(values[name])
         if name in errors:
