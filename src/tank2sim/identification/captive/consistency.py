@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
-from tank2sim.cards.terms import parse_term
+from tank2sim.cards.terms import known_term
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.equations import campaign_equations, excited
 from tank2sim.identification.captive.harmonics import ReducedRun
@@ -105,8 +105,7 @@ def asymmetry(campaign: Campaign, selection: Selection) -> Asymmetry:
     kept, prior = selection.equations.names, selection.equations.prior
     excited_terms: list[str] = []
     for powers in _OPPOSITE_PARITY[force]:
-        term = parse_term(force + powers)
-        assert term is not None
+        term = known_term(force + powers)
         if not excited(campaign, runs, term):
             continue
         trial = campaign_equations(campaign, runs, force, [*kept, *excited_terms, term.name]).held(prior)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
 from tank2sim.cards.scaling import Scales
-from tank2sim.cards.terms import Term, parse_term
+from tank2sim.cards.terms import Term, known_term
 from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS, ACCELERATION_TERMS
 from tank2sim.dynamics.rigid_body import inertia, inertial_forces
 from tank2sim.errors import InputError
@@ -43,7 +43,7 @@ def candidate_terms(force: str, *, heeled: bool = False) -> tuple[Term, ...]:
     """Terms of (3.8) and acceleration terms of one force, in their order; with `heeled` last those of the heel."""
     names = (*ABKOWITZ_TERMS[force], *(name for name in ACCELERATION_TERMS if name[0] == force))
     names += HEEL_TERMS[force] if heeled else ()
-    return tuple(term for term in map(parse_term, names) if term is not None)
+    return tuple(map(known_term, names))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -219,8 +219,7 @@ def _projected_terms(
 def term_history(campaign: Campaign, motion: CaptiveMotion, name: str) -> Array:
     """Force of a term whose prime value is 1, (rows,), N or N m."""
     spelt, _, trend = name.partition(" ")
-    term = parse_term(spelt)
-    assert term is not None
+    term = known_term(spelt)
     model, u0 = campaign.model, campaign.test.speed_mps
     density, length = campaign.test.water_density_kgpm3, model.length_m
     if term.acceleration:

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from tank2sim.arrays import Array, Columns
-from tank2sim.cards.terms import parse_term
+from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import polynomial
 from tank2sim.identification.captive.equations import rigid_body_force
 from tank2sim.identification.captive.harmonics import ReducedRun
@@ -198,8 +198,7 @@ def _regressors(result: ForceResult, v: Array, r: Array, rudder: Array) -> Array
     """What each term of a force gives per unit of its coefficient, (samples, terms), at the test speed."""
     columns = []
     for name in result.solution.names:
-        term = parse_term(name.partition(" ")[0])
-        assert term is not None
+        term = known_term(name.partition(" ")[0])
         acts = not term.acceleration and not term.u and not term.phi and " " not in name
         value = polynomial([term.name], {term.name: 1.0}, v=v, r=r, d=rudder) if acts else 0.0
         columns.append(value * np.ones(len(v)))

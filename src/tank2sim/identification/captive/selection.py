@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import stdtrit
 
-from tank2sim.cards.terms import Term, parse_term
+from tank2sim.cards.terms import known_term
 from tank2sim.identification.captive.equations import CampaignEquations, campaign_equations, candidate_terms, excited
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.oscillation import distinct
@@ -151,13 +151,8 @@ def _judged(solution: Solution, place: int, held: float, *, all_terms: bool) -> 
 
 
 def _always(name: str) -> bool:
-    term = parse_term(name)
-    assert term is not None
-    return bool(term.acceleration) or name == "X0" or _order(term) == 1
-
-
-def _order(term: Term) -> int:
-    return term.v + term.r + term.d + term.u + term.phi
+    term = known_term(name)
+    return bool(term.acceleration) or name == "X0" or sum(term.powers.values()) == 1
 
 
 def _keep_distinguishable(full: CampaignEquations, choices: dict[str, Choice]) -> list[str]:
@@ -203,10 +198,9 @@ def _conditions(full: CampaignEquations) -> int:
 
 def _simplicity(name: str) -> tuple[int, ...]:
     """Sort key: linear terms first, then by order, and within an order terms in one motion before mixed terms."""
-    term = parse_term(name)
-    assert term is not None
-    mixed = sum(power > 0 for power in (term.v, term.r, term.d, term.u, term.phi))
-    return (not _always(name), _order(term), term.u, term.phi, mixed, term.d, term.r)
+    term = known_term(name)
+    mixed = sum(power > 0 for power in term.powers.values())
+    return (not _always(name), sum(term.powers.values()), term.u, term.phi, mixed, term.d, term.r)
 
 
 def usual_zero(full: CampaignEquations) -> float:
