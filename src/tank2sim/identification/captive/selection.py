@@ -199,7 +199,7 @@ def _conditions(full: CampaignEquations) -> int:
 def _simplicity(name: str) -> tuple[int, ...]:
     """Sort key: linear terms first, then by order, and within an order terms in one motion before mixed terms."""
     term = known_term(name)
-    mixed = sum(power > 0 for power in term.powers.values())
+    mixed = len(term.powers)
     return (not _always(name), sum(term.powers.values()), term.u, term.phi, mixed, term.d, term.r)
 
 
