@@ -22,8 +22,8 @@ from tank2sim.apps.programs.bridge_command_surge import (
     SurgeNumbers,
     fitted_surge,
     full_ahead_order,
+    speed_against_drag,
     start_values,
-    steady_speed,
     straight_runs,
     straight_runs_of_card,
 )
@@ -307,9 +307,9 @@ def _of_craft(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[F
         time, way = surge.run(ahead, 0.0, 0.9 * speed)
         after[run.words] = {"final_speed_mps": speed, "time_to_90_percent_s": time, "distance_to_90_percent_m": way}
     for spin, moved in spins:
-        after[spin.words] = {"final_rate_degps": math.degrees(steady_speed(moved, turn_A, turn_B))}
+        after[spin.words] = {"final_rate_degps": math.degrees(speed_against_drag(moved, turn_A, turn_B))}
     for turn, ends in turns:
-        rate, speed = steady_speed(moment(*ends), turn_A, turn_B), surge.speed(sum(ends) / 2)
+        rate, speed = speed_against_drag(moment(*ends), turn_A, turn_B), surge.speed(sum(ends) / 2)
         after[turn.words] = {"steady_rate_degps": math.degrees(rate), "steady_diameter_m": 2 * speed / rate}
     numbers = {
         **surge.keys,

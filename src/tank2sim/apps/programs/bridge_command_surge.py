@@ -42,7 +42,7 @@ def full_ahead_order(model: Model) -> float | None:
     return float(model.input_values()[names.index("propeller.speed")]) if "propeller.speed" in names else None
 
 
-def steady_speed(force: float, quadratic: float, linear: float) -> float:
+def speed_against_drag(force: float, quadratic: float, linear: float) -> float:
     """Steady speed (or rate of turn) at a positive force (or moment) against quadratic and linear drag."""
     root = math.sqrt(linear**2 + 4 * quadratic * force) + linear  # without cancellation where the quadratic is small
     return 2 * force / root if root else math.inf
@@ -70,7 +70,7 @@ class SurgeNumbers:
 
     def speed(self, lever: float) -> float:
         """Steady speed at a lever, m/s."""
-        return steady_speed(lever * self.thrust_N, self.A, self.B)
+        return speed_against_drag(lever * self.thrust_N, self.A, self.B)
 
     def run(self, lever: float, first_mps: float, last_mps: float) -> tuple[float, float]:
         """Time (s) and way (m) between two speeds at a lever."""
