@@ -125,10 +125,10 @@ def _elements(text: str) -> list[tuple[str, list[str]]]:
 
 @pytest.mark.parametrize("write", [gazebo_text, vrx_text])
 def test_a_plugin_of_a_simulator_of_robots_is_xml_with_the_same_elements(
-    write: Callable[[Card], str], made: Made
+    write: Callable[[Card, str], str], made: Made
 ) -> None:
     def elements(text: str) -> list[tuple[str, list[str]]]:
-        return _elements(f"<sdf>{write(made('otter', text).card)}</sdf>")
+        return _elements(f"<sdf>{write(made('otter', text).card, 'inertial')}</sdf>")
 
     expected = elements(BENIGN)
     for text in HOSTILE:

@@ -14,7 +14,7 @@ from tank2sim.files import TABLE
 
 if TYPE_CHECKING:
     from tank2sim.records.campaign_form import CampaignFile, RunType, TankTest
-    from tank2sim.records.campaigns import CaptiveRun
+    from tank2sim.records.captive_record import CaptiveRun
     from tank2sim.results.captive_run import CaptiveRunResult
 
 RunName = Literal[
@@ -153,7 +153,7 @@ def _read(
     import numpy as np
 
     from tank2sim.records.campaign_form import RUN_TYPES, FilesSection, RunSheet
-    from tank2sim.records.campaigns import read_captive_run
+    from tank2sim.records.captive_record import read_captive_run
 
     sheet = None
     if form is not None and campaign is not None:

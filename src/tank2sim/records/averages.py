@@ -6,16 +6,17 @@ import csv
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from tank2sim.arrays import Array
 from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
 from tank2sim.files import read_bytes, read_text
 from tank2sim.notices import Notice
-from tank2sim.records.campaign_form import CampaignFile, SpeltColumn
+from tank2sim.records.campaign_form import CampaignFile, RunSheet, RunType, SpeltColumn
+from tank2sim.records.captive_record import CaptiveRun
 from tank2sim.records.csv_table import LARGEST
 from tank2sim.records.spelt_units import unit_factor
 from tank2sim.records.text_layout import cells_of, decoded_text, text_layout
@@ -25,33 +26,9 @@ LEAST_FORCE = 1e-9
 the smallest of them, is about 1e-3 in prime, and no gauge resolves a millionth of it."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Condition:
-    """One row of averages: SI, radians, rudder positive to starboard, forces in the sense of the file.
-
-    ``name`` states file and line; the normal force of the rudder is positive to port, as that of the MMG method.
-    """
-
-    name: str
-    drift_rad: float
-    rudder_rad: float
-    speed_mps: float
-    X_N: float
-    Y_N: float
-    N_Nm: float
-    propeller_radps: float | None
-    yaw_rate_radps: float = 0.0
-    thrust_N: float | None = None
-    rudder_normal_force_N: float | None = None
-    thrust_left_N: float | None = None
-    rudder_normal_force_left_N: float | None = None
-    torque_Nm: float | None = None
-    heel_rad: float = 0.0
-
-
 def read_averages(
     form: CampaignFile, spelt: Mapping[str, SpeltColumn], path: Path
-) -> tuple[list[Condition], list[Notice]]:
+) -> tuple[list[CaptiveRun], list[Notice]]:
     """Every distinct row of the table that ``[averages]`` names, and what should know of reading it.
 
     Only the columns that ``[averages.columns]`` names are read; others may hold text.
@@ -79,15 +56,15 @@ def read_averages(
     table = np.column_stack(list(values.values())) + 0.0  # + 0.0 turns -0.0 into 0.0
     _, first = np.unique(table, axis=0, return_index=True)
     distinct = sorted(int(row) for row in first)
-    conditions = [
-        _condition(dict(zip(values, table[row].tolist(), strict=True)), (file, lines[row]), form, spelt)
+    runs = [
+        _averaged_run(dict(zip(values, table[row].tolist(), strict=True)), (file, lines[row]), form, spelt)
         for row in distinct
     ]
     repeated = len(lines) - len(distinct)
     text = Notice(
         f"{file.name}: {repeated} of {len(lines)} rows repeat another to the last digit; each is counted once."
     )
-    return conditions, [text] if repeated else []
+    return runs, [text] if repeated else []
 
 
 def read_columns(file: Path, headings: Mapping[str, str]) -> dict[str, list[float]]:
@@ -164,11 +141,12 @@ def _numbers(file: Path, heading: str, lines: Sequence[int], cells: Sequence[str
     return values
 
 
-def _condition(
+def _averaged_run(
     at: Mapping[str, float], place: tuple[Path, int], form: CampaignFile, spelt: Mapping[str, SpeltColumn]
-) -> Condition:
-    assert form.averages is not None
-    file, line = place
+) -> CaptiveRun:
+    """A row of averages as a run of one reading."""
+    averages, (file, line) = form.averages, place
+    assert averages is not None
     for key in ("drift_rad", "rudder_rad", "heel_rad"):
         if abs(at.get(key, 0.0)) >= math.pi / 2:
             as_given = spelt[key]
@@ -176,28 +154,37 @@ def _condition(
             in_degrees = as_given.key != key
             remedy = "correct the row" if in_degrees else f"name its column {key[:-4]}_deg if it is degrees"
             raise InputError(file, f"line {line}", problem, remedy)
-    speed = at.get("speed_mps", form.test.speed_mps)
+    speed, drift, rudder = at.get("speed_mps", form.test.speed_mps), at.get("drift_rad", 0.0), at.get("rudder_rad", 0.0)
     if speed <= 0:
         raise InputError(file, f"line {line}", f"the speed is {speed:g} m/s", "a positive one was expected")
-    scales = Scales(form.test.water_density_kgpm3, form.model.length_m, speed)
-    unit = _unit_of_force(form, scales)
-    arm = 1.0 if form.averages.scaling == "dimensional" else form.model.length_m
+    unit = _unit_of_force(form, Scales(form.test.water_density_kgpm3, form.model.length_m, speed))
+    arm = 1.0 if averages.scaling == "dimensional" else form.model.length_m
     yaw_rate = at.get("yaw_rate_radps", at.get("yaw_rate_prime", 0.0) * speed / form.model.length_m)
-    to_port = 1.0 if form.averages.normal_force_sign == "port" else -1.0
+    to_port = 1.0 if averages.normal_force_sign == "port" else -1.0
+    kind: RunType = "drift_and_rudder"
+    if yaw_rate:
+        kind = "steady_turn"
+    elif rudder == 0.0:
+        kind = "static_drift"
+    elif drift == 0.0:
+        kind = "static_rudder"
 
-    def scaled(key: str, factor: float) -> float | None:
-        return at[key] * factor if key in at else None
+    def scaled(key: str, factor: float) -> Array | None:
+        return np.array([at[key] * factor]) if key in at else None
 
-    return Condition(
+    return CaptiveRun(
         name=f"{file.name} line {line}",
-        drift_rad=at.get("drift_rad", 0.0),
-        rudder_rad=at.get("rudder_rad", 0.0),
-        speed_mps=speed,
-        X_N=at["X"] * unit,
-        Y_N=at["Y"] * unit,
-        N_Nm=at["N"] * unit * arm,
+        type=kind,
+        sheet=RunSheet(file=averages.file, type=kind, drift_rad=drift, rudder_rad=rudder),
+        time_s=np.zeros(1),
+        v_mps=np.array([-speed * np.sin(drift)]),
+        r_radps=np.array([yaw_rate]),
+        speed_mps=np.array([speed]),
+        delta_rad=np.array([rudder]),
+        X_N=form.test.sense * np.array([at["X"] * unit]),
+        Y_N=form.test.sense * np.array([at["Y"] * unit]),
+        N_Nm=form.test.sense * np.array([at["N"] * unit * arm]),
         propeller_radps=at.get("propeller_radps", form.test.propeller_radps),
-        yaw_rate_radps=yaw_rate,
         thrust_N=scaled("thrust", unit),
         rudder_normal_force_N=scaled("rudder_normal_force", unit * to_port),
         thrust_left_N=scaled("thrust_left", unit),

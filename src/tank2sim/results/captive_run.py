@@ -27,7 +27,7 @@ from tank2sim.identification.captive.single_runs import (
     RepeatedCoefficient,
     SingleRun,
 )
-from tank2sim.records.campaigns import FORCE_COLUMNS
+from tank2sim.records.captive_record import FORCE_COLUMNS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -330,15 +330,7 @@ def _words(kind: str) -> str:
 
 
 def cycle_chart(runs: Mapping[str, SingleRun], *, title: str = "") -> ChartSpec:
-    """Averaged cycles over the phase of the motion, one panel a force, in bands of one standard deviation.
-
-    Parameters
-    ----------
-    runs : mapping
-        Label to the run, in one colour each.
-    title : str
-        Title of the chart.
-    """
+    """Averaged cycles over the phase of the motion, one panel a force, in bands of one standard deviation."""
     labels, plots = list(runs), []
     for force, up in _FORCES.items():
         series = []

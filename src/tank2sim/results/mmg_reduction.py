@@ -202,16 +202,7 @@ class MmgReductionResult(Result[MmgStudy]):
 
 
 def computed_chart(name: str, readings: ChannelReadings, *, size_px: int = 300) -> ChartSpec:
-    """Computed over measured readings of one channel, with the line on which both are the same.
-
-    Parameters
-    ----------
-    name : str
-        Name of the channel.
-    readings : ChannelReadings
-    size_px : int
-        Width and height.
-    """
+    """Computed over measured readings of one channel, with the line on which both are the same."""
     unit = readings.unit.replace(".", " ")
     ends = [float(readings.measured.min()), float(readings.measured.max())]
     equal = PlotSeries(label="equal", x=ends, y=ends)

@@ -9,7 +9,8 @@ from tank2sim.apps.design.captive_information import GaugeErrors, PlannedCampaig
 from tank2sim.apps.design.captive_runs import PlannedRun
 from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
 from tank2sim.records.campaign_form import ModelSection
-from tank2sim.records.campaigns import FORCE_COLUMNS, read_campaign
+from tank2sim.records.campaigns import read_campaign
+from tank2sim.records.captive_record import FORCE_COLUMNS
 from tests.identification.captive import generator
 from tests.identification.captive.generator import DENSITY, GRAVITY, NOISE_SHARE, Campaign
 

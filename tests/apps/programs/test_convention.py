@@ -86,7 +86,7 @@ def test_of_ten_published_tables_nine_in_ten_readings_are_true_and_all_but_for_t
         for wanted in list(combinations(Table(source)))[::every]:
             path = written(tmp_path, "\n".join(Table(source).rows(wanted)) + "\n")
             found = vars(t2s.convention(path).readings[0])
-            first += found == wanted
+            first += wanted.items() <= found.items()
             ship += all(found[key] == wanted[key] for key in wanted if key != "origin")
             count += 1
     assert count > least and first / count > 0.9 and ship / count > 0.98

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from tank2sim.apps.programs.osp_gunnerus import gunnerus_files, gunnerus_groups, gunnerus_model
+from tank2sim.apps.programs.osp_case import gunnerus_files, gunnerus_groups, gunnerus_model
 from tank2sim.cards import SteeredCard, read_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.simulator_interface import with_external_forces

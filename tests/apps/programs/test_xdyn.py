@@ -62,8 +62,7 @@ def made(name: str) -> ProgramFiles:
 @pytest.fixture
 def figures_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """Files without the table of figures, which simulates every standard manoeuvre twice."""
-    for name in ("figure_changes", "craft_changes"):
-        monkeypatch.setattr(xdyn, name, lambda *_: ())
+    monkeypatch.setattr(xdyn, "figure_changes", lambda *_: ())
 
 
 def assert_same_motion(evaluator: ModuleType, text: str, model: Model, count: int = 1000) -> None:

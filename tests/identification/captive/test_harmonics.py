@@ -7,7 +7,7 @@ import pytest
 
 from tank2sim.identification.captive.harmonics import reduced_run
 from tank2sim.records.campaign_form import RunSheet
-from tank2sim.records.campaigns import CaptiveRun
+from tank2sim.records.captive_record import CaptiveRun
 
 FREQUENCY = 0.7
 SIGMA = 0.3

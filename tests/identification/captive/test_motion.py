@@ -6,7 +6,7 @@ import pytest
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.motion import measured_frequency, run_motion
 from tank2sim.records.campaign_form import RunSheet
-from tank2sim.records.campaigns import CaptiveRun
+from tank2sim.records.captive_record import CaptiveRun
 
 
 def sway(frequency=0.7, amplitude=0.1, duration=60.0, phase=0.4, noise=0.0, said=0.5):

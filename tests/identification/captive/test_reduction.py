@@ -19,7 +19,7 @@ from tank2sim.identification.captive.reduction import ReductionOptions, reduce_c
 from tank2sim.identification.captive.result_card import card_contents, reduced_card_text, reynolds_ratio
 from tank2sim.identification.captive.stepwise import scatter_within_tests
 from tank2sim.identification.captive.study import prediction_errors, study_reduction
-from tank2sim.identification.captive.type_b import type_b_shifts
+from tank2sim.identification.captive.systematic import type_b_shifts
 from tank2sim.records.campaigns import read_campaign
 from tests.conftest import ROOT
 from tests.identification.captive.generator import Campaign, write

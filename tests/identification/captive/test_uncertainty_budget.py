@@ -37,7 +37,7 @@ def budget_of(campaign, folder, stated=""):
     written = write(campaign, folder)
     written.path.write_text(written.path.read_text().replace("[test]", f"{stated}[test]", 1))
     reduction = reduce_campaign(read_campaign(written.path))
-    return reduction, {row.name: row for row in uncertainty_budget(reduction)}
+    return reduction, uncertainty_budget(reduction).derivatives
 
 
 @pytest.fixture(scope="module")

@@ -11,9 +11,13 @@ import numpy as np
 import pytest
 
 from tank2sim.errors import InputError
-from tank2sim.identification.captive_mmg.contradicted_tests import refuse_impossible_sizes, refuse_other_curve
 from tank2sim.identification.captive_mmg.regression import erring_tests
-from tank2sim.identification.captive_mmg.steady_tests import SteadyTests, read_steady_tests
+from tank2sim.identification.captive_mmg.steady_tests import (
+    SteadyTests,
+    read_steady_tests,
+    refuse_impossible_sizes,
+    refuse_other_curve,
+)
 from tests.identification.captive_mmg.tank import KVLCC2, MASS, X_G, write_campaign
 
 SIZES = {

@@ -23,7 +23,7 @@ from tank2sim.errors import InputError
 from tank2sim.identification.captive.equations import candidate_terms
 from tank2sim.identification.captive.tank_conditions import SHORTEST_MODEL_M
 from tank2sim.records.campaign_form import ModelSection
-from tank2sim.records.campaigns import FORCE_COLUMNS
+from tank2sim.records.captive_record import FORCE_COLUMNS
 
 DRAWN_SHIPS = 12
 """Ships drawn from the errors of the card. Project choice: the plan is then as good for them on average; with 50 it is

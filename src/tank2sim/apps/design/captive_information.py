@@ -29,7 +29,8 @@ from tank2sim.identification.captive.harmonics import ReducedRun, reduced_run
 from tank2sim.identification.captive.regression import Spread, scatters
 from tank2sim.identification.captive.selection import RATIOS
 from tank2sim.records.campaign_form import ModelSection, RunSheet, TankSection, TankTest, UncertaintySection
-from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, CaptiveRun
+from tank2sim.records.campaigns import Campaign
+from tank2sim.records.captive_record import FORCE_COLUMNS, CaptiveRun
 
 _READINGS, _CYCLES = 24, 6
 """Readings a period of made-up runs, and their periods at most; the noise is scaled to readings and length of the run:

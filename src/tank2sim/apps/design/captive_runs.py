@@ -15,7 +15,6 @@ from tank2sim.identification.captive.tank_conditions import (
     LARGEST_FREQUENCY_PARAMETER,
     LARGEST_REDUCED_FREQUENCY,
     OscillationMotion,
-    Tank,
     tank_resonance,
 )
 from tank2sim.records.campaign_form import OSCILLATING, RunType
@@ -181,9 +180,8 @@ class TankRuns:
         return [frequency for frequency in found.tolist() if not self._resonant(motion, frequency)]
 
     def _resonant(self, motion: str, frequency: float) -> bool:
-        basin = Tank(self.tank.tank.breadth_m, self.tank.tank.depth_m)
         run = OscillationMotion("", motion, frequency)
-        return any(caution.runs for caution in tank_resonance((run,), basin, self.tank.model.gravity_mps2))
+        return any(caution.runs for caution in tank_resonance((run,), self.tank.tank, self.tank.model.gravity_mps2))
 
     def steady(self, kind: RunType, drift: float = 0.0, rudder: float = 0.0, share: float = 1.0) -> RunGroup:
         """A steady run and its mirror image."""

@@ -280,10 +280,10 @@ def _tested_range(largest: tuple[float, float, float]) -> TestedRange:
 def _polynomial(card: ManoeuvringCard) -> tuple[ManoeuvringCard, tuple[Notice, ...]]:
     if not isinstance(card, MmgCard):
         return card, ()
-    made, notices = converted_card(card, "abkowitz", Conventions(None, None, 0.0), None)
+    made = converted_card(card, "abkowitz", Conventions(None, None, 0.0), None)
     assert made.card is not None
     words = "the card is of the MMG method: the plan is for the polynomial that is fitted to it"
-    return made.card.manoeuvring(), (Notice(words), *notices)
+    return made.card.manoeuvring(), (Notice(words), *map(Notice, made.losses))
 
 
 def _notices(design: CaptiveDesign, draws: int) -> tuple[Notice, ...]:

@@ -1,17 +1,28 @@
-"""A ship as an own ship of Bridge Command 5.11: ``boat.ini`` with fitted numbers, and a box as its mesh."""
+"""A ship as an own ship of Bridge Command 5.11: ``boat.ini`` with fitted numbers, and a box as its mesh.
+
+A craft with two fixed thrusters is a ship with two engines and without a rudder. With levers e_P, e_S (shares of the
+largest thrust F of a thruster, positive ahead) and the distance b between them::
+
+    m du/dt = F (e_P + e_S) - A u|u| - B u        I dr/dt = F (e_P - e_S) b/2 - TA r|r| - TB r
+
+F, b and the thrust astern are the card's. A and B follow its steady speeds, TA and TB its steady rates of turn in spins
+and in turns by a difference, by least squares that keep them positive.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from itertools import product
 
 import numpy as np
 
-from tank2sim.apps.programs.bridge_command_craft import craft_numbers
 from tank2sim.apps.programs.bridge_command_surge import (
     HEADING_ASTERN,
+    SurgeNumbers,
     fitted_surge,
     full_ahead_order,
+    speed_against_drag,
     start_values,
     straight_runs,
     straight_runs_of_card,
@@ -26,9 +37,10 @@ from tank2sim.apps.programs.bridge_command_yaw import (
     moment_astern,
     sailed,
 )
-from tank2sim.apps.programs.polynomial_fit import FigureChange
-from tank2sim.apps.programs.program_files import ProgramFiles
+from tank2sim.apps.programs.program_files import FigureChange, ProgramFiles
+from tank2sim.arrays import Array
 from tank2sim.cards.card import Card, MmgCard, SteeredCard
+from tank2sim.cards.small_craft import cruising_revolutions
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.effects.fields import CURRENT_FIELD, WIND_FIELD
@@ -37,10 +49,13 @@ from tank2sim.dynamics.effects.surroundings import CURRENT, WAVE_DRIFT, WIND, in
 from tank2sim.dynamics.effects.twin_screws import TWIN_ORDERS
 from tank2sim.dynamics.effects.waves import WAVES
 from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+from tank2sim.simulation.card_range import single_figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.running import Running
+from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, Spin, StraightRun
 
 _FREEBOARD, _EYE_AFT, _LEAST_DRAG, _GEAR_DEGPS = 0.04, 0.3, 1e-6, 30.0
 """Freeboard and place of the eye aft of midships over L (project choices); drag across of a card without, above 0,
@@ -72,16 +87,10 @@ engines, which are `PropSpace` (m) apart."""
 def bridge_command_files(card: Card) -> ProgramFiles:
     """The folder of an own ship of Bridge Command 5.11: ``boat.ini`` and its mesh ``box.x``.
 
-    Parameters
-    ----------
-    card : Card
-        Card of a ship with a rudder (polynomial or MMG, one screw or two, with or without roll), or of a craft with a
-        fixed thruster at either side.
+    `card`: Card of a ship with a rudder (polynomial or MMG, one screw or two, with or without roll), or of a craft with
+    a fixed thruster at either side.
 
-    Raises
-    ------
-    InputError
-        The vessel has neither, the card lacks beam or draught, or the ship does not turn.
+    Raises InputError: The vessel has neither, the card lacks beam or draught, or the ship does not turn.
     """
     ship = card.steered()
     beam, draught = (_particular(ship, name) for name in ("beam_m", "draught_m"))
@@ -156,12 +165,6 @@ def _screw_offset(card: SteeredCard) -> float:
     return sum(one.parameters.get("place_m", 0.0) for one in card.effects if one.name == TWIN_ORDERS.name)
 
 
-def _of_craft(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[FigureChange], list[str]]:
-    """Numbers of a craft with two thrusters, figures before and after, and losses."""
-    made = craft_numbers(card, model)
-    return dict(made.keys), list(made.changes), ["a turning craft neither drifts nor loses speed"]
-
-
 def _seen(length_m: float, draught_m: float) -> dict[str, float]:
     """Keys of the mesh, the view and the instruments."""
     return {
@@ -204,12 +207,7 @@ def _number(value: float) -> str:
 
 
 def box_mesh(length_m: float, beam_m: float, height_m: float) -> str:
-    """A box as DirectX text: x to starboard, y up from the keel, z to the bow, origin midships; faces turn outwards.
-
-    Parameters
-    ----------
-    length_m, beam_m, height_m : float
-    """
+    """A box as DirectX text: x to starboard, y up from the keel, z to the bow, origin midships; faces turn outwards."""
     corners = list(product((-0.5, 0.5), (0.0, 1.0), (-0.5, 0.5)))
     rows = [f"{_number(x * beam_m)};{_number(y * height_m)};{_number(z * length_m)};" for x, y, z in corners]
     faces = []
@@ -260,3 +258,105 @@ def _losses_of_all(card: SteeredCard) -> list[str]:
         *([f"effects of the card count only in the figures that were fitted: {', '.join(lost)}"] if lost else []),
         *(["the figures hold in calm water: wind, waves and current are the scenario's"] * bool(names & _WEATHER)),
     ]
+
+
+_SHARES = (1.0, 0.7, 0.4)
+"""Revolutions of straight runs and spins over the largest, and differences over twice what is left beyond the cruising
+revolutions: the whole range (project choice)."""
+
+
+def _of_craft(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[FigureChange], list[str]]:
+    """Numbers that follow the straight runs, spins and turns of a craft best, figures before and after, and losses.
+
+    Raises InputError: Its thrusters are not two fixed ones of a size, one at either side, that push ahead.
+    """
+    spacing, thruster, cruise = _spacing(card), card.thrusters[0], cruising_revolutions(card)
+    most, least, force = thruster.max_radps, -thruster.lowest_radps, thruster.largest_thrust_N
+    astern = max(1e-6, thruster.astern_Ns2 * least**2 / force)  # 0 would mean as much as ahead
+    left = 1.9 * min(most - cruise, cruise + least)  # nearly all, for rounding
+
+    def lever(revolutions: float) -> float:
+        return math.copysign((revolutions / most) ** 2, revolutions)
+
+    def moment(port: float, starboard: float) -> float:
+        return force * (port - starboard) * spacing / 2
+
+    straight = [(StraightRun(share * most), lever(share * most)) for share in _SHARES]
+    spins = [
+        (Spin(n), moment(lever(n), -thruster.astern_Ns2 / thruster.ahead_Ns2 * lever(n)))
+        for n in (share * min(most, least) for share in _SHARES)
+    ]
+    turns = [
+        (DifferenceTurn(d), (lever(cruise + d / 2), lever(cruise - d / 2))) for d in (share * left for share in _SHARES)
+    ]
+    made: list[StraightRun | Spin | DifferenceTurn] = [run for run, _ in straight]
+    made += [*(run for run, _ in spins), *(run for run, _ in turns)]
+    found = {run.words: _figures(model, run) for run in made}
+    turning = [(moved, found[run.words].get("final_rate_degps")) for run, moved in spins]
+    turning += [(moment(*ends), found[run.words].get("steady_rate_degps")) for run, ends in turns]
+    rates = [(moved, math.radians(abs(rate))) for moved, rate in turning if rate]
+    A, B = _drag([(2 * force * ahead, found[run.words]["final_speed_mps"]) for run, ahead in straight])
+    if not rates:
+        raise card.fault("thrusters", "turn the craft in no spin and no turn", "check the card with simulate")
+    turn_A, turn_B = _drag(rates)
+    surge = SurgeNumbers(A, B, 2 * force, astern, card.rigid_body.mass - card.derivatives.get("Xudot", 0.0))
+
+    after: dict[str, dict[str, float]] = {}
+    for run, ahead in straight:
+        speed = surge.speed(ahead)
+        time, way = surge.run(ahead, 0.0, 0.9 * speed)
+        after[run.words] = {"final_speed_mps": speed, "time_to_90_percent_s": time, "distance_to_90_percent_m": way}
+    for spin, moved in spins:
+        after[spin.words] = {"final_rate_degps": math.degrees(speed_against_drag(moved, turn_A, turn_B))}
+    for turn, ends in turns:
+        rate, speed = speed_against_drag(moment(*ends), turn_A, turn_B), surge.speed(sum(ends) / 2)
+        after[turn.words] = {"steady_rate_degps": math.degrees(rate), "steady_diameter_m": 2 * speed / rate}
+    numbers = {
+        **surge.keys,
+        "Inertia": card.rigid_body.yaw_inertia - card.derivatives.get("Nrdot", 0.0),
+        "Max_propulsion_force": force,
+        "PropSpace": spacing,
+        "MaxRevs": most * 60 / math.tau,
+        "DynamicsTurnDragA": turn_A,
+        "DynamicsTurnDragB": turn_B,
+    }
+    return numbers, _compared(found, after), ["a turning craft neither drifts nor loses speed"]
+
+
+def _compared(before: Mapping[str, dict[str, float]], after: Mapping[str, dict[str, float]]) -> list[FigureChange]:
+    return [
+        FigureChange(words, name, before[words][name], value)
+        for words, figures in after.items()
+        for name, value in figures.items()
+        if name in before[words]
+    ]
+
+
+def _spacing(card: SteeredCard) -> float:
+    """Distance between two alike, fixed thrusters at either side, m; others are refused."""
+    first, last = card.thrusters[0], card.thrusters[-1]
+    alike = all(getattr(first, key) == getattr(last, key) for key in ("ahead_Ns2", "astern_Ns2", "max_radps", "x_m"))
+    fixed = all(one.azimuth_rad == 0 and one.max_azimuth_rad is None for one in (first, last))
+    if len(card.thrusters) != 2 or not alike or not fixed or not first.y_m or first.y_m != -last.y_m:
+        problem = "are not two alike that push ahead, one at either side, as the engines of Bridge Command are"
+        raise card.fault("thrusters", problem, "export an FMU, or convert the card --to gazebo")
+    return 2 * abs(first.y_m)
+
+
+def _figures(model: Model, manoeuvre: StraightRun | Spin | DifferenceTurn) -> dict[str, float]:
+    """Figures of a manoeuvre; none of one that the craft cannot do."""
+    try:
+        return single_figures(simulate(model, manoeuvre).figures)
+    except InputError:
+        return {}
+
+
+def _drag(points: list[tuple[float, float]]) -> tuple[float, float]:
+    """Quadratic and linear coefficient, not negative, by forces (or moments) and steady speeds (or rates)."""
+    from scipy.optimize import nnls  # slow to import
+
+    forces, speeds = np.array(points).T
+    rows: Array = np.column_stack([speeds**2, speeds]) / forces[:, None]
+    scale = np.linalg.norm(rows, axis=0)
+    found = nnls(rows / scale, np.ones(len(forces)))[0] / scale
+    return float(found[0]), float(found[1])

@@ -42,6 +42,12 @@ def full_ahead_order(model: Model) -> float | None:
     return float(model.input_values()[names.index("propeller.speed")]) if "propeller.speed" in names else None
 
 
+def speed_against_drag(force: float, quadratic: float, linear: float) -> float:
+    """Steady speed (or rate of turn) at a positive force (or moment) against quadratic and linear drag."""
+    root = math.sqrt(linear**2 + 4 * quadratic * force) + linear  # without cancellation where the quadratic is small
+    return 2 * force / root if root else math.inf
+
+
 @dataclass(frozen=True)
 class SurgeNumbers:
     """Numbers of surge: A (N s2/m2), B (N s/m), thrust of all engines (N), thrust astern over ahead, mass (kg)."""
@@ -64,10 +70,7 @@ class SurgeNumbers:
 
     def speed(self, lever: float) -> float:
         """Steady speed at a lever, m/s."""
-        thrust = lever * self.thrust_N
-        return (
-            2 * thrust / (math.sqrt(self.B**2 + 4 * self.A * thrust) + self.B)
-        )  # without cancellation where A is small
+        return speed_against_drag(lever * self.thrust_N, self.A, self.B)
 
     def run(self, lever: float, first_mps: float, last_mps: float) -> tuple[float, float]:
         """Time (s) and way (m) between two speeds at a lever."""
@@ -82,11 +85,7 @@ class SurgeNumbers:
 def straight_runs(surge: SurgeNumbers, speed_mps: float) -> Runs:
     """Figures of straight runs in Bridge Command.
 
-    Parameters
-    ----------
-    surge : SurgeNumbers
-    speed_mps : float
-        Speed at full ahead, from which the ship stops and to whose parts it gathers way.
+    `speed_mps`: Speed at full ahead, from which the ship stops and to whose parts it gathers way.
     """
     found = {(name, "final_speed_mps"): surge.speed(lever) for name, lever in _LEVERS.items()}
     for name, lever, first, last, keys in (
@@ -116,14 +115,7 @@ def straight_runs_of_card(model: Model) -> Runs:
 
     A lever is a share of the thrust: the order of the engine goes with its root.
 
-    Parameters
-    ----------
-    model : Model
-
-    Raises
-    ------
-    InputError
-        A run leaves all bounds.
+    Raises InputError: A run leaves all bounds.
     """
     speed = start_values(model)["ship.speed"]
     run = _held(model, 0.5 * speed, None).trajectory()
@@ -148,12 +140,8 @@ def straight_runs_of_card(model: Model) -> Runs:
 def fitted_surge(wanted: Runs, speed_mps: float, mass_kg: float) -> SurgeNumbers:
     """The numbers that follow the straight runs of a card best, with exactly its speed at full ahead.
 
-    Parameters
-    ----------
-    wanted : mapping
-        As of :func:`straight_runs_of_card`, without the change of heading.
-    speed_mps, mass_kg : float
-        Speed at full ahead; mass with the added mass in surge.
+    `wanted`: As of :func:`straight_runs_of_card`, without the change of heading; `speed_mps`, `mass_kg`: Speed at full
+    ahead; mass with the added mass in surge.
     """
     from scipy.optimize import least_squares  # slow to import
 

@@ -39,22 +39,15 @@ fit; RudderBAstern over RudderB, in the stream of a propeller that turns astern 
 
 @dataclass(frozen=True)
 class YawNumbers:
-    """Numbers of yaw over the inertia, of m ships.
+    """Numbers of yaw over the inertia, of m ships."""
 
-    Parameters
-    ----------
-    rudder, quadratic, linear, share : arrays (m, 1)
-        Moment of the rudder at full ahead, 1/(deg s2); TA, 1/rad; TB, 1/s; share of that moment which goes with the
-        speed (RA).
-    neutral_deg : float
-        Rudder of a straight course, deg to starboard.
-    """
-
+    # `rudder`, `quadratic`, `linear`, `share`: (m, 1): Moment of the rudder at full ahead, 1/(deg s2); TA, 1/rad; TB,
+    # 1/s; share of that moment which goes with the speed (RA)
     rudder: Array
     quadratic: Array
     linear: Array
     share: Array
-    neutral_deg: float
+    neutral_deg: float  # Rudder of a straight course, deg to starboard
 
     def keys(self, inertia_kgm2: float, surge: SurgeNumbers) -> dict[str, float]:
         """Keys of ``boat.ini`` of a single ship, with its inertia in yaw."""
@@ -87,13 +80,7 @@ class Course:
 def sailed(yaw: YawNumbers, courses: Sequence[Course], gear_degps: float, full_mps: float, step_s: float) -> Array:
     """The :data:`COURSE_FIGURES` of n courses of m ships, (4, m, n), in the program's order of steps; nan if not seen.
 
-    Parameters
-    ----------
-    yaw : YawNumbers
-    courses : sequence of Course
-    gear_degps, full_mps : float
-        Rate of the rudder (deg/s), speed at full ahead.
-    step_s : float
+    `gear_degps`, `full_mps`: Rate of the rudder (deg/s), speed at full ahead.
     """
     names = ("lever", "speed_mps", "rudder_deg", "switch_rad")
     lever, speed, order, switch = (np.array([getattr(course, name) for course in courses]) for name in names)
@@ -129,13 +116,7 @@ def sailed(yaw: YawNumbers, courses: Sequence[Course], gear_degps: float, full_m
 def heading_astern(yaw: YawNumbers, moment: float, time_s: float) -> float:
     """Change of heading (rad) from a straight course.
 
-    Parameters
-    ----------
-    yaw : YawNumbers
-        Of one ship.
-    moment : float
-        Constant moment over the inertia, 1/s2, positive to starboard.
-    time_s : float
+    `yaw`: Of one ship; `moment`: Constant moment over the inertia, 1/s2, positive to starboard.
     """
     r = psi = 0.0
     step_s = time_s / 2000
@@ -146,14 +127,7 @@ def heading_astern(yaw: YawNumbers, moment: float, time_s: float) -> float:
 
 
 def moment_astern(yaw: YawNumbers, heading_rad: float, time_s: float) -> float:
-    """The constant moment over the inertia (1/s2) that changes the heading so far while the ship stops.
-
-    Parameters
-    ----------
-    yaw : YawNumbers
-        Of one ship.
-    heading_rad, time_s : float
-    """
+    """The constant moment over the inertia (1/s2) that changes the heading so far while the ship stops."""
     from scipy.optimize import brentq
 
     if not heading_rad:
@@ -168,11 +142,7 @@ def moment_astern(yaw: YawNumbers, heading_rad: float, time_s: float) -> float:
 def courses_of_card(model: Model, half_mps: float, slow_mps: float | None) -> tuple[list[Course], Array]:
     """Turns and zigzags, and their figures by the card, (4, n).
 
-    Parameters
-    ----------
-    model : Model
-    half_mps, slow_mps : float
-        Speed at half thrust in Bridge Command and of the card (None without an engine).
+    `half_mps`, `slow_mps`: Speed at half thrust in Bridge Command and of the card (None without an engine).
     """
     values, asked = start_values(model), []
     largest = min(LARGEST_RUDDER_DEG, math.degrees(values.get("steering.max_angle", math.pi)))
@@ -200,13 +170,8 @@ def fitted_yaw(
 ) -> YawNumbers:
     """The numbers of yaw that follow the paths of the card's turns best.
 
-    Parameters
-    ----------
-    model : Model
-    courses, wanted
-        As of :func:`courses_of_card`.
-    gear_degps, neutral_deg : float
-        Rate of the rudder; rudder of a straight course, to starboard.
+    `courses`, `wanted`: As of :func:`courses_of_card`; `gear_degps`, `neutral_deg`: Rate of the rudder; rudder of a
+    straight course, to starboard.
     """
     from scipy.optimize import least_squares
 
@@ -252,14 +217,8 @@ def _share_of_card(model: Model, speed: float) -> float:
 def force_at(model: Model, name: str, motion: Mapping[str, float], orders: Mapping[str, float]) -> float:
     """A force of a card (N, N m) at a motion.
 
-    Parameters
-    ----------
-    model : Model
-    name : str
-    motion : mapping
-        ``motion.u``, ``motion.v``, ``motion.r``, ``rudder.angle``, SI; zero where not given.
-    orders : mapping
-        Inputs that are not as at the start.
+    `motion`: ``motion.u``, ``motion.v``, ``motion.r``, ``rudder.angle``, SI; zero where not given; `orders`: Inputs
+    that are not as at the start.
     """
     x = np.array(model.initial(model.parameter_values())).ravel()
     for place, state in enumerate(model.state_names):

@@ -7,9 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tank2sim.apps.programs.polynomial_fit import FigureChange, figure_changes
-from tank2sim.apps.programs.program_files import ProgramFiles
-from tank2sim.apps.programs.robotics import craft_changes
+from tank2sim.apps.programs.program_files import FigureChange, ProgramFiles, figure_changes
 from tank2sim.arrays import Array
 from tank2sim.cards import Card, SteeredBy, SteeredCard
 from tank2sim.dynamics import build
@@ -31,15 +29,7 @@ def c99_files(card: Card) -> ProgramFiles:
     The figures of standard manoeuvres by the compiled files in double precision are the changes; what float changes of
     them is among the losses. Without a C compiler, or for a card without standard manoeuvres, there are neither.
 
-    Parameters
-    ----------
-    card : Card
-        Of any kind that has a model.
-
-    Raises
-    ------
-    InputError
-        The card names what no model knows.
+    Raises InputError: The card names what no model knows.
     """
     made = plain_ship(card)
     model = with_simulator_interface(build(card))
@@ -48,17 +38,11 @@ def c99_files(card: Card) -> ProgramFiles:
         why = "the card has no standard manoeuvres" if find_compiler() else "no C compiler was found"
         sentence = f"how far float changes manoeuvres was not measured ({why}); self_test.c allows {TOLERANCES[1]:g}"
         return ProgramFiles(files=made.files, use=made.use, losses=(sentence, *geodetic))
-    changes = _changes(card, model, PlainIntegrator(model, made))
-    in_float = _changes(card, model, PlainIntegrator(model, made, single=True))
-    return ProgramFiles(
-        files=made.files, use=made.use, losses=(_loss_of_float(in_float), *geodetic), changes=tuple(changes)
+    before = model if card.steered_by is SteeredBy.RUDDER else build(card)
+    changes, in_float = (
+        figure_changes(card, before, model, PlainIntegrator(model, made, single=single)) for single in (False, True)
     )
-
-
-def _changes(card: SteeredCard, model: Model, integrator: Integrator) -> tuple[FigureChange, ...]:
-    if card.steered_by is SteeredBy.RUDDER:
-        return figure_changes(model, model, (None, integrator))
-    return craft_changes(card, model, integrator)
+    return ProgramFiles(files=made.files, use=made.use, losses=(_loss_of_float(in_float), *geodetic), changes=changes)
 
 
 def _loss_of_float(changes: Sequence[FigureChange]) -> str:
@@ -79,21 +63,8 @@ def _loss_of_float(changes: Sequence[FigureChange]) -> str:
 
 
 class PlainIntegrator(Integrator):
-    """Takes a model's steps by its files of C99, compiled here; outputs are evaluated by the model.
-
-    Parameters
-    ----------
-    model : Model
-        With the interface of a simulator.
-    made : PlainShip
-        Its files.
-    single : bool
-        In single precision.
-
-    Raises
-    ------
-    InputError
-        There is no C compiler that works.
+    """Takes the steps of a model with a simulator's interface by its files of C99, compiled here, in `single` precision
+    or double; outputs are evaluated by the model. Raises InputError: There is no C compiler that works.
     """
 
     def __init__(self, model: Model, made: PlainShip, *, single: bool = False):
@@ -113,10 +84,7 @@ class PlainIntegrator(Integrator):
     def rollout(self, x: Array, u: Array, p: Array, h: float, n: int, *, every: int = 1) -> Array:
         """As of any integrator.
 
-        Raises
-        ------
-        InputError
-            The states leave all bounds.
+        Raises InputError: The states leave all bounds.
         """
         self._x[:], self._u[:], self._p[:] = x, u, p
         place = self._instance.ctypes.data

@@ -117,6 +117,7 @@ def _figures(table: CoefficientTable, entry: RankedReading) -> dict[str, float |
     from tank2sim.cards import ManoeuvringCard
     from tank2sim.cards.reading import parse_card
     from tank2sim.dynamics import build
+    from tank2sim.simulation.card_range import single_figures
     from tank2sim.simulation.manoeuvres import Turn, Zigzag
     from tank2sim.simulation.run import simulate
 
@@ -124,20 +125,12 @@ def _figures(table: CoefficientTable, entry: RankedReading) -> dict[str, float |
         card = parse_card(read_card_text(table, entry), table.source)
         assert isinstance(card, ManoeuvringCard)
         model = build(card)
-        turn = simulate(model, Turn(math.radians(35))).figures
-        zigzag = simulate(model, Zigzag(math.radians(10), math.radians(10))).figures
+        turn = single_figures(simulate(model, Turn(math.radians(35))).figures)
+        zigzag = single_figures(simulate(model, Zigzag(math.radians(10), math.radians(10))).figures)
     except InputError:  # no mass matrix, or a motion without bounds: not a ship
         return {}
-    overshoots = zigzag["overshoots_deg"]
-    first = overshoots[0] if isinstance(overshoots, list) and overshoots else None
-    L = table.length_m
-
-    def lengths(name: str) -> float | None:
-        value = turn.get(name)
-        return float(value) / L if isinstance(value, int | float) and value > 0 else None
-
-    return {
-        "advance_lengths": lengths("advance_m"),
-        "tactical_diameter_lengths": lengths("tactical_diameter_m"),
-        "overshoot_1_deg": first,
+    lengths = {
+        f"{name}_lengths": turn[f"{name}_m"] / table.length_m if turn.get(f"{name}_m", 0.0) > 0 else None
+        for name in ("advance", "tactical_diameter")
     }
+    return {**lengths, "overshoot_1_deg": zigzag.get("overshoot_1_deg")}

@@ -31,71 +31,36 @@ _WORDS = {
 
 @dataclass(frozen=True, kw_only=True)
 class ReadingFound:
-    """A reading of a table.
+    """A reading of a table."""
 
-    Parameters
-    ----------
-    rudder_sign, scaling, yaw_rate_terms, origin : str
-        Conventions, as a card states them.
-    probability : float
-        Among all readings.
-    C_prime : float
-        C' of straight-line stability, positive if stable.
-    turning_index : float or None
-        Norrbin's P: heading by rudder after one ship's length; None without rudder forces.
-    advance_lengths, tactical_diameter_lengths : float or None
-        Turn with 35 deg (or the gear's largest rudder), over L; None where it was not simulated or not reached.
-    overshoot_1_deg : float or None
-        First overshoot of the 10/10 zigzag.
-    vanished : tuple of str
-        Terms that vanish to the printed digits.
-    against : tuple of str
-        What speaks against the reading, the strongest first.
-    """
-
+    # `rudder_sign`, `scaling`, `yaw_rate_terms`, `origin`: Conventions, as a card states them
     rudder_sign: str
     scaling: str
     yaw_rate_terms: str
     origin: str
-    probability: float
-    C_prime: float
-    turning_index: float | None
+    probability: float  # Among all readings
+    C_prime: float  # C' of straight-line stability, positive if stable
+    turning_index: float | None  # Norrbin's P: heading by rudder after one ship's length; None without rudder forces
+    # `advance_lengths`, `tactical_diameter_lengths`: Turn with 35 deg (or the gear's largest rudder), over L; None
+    # where it was not simulated or not reached
     advance_lengths: float | None
     tactical_diameter_lengths: float | None
-    overshoot_1_deg: float | None
-    vanished: tuple[str, ...]
-    against: tuple[str, ...]
+    overshoot_1_deg: float | None  # First overshoot of the 10/10 zigzag
+    vanished: tuple[str, ...]  # Terms that vanish to the printed digits
+    against: tuple[str, ...]  # What speaks against the reading, the strongest first
 
 
 @dataclass(frozen=True, kw_only=True)
 class ConventionStudy:
-    """Readings of a table.
+    """Readings of a table."""
 
-    Parameters
-    ----------
-    source : str
-        The table.
-    stated : dict
-        Conventions that the table states.
-    readings : tuple of ReadingFound
-        The most probable first.
-    assumed : dict
-        Sizes that the table lacks, by key, and the values taken.
-    left_out : tuple of str
-        Numbers that were not read.
-    scaled_with_nominal_speed : bool or None
-        Whether terms by the speed count it once; None if the table lacks them.
-    speed_scale : str or None
-        As the table states it.
-    """
-
-    source: str
-    stated: dict[str, str]
-    readings: tuple[ReadingFound, ...]
-    assumed: dict[str, float]
-    left_out: tuple[str, ...]
-    scaled_with_nominal_speed: bool | None
-    speed_scale: str | None
+    source: str  # The table
+    stated: dict[str, str]  # Conventions that the table states
+    readings: tuple[ReadingFound, ...]  # The most probable first
+    assumed: dict[str, float]  # Sizes that the table lacks, by key, and the values taken
+    left_out: tuple[str, ...]  # Numbers that were not read
+    scaled_with_nominal_speed: bool | None  # Whether terms by the speed count it once; None if the table lacks them
+    speed_scale: str | None  # As the table states it
     notices: tuple[Notice, ...] = ()
 
 
@@ -210,12 +175,7 @@ class ConventionResult(Result[ConventionStudy]):
 
 
 def same_in_practice(first: ReadingFound, second: ReadingFound) -> bool:
-    """Whether two readings are one ship in practice: both stable or neither, and every simulated figure within 5 %.
-
-    Parameters
-    ----------
-    first, second : ReadingFound
-    """
+    """Whether two readings are one ship in practice: both stable or neither, and every simulated figure within 5 %."""
     if (first.C_prime > 0) != (second.C_prime > 0):
         return False
     names = ("advance_lengths", "tactical_diameter_lengths", "overshoot_1_deg")

@@ -22,21 +22,11 @@ _IN_SWAY = {("Y", "v"): "Yrdot", ("N", "v"): "Nrdot", ("K", "v"): "Krdot"}
 
 @dataclass(frozen=True)
 class Conventions:
-    """Conventions of a card's text; None for those that it has.
+    """Conventions of a card's text; None for those that it has."""
 
-    Parameters
-    ----------
-    scaling : str, optional
-        ``prime``, ``prime_ii``, ``bis`` or ``dimensional``.
-    rudder_sign : str, optional
-        ``port`` or ``starboard``.
-    origin_m : float
-        The new origin forward of the old one, m.
-    """
-
-    scaling: str | None = None
-    rudder_sign: str | None = None
-    origin_m: float = 0.0
+    scaling: str | None = None  # ``prime``, ``prime_ii``, ``bis`` or ``dimensional``
+    rudder_sign: str | None = None  # ``port`` or ``starboard``
+    origin_m: float = 0.0  # The new origin forward of the old one, m
 
     @property
     def unchanged(self) -> bool:
@@ -47,11 +37,8 @@ class Conventions:
 def in_conventions(card: ManoeuvringCard, wanted: Conventions) -> ManoeuvringCard:
     """The same ship with its numbers in other conventions; the covariance of the card is carried along.
 
-    Raises
-    ------
-    InputError
-        The scaling needs a particular that the card lacks, an MMG card cannot have what is asked for, or effects are
-        about midships and the origin is to be moved.
+    Raises InputError: The scaling needs a particular that the card lacks, an MMG card cannot have what is asked for, or
+    effects are about midships and the origin is to be moved.
     """
     if wanted.unchanged:
         return card
@@ -134,12 +121,8 @@ def _rewritten(
 def roll_in_file(roll: Roll, inertia: float, length: float) -> dict[str, float]:
     """``[roll]`` by dotted key, as a file has it.
 
-    Parameters
-    ----------
-    roll : Roll
-        In the prime system.
-    inertia, length : float
-        A number of the file over that of the prime system: of inertias and of lengths.
+    `roll`: In the prime system; `inertia`, `length`: A number of the file over that of the prime system: of inertias
+    and of lengths.
     """
     heights = {key: getattr(roll, key) for key in ("z_G", "z_R", "l_x")}
     written = {f"roll.{key}": _written(value * length) for key, value in heights.items() if value}
@@ -202,18 +185,9 @@ def shift_matrix(names: Sequence[str], ahead: float) -> tuple[tuple[str, ...], A
     "hydrodynamic") change by the same rule, as the inertia of the body does. U, by which cards are scaled, is the speed
     of the new origin afterwards: a difference of second order in a' r', which is not in the rule.
 
-    Parameters
-    ----------
-    names : sequence of str
-        The k derivatives about the old origin.
-    ahead : float
-        The new origin forward of it, in lengths.
+    `names`: The k derivatives about the old origin; `ahead`: The new origin forward of it, in lengths.
 
-    Returns
-    -------
-    names : tuple of str
-        The n names, those of the card first.
-    matrix : array (n, k)
+    Returns the n names, those of the card first, and the matrix (n, k).
     """
     columns = [shifted_terms(name, ahead) for name in names]
     every = tuple(dict.fromkeys([*names, *(name for column in columns for name in column)]))

@@ -87,8 +87,9 @@ def convert(
     )
     from tank2sim.apps.programs.languages import converted
     from tank2sim.cards.examination import doubts
+    from tank2sim.notices import Notice
 
-    made, notices = converted(ship.card, to, Conventions(scaling, rudder_sign, origin_m), scatter, added_mass)
+    made = converted(ship.card, to, Conventions(scaling, rudder_sign, origin_m), scatter, added_mass)
     fit = (
         None
         if made.fit is None
@@ -108,6 +109,6 @@ def convert(
         made=FORMS[to].words,
         fit=fit,
         figures=tuple(figures),
-        notices=(*doubts(ship.card), *notices),
+        notices=(*doubts(ship.card), *map(Notice, made.losses)),
     )
     return ConversionResult(study, made, made.card, str(ship.card.source))

@@ -11,8 +11,8 @@ from typing import ClassVar
 from tank2sim.answer.parts import Cell, Section, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.programs.forms import FORMS
-from tank2sim.apps.programs.languages import ConvertedText
 from tank2sim.apps.programs.program_code import program_name
+from tank2sim.apps.programs.program_files import ProgramFiles
 from tank2sim.cards import Card
 from tank2sim.errors import InputError
 from tank2sim.escaping import one_line
@@ -23,17 +23,10 @@ from tank2sim.version import __version__
 
 @dataclass(frozen=True)
 class PolynomialRange:
-    """A polynomial fitted to an MMG ship.
+    """A polynomial fitted to an MMG ship."""
 
-    Parameters
-    ----------
-    residuals_percent : dict
-        Force to the root mean square of its residual, % of its own.
-    ranges : dict
-        ``u`` (over u0), ``drift_deg``, ``yaw_rate_prime``, ``rudder_deg`` to lowest and highest value that was fitted.
-    """
-
-    residuals_percent: dict[str, float]
+    residuals_percent: dict[str, float]  # Force to the root mean square of its residual, % of its own
+    # ``u`` (over u0), ``drift_deg``, ``yaw_rate_prime``, ``rudder_deg`` to lowest and highest value that was fitted
     ranges: dict[str, tuple[float, float]]
 
 
@@ -50,23 +43,12 @@ class ConvertedFigure:
 
 @dataclass(frozen=True, kw_only=True)
 class ConversionStudy:
-    """A ship in another language.
-
-    Parameters
-    ----------
-    ship, from_kind, to : str
-        Name of the ship, kind of its card, and the language.
-    made : str
-        The language in words.
-    fit : PolynomialRange or None
-    figures : tuple of ConvertedFigure
-    notices : tuple of Notice
-    """
+    """A ship in another language."""
 
     ship: str
     from_kind: str
     to: str
-    made: str
+    made: str  # The language in words
     fit: PolynomialRange | None
     figures: tuple[ConvertedFigure, ...]
     notices: tuple[Notice, ...]
@@ -79,7 +61,7 @@ class ConversionResult(Result[ConversionStudy]):
     Parameters
     ----------
     study : ConversionStudy
-    made : ConvertedText, optional
+    made : ProgramFiles, optional
         None if the result was read from its JSON.
     card : Card, optional
         The card that was made; None for a file of another program. ``ship`` is its ship.
@@ -88,7 +70,7 @@ class ConversionResult(Result[ConversionStudy]):
     """
 
     study: ConversionStudy
-    made: ConvertedText | None = None
+    made: ProgramFiles | None = None
     card: Card | None = None
     source: str = ""
     command: ClassVar[str] = "convert"
@@ -99,7 +81,7 @@ class ConversionResult(Result[ConversionStudy]):
         return self._made.text
 
     @property
-    def _made(self) -> ConvertedText:
+    def _made(self) -> ProgramFiles:
         if self.made is None:
             raise LookupError("the JSON of a conversion does not hold its file")
         return self.made
@@ -119,13 +101,13 @@ class ConversionResult(Result[ConversionStudy]):
         """
         path, made, form = Path(path), self._made, FORMS[self.study.to]
         if not names_folder(path):
-            if made.program is not None:
+            if made.files:
                 raise InputError(path, "", f"is one file, and {self.study.to} has several", "give a folder")
             return {path: made.text} if made.card is None else made.card.files(path)
-        if made.program is not None:
+        if made.files:
             return {
-                **{path / name: content for name, content in made.program.files.items()},
-                path / "README.md": self._readme(made.program.use),
+                **{path / name: content for name, content in made.files.items()},
+                path / "README.md": self._readme(made.use),
             }
         main = path / f"{program_name(self.study.ship)}{form.ending}"
         return {**self.files(main), path / "README.md": self._readme(form.use.replace("NAME", main.stem))}

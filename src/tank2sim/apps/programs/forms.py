@@ -15,31 +15,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Form:
-    """Something a card can be converted to.
-
-    Parameters
-    ----------
-    words : str
-    ending : str
-        Of the file that it is; empty for a form of several files, which are a folder.
-    writer : str
-        ``module:function`` that makes the files of a card; empty for a form of one file.
-    use : str
-        How the one file is used, for the README next to it.
-    """
+    """Something a card can be converted to."""
 
     words: str
-    ending: str = ""
-    writer: str = ""
-    use: str = ""
+    ending: str = ""  # Of the file that it is; empty for a form of several files, which are a folder
+    writer: str = ""  # ``module:function`` that makes the files of a card; empty for a form of one file
+    use: str = ""  # How the one file is used, for the README next to it
 
     def files(self, card: SteeredCard) -> ProgramFiles:
         """The files of a form that is a folder.
 
-        Raises
-        ------
-        InputError
-            The card cannot be had in that form.
+        Raises InputError: The card cannot be had in that form.
         """
         module, _, function = self.writer.partition(":")
         made: ProgramFiles = getattr(import_module(f"tank2sim.apps.programs.{module}"), function)(card)
@@ -101,6 +87,6 @@ needs NumPy alone. The comments of the file list states, inputs and parameters."
         writer="bridge_command:bridge_command_files",
     ),
     "osp": Form("a folder with the hull and the system of OSP's case dp-ship", writer="osp_case:osp_files"),
-    "osp_gunnerus": Form("a folder with the hull of OSP's case gunnerus-dp", writer="osp_gunnerus:gunnerus_files"),
+    "osp_gunnerus": Form("a folder with the hull of OSP's case gunnerus-dp", writer="osp_case:gunnerus_files"),
 }
 """Name on the command line to the form."""

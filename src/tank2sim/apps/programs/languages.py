@@ -3,29 +3,24 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from tank2sim.apps.programs.conventions import Conventions, in_conventions
 from tank2sim.apps.programs.forms import FORMS
 from tank2sim.apps.programs.mmg_programs import mmgdynamics_text, shipmmg_text
 from tank2sim.apps.programs.polynomial_fit import (
     SCATTER,
-    FigureChange,
-    PolynomialFit,
-    figure_changes,
     fit_polynomial,
     manoeuvre_motions,
     polynomial_card,
     scattered_motions,
 )
 from tank2sim.apps.programs.program_code import mss_function, pvs_class
-from tank2sim.apps.programs.program_files import ProgramFiles
+from tank2sim.apps.programs.program_files import ProgramFiles, figure_changes
 from tank2sim.apps.programs.robotics import (
     VRX_MASSES,
     VRX_TERMS,
     AddedMass,
-    craft_changes,
-    gazebo_model,
     gazebo_text,
     growth_per_step,
     place_of_added_mass,
@@ -39,48 +34,21 @@ from tank2sim.cards.reading import changed_text, craft_in_scaling, parse_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import ArgumentError
-from tank2sim.notices import Notice
 
 _OF_CRAFT = ("small_craft", "gazebo", "vrx")
 _FOLDERS = ", ".join(name for name, form in FORMS.items() if form.writer)
 _OF_MMG = {"shipmmg": shipmmg_text, "mmgdynamics": mmgdynamics_text}
 
 
-@dataclass(frozen=True)
-class ConvertedText:
-    """A card in another language: the text, the card if it is one, the fit and the figures that changed.
-
-    A form of several files has no text, and its files in `program`.
-    """
-
-    text: str = ""
-    card: SteeredCard | None = None
-    fit: PolynomialFit | None = None
-    changes: tuple[FigureChange, ...] = ()
-    program: ProgramFiles | None = None
-
-
 def converted(
     card: Card, to: str, wanted: Conventions, scatter: float | None, added_mass: AddedMass | None = None
-) -> tuple[ConvertedText, tuple[Notice, ...]]:
-    """A card in another language, and notices.
+) -> ProgramFiles:
+    """A card in another language.
 
-    Parameters
-    ----------
-    card : Card
-    to : str
-        Language, as of ``convert``.
-    wanted : Conventions
-        Of the new card.
-    scatter : float, optional
-        Spread of the motions of a fit about standard manoeuvres.
-    added_mass : str, optional
-        Where Gazebo and VRX have it: :func:`.place_of_added_mass`.
+    `to`: Language, as of ``convert``; `wanted`: Of the new card; `scatter`: Spread of the motions of a fit about
+    standard manoeuvres; `added_mass`: Where Gazebo and VRX have it: :func:`.place_of_added_mass`.
 
-    Raises
-    ------
-    InputError
-        The card cannot be had in that language.
+    Raises InputError: The card cannot be had in that language.
     """
     if FORMS[to].writer:
         return _of_several_files(card, to, wanted, scatter, added_mass)
@@ -98,33 +66,32 @@ def converted(
     if to == "mmg" and not isinstance(given, MmgCard):
         problem = f"is {given.model.kind}: without thrust and rudder force its terms cannot be split into MMG's"
         raise given.fault("model.kind", problem, "convert an MMG card to abkowitz, not the other way")
-    notices: tuple[Notice, ...] = ()
+    losses: tuple[str, ...] = ()
     if wanted.origin_m:
-        notices = (
-            Notice("U of the new origin scales the numbers now: a difference of second order in the distance and r'"),
-            Notice("figures, positions and speeds of the new card refer to its own origin"),
+        losses = (
+            "U of the new origin scales the numbers now: a difference of second order in the distance and r'",
+            "figures, positions and speeds of the new card refer to its own origin",
         )
     if to == "abkowitz" and isinstance(given, MmgCard):
-        return _fitted(given, wanted, SCATTER if scatter is None else scatter, notices)
+        return _fitted(given, wanted, SCATTER if scatter is None else scatter, losses)
     if to == "abkowitz" and given.model.kind == "linear":
         changed = parse_card(changed_text(given.text, given.source, {"model.kind": "abkowitz"}), given.source)
         assert isinstance(changed, ManoeuvringCard)
-        given, notices = changed, (*notices, Notice("third-order terms that the card does not have are zero"))
+        given, losses = changed, (*losses, "third-order terms that the card does not have are zero")
     made = in_conventions(given, wanted)
     build(made)
-    return ConvertedText(made.text, made), notices
+    return ProgramFiles(text=made.text, card=made, losses=losses)
 
 
 def _of_several_files(
     card: Card, to: str, wanted: Conventions, scatter: float | None, added_mass: AddedMass | None
-) -> tuple[ConvertedText, tuple[Notice, ...]]:
+) -> ProgramFiles:
     """A form that is a folder of files."""
     if not wanted.unchanged or scatter is not None or added_mass is not None:
         remedy = "leave scaling, rudder sign, origin, scatter and added mass out"
         raise ArgumentError("to", to, "has conventions of its own", remedy)
     made = FORMS[to].files(card.steered())
-    losses = (*made.losses, *_lost_sensors(card.steered()))
-    return ConvertedText(changes=made.changes, program=made), tuple(map(Notice, losses))
+    return replace(made, losses=(*made.losses, *_lost_sensors(card.steered())))
 
 
 def _lost_sensors(card: SteeredCard) -> list[str]:
@@ -141,9 +108,7 @@ def _of_ship(card: Card, to: str) -> ManoeuvringCard:
     return card.manoeuvring()
 
 
-def _of_craft(
-    card: SteeredCard, to: str, wanted: Conventions, added_mass: AddedMass | None
-) -> tuple[ConvertedText, tuple[Notice, ...]]:
+def _of_craft(card: SteeredCard, to: str, wanted: Conventions, added_mass: AddedMass | None) -> ProgramFiles:
     if to not in _OF_CRAFT:
         problem = "is small_craft, whose damping is not a polynomial about a speed"
         raise card.fault("model.kind", problem, f"convert it to {', '.join(_OF_CRAFT)}, {_FOLDERS}")
@@ -155,13 +120,16 @@ def _of_craft(
         if wanted.scaling not in (None, "dimensional", "prime"):
             raise ArgumentError("scaling", wanted.scaling or "", "is not of a small craft", "give dimensional or prime")
         made = craft_in_scaling(card, wanted.scaling or card.model.scaling)
-        return ConvertedText(made.text, made), ()
+        return ProgramFiles(text=made.text, card=made)
     if wanted.scaling is not None:
         raise ArgumentError("to", to, "has conventions of its own", "leave the scaling out")
-    text, model = (gazebo_text, gazebo_model) if to == "gazebo" else (vrx_text, vrx_model)
-    changes = craft_changes(card, model(card, added_mass))
-    notices = _lost_by(card, to, place_of_added_mass(card, added_mass))
-    return ConvertedText(text(card, added_mass), changes=changes), tuple(map(Notice, notices))
+    place = place_of_added_mass(card, added_mass)
+    after = build(replace(card, effects=())) if to == "gazebo" else vrx_model(card, place)  # Gazebo has the whole hull
+    return ProgramFiles(
+        text=gazebo_text(card, place) if to == "gazebo" else vrx_text(card, place),
+        losses=tuple(_lost_by(card, to, place)),
+        changes=figure_changes(card, build(card), after),
+    )
 
 
 def _lost_by(card: SteeredCard, to: str, place: AddedMass) -> list[str]:
@@ -200,22 +168,20 @@ def _lost_by(card: SteeredCard, to: str, place: AddedMass) -> list[str]:
     return notices
 
 
-def _fitted(
-    card: MmgCard, wanted: Conventions, scatter: float, notices: tuple[Notice, ...]
-) -> tuple[ConvertedText, tuple[Notice, ...]]:
+def _fitted(card: MmgCard, wanted: Conventions, scatter: float, losses: tuple[str, ...]) -> ProgramFiles:
     bare = build(card)
     model = build(replace(card, effects=())) if card.effects else bare
     fit = fit_polynomial(card, model, scattered_motions(model, manoeuvre_motions(model), scatter))
     polynomial = polynomial_card(card, fit)
-    changes = figure_changes(bare, build(polynomial))
+    changes = figure_changes(card, bare, build(polynomial))
     made = in_conventions(polynomial, wanted)
     if fit.covariance is not None:
         carried = "standard errors come from the MMG card's numbers, carried through the fit with their covariance"
-        notices = (*notices, Notice(f"{carried}; what the fit itself misses is in the table alone"))
-    return ConvertedText(made.text, made, fit, changes), notices
+        losses = (*losses, f"{carried}; what the fit itself misses is in the table alone")
+    return ProgramFiles(text=made.text, card=made, fit=fit, changes=changes, losses=losses)
 
 
-def _program(card: ManoeuvringCard, to: str) -> tuple[ConvertedText, tuple[Notice, ...]]:
+def _program(card: ManoeuvringCard, to: str) -> ProgramFiles:
     if to in _OF_MMG:
         if not isinstance(card, MmgCard):
             raise card.fault("model.kind", f"is {card.model.kind}, and {to} is a program of the MMG method", "use mss")
@@ -229,6 +195,6 @@ def _program(card: ManoeuvringCard, to: str) -> tuple[ConvertedText, tuple[Notic
             notices.append(f"effects are left out: {', '.join(entry.name for entry in card.effects)}")
         if card.ship.beam_m is None:
             notices.append("the card states no beam_m: B is nan (shipmmg does not use it)")
-        return ConvertedText(_OF_MMG[to](card)), tuple(map(Notice, notices))
+        return ProgramFiles(text=_OF_MMG[to](card), losses=tuple(notices))
     write = mss_function if to == "mss" else pvs_class
-    return ConvertedText(write(card, build(card))), tuple(map(Notice, _lost_sensors(card)))
+    return ProgramFiles(text=write(card, build(card)), losses=tuple(_lost_sensors(card)))

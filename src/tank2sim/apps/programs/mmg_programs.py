@@ -18,10 +18,7 @@ from tank2sim.escaping import python_text
 def shipmmg_values(card: MmgCard) -> tuple[dict[str, float], dict[str, float]]:
     """Keyword arguments of ``Mmg3DofBasicParams`` and ``Mmg3DofManeuveringParams``.
 
-    Raises
-    ------
-    InputError
-        The ship has two propellers, or an asymmetric hull (Y0, N0).
+    Raises InputError: The ship has two propellers, or an asymmetric hull (Y0, N0).
     """
     _refuse_what_others_lack(card, "shipmmg")
     length, scales, body = card.ship.length_m, card.scales, card.rigid_body
@@ -63,14 +60,7 @@ def mmgdynamics_values(card: MmgCard) -> dict[str, float]:
 
     Its moment of the rudder is (-L/2 + a_H x_H) F_N cos(delta): x_H is such that the sum is that of the card.
 
-    Parameters
-    ----------
-    card : MmgCard
-
-    Raises
-    ------
-    InputError
-        As :func:`shipmmg_values`, or the card has no beam, or x_R is not -0.5 and a_H is 0.
+    Raises InputError: As :func:`shipmmg_values`, or the card has no beam, or x_R is not -0.5 and a_H is 0.
     """
     _refuse_what_others_lack(card, "mmgdynamics")
     ship, rudder, length, scales = card.ship, card.rudder, card.ship.length_m, card.scales
@@ -144,14 +134,7 @@ def _hull_in_prime_ii(card: MmgCard) -> dict[str, float]:
 def mmgdynamics_text(card: MmgCard) -> str:
     """A Python file with the dictionary ``vessel``, and ``u0``, ``nps``, of a card.
 
-    Parameters
-    ----------
-    card : MmgCard
-
-    Raises
-    ------
-    InputError
-        As :func:`mmgdynamics_values`.
+    Raises InputError: As :func:`mmgdynamics_values`.
     """
     entries = "".join(f'    "{key}": {_number_text(value)},\n' for key, value in mmgdynamics_values(card).items())
     n = card.propulsion.nominal_radps / (2 * math.pi) if card.propulsion else 0.0
@@ -170,10 +153,7 @@ def mmgdynamics_text(card: MmgCard) -> str:
 def shipmmg_text(card: MmgCard) -> str:
     """A Python file that makes ``basic_params``, ``maneuvering_params``, ``u0``, ``nps``, ``rho`` of a card.
 
-    Raises
-    ------
-    InputError
-        As :func:`shipmmg_values`.
+    Raises InputError: As :func:`shipmmg_values`.
     """
     basic, hull = shipmmg_values(card)
 

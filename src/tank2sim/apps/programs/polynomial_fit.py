@@ -13,14 +13,15 @@ Cov(theta) = S Cov(p) S^T, S = A dF/dp, at held revolutions.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
 import tomlkit
 
 from tank2sim.apps.programs.conventions import roll_in_file
+from tank2sim.apps.programs.program_files import PolynomialFit, standard_manoeuvres
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard, MmgCard
 from tank2sim.cards.covariance import Covariance, not_referring
@@ -33,12 +34,7 @@ from tank2sim.dynamics.card_parameters import JointErrors, card_parameters, join
 from tank2sim.dynamics.mmg.ship import is_symmetric
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import inertial_forces
-from tank2sim.simulation.integrator import Integrator
-from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.run import simulate
-
-TURNS_DEG, ZIGZAGS_DEG = (10.0, 20.0, 35.0), (10.0, 20.0)
-"""Rudders of the turning circles and of the zigzags, to both sides, in whose motions the polynomial is fitted."""
 
 SCATTER = 0.3
 """Share of :data:`SPREADS` by which each motion is scattered: project choice. With 0.3 the KVLCC2's tactical diameters
@@ -57,39 +53,10 @@ _STATES = ("motion.u", "motion.v", "motion.r", "rudder.angle")
 _SLOWEST = 0.05  # of u0
 
 
-@dataclass(frozen=True)
-class PolynomialFit:
-    """A third-order polynomial in place of an MMG ship.
-
-    Parameters
-    ----------
-    derivatives : mapping
-        Name to prime value, rudder positive to starboard.
-    Xnn : float
-        Effect of revolutions, prime.
-    residuals : mapping
-        Force to the root mean square of the residual over that of the force.
-    ranges : mapping
-        ``u`` (over u0), ``drift_deg``, ``yaw_rate_prime``, ``rudder_deg`` to lowest and highest value that was fitted.
-    covariance : array (k, k), optional
-        Covariance of `derivatives`, in their order, by the errors of the MMG card; None if it states none.
-    """
-
-    derivatives: Mapping[str, float]
-    Xnn: float
-    residuals: Mapping[str, float]
-    ranges: Mapping[str, tuple[float, float]]
-    covariance: Array | None = None
-
-
 def manoeuvre_motions(model: Model) -> Array:
     """u, v, r, rudder (n, 4), SI, of the standard manoeuvres of a ship, :data:`_ROWS` of each."""
-    largest = {p.name: p.start for p in model.parameters}.get("steering.max_angle", math.pi / 2)
-    turns = [Turn(side * min(math.radians(angle), largest)) for angle in TURNS_DEG for side in (1, -1)]
-    zigzags = [Zigzag(side * math.radians(angle), math.radians(angle)) for angle in ZIGZAGS_DEG for side in (1, -1)]
     found = []
-    manoeuvres: list[Turn | Zigzag] = [*turns, *zigzags]
-    for manoeuvre in manoeuvres:
+    for manoeuvre in standard_manoeuvres(model):
         run = simulate(model, manoeuvre).trajectory
         rows = np.linspace(0, len(run.t) - 1, _ROWS).astype(int)
         found.append(np.column_stack([run[name][rows] for name in _STATES]))
@@ -101,19 +68,7 @@ def scattered_motions(
 ) -> Array:
     """Motions about those of manoeuvres, within the rudder's limits and ahead of rest.
 
-    Parameters
-    ----------
-    model : Model
-    motions : array (n, 4)
-        u, v, r, rudder, SI.
-    scatter : float
-        Over :data:`SPREADS`.
-    samples : int
-        Number of motions to return.
-
-    Returns
-    -------
-    array (`samples`, 4)
+    `motions` (n, 4): u, v, r, rudder, SI; `scatter`: Over :data:`SPREADS`; `samples`: Number of motions to return.
     """
     values = {parameter.name: parameter.start for parameter in model.parameters}
     u0, length = values["ship.speed"], values["ship.length"]
@@ -138,15 +93,13 @@ def scattered_motions(
 def fit_polynomial(card: MmgCard, model: Model, motions: Array) -> PolynomialFit:
     """The polynomial by least squares over motions u, v, r, rudder (n, 4), SI.
 
-    Raises
-    ------
-    InputError
-        The motions do not determine the terms.
+    Raises InputError: The motions do not determine the terms.
     """
     forces, primes = _hydrodynamic_primes(card, model, motions)
     kept = [*ACCELERATION_TERMS, *(name for name in card.derivatives if _of_heeling(name))]
     derivatives = {name: card.derivatives[name] for name in kept if name in card.derivatives}
-    errors = joint_errors(card, card_parameters(card, study_model(card))) if _states_errors(card) else None
+    states_errors = card.uncertainty or card.interaction_errors or read_covariance(card) is not None
+    errors = joint_errors(card, card_parameters(card, study_model(card))) if states_errors else None
     numbers = [] if errors is None else [p.name for p in errors.parameters if p.name in model.parameter_names]
     slopes = _force_slopes(card, model, motions, numbers)
     sensitivity = [[float(number == f"derivatives.{name}") for number in numbers] for name in derivatives]
@@ -175,10 +128,6 @@ def fit_polynomial(card: MmgCard, model: Model, motions: Array) -> PolynomialFit
     ranges = {name: (float(np.quantile(v, 0.005)), float(np.quantile(v, 0.995))) for name, v in visited.items()}
     covariance = None if errors is None else _carried(np.array(sensitivity), errors, numbers)
     return PolynomialFit(derivatives, _effect_of_revolutions(card, model), residuals, ranges, covariance)
-
-
-def _states_errors(card: MmgCard) -> bool:
-    return bool(card.uncertainty or card.interaction_errors) or read_covariance(card) is not None
 
 
 def _carried(sensitivity: Array, errors: JointErrors, numbers: Sequence[str]) -> Array:
@@ -265,35 +214,38 @@ def _effect_of_revolutions(card: MmgCard, model: Model) -> float:
 def polynomial_card(card: MmgCard, fit: PolynomialFit) -> ManoeuvringCard:
     """The polynomial as a card, with particulars, gear and effects of the MMG card.
 
-    Raises
-    ------
-    InputError
-        An effect of the card is none of a polynomial.
+    Raises InputError: An effect of the card is none of a polynomial.
     """
     document = tomlkit.parse(card.text.lstrip("\ufeff"))
     for section in ("model", "rigid_body", "derivatives", "uncertainty", "propeller", "rudder", "propulsion"):
         document.pop(section, None)
-    model, body, propulsion, derivatives = (tomlkit.table() for _ in range(4))
     low, high = card.model.speed_range_mps
-    model["kind"], model["speed_mps"], model["scaling"] = "abkowitz", card.model.speed_mps, "prime"
-    model["speed_scale"], model["yaw_rate_terms"] = "instantaneous", "hydrodynamic"
-    model["rudder_sign"] = "starboard"
-    model["valid_speed_mps"] = [round(max(low, fit.ranges["u"][0] * card.model.speed_mps), 4), round(high, 4)]
-    model["low_speed_below_mps"] = card.model.low_speed_bound_mps
-    for key, name in (("valid_drift_deg", "drift_deg"), ("valid_rudder_deg", "rudder_deg")):
-        model[key] = float(f"{max(map(abs, fit.ranges[name])):.3g}")
-    model["valid_yaw_rate_prime"] = float(f"{max(map(abs, fit.ranges['yaw_rate_prime'])):.3g}")
-    for key in ("mass", "yaw_inertia", "x_G"):
-        body[key] = float(f"{getattr(card.rigid_body, key):.12g}")
-    propulsion["nominal_radps"] = card.propulsion.nominal_radps if card.propulsion else 1.0
-    propulsion["Xnn"] = float(f"{fit.Xnn:.10g}")
-    for name, value in fit.derivatives.items():
-        derivatives[name] = float(f"{value:.10g}")
+    reach = {name: float(f"{max(map(abs, fit.ranges[name])):.3g}") for name in fit.ranges}
+    tables: dict[str, dict[str, object]] = {
+        "model": {
+            "kind": "abkowitz",
+            "speed_mps": card.model.speed_mps,
+            "scaling": "prime",
+            "speed_scale": "instantaneous",
+            "yaw_rate_terms": "hydrodynamic",
+            "rudder_sign": "starboard",
+            "valid_speed_mps": [round(max(low, fit.ranges["u"][0] * card.model.speed_mps), 4), round(high, 4)],
+            "low_speed_below_mps": card.model.low_speed_bound_mps,
+            "valid_drift_deg": reach["drift_deg"],
+            "valid_rudder_deg": reach["rudder_deg"],
+            "valid_yaw_rate_prime": reach["yaw_rate_prime"],
+        },
+        "rigid_body": {key: float(f"{getattr(card.rigid_body, key):.12g}") for key in ("mass", "yaw_inertia", "x_G")},
+        "propulsion": {
+            "nominal_radps": card.propulsion.nominal_radps if card.propulsion else 1.0,
+            "Xnn": float(f"{fit.Xnn:.10g}"),
+        },
+        "derivatives": {name: float(f"{value:.10g}") for name, value in fit.derivatives.items()},
+    }
     errors = {} if fit.covariance is None else dict(zip(fit.derivatives, np.sqrt(np.diag(fit.covariance)), strict=True))
     uncertain = [name for name, error in errors.items() if error > 0]
-    uncertainty = tomlkit.table()
-    for name in uncertain:
-        uncertainty[name] = float(f"{errors[name]:.3g}")
+    if uncertain:
+        tables["uncertainty"] = {name: float(f"{errors[name]:.3g}") for name in uncertain}
     if card.roll is not None:
         # The rudder's moment about the longitudinal axis is in the terms of K.
         document.pop("roll", None)
@@ -302,9 +254,11 @@ def polynomial_card(card: MmgCard, fit: PolynomialFit) -> ManoeuvringCard:
     ship = document["ship"]
     assert isinstance(ship, dict)
     ship["source"] = f"{card.ship.source}; fitted by tank2sim convert to the MMG card {card.ship.name}"
-    tables = {"model": model, "rigid_body": body, "propulsion": propulsion, "derivatives": derivatives}
-    document.update(tables | ({"uncertainty": uncertainty} if uncertain else {}))
-    text = not_referring(tomlkit.dumps(_effects_last(document)))
+    document.update(tables)
+    for name in ("effects", "fitted_trials"):  # TOML wants lists of tables at the end
+        if name in document:
+            document[name] = document.pop(name)
+    text = not_referring(tomlkit.dumps(document))
     new = parse_card(text, card.source)
     assert isinstance(new, ManoeuvringCard)
     build(new)
@@ -313,66 +267,3 @@ def polynomial_card(card: MmgCard, fit: PolynomialFit) -> ManoeuvringCard:
     rows = [list(errors).index(name) for name in uncertain]
     names = tuple(f"derivatives.{name}" for name in uncertain)
     return replace(new, covariance=Covariance(names, fit.covariance[np.ix_(rows, rows)]))
-
-
-def _effects_last(document: tomlkit.TOMLDocument) -> tomlkit.TOMLDocument:
-    """The same with its lists of tables at the end, where TOML wants them."""
-    for name in ("effects", "fitted_trials"):
-        if name in document:
-            document[name] = document.pop(name)
-    return document
-
-
-@dataclass(frozen=True)
-class FigureChange:
-    """A figure of a manoeuvre before and after a conversion; None where the run was too short for it.
-
-    Parameters
-    ----------
-    manoeuvre, figure : str
-        ``turn:35`` and ``advance_m``.
-    before, after : float or None
-    """
-
-    manoeuvre: str
-    figure: str
-    before: float | None
-    after: float | None
-
-
-_OF_TURN = ("advance_m", "transfer_m", "tactical_diameter_m", "steady_diameter_m")
-_OVERSHOOTS = ("overshoot_1_deg", "overshoot_2_deg")
-
-
-def figure_changes(
-    before: Model, after: Model, integrators: Sequence[Integrator | None] = (None, None)
-) -> tuple[FigureChange, ...]:
-    """Figures of the standard manoeuvres of one ship by two models, each by its integrator if it is given."""
-    largest = {p.name: p.start for p in before.parameters}.get("steering.max_angle", math.pi / 2)
-    asked: list[tuple[str, Turn | Zigzag, Sequence[str]]] = []
-    for angle in TURNS_DEG:
-        for side in (1, -1):
-            rudder = side * min(math.radians(angle), largest)
-            asked.append((f"turn:{math.degrees(rudder):.4g}", Turn(rudder), _OF_TURN))
-    for angle in ZIGZAGS_DEG:
-        for side in (1, -1):
-            words = f"zigzag:{side * angle:g}/{angle:g}"
-            asked.append((words, Zigzag(side * math.radians(angle), math.radians(angle)), _OVERSHOOTS))
-    found = []
-    for words, manoeuvre, names in asked:
-        runs = zip((before, after), integrators, strict=True)
-        figures = [simulate(model, manoeuvre, integrator=integrator).figures for model, integrator in runs]
-        for name in names:
-            first, second = (_number(each, name) for each in figures)
-            found.append(FigureChange(words, name, first, second))
-    return tuple(found)
-
-
-def _number(figures: Mapping[str, object], name: str) -> float | None:
-    if name in _OVERSHOOTS:
-        overshoots = figures["overshoots_deg"]
-        assert isinstance(overshoots, list)
-        place = _OVERSHOOTS.index(name)
-        return float(overshoots[place]) if place < len(overshoots) else None
-    value = figures.get(name)
-    return float(value) if isinstance(value, int | float) else None

@@ -62,13 +62,8 @@ def _operation(op: int, names: list[str], spelt: Spelling) -> str:
 def operations(model: Model, spelt: Spelling, first: int) -> list[str]:
     """Assignments that make ``xdot`` of ``x``, ``ui``, ``p``, whose entries are counted from `first` (0 or 1).
 
-    Parameters
-    ----------
-    model : Model
-    spelt : callable
-        Spelling of a function or operator in the language.
-    first : int
-        0 for Python, with square brackets; 1 for MATLAB, with round ones.
+    `spelt`: Spelling of a function or operator in the language; `first`: 0 for Python, with square brackets; 1 for
+    MATLAB, with round ones.
     """
     opening, closing = ("[", "]") if first == 0 else ("(", ")")
     arrays, lines = ("x", "ui", "p"), []
@@ -87,23 +82,9 @@ def operations(model: Model, spelt: Spelling, first: int) -> list[str]:
 _LONGEST_NAME = 60  # MATLAB takes 63 letters
 
 _MATLAB_WORDS = (
-    *(
-        "break",
-        "case",
-        "catch",
-        "classdef",
-        "continue",
-        "do",
-        "else",
-        "elseif",
-        "end",
-        "for",
-        "function",
-        "global",
-        "if",
-    ),
-    *("otherwise", "parfor", "persistent", "return", "spmd", "switch", "try", "until", "while"),
-)
+    "break case catch classdef continue do else elseif end for function global if otherwise parfor persistent return "
+    "spmd switch try until while"
+).split()
 
 
 def program_name(ship: str, code: Iterable[str] = ()) -> str:

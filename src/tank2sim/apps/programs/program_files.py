@@ -1,30 +1,102 @@
-"""Files of another program that a card becomes, and what is lost on the way."""
+"""A card in another language: its text or files, what is lost on the way, and figures before and after."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import product
 
-from tank2sim.apps.programs.polynomial_fit import FigureChange
+from tank2sim.arrays import Array
+from tank2sim.cards.card import SteeredBy, SteeredCard
+from tank2sim.cards.small_craft import cruising_revolutions
+from tank2sim.dynamics.model import Model
+from tank2sim.errors import InputError
+from tank2sim.simulation.card_range import single_figures
+from tank2sim.simulation.integrator import Integrator
+from tank2sim.simulation.manoeuvres import Turn, Zigzag
+from tank2sim.simulation.run import simulate
+from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, Spin, StraightRun
+
+TURNS_DEG, ZIGZAGS_DEG = (10.0, 20.0, 35.0), (10.0, 20.0)
+"""Rudders of the turning circles and of the zigzags, to both sides, by which forms of a ship are compared."""
+
+_DIFFERENCE, _SPIN = 0.3, 0.7
+"""Difference of a turn and revolutions of a spin, over the cruising revolutions, with which forms are compared: a wide
+turn and a spin within the reach of any craft (project choice)."""
+_OF_TURN = ("advance_m", "transfer_m", "tactical_diameter_m", "steady_diameter_m")
+_OVERSHOOTS = ("overshoot_1_deg", "overshoot_2_deg")
+
+
+@dataclass(frozen=True)
+class FigureChange:
+    """A figure of a manoeuvre (``turn:35``, ``advance_m``) by two models; None where the run was too short for it."""
+
+    manoeuvre: str
+    figure: str
+    before: float | None
+    after: float | None
+
+
+@dataclass(frozen=True)
+class PolynomialFit:
+    """A third-order polynomial in place of an MMG ship."""
+
+    derivatives: Mapping[str, float]  # Name to prime value, rudder positive to starboard
+    Xnn: float  # Effect of revolutions, prime
+    residuals: Mapping[str, float]  # Force to the root mean square of the residual over that of the force
+    # ``u`` (over u0), ``drift_deg``, ``yaw_rate_prime``, ``rudder_deg`` to lowest and highest value that was fitted
+    ranges: Mapping[str, tuple[float, float]]
+    # (k, k): Covariance of `derivatives`, in their order, by the errors of the MMG card; None if it states none
+    covariance: Array | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class ProgramFiles:
-    """What a card is in another program.
+    """What a card is in another language."""
 
-    Parameters
-    ----------
-    files : mapping
-        Path within the folder to content.
-    use : str
-        How the program takes the files, in Markdown, for the README next to them.
-    losses : tuple of str
-        What the program does not have of the card, a sentence each.
-    changes : tuple of FigureChange
-        Figures of standard manoeuvres by tank2sim and by the equations of the program.
+    text: str = ""  # Of a form that is one file
+    files: Mapping[str, str | bytes] = field(default_factory=dict)  # Path within the folder of any other to content
+    use: str = ""  # How the program takes the files, in Markdown, for the README next to them
+    losses: tuple[str, ...] = ()  # What the program does not have of the card, a sentence each
+    changes: tuple[FigureChange, ...] = ()  # Figures of standard manoeuvres by the card and in the other language
+    card: SteeredCard | None = None  # If it is a card
+    fit: PolynomialFit | None = None  # Of a polynomial in place of an MMG ship
+
+
+def standard_manoeuvres(model: Model) -> Iterator[Turn | Zigzag]:
+    """Turns and zigzags of a ship to both sides, within the limits of its rudder."""
+    largest = {p.name: p.start for p in model.parameters}.get("steering.max_angle", math.pi / 2)
+    for angle, side in product(TURNS_DEG, (1, -1)):
+        yield Turn(side * min(math.radians(angle), largest))
+    for angle, side in product(ZIGZAGS_DEG, (1, -1)):
+        yield Zigzag(side * math.radians(angle), math.radians(angle))
+
+
+def figure_changes(
+    card: SteeredCard, before: Model, after: Model, integrator: Integrator | None = None
+) -> tuple[FigureChange, ...]:
+    """Figures of the standard manoeuvres of a card by two models, the second by its integrator if it is given.
+
+    A craft makes a straight run, a turn and a spin, as far as its thrusters can.
     """
-
-    files: Mapping[str, str | bytes]
-    use: str
-    losses: tuple[str, ...] = ()
-    changes: tuple[FigureChange, ...] = ()
+    manoeuvres: Sequence[Turn | Zigzag | StraightRun | DifferenceTurn | Spin] = [*standard_manoeuvres(before)]
+    if craft := card.steered_by is SteeredBy.THRUSTERS:
+        n = cruising_revolutions(card)
+        manoeuvres = StraightRun(n), DifferenceTurn(_DIFFERENCE * n), Spin(_SPIN * n)
+    found = []
+    for manoeuvre in manoeuvres:
+        try:
+            first, second = (
+                single_figures(simulate(model, manoeuvre, integrator=by).figures)
+                for model, by in ((before, None), (after, integrator))
+            )
+        except InputError:
+            if craft:
+                continue  # thrusters that are not on both sides, or do not reverse as far
+            raise
+        names: Sequence[str] = _OF_TURN if isinstance(manoeuvre, Turn) else _OVERSHOOTS
+        if craft:
+            names = [name for name in first if not name.endswith(("_lengths", "_percent"))]
+        found += [FigureChange(manoeuvre.words, name, first.get(name), second.get(name)) for name in names]
+    return tuple(found)

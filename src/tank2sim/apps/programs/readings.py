@@ -80,14 +80,9 @@ over L, 0.34 to 0.50 on the bundled ships, and standard deviation. Project choic
 
 @dataclass(frozen=True)
 class Reading:
-    """Conventions by which a table may be read.
+    """Conventions by which a table may be read."""
 
-    Parameters
-    ----------
-    rudder_sign, scaling, yaw_rate_terms, origin : str
-        One each of :data:`.STATED_CONVENTIONS`.
-    """
-
+    # `rudder_sign`, `scaling`, `yaw_rate_terms`, `origin`: One each of :data:`.STATED_CONVENTIONS`
     rudder_sign: str
     scaling: str
     yaw_rate_terms: str
@@ -96,50 +91,26 @@ class Reading:
 
 @dataclass(frozen=True)
 class ReadShip:
-    """A ship as a reading of a table has it: prime system, midships, without inertia, rudder to starboard.
+    """A ship as a reading of a table has it: prime system, midships, without inertia, rudder to starboard."""
 
-    Parameters
-    ----------
-    derivatives : mapping
-        Name to value.
-    body : RigidBody
-    vanished : tuple of str
-        Derivatives that became zero to the printed digits.
-    """
-
-    derivatives: Mapping[str, float]
+    derivatives: Mapping[str, float]  # Name to value
     body: RigidBody
-    vanished: tuple[str, ...]
+    vanished: tuple[str, ...]  # Derivatives that became zero to the printed digits
 
 
 @dataclass(frozen=True)
 class RankedReading:
-    """A reading with its ship and its probability.
-
-    Parameters
-    ----------
-    reading : Reading
-    ship : ReadShip
-    weight : float
-        Natural logarithm of prior times density of the table.
-    probability : float
-        Among all readings.
-    criterion : float
-        C' of straight-line stability, positive if stable.
-    turning_index : float or None
-        Norrbin's P: heading by rudder after one ship's length, positive if it turns to the side of the rudder; None
-        without rudder forces.
-    against : tuple of str
-        What speaks against it, the strongest first.
-    """
+    """A reading with its ship and its probability."""
 
     reading: Reading
     ship: ReadShip
-    weight: float
-    probability: float
-    criterion: float
+    weight: float  # Natural logarithm of prior times density of the table
+    probability: float  # Among all readings
+    criterion: float  # C' of straight-line stability, positive if stable
+    # Norrbin's P: heading by rudder after one ship's length, positive if it turns to the side of the rudder; None
+    # without rudder forces
     turning_index: float | None
-    against: tuple[str, ...]
+    against: tuple[str, ...]  # What speaks against it, the strongest first
 
 
 def possible_readings(table: CoefficientTable) -> list[Reading]:
@@ -172,10 +143,6 @@ def scaled_with_nominal_speed(table: CoefficientTable) -> bool | None:
 
     A lift goes with u v, u r and u^2 delta. Scaled with u0, so that u = u0 (1 + Du'), this is Y_vu = Y_v, Y_ru = Y_r,
     Y_du = 2 Y_d, Y_duu = Y_d, N alike; scaled with the speed at any time, all of these are about zero.
-
-    Parameters
-    ----------
-    table : CoefficientTable
     """
     known = table.derivatives
     shares = [
@@ -288,6 +255,10 @@ class _Evidence:
         if weight < expected - 3.0:
             self.against.append((expected - weight, words))
 
+    def compare(self, z: float, words: str) -> None:
+        """Add the density of a number `z` standard deviations from what ships have."""
+        self.add(_log_density(z), _log_density(0), words)
+
 
 def weigh(table: CoefficientTable, reading: Reading) -> RankedReading:
     """A reading with the log of its weight; its probability, which takes all readings, is 0 yet."""
@@ -323,20 +294,20 @@ def _weigh_coefficients(found: _Evidence, table: CoefficientTable, reading: Read
         factor = abs(file_factor(known_term(name), scales, rudder_to_port=False))
         z = (value - about.value) / error
         words = f"{name} = {value:.3g}, {abs(z):.0f} standard errors from {about.source.partition(',')[0]}"
-        found.add(_log_density(z), _log_density(0), words)
+        found.compare(z, words)
         found.total -= math.log(error * factor)
     of_length = scales.length if scales else 1.0
     if table.body.get("mass", 0.0) > 0:
         z = math.log(ship.body.mass / _mass(table)) / (_ASSUMED_MASS_ERROR if table.assumed else _MASS_ERROR)
-        found.add(_log_density(z), _log_density(0), f"mass {ship.body.mass / _mass(table):.3g} times the displacement")
+        found.compare(z, f"mass {ship.body.mass / _mass(table):.3g} times the displacement")
     if table.body.get("yaw_inertia", 0.0) > 0:
         radius = math.sqrt(max(ship.body.yaw_inertia / ship.body.mass, 1e-12))
         z = math.log(radius / 0.25) / 0.1
-        found.add(_log_density(z), _log_density(0), f"radius of gyration {radius:.3g} L")
+        found.compare(z, f"radius of gyration {radius:.3g} L")
     if table.body.get("x_G") and table.centre_of_gravity_m is None:
         centre = table.body["x_G"] / of_length
         z = centre / _CENTRE_ERROR
-        found.add(_log_density(z), _log_density(0), f"x_G = {centre:.3g} L")
+        found.compare(z, f"x_G = {centre:.3g} L")
         found.total -= math.log(_CENTRE_ERROR * of_length)
     _weigh_rudder(found, table, ship)
 
@@ -349,17 +320,13 @@ def _weigh_rudder(found: _Evidence, table: CoefficientTable, ship: ReadShip) -> 
         if Yd > 0:
             found.add(_WRONG_SIDE, 0.0, "a rudder to starboard pushes the stern to starboard")
         z = math.log(abs(Yd) / side) / _RUDDER_ERROR
-        found.add(
-            _log_density(z),
-            _log_density(0),
-            f"Yd = {Yd:.3g}, {abs(Yd) / side:.2g} of a rudder by the rules",
-        )
+        found.compare(z, f"Yd = {Yd:.3g}, {abs(Yd) / side:.2g} of a rudder by the rules")
     if Nd and not Yd:
         z = math.log(abs(Nd) / (side * _LEVER)) / _RUDDER_ERROR
-        found.add(_log_density(z), _log_density(0), f"Nd = {Nd:.3g}")
+        found.compare(z, f"Nd = {Nd:.3g}")
     if Yd and Nd:
         z = (-Nd / Yd - _LEVER) / _LEVER_ERROR
-        found.add(_log_density(z), _log_density(0), f"the rudder acts {Nd / Yd:.2g} L from midships")
+        found.compare(z, f"the rudder acts {Nd / Yd:.2g} L from midships")
 
 
 def _mass(table: CoefficientTable) -> float:
@@ -387,12 +354,7 @@ def _filled(table: CoefficientTable, ship: ReadShip) -> dict[str, float]:
 def linear_figures(derivatives: Mapping[str, float], body: RigidBody) -> tuple[float, float, float | None]:
     """C', growth of the faster mode of sway and yaw (U/L), and Norrbin's P (None without rudder forces).
 
-    Parameters
-    ----------
-    derivatives : mapping
-        Prime, about the origin of `body`, without inertia, rudder to starboard.
-    body : RigidBody
-        Prime.
+    `derivatives`: Prime, about the origin of `body`, without inertia, rudder to starboard; `body`: Prime.
     """
     d = {name: derivatives.get(name, 0.0) for name in ("Yv", "Yr", "Nv", "Nr", "Yd", "Nd")}
     a = {name: derivatives.get(name, 0.0) for name in ("Yvdot", "Yrdot", "Nvdot", "Nrdot")}
@@ -425,11 +387,7 @@ def with_probabilities(readings: Sequence[RankedReading]) -> list[RankedReading]
 def with_diameter(ranked: RankedReading, diameter_lengths: float | None) -> RankedReading:
     """A reading whose weight takes the tactical diameter at 35 deg into account.
 
-    Parameters
-    ----------
-    ranked : RankedReading
-    diameter_lengths : float or None
-        Over L; None if the ship never turned so far.
+    `diameter_lengths`: Over L; None if the ship never turned so far.
     """
     if diameter_lengths is None:
         words = "does not turn through 180 deg at 35 deg of rudder"
@@ -445,34 +403,29 @@ def read_card_text(table: CoefficientTable, ranked: RankedReading) -> str:
     Accelerations that the table lacks are the estimates of :mod:`tank2sim.cards.estimates`, and said so.
     """
     filled, ship = _filled(table, ranked.ship), ranked.ship
-    third = any(
-        name in filled and sum(known_term(name).powers.values()) > 1 and known_term(name).force != "X"
-        for name in filled
-    )
+    third = any(sum(known_term(name).powers.values()) > 1 and known_term(name).force != "X" for name in filled)
     read = ", ".join(f"{key} {value}" for key, value in vars(ranked.reading).items())
+    sizes = {key: getattr(table, key) for key in ("length_m", "beam_m", "draught_m", "displacement_kg")}
+    if table.rudder_area_m2 is not None:
+        sizes["rudder_area_m2"] = table.rudder_area_m2
+    source = f"{Path(table.source).name}, read as: {read} (probability {ranked.probability:.2g})"
+    derivatives = {name: tomlkit.item(float(f"{value:.8g}")) for name, value in filled.items() if value}
+    for name in derivatives.keys() - table.derivatives.keys() - ship.derivatives.keys():
+        derivatives[name].comment("ESTIMATED: the table has none")
     document = tomlkit.document()
-    document["format"] = "tank2sim-ship/1"
-    particulars = tomlkit.table()
-    particulars["name"] = f"{Path(table.source).stem}"
-    for key in ("length_m", "beam_m", "draught_m", "displacement_kg", "rudder_area_m2"):
-        if (value := getattr(table, key)) is not None:
-            particulars[key] = value
-    particulars["source"] = f"{Path(table.source).name}, read as: {read} (probability {ranked.probability:.2g})"
-    environment = tomlkit.table()
-    environment["water_density_kgpm3"] = table.environment.water_density_kgpm3
-    model = tomlkit.table()
-    model["kind"], model["speed_mps"], model["scaling"] = "abkowitz" if third else "linear", table.speed_mps, "prime"
-    model["speed_scale"] = _speed_scale(table)
-    model["yaw_rate_terms"] = "hydrodynamic"
-    model["rudder_sign"] = "starboard"
-    body, derivatives = tomlkit.table(), tomlkit.table()
-    for key, value in ship.body.model_dump().items():
-        body[key] = float(f"{value:.8g}")
-    for name, value in filled.items():
-        if value:
-            derivatives[name] = float(f"{value:.8g}")
-            if name not in table.derivatives and name not in ship.derivatives:
-                derivatives[name].comment("ESTIMATED: the table has none")
-    document |= {"ship": particulars, "environment": environment, "model": model}
-    document |= {"rigid_body": body, "derivatives": derivatives}
+    document |= {
+        "format": "tank2sim-ship/1",
+        "ship": {"name": Path(table.source).stem, **sizes, "source": source},
+        "environment": {"water_density_kgpm3": table.environment.water_density_kgpm3},
+        "model": {
+            "kind": "abkowitz" if third else "linear",
+            "speed_mps": table.speed_mps,
+            "scaling": "prime",
+            "speed_scale": _speed_scale(table),
+            "yaw_rate_terms": "hydrodynamic",
+            "rudder_sign": "starboard",
+        },
+        "rigid_body": {key: float(f"{value:.8g}") for key, value in ship.body.model_dump().items()},
+        "derivatives": derivatives,
+    }
     return tomlkit.dumps(document)

@@ -25,20 +25,14 @@ from typing import Literal
 
 import numpy as np
 
-from tank2sim.apps.programs.polynomial_fit import FigureChange
 from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.craft_terms import CRAFT_ADDED_MASSES, VELOCITY_TERMS
 from tank2sim.cards.form import ThrusterSection
-from tank2sim.cards.small_craft import cruising_revolutions
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import added_mass_forces
-from tank2sim.errors import ArgumentError, InputError
+from tank2sim.errors import ArgumentError
 from tank2sim.escaping import xml_comment
-from tank2sim.simulation.card_range import single_figures
-from tank2sim.simulation.integrator import Integrator
-from tank2sim.simulation.run import simulate
-from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, Spin, StraightRun
 
 VRX_TERMS = {"Xu": "xU", "Xuabsu": "xUU", "Yv": "yV", "Yvabsv": "yVV", "Nr": "nR", "Nrabsr": "nRR"}
 """Derivative to its name in VRX, where it is positive for damping."""
@@ -46,9 +40,6 @@ VRX_TERMS = {"Xu": "xU", "Xuabsu": "xUU", "Yv": "yV", "Yvabsv": "yVV", "Nr": "nR
 VRX_MASSES = {"Xudot": "xDotU", "Yvdot": "yDotV", "Nrdot": "nDotR"}
 
 _NUMBER = "{:.10g}"
-_DIFFERENCE, _SPIN = 0.3, 0.7
-"""Difference of a turn and revolutions of a spin, over the cruising revolutions, with which forms are compared: a wide
-turn and a spin within the reach of any craft (project choice)."""
 
 
 def gazebo_name(name: str) -> str:
@@ -68,10 +59,7 @@ def gazebo_name(name: str) -> str:
 def coriolis_products(derivatives: Mapping[str, float]) -> dict[str, float]:
     """-C_A nu (:func:`.added_mass_forces`) as coefficients of products of velocities: ``xVR``, ``yUR``, ``nUV``, ...
 
-    Parameters
-    ----------
-    derivatives : mapping
-        ``Xudot Yvdot Yrdot Nvdot``, kg and kg m; absent means 0.
+    `derivatives`: ``Xudot Yvdot Yrdot Nvdot``, kg and kg m; absent means 0.
     """
     known = {name: derivatives.get(name, 0.0) for name in CRAFT_ADDED_MASSES}
     products: dict[str, float] = {}
@@ -100,10 +88,6 @@ def growth_per_step(card: SteeredCard) -> float:
     The largest root z of ``z^2 I - z (I - dt M^-1 D - M^-1 A) - M^-1 A = 0``, with the rigid mass M and the added mass
     A about the origin of the link, and the slope D of the damping at the highest speed of the card. Without damping it
     is the largest eigenvalue of M^-1 A, or 1; above 1 the velocity has no bound, at any step dt.
-
-    Parameters
-    ----------
-    card : SteeredCard
     """
     body, known = card.rigid_body, card.derivatives
     lever = body.mass * body.x_G
@@ -127,15 +111,7 @@ def growth_per_step(card: SteeredCard) -> float:
 def place_of_added_mass(card: SteeredCard, wanted: AddedMass | None) -> AddedMass:
     """Where the added mass of a craft goes: as `wanted`, by default into the plugin where that is stable.
 
-    Parameters
-    ----------
-    card : SteeredCard
-    wanted : str, optional
-
-    Raises
-    ------
-    InputError
-        It is wanted in the plugin, and an error would grow there.
+    Raises InputError: It is wanted in the plugin, and an error would grow there.
     """
     growth = growth_per_step(card)
     if wanted == "plugin" and growth >= 1:
@@ -161,16 +137,9 @@ def _inertial(card: SteeredCard) -> list[str]:
     ]
 
 
-def gazebo_text(card: SteeredCard, added_mass: AddedMass | None = None) -> str:
-    """SDF of the plugins of a craft for Gazebo: hydrodynamics, and one thruster each.
-
-    Parameters
-    ----------
-    card : SteeredCard
-    added_mass : str, optional
-        As of :func:`place_of_added_mass`.
-    """
-    derivatives, in_plugin = card.derivatives, place_of_added_mass(card, added_mass) == "plugin"
+def gazebo_text(card: SteeredCard, place: AddedMass) -> str:
+    """SDF of the plugins of a craft for Gazebo: hydrodynamics, and one thruster each."""
+    derivatives, in_plugin = card.derivatives, place == "plugin"
     hull = {
         gazebo_name(name): value
         for name, value in derivatives.items()
@@ -215,16 +184,9 @@ def _joint(thruster: ThrusterSection) -> str:
     return f"x {thruster.x_m:g}, y {-thruster.y_m + 0.0:g} m (to port), axis of the joint {axis}"
 
 
-def vrx_text(card: SteeredCard, added_mass: AddedMass | None = None) -> str:
-    """SDF of VRX's SimpleHydrodynamics for a craft.
-
-    Parameters
-    ----------
-    card : SteeredCard
-    added_mass : str, optional
-        As of :func:`place_of_added_mass`.
-    """
-    in_plugin = place_of_added_mass(card, added_mass) == "plugin"
+def vrx_text(card: SteeredCard, place: AddedMass) -> str:
+    """SDF of VRX's SimpleHydrodynamics for a craft."""
+    in_plugin = place == "plugin"
     masses = {VRX_MASSES[name]: -card.derivatives.get(name, 0.0) if in_plugin else 0.0 for name in VRX_MASSES}
     damping = {VRX_TERMS[name]: 0.0 - card.derivatives.get(name, 0.0) for name in VRX_TERMS}
     lines = [
@@ -250,16 +212,9 @@ def _head(card: SteeredCard, where: str) -> list[str]:
     ]
 
 
-def vrx_model(card: SteeredCard, added_mass: AddedMass | None = None) -> Model:
-    """The model of a craft with the terms of VRX's plugin: six of damping, no effects, and C_A with the inertia alone.
-
-    Parameters
-    ----------
-    card : SteeredCard
-    added_mass : str, optional
-        As of :func:`place_of_added_mass`.
-    """
-    inertial = place_of_added_mass(card, added_mass) == "inertial"
+def vrx_model(card: SteeredCard, place: AddedMass) -> Model:
+    """The model of a craft with the terms of VRX's plugin: six of damping, no effects; C_A with the inertia alone."""
+    inertial = place == "inertial"
     kept = {*VRX_TERMS, *(CRAFT_ADDED_MASSES if inertial else VRX_MASSES)}
     derivatives = {name: value for name, value in card.derivatives.items() if name in kept}
     model = build(replace(card, derivatives=derivatives, effects=()))
@@ -270,28 +225,3 @@ def vrx_model(card: SteeredCard, added_mass: AddedMass | None = None) -> Model:
     for force, value in zip("XYN", added_mass_forces(added, *motion), strict=True):
         model = model.redefine(f"force.{force}", lambda old, value=value: old - value)  # type: ignore[misc]
     return model
-
-
-def gazebo_model(card: SteeredCard, _: AddedMass | None = None) -> Model:
-    """The model of a craft with what Gazebo's plugin has of it: the whole hull, without effects."""
-    return build(replace(card, effects=()))
-
-
-def craft_changes(card: SteeredCard, model: Model, integrator: Integrator | None = None) -> tuple[FigureChange, ...]:
-    """Figures of a straight run, a turn and a spin of a card, and of another `model` of the same craft."""
-    n = cruising_revolutions(card)
-    before = build(card)
-    found = []
-    for manoeuvre in (StraightRun(n), DifferenceTurn(_DIFFERENCE * n), Spin(_SPIN * n)):
-        try:
-            runs = [
-                simulate(before, manoeuvre).figures,
-                simulate(model, manoeuvre, integrator=integrator).figures,
-            ]
-        except InputError:
-            continue  # thrusters that are not on both sides, or do not reverse as far
-        first, second = map(single_figures, runs)
-        for name, value in first.items():
-            if not name.endswith(("_lengths", "_percent")):
-                found.append(FigureChange(manoeuvre.words, name, value, second.get(name)))
-    return tuple(found)

@@ -1,7 +1,7 @@
 """A ship or craft as a body of xdyn: its forces as expressions, its mass matrices, and commands for manoeuvres.
 
 ``centre of inertia`` is the origin, midships, and m x_G is in the matrix: xdyn then solves the card's own equations.
-Heave, roll and pitch are blocked, unless the card's ship rolls (:mod:`tank2sim.apps.programs.xdyn_roll`). xdyn gives a
+Heave, roll and pitch are blocked, unless the card's ship rolls (:mod:`tank2sim.apps.programs.xdyn_body`). xdyn gives a
 body no states of its own: rudder, engine and whatever else has a lag are commands, with the history of tank2sim's own
 run.
 """
@@ -13,9 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
-from tank2sim.apps.programs.polynomial_fit import figure_changes
-from tank2sim.apps.programs.program_files import ProgramFiles
-from tank2sim.apps.programs.robotics import craft_changes
+from tank2sim.apps.programs.program_files import ProgramFiles, figure_changes
 from tank2sim.apps.programs.xdyn_body import XdynBody, read_back, values_at, written_body
 from tank2sim.arrays import Array
 from tank2sim.cards import Card, SteeredBy, SteeredCard
@@ -46,14 +44,7 @@ _ON_LINE = 1e-9
 def xdyn_files(card: Card) -> ProgramFiles:
     """A ship or craft as files of xdyn: ``ship.yml``, and ``turn_commands.yml`` and ``zigzag_commands.yml`` of a ship.
 
-    Parameters
-    ----------
-    card : Card
-
-    Raises
-    ------
-    InputError
-        The card is none of a ship or craft that manoeuvres, or an effect has no expression in xdyn.
+    Raises InputError: The card is none of a ship or craft that manoeuvres, or an effect has no expression in xdyn.
     """
     given = card.steered()
     model = build(given)
@@ -64,11 +55,13 @@ def xdyn_files(card: Card) -> ProgramFiles:
     except ValueError as error:
         raise given.fault("effects", f"cannot be written: {error}", "leave the effect out") from None
     after = read_back(model, body)
-    changes = craft_changes(given, after) if given.steered_by is SteeredBy.THRUSTERS else figure_changes(model, after)
     files = {"ship.yml": ship_text(given, body, first)}
     files |= {f"{name}_commands.yml": _commands_text(name, body, run) for name, run in runs.items()}
     return ProgramFiles(
-        files=files, use=_use(files, model, body), losses=tuple(_losses(model, after, body, first)), changes=changes
+        files=files,
+        use=_use(files, model, body),
+        losses=tuple(_losses(model, after, body, first)),
+        changes=figure_changes(given, model, after),
     )
 
 

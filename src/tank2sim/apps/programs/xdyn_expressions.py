@@ -12,9 +12,11 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
+
+from tank2sim.native.operations import FUNCTIONS, instructions
 
 _ADD, _MUL, _POW, _ATOM = range(4)
 _INLINE = 3
@@ -37,23 +39,12 @@ XDYN_STATES = {f"motion.{name}": f"{name}(t)" for name in "x y psi u v r phi p".
 
 @dataclass(frozen=True)
 class XdynTerm:
-    """An expression as text.
-
-    Parameters
-    ----------
-    text : str
-    level : int
-        How tightly its last operation binds: 0 sum, 1 product, 2 power, 3 name, number or call.
-    weight : int
-        Number of operations.
-    opposite : XdynTerm, optional
-        If the text is ``0 - a``: a.
-    """
+    """An expression as text."""
 
     text: str
-    level: int = _ATOM
-    weight: int = 0
-    opposite: XdynTerm | None = None
+    level: int = _ATOM  # How tightly its last operation binds: 0 sum, 1 product, 2 power, 3 name, number or call
+    weight: int = 0  # Number of operations
+    opposite: XdynTerm | None = None  # If the text is ``0 - a``: a
 
     def within(self, level: int) -> str:
         """The text, in brackets if it binds less tightly than `level`."""
@@ -117,17 +108,8 @@ _UNARY: Mapping[int, Callable[[XdynTerm], XdynTerm]] = {
     ca.OP_SQ: lambda a: _power(a, _TWO),
     ca.OP_TWICE: lambda a: _product(_TWO, a),
     ca.OP_INV: lambda a: _quotient(_ONE, a),
-    **{
-        op: _called(word)
-        for op, word in (
-            (ca.OP_COS, "cos"),
-            (ca.OP_SIN, "sin"),
-            (ca.OP_EXP, "exp"),
-            (ca.OP_FABS, "abs"),
-            (ca.OP_LOG, "log"),
-            (ca.OP_SQRT, "sqrt"),
-        )
-    },
+    **{op: _called(FUNCTIONS[op]) for op in (ca.OP_COS, ca.OP_SIN, ca.OP_EXP, ca.OP_LOG, ca.OP_SQRT)},
+    ca.OP_FABS: _called("abs"),
 }
 _BINARY: Mapping[int, Callable[[XdynTerm, XdynTerm], XdynTerm]] = {
     ca.OP_ADD: _sum,
@@ -144,18 +126,10 @@ _TRUTHS = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP_O
 
 @dataclass
 class Definitions:
-    """Named expressions in an order in which each uses only those before it.
+    """Named expressions in an order in which each uses only those before it."""
 
-    Parameters
-    ----------
-    taken : set of str
-        Names that are in use.
-    texts : dict
-        Name to expression.
-    """
-
-    taken: set[str] = field(default_factory=lambda: set(RESERVED))
-    texts: dict[str, str] = field(default_factory=dict)
+    taken: set[str] = field(default_factory=lambda: set(RESERVED))  # Names that are in use
+    texts: dict[str, str] = field(default_factory=dict)  # Name to expression
 
     def new_name(self, wanted: str) -> str:
         """A name of letters, digits and underscores that resembles `wanted` and is not in use, which it then is."""
@@ -257,19 +231,10 @@ class Definitions:
     ) -> None:
         """Define expressions of `symbols`, which are spelt `spelt`; parts that are used often get names, too.
 
-        Parameters
-        ----------
-        symbols : sequence of casadi.SX
-        spelt : sequence of str
-        wanted : mapping
-            Name to expression; each may hold symbols that are spelt as a name before it.
-        numbers : mapping
-            Spelling of constants to their value: longer terms of these alone become numbers.
+        `wanted`: Name to expression; each may hold symbols that are spelt as a name before it; `numbers`: Spelling of
+        constants to their value: longer terms of these alone become numbers.
 
-        Raises
-        ------
-        ValueError
-            An operation has no spelling in xdyn.
+        Raises ValueError: An operation has no spelling in xdyn.
         """
         function = ca.Function("f", [ca.vcat(symbols)], list(wanted.values()), {"cse": True})
         nodes, names = _nodes(function), list(wanted)
@@ -288,7 +253,7 @@ class Definitions:
                 term = XdynTerm(spelt[node.place])
                 fixed = term.text in numbers
             elif node.op == ca.OP_CONST:
-                term = number_term(function.instruction_constant(k))
+                term = number_term(node.constant)
             else:
                 before = len(self.texts)
                 term = self._operation(nodes, k, stem, into)
@@ -325,46 +290,39 @@ class Definitions:
         return number_term(float(read_expressions({**parts, "folded value": term.text}, numbers)["folded value"]))
 
 
-@dataclass(frozen=True)
-class _Node:
+class _Node(NamedTuple):
     """An instruction of a function: its operation, its sources and the output for which it is, all by their number."""
 
     op: int
     sources: tuple[int, ...]
     place: int
     output: int
+    constant: float
 
 
 def _nodes(function: ca.Function) -> list[_Node]:
     """The instructions of a function of one vector."""
-    outputs, following = [], 0
-    for k in reversed(range(function.n_instructions())):
-        if function.instruction_id(k) == ca.OP_OUTPUT:
-            following = function.instruction_output(k)[0]
-        outputs.append(following)
+    steps = list(instructions(function))
+    outputs, following = [0] * len(steps), 0
+    for k in reversed(range(len(steps))):
+        following = steps[k].to[0] if steps[k].operation == ca.OP_OUTPUT else following
+        outputs[k] = following
     nodes: list[_Node] = []
     made: dict[int, int] = {}
-    for k, output in enumerate(reversed(outputs)):
-        op, out, into = function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
-        if op in (ca.OP_INPUT, ca.OP_CONST):
-            sources: tuple[int, ...] = ()
-        else:
-            sources = tuple(made[place] for place in (into[:1] if op == ca.OP_OUTPUT else into))
+    for k, (op, to, given, constant) in enumerate(steps):
+        known = () if op in (ca.OP_INPUT, ca.OP_CONST) else given[:1] if op == ca.OP_OUTPUT else given
+        sources = tuple(made[place] for place in known)
         if op != ca.OP_OUTPUT:
-            made[out[0]] = k
-        nodes.append(_Node(op, sources, into[1] if op == ca.OP_INPUT else 0, output))
+            made[to[0]] = k
+        nodes.append(_Node(op, sources, given[1] if op == ca.OP_INPUT else 0, outputs[k], constant))
     return nodes
 
 
 def read_expressions(texts: Mapping[str, str], known: Mapping[str, Any]) -> dict[str, ca.SX]:
     """The values of written expressions, read back: each in names of `known` or of those before it.
 
-    Parameters
-    ----------
-    texts : mapping
-        Name to expression.
-    known : mapping
-        ``u`` and the other states to a function of time, commands and numbers to their symbol or value.
+    `texts`: Name to expression; `known`: ``u`` and the other states to a function of time, commands and numbers to
+    their symbol or value.
     """
     functions = {"cos": ca.cos, "sin": ca.sin, "exp": ca.exp, "abs": ca.fabs, "log": ca.log, "sqrt": ca.sqrt}
     values: dict[str, Any] = {"__builtins__": {}, **functions, **known}

@@ -5,21 +5,21 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import chdtrc
 
-from tank2sim.cards.terms import parse_term
+from tank2sim.cards.terms import known_term
 from tank2sim.errors import InputError
-from tank2sim.identification.captive.cross_validation import LeftOut, leave_one_out
 from tank2sim.identification.captive.equations import campaign_equations, excited
 from tank2sim.identification.captive.harmonics import ReducedRun
-from tank2sim.identification.captive.regression import Spread, solve
+from tank2sim.identification.captive.regression import LeftOut, Spread, leave_one_out, solve
 from tank2sim.identification.captive.selection import Selection, distinguishable_equations, usual_zero, with_prior
 from tank2sim.identification.conditioning import COLLINEAR
 from tank2sim.records.campaign_form import OSCILLATING
-from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign
+from tank2sim.records.campaigns import Campaign
+from tank2sim.records.captive_record import FORCE_COLUMNS
 
 _TIMES_USUAL = 8.0
 """Least misfit of a contradicted run, in those usual in the campaign. Sound runs of synthetic campaigns reach 6 with
@@ -43,11 +43,6 @@ def contradicted(campaign: Campaign, runs: Sequence[ReducedRun]) -> dict[str, In
     A dead gauge with noise, or a wrong unit or sign in a single run, distorts the least squares of the whole campaign,
     and its small scatter may even give it the greatest weight. Therefore each run is compared with the others at equal
     weights, and the worst is removed before the next comparison.
-
-    Parameters
-    ----------
-    runs : sequence of ReducedRun
-        The runs used for the derivatives.
     """
     found: dict[str, InputError] = {}
     for force in FORCE_COLUMNS:
@@ -84,34 +79,18 @@ def _worst(campaign: Campaign, runs: Sequence[ReducedRun], force: str) -> tuple[
 def _levelled(runs: Sequence[ReducedRun], force: str) -> list[ReducedRun]:
     """The runs with the campaign's median noise, because small scatter does not make a run more credible."""
     usual = float(np.median(np.concatenate([run.fits[force].density for run in runs])))
-    levelled = []
-    for run in runs:
-        fit = run.fits[force]
-        ratio = np.sqrt(usual / fit.density)
-        same = replace(
-            fit, density=np.full_like(fit.density, usual), covariance=fit.covariance * np.outer(ratio, ratio)
-        )
-        levelled.append(replace(run, fits={**run.fits, force: same}))
-    return levelled
+    return [run.with_density(force, np.full_like(run.fits[force].density, usual)) for run in runs]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Asymmetry:
-    """Test of the symmetry of (3.8) for one force.
+    """Test of the symmetry of (3.8) for one force."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        Terms of the opposite parity that the campaign excites.
-    values, standard_errors : tuple of float
-        Prime, with all of them in addition to the terms of the result.
-    chance : float
-        Probability of values as large as these together if the symmetry holds (Wald's test); 1 without terms.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # Terms of the opposite parity that the campaign excites
+    # `values`, `standard_errors`: Prime, with all of them in addition to the terms of the result
     values: tuple[float, ...]
     standard_errors: tuple[float, ...]
+    # Probability of values as large as these together if the symmetry holds (Wald's test); 1 without terms
     chance: float
 
 
@@ -126,8 +105,7 @@ def asymmetry(campaign: Campaign, selection: Selection) -> Asymmetry:
     kept, prior = selection.equations.names, selection.equations.prior
     excited_terms: list[str] = []
     for powers in _OPPOSITE_PARITY[force]:
-        term = parse_term(force + powers)
-        assert term is not None
+        term = known_term(force + powers)
         if not excited(campaign, runs, term):
             continue
         trial = campaign_equations(campaign, runs, force, [*kept, *excited_terms, term.name]).held(prior)
@@ -151,21 +129,11 @@ _RELATIVE = 0.02
 
 @dataclass(frozen=True, kw_only=True)
 class Repeats:
-    """Repeats of one campaign.
+    """Repeats of one campaign."""
 
-    Parameters
-    ----------
-    groups : tuple of tuple of str
-        Names of the runs of the same test.
-    deviation : mapping
-        Force to the standard deviation of a run's mean within the groups, prime.
-    freedom : int
-        Degrees of freedom of the deviations.
-    """
-
-    groups: tuple[tuple[str, ...], ...]
-    deviation: Mapping[str, float]
-    freedom: int
+    groups: tuple[tuple[str, ...], ...]  # Names of the runs of the same test
+    deviation: Mapping[str, float]  # Force to the standard deviation of a run's mean within the groups, prime
+    freedom: int  # Degrees of freedom of the deviations
 
 
 def repeats(campaign: Campaign, runs: Sequence[ReducedRun]) -> Repeats | None:
@@ -181,7 +149,10 @@ def repeats(campaign: Campaign, runs: Sequence[ReducedRun]) -> Repeats | None:
     for force in FORCE_COLUMNS:
         total = 0.0
         for group in groups:
-            means = [_mean(campaign, run, force) for run in group]
+            means = [
+                float(run.fits[force].coefficients[0] / campaign.scales_at(run.motion.mean_speed_mps).unit(force))
+                for run in group
+            ]
             centre = sum(means) / len(means)
             total += sum((mean - centre) ** 2 for mean in means)
         deviation[force] = math.sqrt(total / freedom)
@@ -210,7 +181,3 @@ def _test(campaign: Campaign, run: ReducedRun) -> tuple[object, ...]:
         heel,
         *(round(math.log(step) / _RELATIVE) for step in steps if step > 0),
     )
-
-
-def _mean(campaign: Campaign, run: ReducedRun, force: str) -> float:
-    return float(run.fits[force].coefficients[0] / campaign.scales_at(run.motion.mean_speed_mps).unit(force))

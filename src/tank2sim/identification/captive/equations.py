@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
 from tank2sim.cards.scaling import Scales
-from tank2sim.cards.terms import Term, parse_term
+from tank2sim.cards.terms import Term, known_term
 from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS, ACCELERATION_TERMS
 from tank2sim.dynamics.rigid_body import inertia, inertial_forces
 from tank2sim.errors import InputError
@@ -43,50 +43,26 @@ def candidate_terms(force: str, *, heeled: bool = False) -> tuple[Term, ...]:
     """Terms of (3.8) and acceleration terms of one force, in their order; with `heeled` last those of the heel."""
     names = (*ABKOWITZ_TERMS[force], *(name for name in ACCELERATION_TERMS if name[0] == force))
     names += HEEL_TERMS[force] if heeled else ()
-    return tuple(term for term in map(parse_term, names) if term is not None)
+    return tuple(map(known_term, names))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CampaignEquations:
-    """Weighted equations of one force over a campaign: rows are coefficients of runs, columns are terms.
+    """Weighted equations of one force over a campaign: rows are coefficients of runs, columns are terms."""
 
-    Parameters
-    ----------
-    force : str
-        ``X``, ``Y`` or ``N``.
-    names : tuple of str
-        Names of the columns.
-    design : array, (rows, columns)
-        Each run's block is multiplied by the inverse root of its within-run covariance.
-    values : array, (rows,)
-        The water's force, weighted in the same way.
-    zero : array, (rows,)
-        Effect of a zero error of 1 common to a run, weighted.
-    gauge : array, (rows,)
-        The gauge's force, with the reaction of the body's inertia, weighted: the effect of a gain error of 1 common to
-        a run.
-    run_of_row : array of int, (rows,)
-        Index of each row's run in `runs`.
-    runs : tuple of ReducedRun
-        The runs.
-    unit : float
-        Force or moment by which rows are made non-dimensional before weighting, N or N m.
-    roots : tuple of array
-        Cholesky root of each run's within-run covariance, in `unit`.
-    prior : mapping
-        Term to the standard deviation (prime) of its prior about zero; other terms are free.
-    """
-
-    force: str
-    names: tuple[str, ...]
-    design: Array
-    values: Array
-    zero: Array
+    force: str  # ``X``, ``Y`` or ``N``
+    names: tuple[str, ...]  # Names of the columns
+    design: Array  # (rows, columns): Each run's block is multiplied by the inverse root of its within-run covariance
+    values: Array  # (rows,): The water's force, weighted in the same way
+    zero: Array  # (rows,): Effect of a zero error of 1 common to a run, weighted
+    # (rows,): The gauge's force, with the reaction of the body's inertia, weighted: the effect of a gain error of 1
+    # common to a run
     gauge: Array
-    run_of_row: NDArray[np.int64]
-    runs: tuple[ReducedRun, ...]
-    unit: float
-    roots: tuple[Array, ...]
+    run_of_row: NDArray[np.int64]  # (rows,): Index of each row's run in `runs`
+    runs: tuple[ReducedRun, ...]  # The runs
+    unit: float  # Force or moment by which rows are made non-dimensional before weighting, N or N m
+    roots: tuple[Array, ...]  # Cholesky root of each run's within-run covariance, in `unit`
+    # Term to the standard deviation (prime) of its prior about zero; other terms are free
     prior: Mapping[str, float] = field(default_factory=dict)
 
     def held(self, prior: Mapping[str, float]) -> CampaignEquations:
@@ -147,10 +123,7 @@ def campaign_equations(
 ) -> CampaignEquations:
     """The equations of a force for the named terms (or trend terms, ``Yv w2``).
 
-    Raises
-    ------
-    InputError
-        The inertia of a yaw run must be removed and the campaign does not give it.
+    Raises InputError: The inertia of a yaw run must be removed and the campaign does not give it.
     """
     scales = campaign.scales
     unit = scales.unit(force)
@@ -246,8 +219,7 @@ def _projected_terms(
 def term_history(campaign: Campaign, motion: CaptiveMotion, name: str) -> Array:
     """Force of a term whose prime value is 1, (rows,), N or N m."""
     spelt, _, trend = name.partition(" ")
-    term = parse_term(spelt)
-    assert term is not None
+    term = known_term(spelt)
     model, u0 = campaign.model, campaign.test.speed_mps
     density, length = campaign.test.water_density_kgpm3, model.length_m
     if term.acceleration:

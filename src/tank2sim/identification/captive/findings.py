@@ -8,17 +8,16 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from tank2sim.cards.plausibility import Caution
 from tank2sim.identification.captive.consistency import repeats
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.oscillation import cubic_findings
 from tank2sim.identification.captive.reduction import ForceResult, Reduction, is_resistance
 from tank2sim.identification.captive.regression import moved_terms
 from tank2sim.identification.captive.systematic import can_show_delay, correct_delay
-from tank2sim.identification.captive.tank_conditions import Tank, tank_resonance, tank_size
+from tank2sim.identification.captive.tank_conditions import tank_resonance, tank_size
 from tank2sim.identification.captive.warnings import OscillationMotion, cautions_of_result, cautions_of_test
 from tank2sim.notices import Notice, caution
-from tank2sim.records.campaigns import FORCE_COLUMNS
+from tank2sim.records.captive_record import FORCE_COLUMNS, FORCE_UNITS_SI
 
 _SHEET = 0.05
 _DRIFT = 0.02
@@ -39,7 +38,10 @@ def reduction_findings(reduction: Reduction) -> tuple[Notice, ...]:
         *_omitted_runs(reduction),
         *reduction.campaign.remarks,
         *_missing(reduction),
-        *_physics(reduction),
+        *(
+            Notice(f"{doubt.message}{f' Runs: {_listed(doubt.runs)}.' if doubt.runs else ''}")
+            for doubt in cautions_of_test(reduction.campaign, _oscillating(reduction))
+        ),
         *_conventions(reduction),
         *_alignment(reduction),
         *_unchecked(reduction),
@@ -59,10 +61,12 @@ def implausible(reduction: Reduction) -> tuple[Notice, ...]:
     cautions = cautions_of_result(values, errors, reduction.campaign)
     found = [error.message for error in reduction.systematic] + [each.message for each in cautions]
     found += [*drifting_zeros(reduction.runs)]
-    campaign, resonant = reduction.campaign, [run for each in _resonances(reduction) for run in each.runs]
+    campaign = reduction.campaign
+    resonances = tank_resonance(_oscillating(reduction), campaign.tank, campaign.test.gravity_mps2)
+    resonant = [run for each in resonances for run in each.runs]
     if reduction.systematic and resonant:
         found.append(f"standing waves of the tank would do the same to {_listed(resonant)}: compare without them.")
-    found += [each.message for each in tank_size(Tank(campaign.tank.breadth_m, campaign.tank.depth_m))]
+    found += [each.message for each in tank_size(campaign.tank)]
     return tuple(map(caution, found))
 
 
@@ -78,11 +82,10 @@ def drifting_zeros(runs: Sequence[ReducedRun]) -> Iterator[str]:
         middle, size = float(np.median(drifts)), float(np.sqrt(np.mean(np.square(means))))
         scatter = float(np.std(drifts)) / math.sqrt(len(drifts))
         if abs(middle) > max(2 * _DRIFT * size, _SURE * scatter):
-            unit = "N m" if force == "N" else "N"
             yield (
-                f"the zero of the {force} gauge drifts by {abs(middle):.3g} {unit} within a run (median of {len(runs)}"
-                f"), {100 * abs(middle) / size:.2g} % of the mean force: take the zeros before and after each run and "
-                "correct the records; standard errors do not hold it."
+                f"the zero of the {force} gauge drifts by {abs(middle):.3g} {FORCE_UNITS_SI[force]} within a run "
+                f"(median of {len(runs)}), {100 * abs(middle) / size:.2g} % of the mean force: take the zeros before "
+                "and after each run and correct the records; standard errors do not hold it."
             )
 
 
@@ -125,16 +128,6 @@ def _oscillating(reduction: Reduction) -> tuple[OscillationMotion, ...]:
         OscillationMotion(row.run, "sway" if row.letter == "v" else "yaw", row.frequency_radps)
         for row in reduction.oscillations
     )
-
-
-def _resonances(reduction: Reduction) -> Iterator[Caution]:
-    tank, gravity = reduction.campaign.tank, reduction.campaign.test.gravity_mps2
-    return tank_resonance(_oscillating(reduction), Tank(tank.breadth_m, tank.depth_m), gravity)
-
-
-def _physics(reduction: Reduction) -> Iterator[Notice]:
-    for doubt in cautions_of_test(reduction.campaign, _oscillating(reduction)):
-        yield Notice(f"{doubt.message}{f' Runs: {_listed(doubt.runs)}.' if doubt.runs else ''}")
 
 
 def _conventions(reduction: Reduction) -> Iterator[Notice]:

@@ -18,7 +18,7 @@ from scipy.special import digamma, polygamma
 
 from tank2sim.arrays import Array
 from tank2sim.identification.captive.motion import CaptiveMotion, harmonic_basis, run_motion
-from tank2sim.records.campaigns import FORCE_COLUMNS, CaptiveRun
+from tank2sim.records.captive_record import FORCE_COLUMNS, CaptiveRun
 
 FORCE_HARMONICS = 5
 """Harmonics of the forces that are fitted."""
@@ -32,46 +32,24 @@ _FLOOR = 1e-6
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class HarmonicFit:
-    """Harmonics of one force in one run.
+    """Harmonics of one force in one run."""
 
-    Parameters
-    ----------
-    coefficients : array, (columns,)
-        In the order of :attr:`ReducedRun.labels`, N or N m, hydrodynamic sense, as measured.
-    covariance : array, (columns, columns)
-        Covariance of noise within the run, without the zero error of the run.
-    density : array, (columns,)
-        Variance of white noise that would disturb each coefficient as much.
-    freedom : array, (columns,)
-        Degrees of freedom of each density.
-    """
-
+    # (columns,): In the order of :attr:`ReducedRun.labels`, N or N m, hydrodynamic sense, as measured
     coefficients: Array
-    covariance: Array
-    density: Array
-    freedom: Array
+    covariance: Array  # (columns, columns): Covariance of noise within the run, without the zero error of the run
+    density: Array  # (columns,): Variance of white noise that would disturb each coefficient as much
+    freedom: Array  # (columns,): Degrees of freedom of each density
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ReducedRun:
-    """A run reduced to harmonics.
+    """A run reduced to harmonics."""
 
-    Parameters
-    ----------
-    run : CaptiveRun
-        The record.
-    motion : CaptiveMotion
-        Smooth motion of the run.
-    labels : tuple of str
-        ``mean``, ``cos 1``, ``sin 1``, ..., and last ``trend`` (by the time over half the record's length).
-    fits : mapping
-        ``X``, ``Y``, ``N`` to its fit.
-    """
-
-    run: CaptiveRun
-    motion: CaptiveMotion
+    run: CaptiveRun  # The record
+    motion: CaptiveMotion  # Smooth motion of the run
+    # ``mean``, ``cos 1``, ``sin 1``, ..., and last ``trend`` (by the time over half the record's length)
     labels: tuple[str, ...]
-    fits: Mapping[str, HarmonicFit]
+    fits: Mapping[str, HarmonicFit]  # ``X``, ``Y``, ``N`` to its fit
 
     @property
     def regressed(self) -> int:
@@ -91,6 +69,13 @@ class ReducedRun:
     def residual(self, force: str) -> Array:
         """Record less fit, (rows,), N or N m."""
         return self.run.force(force)[self.motion.kept] - self.fitted(force)
+
+    def with_density(self, force: str, density: Array) -> ReducedRun:
+        """The run with another density of the noise of a force, (columns,)."""
+        fit = self.fits[force]
+        ratio = np.sqrt(density / fit.density)
+        changed = replace(fit, density=density, covariance=fit.covariance * np.outer(ratio, ratio))
+        return replace(self, fits={**self.fits, force: changed})
 
     def projected(self, histories: Array) -> Array:
         """Coefficients (regressed, n) of the given histories (rows, n); exactly linear."""
@@ -114,10 +99,7 @@ def force_basis(motion: CaptiveMotion) -> Array:
 def reduced_run(run: CaptiveRun) -> ReducedRun:
     """Reduce a run to mean, harmonics and trend of its forces.
 
-    Raises
-    ------
-    InputError
-        As :func:`tank2sim.identification.captive.motion.run_motion`.
+    Raises InputError: As :func:`tank2sim.identification.captive.motion.run_motion`.
     """
     motion = run_motion(run)
     basis = force_basis(motion)
@@ -166,9 +148,7 @@ def moderated(runs: Sequence[ReducedRun]) -> tuple[ReducedRun, ...]:
                 density = np.full(len(density), usual)
             elif weight > 0:
                 density = (weight * usual + fit.freedom * fit.density) / (weight + fit.freedom)
-            ratio = np.sqrt(density / fit.density)
-            changed = replace(fit, density=density, covariance=fit.covariance * np.outer(ratio, ratio))
-            result[place] = replace(result[place], fits={**result[place].fits, force: changed})
+            result[place] = result[place].with_density(force, density)
     return tuple(result)
 
 

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.records.campaigns import CaptiveRun
+from tank2sim.records.captive_record import CaptiveRun
 
 MOTION_HARMONICS = 3
 """Number of harmonics of the mechanism's motion."""
@@ -31,43 +31,28 @@ _FEW_PERIODS = 2.5
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CaptiveMotion:
-    """Smooth motion of a run over whole periods; SI, radians, rudder to starboard.
+    """Smooth motion of a run over whole periods; SI, radians, rudder to starboard."""
 
-    Parameters
-    ----------
-    kept : slice
-        Rows of the record used.
-    time_s : array, (rows,)
-        Of those rows, less the delay of the forces behind the motion; in an oscillating run counted from a moment at
-        which the leading velocity (v in pure sway, else r) is greatest, so that it is cos(omega t) and its acceleration
-        is -sin(omega t).
-    frequency_radps : float
-        omega; 0 in a steady run.
-    periods : int
-        Whole periods kept; 0 in a steady run.
-    v_mps, r_radps, speed_mps, delta_rad, vdot_mps2, rdot_radps2 : array, (rows,)
-        ``speed_mps`` is U through the water.
-    heel_rad : float
-        At which the model is held.
-    projections : dict
-        What :mod:`tank2sim.identification.captive.equations` has projected on the harmonics of this motion, kept
-        because a campaign's equations are set up several times.
-    erring : dict
-        The same of this motion with an error, by its kind and size.
-    """
-
-    kept: slice
+    kept: slice  # Rows of the record used
+    # (rows,): Of those rows, less the delay of the forces behind the motion; in an oscillating run counted from a
+    # moment at which the leading velocity (v in pure sway, else r) is greatest, so that it is cos(omega t) and its
+    # acceleration is -sin(omega t)
     time_s: Array
-    frequency_radps: float
-    periods: int
+    frequency_radps: float  # omega; 0 in a steady run
+    periods: int  # Whole periods kept; 0 in a steady run
+    # `v_mps`, `r_radps`, `speed_mps`, `delta_rad`, `vdot_mps2`, `rdot_radps2`: (rows,): ``speed_mps`` is U through the
+    # water
     v_mps: Array
     r_radps: Array
     speed_mps: Array
     delta_rad: Array
     vdot_mps2: Array
     rdot_radps2: Array
-    heel_rad: float = 0.0
+    heel_rad: float = 0.0  # At which the model is held
+    # What :mod:`tank2sim.identification.captive.equations` has projected on the harmonics of this motion, kept because
+    # a campaign's equations are set up several times
     projections: dict[Hashable, Array] = field(init=False, repr=False, default_factory=dict)
+    # The same of this motion with an error, by its kind and size
     erring: dict[tuple[str, float], dict[Hashable, Array]] = field(init=False, repr=False, default_factory=dict)
 
     @cached_property
@@ -86,24 +71,9 @@ class CaptiveMotion:
         """True for a sway velocity, and for a yaw rate, that changes."""
         return bool(np.any(self.vdot_mps2)), bool(np.any(self.rdot_radps2))
 
-    def with_error(
-        self,
-        source: str,
-        size: float,
-        *,
-        v_mps: Array | None = None,
-        speed_mps: Array | None = None,
-        delta_rad: Array | None = None,
-    ) -> CaptiveMotion:
-        """The motion with other histories, by an error of a kind and size; what is projected of it is kept here."""
-        changed = replace(
-            self,
-            v_mps=self.v_mps if v_mps is None else v_mps,
-            speed_mps=self.speed_mps if speed_mps is None else speed_mps,
-            delta_rad=self.delta_rad if delta_rad is None else delta_rad,
-        )
-        kept = self.erring.setdefault((source, size), changed.projections)
-        object.__setattr__(changed, "projections", kept)
+    def with_error(self, source: str, size: float, changed: CaptiveMotion) -> CaptiveMotion:
+        """This motion `changed` by an error of a kind and size; what is projected of it is kept here."""
+        object.__setattr__(changed, "projections", self.erring.setdefault((source, size), changed.projections))
         return changed
 
     def amplitude(self, values: Array) -> float:
@@ -119,10 +89,7 @@ def leading(run: CaptiveRun) -> Array:
 def run_motion(run: CaptiveRun) -> CaptiveMotion:
     """The motion of a run.
 
-    Raises
-    ------
-    InputError
-        An oscillating run has no oscillation, less than one whole period, or too few readings a period.
+    Raises InputError: An oscillating run has no oscillation, less than one whole period, or too few readings a period.
     """
     return _oscillating(run) if run.oscillates else _steady(run)
 

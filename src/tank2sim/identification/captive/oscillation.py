@@ -28,33 +28,22 @@ _DISTINCT = 0.02
 
 @dataclass(frozen=True, kw_only=True)
 class OscillationDerivatives:
-    """One run's derivatives by (4.4), prime and "hydrodynamic".
-
-    Parameters
-    ----------
-    run, type : str
-        Name and type of the run.
-    letter : str
-        ``v`` in pure sway, else ``r``.
-    frequency_radps, amplitude : float
-        omega, and the prime amplitude of v or r.
-    reduced_frequency, frequency_parameter : float
-        omega L/U and omega U/g.
-    values, standard_errors : mapping
-        ``Yv``, ``Nv``, ``Yvdot``, ``Nvdot`` (or r) at this frequency and amplitude; errors within the run.
-    third : mapping
-        ``Yvvv``, ``Nvvv`` (or rrr) from the third harmonic, value and standard error.
-    """
+    """One run's derivatives by (4.4), prime and "hydrodynamic"."""
 
     run: str
     type: str
-    letter: str
+    letter: str  # ``v`` in pure sway, else ``r``
+    # `frequency_radps`, `amplitude`: omega, and the prime amplitude of v or r
     frequency_radps: float
     amplitude: float
+    # `reduced_frequency`, `frequency_parameter`: omega L/U and omega U/g
     reduced_frequency: float
     frequency_parameter: float
+    # `values`, `standard_errors`: ``Yv``, ``Nv``, ``Yvdot``, ``Nvdot`` (or r) at this frequency and amplitude; errors
+    # within the run
     values: Mapping[str, float]
     standard_errors: Mapping[str, float]
+    # ``Yvvv``, ``Nvvv`` (or rrr) from the third harmonic, value and standard error
     third: Mapping[str, tuple[float, float]]
 
 

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from tank2sim.arrays import Array, Columns
-from tank2sim.cards.terms import parse_term
+from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import polynomial
 from tank2sim.identification.captive.equations import rigid_body_force
 from tank2sim.identification.captive.harmonics import ReducedRun
@@ -41,24 +41,15 @@ def _nothing() -> Array:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ForceSeries:
-    """One force against an angle or an amplitude.
+    """One force against an angle or an amplitude."""
 
-    Parameters
-    ----------
-    label : str
-        Name of the series, such as ``pure sway, 0.45 rad/s``.
-    x, value : array (n,)
-        Measured points.
-    half_width : array (n,), optional
-        Half the 95 % interval of each point, in its unit.
-    fit_x, fit_value, fit_half_width : array (m,), optional
-        The fit and half its 95 % band; a fit without half widths has no band.
-    """
-
-    label: str
+    label: str  # Name of the series, such as ``pure sway, 0.45 rad/s``
+    # `x`, `value`: (n,): Measured points
     x: Array = field(default_factory=_nothing)
     value: Array = field(default_factory=_nothing)
-    half_width: Array | None = None
+    half_width: Array | None = None  # (n,): Half the 95 % interval of each point, in its unit
+    # `fit_x`, `fit_value`, `fit_half_width`: (m,): The fit and half its 95 % band; a fit without half widths has no
+    # band
     fit_x: Array = field(default_factory=_nothing)
     fit_value: Array = field(default_factory=_nothing)
     fit_half_width: Array | None = None
@@ -66,26 +57,13 @@ class ForceSeries:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ForceLoop:
-    """Forces over the motion in one run, in the order of time.
+    """Forces over the motion in one run, in the order of time."""
 
-    Parameters
-    ----------
-    label : str
-        Name of the run.
-    motion : array (n,)
-        Sway velocity or yaw rate.
-    forces : dict
-        Name of a force to its values (n,).
-    fitted_motion : array (m,)
-    fitted : dict
-        Name of a force to the values (m,) of the fit.
-    """
-
-    label: str
-    motion: Array
-    forces: Columns
-    fitted_motion: Array = field(default_factory=_nothing)
-    fitted: Columns = field(default_factory=dict)
+    label: str  # Name of the run
+    motion: Array  # (n,): Sway velocity or yaw rate
+    forces: Columns  # Name of a force to its values (n,)
+    fitted_motion: Array = field(default_factory=_nothing)  # (m,)
+    fitted: Columns = field(default_factory=dict)  # Name of a force to the values (m,) of the fit
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -206,7 +184,7 @@ def _motion_of(run: ReducedRun, letter: str, length_m: float = 1.0) -> float:
 
 def _coefficient(reduction: Reduction, force: str, run: ReducedRun) -> tuple[float, float]:
     """Mean coefficient of the water's force in a steady run, and its standard error with the run's zero error."""
-    unit = _unit(reduction, force, run)
+    unit = float(reduction.campaign.scales_at(run.motion.mean_speed_mps).unit(force))
     result = reduction.forces[force].selection
     place = result.equations.runs.index(run)
     root = result.spread.run_roots(result.equations)[place] * result.equations.unit
@@ -216,17 +194,11 @@ def _coefficient(reduction: Reduction, force: str, run: ReducedRun) -> tuple[flo
     ) / unit
 
 
-def _unit(reduction: Reduction, force: str, run: ReducedRun) -> float:
-    campaign = reduction.campaign
-    return float(campaign.scales_at(run.motion.mean_speed_mps).unit(force))
-
-
 def _regressors(result: ForceResult, v: Array, r: Array, rudder: Array) -> Array:
     """What each term of a force gives per unit of its coefficient, (samples, terms), at the test speed."""
     columns = []
     for name in result.solution.names:
-        term = parse_term(name.partition(" ")[0])
-        assert term is not None
+        term = known_term(name.partition(" ")[0])
         acts = not term.acceleration and not term.u and not term.phi and " " not in name
         value = polynomial([term.name], {term.name: 1.0}, v=v, r=r, d=rudder) if acts else 0.0
         columns.append(value * np.ones(len(v)))

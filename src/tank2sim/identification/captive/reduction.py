@@ -16,7 +16,6 @@ from threadpoolctl import threadpool_limits
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.consistency import Asymmetry, asymmetry, contradicted
-from tank2sim.identification.captive.cross_validation import LeftOut, leave_one_out
 from tank2sim.identification.captive.equations import HEEL_TERMS, SPEED_RANGE
 from tank2sim.identification.captive.harmonics import ReducedRun, moderated, reduced_run
 from tank2sim.identification.captive.oscillation import (
@@ -26,7 +25,7 @@ from tank2sim.identification.captive.oscillation import (
     oscillations,
     run_frequency_parameter,
 )
-from tank2sim.identification.captive.regression import Solution, efficient_solution, moved_terms
+from tank2sim.identification.captive.regression import LeftOut, Solution, efficient_solution, leave_one_out, moved_terms
 from tank2sim.identification.captive.run_faults import record_faults, reduced_faults
 from tank2sim.identification.captive.selection import Selection, Trend, select, trends
 from tank2sim.identification.captive.stepwise import (
@@ -37,22 +36,20 @@ from tank2sim.identification.captive.stepwise import (
     stepwise,
 )
 from tank2sim.identification.captive.systematic import (
+    AlignmentEstimate,
     DelayEstimate,
     SystematicError,
+    alignment_estimate,
     correct_delay,
     delay_estimate,
     force_delays,
     gauge_gains,
-)
-from tank2sim.identification.captive.tank_conditions import LARGEST_FREQUENCY_PARAMETER, impossible_body
-from tank2sim.identification.captive.type_b import (
-    AlignmentEstimate,
-    alignment_estimate,
     type_b_shifts,
     with_common_error,
 )
-from tank2sim.identification.captive.warnings import body_of
-from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, together
+from tank2sim.identification.captive.tank_conditions import LARGEST_FREQUENCY_PARAMETER, impossible_body
+from tank2sim.records.campaigns import Campaign, together
+from tank2sim.records.captive_record import FORCE_COLUMNS
 
 DISAGREEMENT_LIMIT = 3.5
 """Standard errors from which a difference between the methods is reported."""
@@ -64,136 +61,65 @@ ESSENTIAL = ("Xudot", "Yvdot", "Yrdot", "Nvdot", "Nrdot", "Yv", "Nv", "Yr", "Nr"
 
 @dataclass(frozen=True, kw_only=True)
 class ReductionOptions:
-    """Options of a reduction.
+    """Options of a reduction."""
 
-    Parameters
-    ----------
-    keep_going : bool
-        Omit runs with faults instead of refusing the campaign.
-    keep_fast : bool
-        Use runs with omega U/g of 0.1 and more, too.
-    off_speed : bool
-        Use runs away from the test speed, and at other revolutions of the propeller, too, and find terms in Du.
-    all_terms : bool
-        Keep terms that the tests do not determine.
-    test_symmetry : bool
-        Test terms of the opposite parity, which (3.8) lacks.
-    """
-
-    keep_going: bool = False
-    keep_fast: bool = False
+    keep_going: bool = False  # Omit runs with faults instead of refusing the campaign
+    keep_fast: bool = False  # Use runs with omega U/g of 0.1 and more, too
+    # Use runs away from the test speed, and at other revolutions of the propeller, too, and find terms in Du
     off_speed: bool = False
-    all_terms: bool = False
-    test_symmetry: bool = False
+    all_terms: bool = False  # Keep terms that the tests do not determine
+    test_symmetry: bool = False  # Test terms of the opposite parity, which (3.8) lacks
 
 
 @dataclass(frozen=True, kw_only=True)
 class Derivative:
-    """A derivative (prime).
+    """A derivative (prime)."""
 
-    Parameters
-    ----------
-    value, standard_error : float
-        ``standard_error`` combines both types.
-    type_a : float
-        Standard error from the scatter of the campaign.
-    type_b : mapping
-        Source to standard error, of stated uncertainties and of systematic errors that the campaign shows.
-    found_in : tuple of str
-        Types of run that determine it in the paper's order; empty if that order does not give it.
-    """
-
+    # `value`, `standard_error`: ``standard_error`` combines both types
     value: float
     standard_error: float
-    type_a: float
+    type_a: float  # Standard error from the scatter of the campaign
+    # Source to standard error, of stated uncertainties and of systematic errors that the campaign shows
     type_b: Mapping[str, float] = field(default_factory=dict)
-    found_in: str = ""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ForceResult:
-    """Result of a campaign for one force.
+    """Result of a campaign for one force."""
 
-    Parameters
-    ----------
-    selection : Selection
-        Chosen terms and equations; its ``choices`` state the decision on every candidate.
-    solution : Solution
-        The weighted regression over the whole campaign (Type A errors).
-    stepwise : Stepwise
-        The paper's order.
-    disagreements : tuple
-        Terms on which the two differ.
-    trends : tuple
-        Trends with frequency, and values extrapolated to zero frequency.
-    left_out : tuple
-        Each run predicted from all other runs.
-    asymmetry : Asymmetry or None
-        The test of the opposite parity, on request.
-    systematic : tuple
-        Errors common to many runs that the campaign shows in this force.
-    unchecked : tuple of str
-        Types of run whose derivatives no other type gives: an error of the gauge in them alone would not show.
-    timing_s : float
-        Delay of the forces that may be left, one standard deviation; 0 if it is stated, corrected or unknown.
-    alignment_rad : float
-        Zero of the drift angle that the campaign shows; 0 if it is stated or none is shown.
-    """
-
-    selection: Selection
-    solution: Solution
-    stepwise: Stepwise
-    disagreements: tuple[Disagreement, ...]
-    trends: tuple[Trend, ...]
-    left_out: tuple[LeftOut, ...]
-    asymmetry: Asymmetry | None = None
-    systematic: tuple[SystematicError, ...] = ()
+    selection: Selection  # Chosen terms and equations; its ``choices`` state the decision on every candidate
+    solution: Solution  # The weighted regression over the whole campaign (Type A errors)
+    stepwise: Stepwise  # The paper's order
+    disagreements: tuple[Disagreement, ...]  # Terms on which the two differ
+    trends: tuple[Trend, ...]  # Trends with frequency, and values extrapolated to zero frequency
+    left_out: tuple[LeftOut, ...]  # Each run predicted from all other runs
+    asymmetry: Asymmetry | None = None  # The test of the opposite parity, on request
+    systematic: tuple[SystematicError, ...] = ()  # Errors common to many runs that the campaign shows in this force
+    # Types of run whose derivatives no other type gives: an error of the gauge in them alone would not show
     unchecked: tuple[str, ...] = ()
-    timing_s: float = 0.0
-    alignment_rad: float = 0.0
+    # Error common to many runs to the change of each term (prime), with its sign, that it makes: stated errors (Type B)
+    # of one standard deviation, the delay of the forces that may be left, and the full errors (delays, gains, the zero
+    # of the drift angle) that the campaign shows and that are not corrected
+    shifts: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Reduction:
-    """Result of a reduction.
+    """Result of a reduction."""
 
-    Parameters
-    ----------
-    campaign : Campaign
-        As read.
-    options : ReductionOptions
-        The options used.
-    runs : tuple of ReducedRun
-        The runs used.
-    not_used : mapping
-        Name of an omitted run to the reason.
-    faults : tuple of InputError
-        Faults of runs omitted with `keep_going`.
-    forces : mapping
-        ``X``, ``Y``, ``N`` to its result.
-    derivatives : mapping
-        Derivatives by name.
-    oscillations, cubics
-        Evaluation of single oscillation tests.
-    missing : tuple of str
-        Names in :data:`ESSENTIAL` that the campaign does not give.
-    delay : DelayEstimate or None
-        Delay of the forces as recorded, less ``[test] force_delay_s``; None without oscillations at two frequencies.
-    alignment : AlignmentEstimate or None
-        The zero of the drift angle by Y0 and N0; None if the campaign does not give them.
-    """
-
-    campaign: Campaign
-    options: ReductionOptions
-    runs: tuple[ReducedRun, ...]
-    not_used: Mapping[str, str]
-    faults: tuple[InputError, ...]
-    forces: Mapping[str, ForceResult]
-    derivatives: Mapping[str, Derivative]
+    campaign: Campaign  # As read
+    options: ReductionOptions  # The options used
+    runs: tuple[ReducedRun, ...]  # The runs used
+    not_used: Mapping[str, str]  # Name of an omitted run to the reason
+    faults: tuple[InputError, ...]  # Faults of runs omitted with `keep_going`
+    forces: Mapping[str, ForceResult]  # ``X``, ``Y``, ``N`` to its result
+    derivatives: Mapping[str, Derivative]  # Derivatives by name
     oscillations: tuple[OscillationDerivatives, ...]
     cubics: tuple[CubicByTwoWays, ...]
-    missing: tuple[str, ...]
+    missing: tuple[str, ...]  # Names in :data:`ESSENTIAL` that the campaign does not give
+    # Delay of the forces as recorded, less ``[test] force_delay_s``; None without oscillations at two frequencies
     delay: DelayEstimate | None = None
+    # The zero of the drift angle by Y0 and N0; None if the campaign does not give them
     alignment: AlignmentEstimate | None = None
 
     @property
@@ -205,11 +131,8 @@ class Reduction:
 def reduce_campaign(campaign: Campaign, options: ReductionOptions | None = None) -> Reduction:
     """Derivatives from a campaign.
 
-    Raises
-    ------
-    InputError
-        Runs have faults without `keep_going` (all are reported), no run remains, a necessary key is missing, or a
-        number of ``[model]`` or the sign of the resistance is impossible.
+    Raises InputError: Runs have faults without `keep_going` (all are reported), no run remains, a necessary key is
+    missing, or a number of ``[model]`` or the sign of the resistance is impossible.
     """
     with threadpool_limits(limits=1, user_api="blas"):  # several threads take four times as long
         return _reduction(campaign, options or ReductionOptions())
@@ -217,38 +140,40 @@ def reduce_campaign(campaign: Campaign, options: ReductionOptions | None = None)
 
 def _reduction(campaign: Campaign, options: ReductionOptions) -> Reduction:
     """Derivatives from a campaign, on one thread."""
-    _refuse_impossible_body(campaign)
+    for key, problem in impossible_body(campaign.model, campaign.test.water_density_kgpm3):
+        raise InputError(campaign.path, f"model.{key}", problem, "correct the unit of one of these numbers")
     runs, faults = _credible_runs(campaign, options)
     used, not_used = _used_runs(campaign, moderated(runs), options)
     if not used:
         messages = [*map(str, faults), *(f"{name}, for {reason}" for name, reason in not_used.items())]
         remedy = f"the first was left out: {messages[0]}" if messages else "give it runs"
         raise InputError(campaign.path, "runs", "no run can be used", remedy)
-    selections = {force: select(campaign, used, force, all_terms=options.all_terms) for force in FORCE_COLUMNS}
+    selections = _selections(campaign, used, options)
     equations = {force: selection.equations for force, selection in selections.items()}
     delay = delay_estimate(equations)
     delays = force_delays(equations, delay)
-    if any(error.corrected for error in delays):
-        runs = [_advanced(run, delays[0].size) for run in runs]
+    if any(error.corrected for error in delays):  # the forces of oscillating runs are taken a time earlier
+        later_s = delays[0].size
+        runs = [
+            reduced_run(replace(run.run, force_delay_s=run.run.force_delay_s + later_s)) if run.run.oscillates else run
+            for run in runs
+        ]
         used, not_used = _used_runs(campaign, moderated(runs), options)
-        selections = {force: select(campaign, used, force, all_terms=options.all_terms) for force in FORCE_COLUMNS}
-    stated_keys = campaign.uncertainty.model_fields_set
-    stated = "force_delay_s" in stated_keys
-    timing = 0.0 if delays or stated or delay is None or not delay.alike else delay.possible_s
-    forces = {
-        force: replace(_force_result(campaign, selection, delays, options), timing_s=timing)
-        for force, selection in selections.items()
-    }
+        selections = _selections(campaign, used, options)
+    forces = {force: _force_result(campaign, selection, delays, options) for force, selection in selections.items()}
     alignment = alignment_estimate(
         campaign,
         {force: forces[force].selection.equations for force in "YN"},
         {force: forces[force].solution for force in "YN"},
     )
-    if alignment is not None and alignment.shown and "alignment_rad" not in stated_keys:
-        forces = {force: replace(result, alignment_rad=alignment.angle_rad) for force, result in forces.items()}
-    derivatives = {
-        name: found for force in FORCE_COLUMNS for name, found in _derivatives(campaign, forces[force]).items()
+    stated = campaign.uncertainty.model_fields_set
+    possible_s = 0.0 if delays or "force_delay_s" in stated or delay is None or not delay.alike else delay.possible_s
+    angle_rad = alignment.angle_rad if alignment and alignment.shown and "alignment_rad" not in stated else 0.0
+    forces = {
+        force: replace(result, shifts=_common_shifts(campaign, result, possible_s, angle_rad))
+        for force, result in forces.items()
     }
+    derivatives = {name: found for result in forces.values() for name, found in _derivatives(result).items()}
     _refuse_thrust(campaign, derivatives)
     alone = oscillations(campaign, runs)
     return Reduction(
@@ -267,16 +192,8 @@ def _reduction(campaign: Campaign, options: ReductionOptions) -> Reduction:
     )
 
 
-def _advanced(run: ReducedRun, delay_s: float) -> ReducedRun:
-    """A run reduced again with its forces a time earlier."""
-    if not run.run.oscillates:
-        return run
-    return reduced_run(replace(run.run, force_delay_s=run.run.force_delay_s + delay_s))
-
-
-def _refuse_impossible_body(campaign: Campaign) -> None:
-    for key, problem in impossible_body(body_of(campaign)):
-        raise InputError(campaign.path, f"model.{key}", problem, "correct the unit of one of these numbers")
+def _selections(campaign: Campaign, used: Sequence[ReducedRun], options: ReductionOptions) -> dict[str, Selection]:
+    return {force: select(campaign, used, force, all_terms=options.all_terms) for force in FORCE_COLUMNS}
 
 
 def _refuse_thrust(campaign: Campaign, derivatives: Mapping[str, Derivative]) -> None:
@@ -329,7 +246,8 @@ def _used_runs(
 ) -> tuple[list[ReducedRun], dict[str, str]]:
     used: list[ReducedRun] = []
     not_used: dict[str, str] = {}
-    usual = _usual_revolutions(campaign)
+    # Most runs have these revolutions: the polynomial has no term in them, and load-variation tests have others.
+    usual = float(np.median([run.propeller_radps or 0.0 for run in campaign.runs]))
     for run in runs:
         turning = run.run.propeller_radps or 0.0
         speed, fast = run.motion.mean_speed_mps, run_frequency_parameter(campaign, run)
@@ -345,11 +263,6 @@ def _used_runs(
         else:
             used.append(run)
     return used, not_used
-
-
-def _usual_revolutions(campaign: Campaign) -> float:
-    """Revolutions of most runs, rad/s: the polynomial has no term in them, and load-variation tests have others."""
-    return float(np.median([run.propeller_radps or 0.0 for run in campaign.runs]))
 
 
 def _force_result(
@@ -383,36 +296,32 @@ def _force_result(
     )
 
 
-def _derivatives(campaign: Campaign, result: ForceResult) -> dict[str, Derivative]:
-    solution, steps = result.solution, result.stepwise
-    sources = common_shifts(campaign, result)
-    found = {}
+def _derivatives(result: ForceResult) -> dict[str, Derivative]:
+    """Reported derivatives; a trend with frequency is none."""
+    solution, found = result.solution, {}
     for name, value, error in zip(solution.names, solution.values, solution.standard_errors, strict=True):
         if name not in result.selection.reported or " " in name:
-            continue  # not reported, or a trend with frequency, which is not a derivative
-        type_b = {source: abs(shifts.get(name, 0.0)) for source, shifts in sources.items()}
+            continue
+        type_b = {source: abs(shifts.get(name, 0.0)) for source, shifts in result.shifts.items()}
         found[name] = Derivative(
             value=float(value),
             standard_error=float(np.sqrt(error**2 + sum(size**2 for size in type_b.values()))),
             type_a=float(error),
             type_b=type_b,
-            found_in=steps.found_in[steps.names.index(name)] if name in steps.names else "",
         )
     return found
 
 
-def common_shifts(campaign: Campaign, result: ForceResult) -> dict[str, dict[str, float]]:
-    """Change of each term of a force (prime), with its sign, by each error common to many runs: source to changes.
-
-    Stated errors (Type B) of one standard deviation, the delay of the forces that may be left, and the full errors
-    (delays, gains, the zero of the drift angle) that the campaign shows and that are not corrected.
-    """
+def _common_shifts(
+    campaign: Campaign, result: ForceResult, delay_s: float, alignment_rad: float
+) -> dict[str, dict[str, float]]:
+    """As :attr:`ForceResult.shifts`; the delay and the angle are 0 where they are stated, corrected or unknown."""
     used, solution = result.selection.equations, result.solution
     shown = {error.source: error.shifts(used, solution) for error in result.systematic}
-    if result.timing_s:
-        shown["force_delay"] = moved_terms(correct_delay(used, result.timing_s), solution)
-    if result.alignment_rad:
-        turned = with_common_error(campaign, used, "alignment_rad", result.alignment_rad)
+    if delay_s:
+        shown["force_delay"] = moved_terms(correct_delay(used, delay_s), solution)
+    if alignment_rad:
+        turned = with_common_error(campaign, used, "alignment_rad", alignment_rad)
         shown["alignment"] = moved_terms(turned, solution)
     return type_b_shifts(campaign, used, solution) | shown
 
@@ -443,7 +352,7 @@ def reduction_covariance(reduction: Reduction, names: Sequence[str]) -> Array:
         columns = [place for place, name in enumerate(solution.names) if name in places]
         rows = [places[solution.names[place]] for place in columns]
         covariance[np.ix_(rows, rows)] += solution.covariance[np.ix_(columns, columns)]
-        for source, moved in common_shifts(reduction.campaign, result).items():
+        for source, moved in result.shifts.items():
             shift = shifts.setdefault(source, np.zeros(len(names)))
             for name, by in moved.items():
                 if name in places:

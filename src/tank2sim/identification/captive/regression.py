@@ -45,27 +45,14 @@ _CLEARLY = 0.05
 
 @dataclass(frozen=True)
 class Spread:
-    """Scatter of the runs of a campaign.
+    """Scatter of the runs of a campaign."""
 
-    Parameters
-    ----------
-    noise : float
-        Factor on the within-run covariances; 1 if they are complete.
-    zero_variance : float
-        Variance of the zero error from run to run, in ``Equations.unit`` squared.
-    by_type : mapping
-        Type of run to its own variance, where the types differ; it includes the misfit of (3.8).
-    gain_variance : float
-        Variance of the gauge's relative gain from run to run.
-    weights : Spread or None
-        Spread that weights the runs, if different.
-    """
-
-    noise: float
-    zero_variance: float
+    noise: float  # Factor on the within-run covariances; 1 if they are complete
+    zero_variance: float  # Variance of the zero error from run to run, in ``Equations.unit`` squared
+    # Type of run to its own variance, where the types differ; it includes the misfit of (3.8)
     by_type: Mapping[str, float] = field(default_factory=dict)
-    gain_variance: float = 0.0
-    weights: Spread | None = None
+    gain_variance: float = 0.0  # Variance of the gauge's relative gain from run to run
+    weights: Spread | None = None  # Spread that weights the runs, if different
 
     def zeros(self, equations: CampaignEquations) -> Array:
         """Variance of the zero error of each run, (runs,)."""
@@ -116,30 +103,14 @@ class Spread:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Derivatives of one force from a set of equations.
+    """Derivatives of one force from a set of equations."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        Names of the terms.
-    values : array, (terms,)
-        Prime.
-    covariance : array, (terms, terms)
-        Covariance of the values.
-    spread : Spread
-        With which they were weighted.
-    condition : float
-        Scaled condition number of the weighted design.
-    inflation : array, (terms,)
-        Variance inflation factors: variance of a term over its variance as the only term.
-    """
-
-    names: tuple[str, ...]
-    values: Array
-    covariance: Array
-    spread: Spread
-    condition: float
-    inflation: Array
+    names: tuple[str, ...]  # Names of the terms
+    values: Array  # (terms,): Prime
+    covariance: Array  # (terms, terms): Covariance of the values
+    spread: Spread  # With which they were weighted
+    condition: float  # Scaled condition number of the weighted design
+    inflation: Array  # (terms,): Variance inflation factors: variance of a term over its variance as the only term
 
     @property
     def standard_errors(self) -> Array:
@@ -284,25 +255,14 @@ class _ZeroLikelihood:
 
     Along the zero error the coefficients of a run have the variance s_i = noise + zero_i z_i' z_i, across it the noise
     alone: there all runs together are one triangular system, which holds for every spread.
-
-    Parameters
-    ----------
-    along : array, (runs, columns + 1)
-        Design and right-hand side of each run along its zero error.
-    across : array, (columns + 1, columns + 1)
-        Design and right-hand side of all runs across their zero errors, as a triangle.
-    prior : array, (terms, columns + 1)
-    sizes : array, (runs,)
-        z_i' z_i.
-    count : int
-        Equations across.
     """
 
-    along: Array
+    along: Array  # (runs, columns + 1): Design and right-hand side of each run along its zero error
+    # (columns + 1, columns + 1): Design and right-hand side of all runs across their zero errors, as a triangle
     across: Array
-    prior: Array
-    sizes: Array
-    count: int
+    prior: Array  # (terms, columns + 1)
+    sizes: Array  # (runs,): z_i' z_i
+    count: int  # Equations across
 
     @classmethod
     def of(cls, equations: CampaignEquations) -> _ZeroLikelihood:
@@ -373,3 +333,91 @@ def _starting_zero(equations: CampaignEquations) -> float:
     design, values = equations.design[means] * roots[:, None], equations.values[means] * roots
     residual = values - design @ np.linalg.lstsq(design, values, rcond=None)[0]
     return float(max(float(residual @ residual) / max(1, len(residual) - design.shape[1] // 2), 1e-24))
+
+
+_UNLIKELY = 1e-4
+
+
+@dataclass(frozen=True, kw_only=True)
+class LeftOut:
+    """Prediction of a run from all other runs."""
+
+    run: str
+    type: str
+    # `measured`, `predicted`: The water's force, by 1/2 rho L^2 u0^2 (N: L^3): mean in a steady run, part in phase with
+    # the velocity in an oscillating run; predicted with the derivatives of all other runs
+    measured: float
+    predicted: float
+    # `error`, `standard_error`: Predicted less measured, and its standard error
+    error: float
+    standard_error: float
+    chance: float  # Probability of at least this misfit of all coefficients
+    misfit: float  # Root mean square misfit of all coefficients, in standard errors
+    # `gap`, `size`: Norm of that misfit, and the larger norm of the coefficients measured and predicted; units as
+    # `measured`
+    gap: float
+    size: float
+    influence: float  # Largest change of a derivative without the run, in standard errors
+    moved: str  # Name of that derivative
+
+    @property
+    def unlikely(self) -> bool:
+        """True if the probability of the misfit is below one in ten thousand."""
+        return self.chance < _UNLIKELY
+
+
+def leave_one_out(equations: CampaignEquations, spread: Spread) -> tuple[LeftOut, ...]:
+    """Leave out each run in turn, with the spread of the whole campaign.
+
+    A single solution serves all runs: its share is subtracted from the normal equations. A run without which a term is
+    not determined has no row.
+    """
+    if not equations.names:
+        return ()
+    weights = spread.weights or spread
+    design, values = weighted_system(equations, weights)
+    norms = column_norms(design)
+    design = design / norms
+    normal, right = design.T @ design, design.T @ values
+    whole = np.linalg.pinv(normal)
+    estimate, errors = whole @ right, solve(equations, spread).standard_errors * norms
+    prior = design[len(equations.values) :]
+    scatter = scatters(equations, spread) / np.outer(norms, norms)
+    together = np.sum(scatter, axis=0) + prior.T @ prior
+    found = []
+    blocks = [design[rows] for rows in equations.rows]
+    remaining = normal - np.array([block.T @ block for block in blocks])
+    determined = np.linalg.cond(remaining) <= 1e10
+    inverses = np.linalg.inv(np.where(determined[:, None, None], remaining, np.eye(len(norms))))
+    covariances, roots = run_covariances(equations, spread), weights.run_roots(equations)
+    for place, rows in enumerate(equations.rows):
+        if not determined[place]:
+            continue
+        block, target, inverse = blocks[place], values[rows], inverses[place]
+        without = inverse @ (right - block.T @ target)
+        shift = np.abs(without - estimate) / np.maximum(errors, 1e-300)
+        largest = int(np.argmax(shift))
+        prediction_covariance = block @ inverse @ (together - scatter[place]) @ inverse @ block.T
+        misfit_covariance = covariances[place] + prediction_covariance
+        root = roots[place]
+        row = 1 if equations.runs[place].run.oscillates else 0
+        shown, expected = root @ target, root @ (block @ without)
+        misfit = target - block @ without
+        squares = float(misfit @ np.linalg.solve(misfit_covariance, misfit))
+        found.append(
+            LeftOut(
+                run=equations.runs[place].run.name,
+                type=equations.runs[place].run.type,
+                measured=float(shown[row]),
+                predicted=float(expected[row]),
+                error=float(expected[row]) - float(shown[row]),
+                standard_error=float(np.sqrt((root @ misfit_covariance @ root.T)[row, row])),
+                chance=float(chdtrc(len(target), squares)),
+                misfit=float(np.sqrt(squares / len(target))),
+                gap=float(np.linalg.norm(shown - expected)),
+                size=float(max(np.linalg.norm(shown), np.linalg.norm(expected))),
+                influence=float(shift[largest]),
+                moved=equations.names[largest],
+            )
+        )
+    return tuple(found)

@@ -24,43 +24,24 @@ FILLS: Mapping[str, str] = {"clarke1983": CLARKE}
 
 @dataclass(frozen=True, kw_only=True)
 class Contents:
-    """Contents of the card.
+    """Contents of the card."""
 
-    Parameters
-    ----------
-    entries : mapping
-        Name to value, standard error (prime) and origin, in the canonical order.
-    estimated : tuple of str
-        Names of the estimates.
-    missing : tuple of str
-        Names of essential derivatives that are neither measured nor estimated.
-    mass, yaw_inertia, x_G : float
-        Prime.
-    inertia_source : str
-        Source of the yaw inertia.
-    """
-
-    entries: Mapping[str, DerivativeEntry]
-    estimated: tuple[str, ...]
-    missing: tuple[str, ...]
+    entries: Mapping[str, DerivativeEntry]  # Name to value, standard error (prime) and origin, in the canonical order
+    estimated: tuple[str, ...]  # Names of the estimates
+    missing: tuple[str, ...]  # Names of essential derivatives that are neither measured nor estimated
+    # `mass`, `yaw_inertia`, `x_G`: Prime
     mass: float
     yaw_inertia: float
     x_G: float
-    inertia_source: str
+    inertia_source: str  # Source of the yaw inertia
 
 
 def card_contents(reduction: Reduction, fill: str | None = None) -> Contents:
     """Contents of the card of a reduction.
 
-    Parameters
-    ----------
-    fill : str, optional
-        Key of :data:`FILLS`: the source of derivatives that the campaign does not give.
+    `fill`: Key of :data:`FILLS`: the source of derivatives that the campaign does not give.
 
-    Raises
-    ------
-    InputError
-        The estimate needs beam and draught, and the campaign lacks them.
+    Raises InputError: The estimate needs beam and draught, and the campaign lacks them.
     """
     campaign = reduction.campaign
     model, scales = campaign.model, campaign.scales
@@ -77,10 +58,13 @@ def card_contents(reduction: Reduction, fill: str | None = None) -> Contents:
             for name, number in estimate(_particulars(campaign), lacking).items()
         }
         estimates |= _constant_thrust(reduction, found)
-    entries = found | estimates
+    entries = {  # in the card's figures, so that card and JSON agree exactly
+        name: DerivativeEntry(float(f"{entry.value:.7g}"), float(f"{entry.standard_error:.3g}"), entry.how)
+        for name, entry in (found | estimates).items()
+    }
     inertia, source = model_yaw_inertia(model)
     return Contents(
-        entries={name: _in_card_figures(entries[name]) for name in ALL_TERMS if name in entries},
+        entries={name: entries[name] for name in ALL_TERMS if name in entries},
         estimated=tuple(estimates),
         missing=tuple(name for name in ESSENTIAL if name not in entries),
         mass=model.mass_kg / float(scales.mass),
@@ -88,11 +72,6 @@ def card_contents(reduction: Reduction, fill: str | None = None) -> Contents:
         x_G=model.x_G_m / model.length_m,
         inertia_source=source,
     )
-
-
-def _in_card_figures(entry: DerivativeEntry) -> DerivativeEntry:
-    """Figures rounded as in the card, so that card and JSON agree exactly."""
-    return DerivativeEntry(float(f"{entry.value:.7g}"), float(f"{entry.standard_error:.3g}"), entry.how)
 
 
 def _how(reduction: Reduction, name: str) -> str:
@@ -162,15 +141,15 @@ def reduced_card_text(reduction: Reduction, card: Contents, scale: float = 1.0) 
     water = campaign.full_scale or FullScaleSection()
     density = water.water_density_kgpm3 if scale != 1.0 else test.water_density_kgpm3
     ratio = FroudeScaling(scale, density / test.water_density_kgpm3)
-    particulars: dict[str, float | str] = {"name": model.name, "length_m": model.length_m * scale}
+    sizes = {"length_m": model.length_m * scale}
     for key in ("beam_m", "draught_m", "propeller_diameter_m"):
         if (size := getattr(model, key)) is not None:
-            particulars[key] = size * scale
-    particulars["displacement_kg"] = model.mass_kg * ratio.force
+            sizes[key] = size * scale
+    sizes["displacement_kg"] = model.mass_kg * ratio.force
     if model.block_coefficient is not None:
-        particulars["block_coefficient"] = model.block_coefficient
+        sizes["block_coefficient"] = model.block_coefficient
     if model.rudder_area_m2 is not None:
-        particulars["rudder_area_m2"] = model.rudder_area_m2 * scale**2
+        sizes["rudder_area_m2"] = model.rudder_area_m2 * scale**2
     environment = {
         "water_density_kgpm3": density,
         "gravity_mps2": water.gravity_mps2 if scale != 1.0 else test.gravity_mps2,
@@ -181,7 +160,7 @@ def reduced_card_text(reduction: Reduction, card: Contents, scale: float = 1.0) 
     speed = test.speed_mps * math.sqrt(scale * environment["gravity_mps2"] / test.gravity_mps2)
     return manoeuvring_card_text(
         ManoeuvringResult(
-            particulars=_in_figures(particulars),
+            particulars={"name": model.name} | {key: float(f"{size:.6g}") for key, size in sizes.items()},
             source=f"tank2sim reduce {campaign.path.parent.name}/{campaign.path.name}",
             notes=_notes(reduction, card, scale),
             environment=environment,
@@ -203,10 +182,6 @@ def _tested(reduction: Reduction) -> TestedRange:
         rudder.append(float(np.max(np.abs(motion.delta_rad))))
         rate.append(float(np.max(np.abs(motion.r_radps) / speed)) * reduction.campaign.model.length_m)
     return TestedRange(max(drift), max(rudder), max(rate))
-
-
-def _in_figures(particulars: Mapping[str, float | str]) -> dict[str, float | str]:
-    return {key: value if isinstance(value, str) else float(f"{value:.6g}") for key, value in particulars.items()}
 
 
 def _notes(reduction: Reduction, card: Contents, scale: float) -> str:
@@ -261,14 +236,7 @@ def heel_notices(reduction: Reduction) -> list[Notice]:
 def fill_notices(card: Contents, fill: str | None, ratio: float | None, campaign: Campaign) -> list[Notice]:
     """Notices on what the card has from estimates, lacks, and takes from another size.
 
-    Parameters
-    ----------
-    card : Contents
-    fill : str or None
-        Published estimate.
-    ratio : float or None
-        Length of the card's ship over the model's.
-    campaign : Campaign
+    `fill`: Published estimate; `ratio`: Length of the card's ship over the model's.
     """
     notices = []
     if card.estimated:

@@ -16,7 +16,8 @@ from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.motion import leading
-from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, CaptiveRun
+from tank2sim.records.campaigns import Campaign
+from tank2sim.records.captive_record import FORCE_COLUMNS, FORCE_UNITS_SI, CaptiveRun
 
 _FASTEST_SWAY = 0.95
 """Largest sideways velocity as a share of the speed: a drift angle of 70 deg."""
@@ -90,8 +91,9 @@ def reduced_faults(run: ReducedRun) -> Iterator[InputError]:
         found = _step(run, force, basis)
         if found is not None:
             when, size, ratio = found
-            unit = "N m" if force == "N" else "N"
-            problem = f"its zero steps by {size:.3g} {unit} at {when:.4g} s ({ratio:.1f} standard errors)"
+            problem = (
+                f"its zero steps by {size:.3g} {FORCE_UNITS_SI[force]} at {when:.4g} s ({ratio:.1f} standard errors)"
+            )
             yield InputError(run.run.name, f"gauge {force}", problem, "repeat the run, or cut the record there")
 
 
@@ -129,9 +131,8 @@ def _impossible_values(campaign: Campaign, run: CaptiveRun) -> Iterator[InputErr
         unit = scales.unit(force)
         largest = float(np.max(np.abs(run.force(force)))) / unit
         if largest > _LARGEST_PRIME[force]:
-            column = "N_Nm" if force == "N" else f"{force}_N"
             problem = f"reaches {largest * unit:.4g}, {force}' = {largest:.3g}, which no hull has"
-            yield InputError(run.name, f"column {column}", problem, f"give it in {'N m' if force == 'N' else 'N'}")
+            yield InputError(run.name, f"column {FORCE_COLUMNS[force]}", problem, f"give it in {FORCE_UNITS_SI[force]}")
 
 
 def _foreign_motion(campaign: Campaign, run: CaptiveRun) -> Iterator[InputError]:

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import stdtrit
 
-from tank2sim.cards.terms import Term, parse_term
+from tank2sim.cards.terms import known_term
 from tank2sim.identification.captive.equations import CampaignEquations, campaign_equations, candidate_terms, excited
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.oscillation import distinct
@@ -56,26 +56,14 @@ Nvvv/Nv 6.2, Nvvd/Nd 3.5, Yvvd/Yd 4.3, Yddd/Yd 0.32). Other terms are free."""
 
 @dataclass(frozen=True)
 class Choice:
-    """Decision on a candidate term.
+    """Decision on a candidate term."""
 
-    Parameters
-    ----------
-    name : str
-        The term.
-    kept : bool
-        True for a reported term.
-    reason : str
-        ``linear``, ``determined``, ``asked for``, ``not excited``, ``collinear``, ``not determined``, ``trend``.
-    explanation : str
-        The reason in a sentence, with its figures.
-    inflation, ratio : float or None
-        Variance inflation factor, and value over standard error, at the decision.
-    """
-
-    name: str
-    kept: bool
+    name: str  # The term
+    kept: bool  # True for a reported term
+    # ``linear``, ``determined``, ``asked for``, ``not excited``, ``collinear``, ``not determined``, ``trend``
     reason: str
-    explanation: str
+    explanation: str  # The reason in a sentence, with its figures
+    # `inflation`, `ratio`: Variance inflation factor, and value over standard error, at the decision
     inflation: float | None = None
     ratio: float | None = None
 
@@ -117,15 +105,7 @@ class Selection:
 def select(campaign: Campaign, runs: Sequence[ReducedRun], force: str, *, all_terms: bool = False) -> Selection:
     """Choose the terms of one force.
 
-    Parameters
-    ----------
-    all_terms : bool
-        Report terms that the tests do not determine, too.
-
-    Raises
-    ------
-    InputError
-        As :func:`tank2sim.identification.captive.equations.campaign_equations`.
+    Raises InputError: As :func:`tank2sim.identification.captive.equations.campaign_equations`.
     """
     choices: dict[str, Choice] = {}
     used = distinguishable_equations(campaign, runs, force, choices)
@@ -171,13 +151,8 @@ def _judged(solution: Solution, place: int, held: float, *, all_terms: bool) -> 
 
 
 def _always(name: str) -> bool:
-    term = parse_term(name)
-    assert term is not None
-    return bool(term.acceleration) or name == "X0" or _order(term) == 1
-
-
-def _order(term: Term) -> int:
-    return term.v + term.r + term.d + term.u + term.phi
+    term = known_term(name)
+    return bool(term.acceleration) or name == "X0" or sum(term.powers.values()) == 1
 
 
 def _keep_distinguishable(full: CampaignEquations, choices: dict[str, Choice]) -> list[str]:
@@ -223,10 +198,9 @@ def _conditions(full: CampaignEquations) -> int:
 
 def _simplicity(name: str) -> tuple[int, ...]:
     """Sort key: linear terms first, then by order, and within an order terms in one motion before mixed terms."""
-    term = parse_term(name)
-    assert term is not None
-    mixed = sum(power > 0 for power in (term.v, term.r, term.d, term.u, term.phi))
-    return (not _always(name), _order(term), term.u, term.phi, mixed, term.d, term.r)
+    term = known_term(name)
+    mixed = len(term.powers)
+    return (not _always(name), sum(term.powers.values()), term.u, term.phi, mixed, term.d, term.r)
 
 
 def usual_zero(full: CampaignEquations) -> float:
@@ -236,26 +210,16 @@ def usual_zero(full: CampaignEquations) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Trend:
-    """Trend of one term with frequency.
+    """Trend of one term with frequency."""
 
-    Parameters
-    ----------
-    name : str
-        The term.
-    slope, standard_error : float
-        Change of its prime value by (omega L/U)^2.
-    at_zero, error_at_zero : float
-        Its value extrapolated to zero frequency, with this slope in the regression.
-    used : bool
-        True for a significant slope: the result's value is that at zero frequency.
-    """
-
-    name: str
+    name: str  # The term
+    # `slope`, `standard_error`: Change of its prime value by (omega L/U)^2
     slope: float
     standard_error: float
+    # `at_zero`, `error_at_zero`: Its value extrapolated to zero frequency, with this slope in the regression
     at_zero: float
     error_at_zero: float
-    used: bool
+    used: bool  # True for a significant slope: the result's value is that at zero frequency
 
 
 def trends(campaign: Campaign, selection: Selection) -> tuple[Selection, tuple[Trend, ...]]:

@@ -23,7 +23,8 @@ from tank2sim.identification.captive.motion import harmonic_basis
 from tank2sim.identification.captive.oscillation import OscillationDerivatives, oscillations
 from tank2sim.identification.captive.run_faults import motion_faults, record_faults, reduced_faults
 from tank2sim.notices import Notice, caution
-from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign, CaptiveRun
+from tank2sim.records.campaigns import Campaign
+from tank2sim.records.captive_record import FORCE_COLUMNS, FORCE_UNITS_SI, CaptiveRun
 from tank2sim.records.thinning import drawn_columns
 
 CYCLE_BINS = 72
@@ -37,106 +38,67 @@ REPEATS_DIFFER = 0.01
 
 @dataclass(frozen=True, kw_only=True)
 class FourierCoefficient:
-    """A Fourier coefficient of a run.
+    """A Fourier coefficient of a run."""
 
-    Parameters
-    ----------
-    signal : str
-        ``X``, ``Y``, ``N`` as measured (hydrodynamic sense), ``X_water`` ... without the body's inertia, or ``v``,
-        ``r``, ``speed``, ``delta``.
-    unit : str
-        ``N``, ``N m``, ``m/s``, ``rad/s`` or ``rad``.
-    order : int
-        0 for the mean.
-    cosine, sine : float
-        For order 0 ``cosine`` is the mean, and ``sine`` is 0.
-    cosine_error, sine_error : float
-        Standard errors; 0 for motions, which are fitted as the mechanism makes them.
-    amplitude, amplitude_error : float
-        Amplitude (for order 0 the size of the mean), and its standard error to first order.
-    phase_rad, phase_error_rad : float
-        Phase by which it lags the leading velocity, a cos(n omega t - phase), and its standard error to first order;
-        pi without an amplitude.
-    """
-
+    # ``X``, ``Y``, ``N`` as measured (hydrodynamic sense), ``X_water`` ... without the body's inertia, or ``v``, ``r``,
+    # ``speed``, ``delta``
     signal: str
-    unit: str
-    order: int
+    unit: str  # ``N``, ``N m``, ``m/s``, ``rad/s`` or ``rad``
+    order: int  # 0 for the mean
+    # `cosine`, `sine`: For order 0 ``cosine`` is the mean, and ``sine`` is 0
     cosine: float
     sine: float
+    # `cosine_error`, `sine_error`: Standard errors; 0 for motions, which are fitted as the mechanism makes them
     cosine_error: Number
     sine_error: Number
+    # `amplitude`, `amplitude_error`: Amplitude (for order 0 the size of the mean), and its standard error to first
+    # order
     amplitude: float
     amplitude_error: Number
+    # `phase_rad`, `phase_error_rad`: Phase by which it lags the leading velocity, a cos(n omega t - phase), and its
+    # standard error to first order; pi without an amplitude
     phase_rad: float
     phase_error_rad: Number
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AveragedCycle:
-    """A force over the phase of the motion, averaged over the periods of a run.
+    """A force over the phase of the motion, averaged over the periods of a run."""
 
-    Parameters
-    ----------
-    phase_rad : array, (bins,)
-        Middle of each bin, from the greatest leading velocity.
-    mean, deviation, fit : array, (bins,)
-        Mean, standard deviation between readings of the bin, and the harmonics; N or N m. nan in an empty bin.
-    count : array, (bins,)
-        Readings.
-    """
-
-    phase_rad: Array
+    phase_rad: Array  # (bins,): Middle of each bin, from the greatest leading velocity
+    # `mean`, `deviation`, `fit`: (bins,): Mean, standard deviation between readings of the bin, and the harmonics; N or
+    # N m. nan in an empty bin
     mean: Array
     deviation: Array
     fit: Array
-    count: Array
+    count: Array  # (bins,): Readings
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SingleRun:
-    """One run reduced by itself.
-
-    Parameters
-    ----------
-    name, type : str
-    speed_mps, frequency_radps : float
-        Mean speed; frequency of the oscillation, 0 in a steady run.
-    periods, readings : int
-        Whole periods that are used, and their readings.
-    coefficients : tuple of FourierCoefficient
-    cycles : dict
-        ``X``, ``Y``, ``N`` to the averaged cycle; empty for a steady run.
-    residual_rms : dict
-        Force to the root mean square of record less harmonics and trend, N or N m.
-    derivatives : OscillationDerivatives or None
-        Derivatives of an oscillating run whose model is known, by its first and third harmonics.
-    history : dict
-        Columns ``t_s``, and record, fit and residual of each force (``X_N``, ``X_fit_N``, ``X_residual_N``), to draw.
-    faults : tuple of str
-        Contradictions in the record.
-    """
+    """One run reduced by itself."""
 
     name: str
     type: str
+    # `speed_mps`, `frequency_radps`: Mean speed; frequency of the oscillation, 0 in a steady run
     speed_mps: float
     frequency_radps: float
+    # `periods`, `readings`: Whole periods that are used, and their readings
     periods: int
     readings: int
     coefficients: tuple[FourierCoefficient, ...]
-    cycles: dict[str, AveragedCycle]
-    residual_rms: dict[str, float]
+    cycles: dict[str, AveragedCycle]  # ``X``, ``Y``, ``N`` to the averaged cycle; empty for a steady run
+    residual_rms: dict[str, float]  # Force to the root mean square of record less harmonics and trend, N or N m
+    # Derivatives of an oscillating run whose model is known, by its first and third harmonics
     derivatives: OscillationDerivatives | None
+    # Columns ``t_s``, and record, fit and residual of each force (``X_N``, ``X_fit_N``, ``X_residual_N``), to draw
     history: Columns
-    faults: tuple[str, ...]
+    faults: tuple[str, ...]  # Contradictions in the record
 
     def coefficient(self, signal: str, order: int) -> FourierCoefficient:
         """The coefficient of a signal and order.
 
-        Raises
-        ------
-        KeyError
-            There is none.
+        Raises KeyError: There is none.
         """
         for found in self.coefficients:
             if (found.signal, found.order) == (signal, order):
@@ -146,31 +108,19 @@ class SingleRun:
 
 @dataclass(frozen=True, kw_only=True)
 class RepeatedCoefficient:
-    """A Fourier coefficient in repeats of a run.
+    """A Fourier coefficient in repeats of a run."""
 
-    Parameters
-    ----------
-    signal, unit, order, part
-        ``part`` is ``mean``, ``cos`` or ``sin``.
-    values : tuple of float
-        In the order of the runs.
-    mean, deviation : float
-        Over the runs; the standard deviation of one run.
-    expected : float
-        Deviation that the noise within the runs explains.
-    chance : float
-        Probability of a larger scatter by that noise alone.
-    """
-
+    # `signal`, `unit`, `order`, `part`: ``part`` is ``mean``, ``cos`` or ``sin``
     signal: str
     unit: str
     order: int
     part: str
-    values: tuple[float, ...]
+    values: tuple[float, ...]  # In the order of the runs
+    # `mean`, `deviation`: Over the runs; the standard deviation of one run
     mean: float
     deviation: float
-    expected: Number
-    chance: Number
+    expected: Number  # Deviation that the noise within the runs explains
+    chance: Number  # Probability of a larger scatter by that noise alone
 
     @property
     def differs(self) -> bool:
@@ -180,21 +130,12 @@ class RepeatedCoefficient:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CaptiveRunStudy:
-    """Captive runs reduced by themselves.
-
-    Parameters
-    ----------
-    runs : tuple of SingleRun
-    repeats : tuple of RepeatedCoefficient
-        Scatter of the coefficients between the runs; empty for a single one and for runs of different tests.
-    inertia_removed : bool
-        Whether the model is known, and its inertia removed.
-    notices : tuple of Notice
-    """
+    """Captive runs reduced by themselves."""
 
     runs: tuple[SingleRun, ...]
+    # Scatter of the coefficients between the runs; empty for a single one and for runs of different tests
     repeats: tuple[RepeatedCoefficient, ...]
-    inertia_removed: bool
+    inertia_removed: bool  # Whether the model is known, and its inertia removed
     notices: tuple[Notice, ...]
 
 
@@ -203,18 +144,10 @@ def study_runs(
 ) -> tuple[CaptiveRunStudy, tuple[ReducedRun, ...]]:
     """Reduce runs, each by itself, and compare repeats.
 
-    Parameters
-    ----------
-    runs : sequence of CaptiveRun
-    campaign : Campaign or None
-        Model and test; without them no inertia is removed and no derivatives are given.
-    remarks : sequence of Notice
-        Notices on the records.
+    `campaign`: Model and test; without them no inertia is removed and no derivatives are given; `remarks`: Notices on
+    the records.
 
-    Raises
-    ------
-    InputError
-        As of :func:`single_run`.
+    Raises InputError: As of :func:`single_run`.
     """
     single, reduced = zip(*(single_run(run, campaign) for run in runs), strict=True)
     alike = len(runs) > 1 and same_test(single)
@@ -244,34 +177,23 @@ def study_runs(
 def single_run(run: CaptiveRun, campaign: Campaign | None) -> tuple[SingleRun, ReducedRun]:
     """Reduce one run.
 
-    Parameters
-    ----------
-    run : CaptiveRun
-    campaign : Campaign or None
-        Model and test; without them no inertia is removed and no derivatives are given.
+    `campaign`: Model and test; without them no inertia is removed and no derivatives are given.
 
-    Raises
-    ------
-    InputError
-        An oscillating run has no whole period or too few readings a period, or no carriage moves so.
+    Raises InputError: An oscillating run has no whole period or too few readings a period, or no carriage moves so.
     """
     for fault in motion_faults(run):
         raise fault
     reduced = reduced_run(run)
     faults = [*(record_faults(campaign, run) if campaign else ()), *reduced_faults(reduced)]
     coefficients = [*_motion_coefficients(reduced)]
-    for force in FORCE_COLUMNS:
-        fit = reduced.fits[force]
-        errors = np.sqrt(np.diag(fit.covariance))
-        coefficients += _pairs(force, _unit_of(force), fit.coefficients, errors)
-    if campaign is not None:
-        inertial = rigid_body_force(campaign, reduced.motion)
+    inertial = {} if campaign is None else rigid_body_force(campaign, reduced.motion)
+    for part, water in (("", False), ("_water", True))[: 1 if campaign is None else 2]:
         for force in FORCE_COLUMNS:
             fit = reduced.fits[force]
-            water = fit.coefficients.copy()
-            water[: reduced.regressed] += reduced.projected(inertial[force][:, None])[:, 0]
-            errors = np.sqrt(np.diag(fit.covariance))
-            coefficients += _pairs(f"{force}_water", _unit_of(force), water, errors)
+            values, errors = fit.coefficients.copy(), np.sqrt(np.diag(fit.covariance))
+            if water:
+                values[: reduced.regressed] += reduced.projected(inertial[force][:, None])[:, 0]
+            coefficients += _pairs(f"{force}{part}", FORCE_UNITS_SI[force], values, errors)
     motion = reduced.motion
     return SingleRun(
         name=run.name,
@@ -294,7 +216,11 @@ def _history(reduced: ReducedRun) -> Columns:
     kept = reduced.motion.kept
     columns = {"t_s": reduced.run.time_s[kept]}
     for force in FORCE_COLUMNS:
-        record, fit, unit = reduced.run.force(force)[kept], reduced.fitted(force), _unit_of(force).replace(" ", "")
+        record, fit, unit = (
+            reduced.run.force(force)[kept],
+            reduced.fitted(force),
+            FORCE_COLUMNS[force][2:],
+        )
         named = {force: record, f"{force}_fit": fit, f"{force}_residual": record - fit}
         columns |= {f"{name}_{unit}": values for name, values in named.items()}
     return drawn_columns(columns)
@@ -305,13 +231,6 @@ def averaged_cycle(run: ReducedRun, force: str) -> AveragedCycle:
 
     The mean of a bin is the value of the harmonics at its middle plus the mean residual inside it: the curvature of
     the force over the bin does not bias it, and a trend of the zero does not widen it.
-
-    Parameters
-    ----------
-    run : ReducedRun
-        An oscillating run.
-    force : str
-        ``X``, ``Y`` or ``N``.
     """
     fit, left = run.fits[force], run.residual(force)
     waves = [place for place, label in enumerate(run.labels) if label != "trend"]
@@ -381,10 +300,6 @@ def repeated_coefficients(runs: Sequence[SingleRun]) -> tuple[RepeatedCoefficien
                 )
             )
     return tuple(found)
-
-
-def _unit_of(force: str) -> str:
-    return "N m" if force == "N" else "N"
 
 
 def _motion_coefficients(run: ReducedRun) -> list[FourierCoefficient]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.terms import parse_term
+from tank2sim.cards.terms import known_term
 from tank2sim.identification.captive.equations import SPEED_RANGE, CampaignEquations
 from tank2sim.identification.captive.regression import Solution, Spread, fitted_spread
 from tank2sim.identification.conditioning import COLLINEAR, column_norms, scaled_condition
@@ -37,22 +37,12 @@ _LEAST_SPREAD = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Stepwise:
-    """Result of the paper's order for one force.
+    """Result of the paper's order for one force."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        Terms in the order of their estimation.
-    values, standard_errors : array, (terms,)
-        Prime.
-    found_in : tuple of str
-        Type of run that gave each term.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # Terms in the order of their estimation
     values: Array
     standard_errors: Array
-    found_in: tuple[str, ...]
+    found_in: tuple[str, ...]  # Type of run that gave each term
 
 
 @dataclass(frozen=True)
@@ -149,8 +139,7 @@ def _new_terms(part: CampaignEquations, spread: Spread, found: set[str], motions
     reach = np.abs(spread.weighted(part, part.design)).max(axis=0)
     new: list[str] = []
     for name, reached in zip(part.names, reach, strict=True):
-        term = parse_term(name.partition(" ")[0])
-        assert term is not None
+        term = known_term(name.partition(" ")[0])
         letters = set("".join(term.powers)) | set(term.acceleration)
         if name in found or reached < 1e-6 or not letters <= set(motions):
             continue

@@ -9,24 +9,16 @@ import numpy as np
 
 from tank2sim.arrays import Array, Number, Unbounded
 from tank2sim.identification.captive.consistency import Asymmetry, Repeats, repeats
-from tank2sim.identification.captive.cross_validation import LeftOut
 from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.oscillation import CubicByTwoWays, OscillationDerivatives
 from tank2sim.identification.captive.plot_data import ForcePlot, HarmonicsPlot, LoopPlot, reduction_plots
 from tank2sim.identification.captive.reduction import ForceResult, Reduction, is_resistance, terms_of_heel
+from tank2sim.identification.captive.regression import LeftOut
 from tank2sim.identification.captive.result_card import Contents
 from tank2sim.identification.captive.selection import Choice, Trend
 from tank2sim.identification.captive.stepwise import Disagreement, Stepwise
-from tank2sim.identification.captive.systematic import DelayEstimate, SystematicError
-from tank2sim.identification.captive.type_b import AlignmentEstimate
-from tank2sim.identification.captive.uncertainty_budget import (
-    BUDGET_SOURCES,
-    COVERAGE_FACTOR,
-    BudgetRow,
-    blockage_speed,
-    sources_not_stated,
-    uncertainty_budget,
-)
+from tank2sim.identification.captive.systematic import AlignmentEstimate, DelayEstimate, SystematicError
+from tank2sim.identification.captive.uncertainty_budget import UncertaintyBudget, uncertainty_budget
 from tank2sim.notices import Notice
 from tank2sim.records.campaigns import Campaign
 
@@ -50,28 +42,13 @@ class Stepped(PrimeValue):
 
 @dataclass(frozen=True, kw_only=True)
 class ReducedDerivative(PrimeValue):
-    """A derivative, prime.
+    """A derivative, prime."""
 
-    Parameters
-    ----------
-    value, standard_error : float
-    origin : str
-        ``measured`` or ``estimated``.
-    source : str
-        Source of an estimate.
-    type_a : float, optional
-        Standard error from the scatter of the campaign.
-    type_b : dict
-        Source of a stated uncertainty or a systematic error to its standard error.
-    paper_order : Stepped, optional
-        The same by the paper's order; None if it does not give it.
-    """
-
-    origin: str
-    source: str = ""
-    type_a: float | None = None
-    type_b: dict[str, float]
-    paper_order: Stepped | None = None
+    origin: str  # ``measured`` or ``estimated``
+    source: str = ""  # Source of an estimate
+    type_a: float | None = None  # Standard error from the scatter of the campaign
+    type_b: dict[str, float]  # Source of a stated uncertainty or a systematic error to its standard error
+    paper_order: Stepped | None = None  # The same by the paper's order; None if it does not give it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,53 +71,17 @@ class ReducedBody:
     x_G: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class UncertaintyBudget:
-    """The uncertainty budget after ITTC 7.5-02-06-04, prime.
-
-    Parameters
-    ----------
-    coverage_factor : float
-    sources : dict
-        Source to its words.
-    not_stated : tuple of str
-        Keys of ``[uncertainty]`` that the campaign does not state.
-    blockage_speed_relative : float, optional
-        Relative increase of the speed past the model by the walls; None if a size is missing.
-    derivatives : dict
-        Derivative to its budget.
-    """
-
-    coverage_factor: float
-    sources: dict[str, str]
-    not_stated: tuple[str, ...]
-    blockage_speed_relative: float | None
-    derivatives: dict[str, BudgetRow]
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WeightedRegression:
-    """The regression of one force over the whole campaign, prime.
+    """The regression of one force over the whole campaign, prime."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        Terms.
-    values, standard_errors, variance_inflation : array (terms,)
-    covariance : array (terms, terms)
-    condition : float
-        Scaled condition number.
-    held_within : dict
-        Term to the standard deviation of its prior about zero.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # Terms
     values: Array
     standard_errors: Array
-    covariance: Array
-    condition: Unbounded
+    covariance: Array  # (terms, terms)
+    condition: Unbounded  # Scaled condition number
     variance_inflation: Array
-    held_within: dict[str, float]
+    held_within: dict[str, float]  # Term to the standard deviation of its prior about zero
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -154,61 +95,30 @@ class ForceMethods:
 
 @dataclass(frozen=True, kw_only=True)
 class RunSpread:
-    """Scatter of the runs of one force.
+    """Scatter of the runs of one force."""
 
-    Parameters
-    ----------
-    noise_factor : float
-        Variance of the noise within runs over its estimate from each run.
-    zero_error_prime, zero_error_si : float
-        Zero error from run to run, prime and in N or N m.
-    gain_error : float
-        Relative gain error from run to run.
-    by_type : dict
-        Type of run to its further zero error, prime.
-    """
-
-    noise_factor: float
+    noise_factor: float  # Variance of the noise within runs over its estimate from each run
+    # `zero_error_prime`, `zero_error_si`: Zero error from run to run, prime and in N or N m
     zero_error_prime: float
     zero_error_si: float
-    gain_error: float
-    by_type: dict[str, float]
+    gain_error: float  # Relative gain error from run to run
+    by_type: dict[str, float]  # Type of run to its further zero error, prime
 
 
 @dataclass(frozen=True, kw_only=True)
 class PredictionError:
-    """Error of the runs of a type, each predicted from the others, prime.
-
-    Parameters
-    ----------
-    rms, largest : float
-    range : float
-        Range of the measured force in these runs.
-    relative : float
-        Root mean square over range; NaN without a range.
-    runs : int
-    """
+    """Error of the runs of a type, each predicted from the others, prime."""
 
     rms: float
     largest: float
-    range: float
-    relative: Number
+    range: float  # Range of the measured force in these runs
+    relative: Number  # Root mean square over range; NaN without a range
     runs: int
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunSummary:
-    """A run with its motion and its harmonics, prime with its own speed.
-
-    Parameters
-    ----------
-    name, type : str
-    speed_mps, frequency_radps : float
-    periods : int
-    v_amplitude_mps, r_amplitude_radps, v_mean_mps, rudder_rad : float
-    harmonics : dict
-        Force to harmonic to value.
-    """
+    """A run with its motion and its harmonics, prime with its own speed."""
 
     name: str
     type: str
@@ -219,84 +129,46 @@ class RunSummary:
     r_amplitude_radps: float
     v_mean_mps: float
     rudder_rad: float
-    harmonics: dict[str, dict[str, PrimeValue]]
+    harmonics: dict[str, dict[str, PrimeValue]]  # Force to harmonic to value
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ReductionStudy:
-    """A reduced campaign: prime, instantaneous, "hydrodynamic", starboard-positive, expanded at the test speed.
+    """A reduced campaign: prime, instantaneous, "hydrodynamic", starboard-positive, expanded at the test speed."""
 
-    Parameters
-    ----------
-    campaign : str
-        File of the campaign.
-    model, test : dict
-        Keys of these sections of the file to values.
-    card_scale : float, optional
-        Length of the card's ship over the length of the model; None: the card is of the model.
-    conventions : DerivativeConventions
-    rigid_body : ReducedBody
-    derivatives : dict
-        Derivatives of the card.
-    heel_derivatives : dict
-        Derivatives of the heel, which the card does not have.
-    uncertainty_budget : UncertaintyBudget
-    missing : tuple of str
-        Essential derivatives that are neither measured nor estimated.
-    notices : tuple of Notice
-    methods, selection, spread, symmetry, leave_one_out : dict
-        By force: methods, choice of terms, scatter of the runs, test of the symmetry (on request), predicted runs.
-    systematic_errors : tuple of SystematicError
-        Errors common to many runs that the campaign shows.
-    force_delay : DelayEstimate, optional
-    alignment : AlignmentEstimate, optional
-    trends : tuple of Trend
-        Trends with frequency.
-    prediction_errors : dict
-        Type of run to force to error.
-    oscillations : tuple of OscillationDerivatives
-    third_order : tuple of CubicByTwoWays
-    runs : tuple of RunSummary
-        Runs that are used.
-    not_used : dict
-        Run to the reason.
-    faults : tuple of str
-    repeats : Repeats, optional
-    resistance : dict
-        ``X0``, if it is the resistance of a model without a propeller and so not on the card.
-    plots : dict
-        Data of the charts by name.
-    """
-
-    campaign: str
+    campaign: str  # File of the campaign
+    # `model`, `test`: Keys of these sections of the file to values
     model: _SectionValues
     test: _SectionValues
-    card_scale: float | None
+    card_scale: float | None  # Length of the card's ship over the length of the model; None: the card is of the model
     conventions: DerivativeConventions
     rigid_body: ReducedBody
-    derivatives: dict[str, ReducedDerivative]
-    heel_derivatives: dict[str, ReducedDerivative]
+    derivatives: dict[str, ReducedDerivative]  # Derivatives of the card
+    heel_derivatives: dict[str, ReducedDerivative]  # Derivatives of the heel, which the card does not have
     uncertainty_budget: UncertaintyBudget
-    missing: tuple[str, ...]
+    missing: tuple[str, ...]  # Essential derivatives that are neither measured nor estimated
     notices: tuple[Notice, ...]
+    # `methods`, `selection`, `spread`, `symmetry`, `leave_one_out`: By force: methods, choice of terms, scatter of the
+    # runs, test of the symmetry (on request), predicted runs
     methods: dict[str, ForceMethods]
     selection: dict[str, tuple[Choice, ...]]
     spread: dict[str, RunSpread]
-    systematic_errors: tuple[SystematicError, ...]
+    systematic_errors: tuple[SystematicError, ...]  # Errors common to many runs that the campaign shows
     force_delay: DelayEstimate | None
     alignment: AlignmentEstimate | None
-    trends: tuple[Trend, ...]
+    trends: tuple[Trend, ...]  # Trends with frequency
     symmetry: dict[str, Asymmetry]
     leave_one_out: dict[str, tuple[LeftOut, ...]]
-    prediction_errors: dict[str, dict[str, PredictionError]]
+    prediction_errors: dict[str, dict[str, PredictionError]]  # Type of run to force to error
     oscillations: tuple[OscillationDerivatives, ...]
     third_order: tuple[CubicByTwoWays, ...]
-    runs: tuple[RunSummary, ...]
-    not_used: dict[str, str]
+    runs: tuple[RunSummary, ...]  # Runs that are used
+    not_used: dict[str, str]  # Run to the reason
     faults: tuple[str, ...]
     repeats: Repeats | None
+    # ``X0``, if it is the resistance of a model without a propeller and so not on the card
     resistance: dict[str, PrimeValue]
-    plots: dict[str, ForcePlot | HarmonicsPlot | LoopPlot]
+    plots: dict[str, ForcePlot | HarmonicsPlot | LoopPlot]  # Data of the charts by name
 
     @property
     def choices(self) -> list[Choice]:
@@ -309,15 +181,8 @@ def study_reduction(
 ) -> ReductionStudy:
     """The study of a reduction.
 
-    Parameters
-    ----------
-    reduction : Reduction
-    card : Contents
-        Contents of its card.
-    notices : tuple of Notice
-        Messages for the user, in sentences.
-    card_scale : float, optional
-        As of :class:`ReductionStudy`.
+    `card`: Contents of its card; `notices`: Messages for the user, in sentences; `card_scale`: As of
+    :class:`ReductionStudy`.
     """
     campaign, forces, found = reduction.campaign, reduction.forces, reduction.derivatives
     resistance = ["X0"] if is_resistance(campaign) and "X0" in found else []
@@ -334,7 +199,7 @@ def study_reduction(
             name: _measured(reduction, name, found[name].value, found[name].standard_error)
             for name in terms_of_heel(reduction)
         },
-        uncertainty_budget=_budget(reduction),
+        uncertainty_budget=uncertainty_budget(reduction),
         missing=card.missing,
         notices=notices,
         methods={force: _methods(result) for force, result in forces.items()},
@@ -377,17 +242,6 @@ def prediction_errors(reduction: Reduction) -> dict[str, dict[str, PredictionErr
                 runs=len(rows),
             )
     return found
-
-
-def _budget(reduction: Reduction) -> UncertaintyBudget:
-    campaign = reduction.campaign
-    return UncertaintyBudget(
-        coverage_factor=COVERAGE_FACTOR,
-        sources=BUDGET_SOURCES,
-        not_stated=sources_not_stated(reduction),
-        blockage_speed_relative=blockage_speed(campaign.model, campaign.tank, campaign.test),
-        derivatives={row.name: row for row in uncertainty_budget(reduction)},
-    )
 
 
 def _derivative(reduction: Reduction, card: Contents, name: str) -> ReducedDerivative:

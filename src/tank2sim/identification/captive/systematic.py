@@ -7,6 +7,10 @@ channels: to Y and N, to sway and yaw, and to the share of the force that is the
 memory. A delay that sway and yaw both show is taken out, and its standard error goes into the derivatives. A gauge that
 reads more in one kind of run gives derivatives that differ from those of all other kinds of run. Other errors are not
 corrected: they are reported first, and the effect of their correction is added to the standard errors.
+
+Errors that the campaign states (Type B, ITTC 7.5-02-06-04) are common to all its runs, whose scatter does not show
+them. Each is propagated by applying it and solving again: the change of the derivatives is their uncertainty. Different
+errors are independent and add in squares.
 """
 
 from __future__ import annotations
@@ -14,16 +18,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import chdtrc
 
 from tank2sim.arrays import Array
-from tank2sim.identification.captive.equations import CampaignEquations
+from tank2sim.identification.captive.equations import CampaignEquations, campaign_equations
 from tank2sim.identification.captive.harmonics import ReducedRun
+from tank2sim.identification.captive.motion import CaptiveMotion
 from tank2sim.identification.captive.oscillation import distinct
 from tank2sim.identification.captive.regression import Solution, Spread, fitted_spread, moved_terms, solve
 from tank2sim.identification.conditioning import SINGULAR_CONDITION
+from tank2sim.records.campaign_form import OSCILLATING
+from tank2sim.records.campaigns import Campaign
 
 _SHOWN = 4.0
 """Standard errors of a reported error: with some 20 possible errors, chance exceeds it in one of 800 campaigns."""
@@ -56,31 +64,17 @@ _MOTIONS = {"sway": ("pure_sway",), "yaw": ("pure_yaw", "yaw_with_drift")}
 
 @dataclass(frozen=True, kw_only=True)
 class SystematicError:
-    """An error common to many runs.
+    """An error common to many runs."""
 
-    Parameters
-    ----------
-    source : str
-        ``force_delay``, or ``gain of Y in static_drift``.
-    force : str
-        The gauges concerned: ``Y``, ``N``, or ``XYN``.
-    runs : str
-        Type of the runs concerned; empty for all oscillating runs.
-    or_runs : tuple of str
-        Other types of run whose error would explain the data nearly as well.
-    size, standard_error : float
-        Delay in s, positive if the forces lag the motion; relative gain, positive if the gauge reads too much.
-    corrected : bool
-        It is taken out of the results, and only its standard error is left in theirs.
-    """
-
-    source: str
-    force: str
-    runs: str
+    source: str  # ``force_delay``, or ``gain of Y in static_drift``
+    force: str  # The gauges concerned: ``Y``, ``N``, or ``XYN``
+    runs: str  # Type of the runs concerned; empty for all oscillating runs
+    # `size`, `standard_error`: Delay in s, positive if the forces lag the motion; relative gain, positive if the gauge
+    # reads too much
     size: float
     standard_error: float
-    or_runs: tuple[str, ...] = ()
-    corrected: bool = False
+    or_runs: tuple[str, ...] = ()  # Other types of run whose error would explain the data nearly as well
+    corrected: bool = False  # It is taken out of the results, and only its standard error is left in theirs
 
     @property
     def message(self) -> str:
@@ -133,31 +127,16 @@ class ChannelDelay:
 
 @dataclass(frozen=True, kw_only=True)
 class DelayEstimate:
-    """The delay of the forces behind the motion by all channels that show it.
+    """The delay of the forces behind the motion by all channels that show it."""
 
-    Parameters
-    ----------
-    size, standard_error : float
-        Weighted mean of the channels, s, positive if the forces lag.
-    channels : tuple of ChannelDelay
-        Gauges and motions.
-    chance : float
-        Probability of so large a scatter of the channels about one common delay.
-    alike : bool
-        The channels have one delay; if not, they differ as memory of the flow does.
-    supported : bool
-        Sway and yaw show it each by itself: it is not the memory of one of the motions.
-    corrected : bool
-        It is taken out of the results.
-    """
-
+    # `size`, `standard_error`: Weighted mean of the channels, s, positive if the forces lag
     size: float
     standard_error: float
-    channels: tuple[ChannelDelay, ...]
-    chance: float
-    alike: bool
-    supported: bool
-    corrected: bool = False
+    channels: tuple[ChannelDelay, ...]  # Gauges and motions
+    chance: float  # Probability of so large a scatter of the channels about one common delay
+    alike: bool  # The channels have one delay; if not, they differ as memory of the flow does
+    supported: bool  # Sway and yaw show it each by itself: it is not the memory of one of the motions
+    corrected: bool = False  # It is taken out of the results
 
     @property
     def possible_s(self) -> float:
@@ -169,10 +148,7 @@ class DelayEstimate:
 def delay_estimate(forces: Mapping[str, CampaignEquations]) -> DelayEstimate | None:
     """The common delay by oscillations at several frequencies; None if there are none.
 
-    Parameters
-    ----------
-    forces : mapping
-        ``Y`` and ``N`` to their equations, without trends with frequency, which would absorb the delay.
+    `forces`: ``Y`` and ``N`` to their equations, without trends with frequency, which would absorb the delay.
     """
     channels = tuple(
         ChannelDelay(force=force, motion=motion, size=size, standard_error=error)
@@ -182,24 +158,19 @@ def delay_estimate(forces: Mapping[str, CampaignEquations]) -> DelayEstimate | N
     )
     if not channels:
         return None
-    mean, error, chance = _mean_delay([(channel.size, channel.standard_error) for channel in channels])
-    apart = [
-        abs(channel.size - mean) > max(_SHOWN * channel.standard_error, _NEARLY * abs(mean)) for channel in channels
-    ]
+    mean = _mean_delay([(channel.size, channel.standard_error) for channel in channels])
     by_motion = [
         _mean_delay([(channel.size, channel.standard_error) for channel in channels if channel.motion == motion])
         for motion in dict.fromkeys(channel.motion for channel in channels)
     ]
-    supported = len(by_motion) > 1 and all(
-        size * math.copysign(1.0, mean) > _SUPPORT * error for size, error, _ in by_motion
-    )
+    sign = math.copysign(1.0, mean.size)
     return DelayEstimate(
-        size=mean,
-        standard_error=error,
+        size=mean.size,
+        standard_error=mean.standard_error,
         channels=channels,
-        chance=chance,
-        alike=chance >= _ALIKE or not any(apart),
-        supported=supported,
+        chance=mean.chance,
+        alike=mean.alike,
+        supported=len(by_motion) > 1 and all(sign * one.size > _SUPPORT * one.standard_error for one in by_motion),
     )
 
 
@@ -208,38 +179,37 @@ def force_delays(
 ) -> tuple[SystematicError, ...]:
     """The delay of all gauges behind the motion, or of one, that oscillations at several frequencies show.
 
-    Parameters
-    ----------
-    forces : mapping
-        As :func:`delay_estimate` has them.
-    estimate : DelayEstimate or None
-        The common delay.
+    `forces`: As :func:`delay_estimate` has them; `estimate`: The common delay.
     """
     if estimate is None:
         return ()
     fastest = max((run.motion.frequency_radps for used in forces.values() for run in used.runs), default=0.0)
+
+    def common(delays: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
+        """The common value of delays and its standard error, s; None if it is not significant."""
+        if not delays:
+            return None
+        mean = _mean_delay(delays)
+        least = max(_SHOWN * mean.standard_error, LEAST_PHASE_RAD / max(fastest, 1e-12))
+        return (mean.size, mean.standard_error) if abs(mean.size) >= least and mean.alike else None
+
     found = {
         force: [(channel.size, channel.standard_error) for channel in estimate.channels if channel.force == force]
         for force in "YN"
     }
-    shown = {force: _common_delay(delays, fastest) for force, delays in found.items()}
-    common = _common_delay([delay for delays in found.values() for delay in delays], fastest)
-    if common is None and (alone := [delay for delay in shown.values() if delay is not None])[1:]:
-        common = _common_delay(alone, fastest)
-    if common is not None and all(found.values()):
-        error = SystematicError(
-            source="force_delay",
-            force="XYN",
-            runs="",
-            size=common[0],
-            standard_error=common[1],
-            corrected=estimate.supported,
-        )
-        return (error,)
+    shown = {force: delay for force, delays in found.items() if (delay := common(delays)) is not None}
+    of_all = common([delay for delays in found.values() for delay in delays])
+    if of_all is None and len(shown) > 1:
+        of_all = common([*shown.values()])
+    supported = False
+    if of_all is not None and all(found.values()):
+        shown, supported = {"XYN": of_all}, estimate.supported
     return tuple(
-        SystematicError(source="force_delay", force=force, runs="", size=delay[0], standard_error=delay[1])
-        for force, delay in shown.items()
-        if delay is not None and len(found[force]) > 1
+        SystematicError(
+            source="force_delay", force=force, runs="", size=size, standard_error=error, corrected=supported
+        )
+        for force, (size, error) in shown.items()
+        if force == "XYN" or len(found[force]) > 1
     )
 
 
@@ -254,16 +224,11 @@ def gauge_gains(
     """The kind of run in which a gauge departs most from the prediction of all other kinds, if any; and the kinds that
     cannot be checked, because no other kind gives their derivatives.
 
-    Parameters
-    ----------
-    equations : CampaignEquations
-        Without trends with frequency.
-    spread : Spread
-        Spread of the runs within each kind.
-    rival : float
-        Largest ratio of a trend with frequency to its standard error: a gain must explain the runs better.
+    `equations`: Without trends with frequency; `spread`: Spread of the runs within each kind; `rival`: Largest ratio of
+    a trend with frequency to its standard error: a gain must explain the runs better.
     """
-    predicted = _predicted(equations, spread)
+    # The gauge's coefficients as predicted by the derivatives, without noise.
+    predicted = equations.gauge - (equations.values - equations.design @ solve(equations, spread).values)
     kinds = np.array([run.run.type for run in equations.runs])[equations.run_of_row]
     gains: dict[str, tuple[float, float]] = {}
     unknown = []
@@ -295,10 +260,12 @@ def gauge_gains(
     return (found,), tuple(unknown)
 
 
-def correct_delay(equations: CampaignEquations, delay_s: float) -> CampaignEquations:
-    """The equations with the forces of the oscillating runs corrected for a delay."""
+def correct_delay(
+    equations: CampaignEquations, delay_s: float, kinds: Sequence[str] = OSCILLATING
+) -> CampaignEquations:
+    """The equations with the forces of the oscillating runs of some `kinds` corrected for a delay."""
     change = np.zeros_like(equations.gauge)
-    for rows, run, root in _oscillating(equations):
+    for rows, run, root in _runs_of(equations, kinds):
         turn = _phase_shift(len(root), run.motion.frequency_radps * delay_s)
         change[rows] = np.linalg.solve(root, turn @ root @ equations.gauge[rows]) - equations.gauge[rows]
     return replace(equations, values=equations.values + change, gauge=equations.gauge + change)
@@ -311,25 +278,23 @@ def _correct_gain(equations: CampaignEquations, kind: str, gain: float) -> Campa
     return replace(equations, values=equations.values + change, gauge=equations.gauge + change)
 
 
-def _common_delay(delays: Sequence[tuple[float, float]], fastest_radps: float) -> tuple[float, float] | None:
-    """The common value of delays (value, standard error) and its standard error, s; None if it is not significant."""
-    if not delays:
-        return None
-    mean, error, chance = _mean_delay(delays)
-    if abs(mean) < max(_SHOWN * error, LEAST_PHASE_RAD / max(fastest_radps, 1e-12)):
-        return None
-    apart = [abs(value - mean) > max(_SHOWN * error_of, _NEARLY * abs(mean)) for value, error_of in delays]
-    if chance < _ALIKE and any(apart):
-        return None
-    return mean, error
+class _MeanDelay(NamedTuple):
+    """Weighted mean of delays, s, the probability of their scatter, and whether they are one delay."""
+
+    size: float
+    standard_error: float
+    chance: float
+    alike: bool
 
 
-def _mean_delay(delays: Sequence[tuple[float, float]]) -> tuple[float, float, float]:
-    """Weighted mean of delays, its standard error, and the probability of their scatter."""
-    values, weights = np.array([value for value, _ in delays]), np.array([error**-2.0 for _, error in delays])
+def _mean_delay(delays: Sequence[tuple[float, float]]) -> _MeanDelay:
+    """Weighted mean of delays (value, standard error)."""
+    values, errors = (np.array(column) for column in zip(*delays, strict=True))
+    weights = np.array([error**-2.0 for _, error in delays])
     mean, error = float(weights @ values / weights.sum()), float(weights.sum() ** -0.5)
     chance = float(chdtrc(len(values) - 1, weights @ (values - mean) ** 2)) if len(values) > 1 else 1.0
-    return mean, error, chance
+    apart = np.abs(values - mean) > np.maximum(_SHOWN * errors, _NEARLY * abs(mean))
+    return _MeanDelay(mean, error, chance, chance >= _ALIKE or not apart.any())
 
 
 def _delays(equations: CampaignEquations) -> dict[str, tuple[float, float]]:
@@ -364,36 +329,23 @@ def _with_slopes(
     equations: CampaignEquations, motions: Mapping[str, Sequence[str]], delays: Mapping[str, float]
 ) -> CampaignEquations:
     """The equations corrected for a delay of each motion, with a small further delay of each as unknown."""
-    corrected = equations
     for motion, kinds in motions.items():
-        corrected = _advance_kinds(corrected, kinds, delays[motion])
-    return _with_unknowns(corrected, {motion: _slope(corrected, kinds) for motion, kinds in motions.items()})
-
-
-def _advance_kinds(equations: CampaignEquations, kinds: Sequence[str], delay_s: float) -> CampaignEquations:
-    affected = np.array([run.run.type in kinds for run in equations.runs])[equations.run_of_row]
-    whole = correct_delay(equations, delay_s)
-    return replace(
-        equations,
-        values=np.where(affected, whole.values, equations.values),
-        gauge=np.where(affected, whole.gauge, equations.gauge),
-    )
+        equations = correct_delay(equations, delays[motion], kinds)
+    return _with_unknowns(equations, {motion: _slope(equations, kinds) for motion, kinds in motions.items()})
 
 
 def _slope(equations: CampaignEquations, kinds: Sequence[str]) -> Array:
     """Effect on the equations of a gauge delay of 1 s in some kinds of run: minus the rate of change, (rows,)."""
     column = np.zeros_like(equations.gauge)
-    for rows, run, root in _oscillating(equations):
-        if run.run.type in kinds:
-            column[rows] = -np.linalg.solve(
-                root, _rate(len(root), run.motion.frequency_radps) @ root @ equations.gauge[rows]
-            )
+    for rows, run, root in _runs_of(equations, kinds):
+        rate = _rate(len(root), run.motion.frequency_radps)
+        column[rows] = -np.linalg.solve(root, rate @ root @ equations.gauge[rows])
     return column
 
 
-def _oscillating(equations: CampaignEquations) -> Iterator[tuple[slice, ReducedRun, Array]]:
+def _runs_of(equations: CampaignEquations, kinds: Sequence[str]) -> Iterator[tuple[slice, ReducedRun, Array]]:
     for rows, run, root in zip(equations.rows, equations.runs, equations.roots, strict=True):
-        if run.run.oscillates:
+        if run.run.type in kinds:
             yield rows, run, root
 
 
@@ -425,7 +377,102 @@ def _with_unknowns(equations: CampaignEquations, columns: Mapping[str, Array]) -
     )
 
 
-def _predicted(equations: CampaignEquations, spread: Spread) -> Array:
-    """The gauge's coefficients as predicted by the derivatives, without noise, (rows,)."""
-    residual: Array = equations.values - equations.design @ solve(equations, spread).values
-    return equations.gauge - residual
+_SMALL_RAD = 1e-4
+"""Turn by which the slope is found: far below any angle that matters, far above rounding."""
+_SAME_ANGLE = 0.01
+"""Probability of the difference of the two angles below which they are not one angle. Project choice."""
+
+
+def type_b_shifts(campaign: Campaign, used: CampaignEquations, solution: Solution) -> dict[str, dict[str, float]]:
+    """Change of each term of a force (prime), with its sign, by each stated error of one standard deviation.
+
+    `solution` is the solution of the equations `used`.
+    """
+    return {
+        source: moved_terms(with_common_error(campaign, used, source, size), solution)
+        for source, size in campaign.uncertainty.model_dump().items()
+        if size
+    }
+
+
+def with_common_error(campaign: Campaign, used: CampaignEquations, source: str, size: float) -> CampaignEquations:
+    """The equations with an error common to the campaign.
+
+    `source`: A key of ``[uncertainty]``; `size`: In the unit of the key.
+    """
+    if source == "force_delay_s":
+        return correct_delay(used, size)
+    runs: Sequence[ReducedRun] = used.runs
+    key = {"mass_relative": "mass_kg", "yaw_inertia_relative": "yaw_inertia_kgm2"}.get(source)
+    if key and (value := getattr(campaign.model, key)) is not None:
+        campaign = replace(campaign, model=campaign.model.model_copy(update={key: value * (1 + size)}))
+    elif source == "calibration_relative":
+        runs = [_scaled(run, 1 + size) for run in runs]
+    elif not key:
+        runs = [replace(run, motion=_erring(run.motion, source, size)) for run in runs]
+    return campaign_equations(campaign, runs, used.force, used.names).held(used.prior)
+
+
+def _erring(motion: CaptiveMotion, source: str, size: float) -> CaptiveMotion:
+    """A motion with an error of the recorded drift, rudder or speed."""
+    if source == "alignment_rad":
+        changed = replace(motion, v_mps=motion.v_mps - motion.speed_mps * np.sin(size))
+    elif source == "rudder_rad":
+        changed = replace(motion, delta_rad=motion.delta_rad + size)
+    else:
+        assert source in ("speed_relative", "blockage_relative")
+        changed = replace(motion, speed_mps=motion.speed_mps * (1 + size))
+    return motion.with_error(source, size, changed)
+
+
+def _scaled(run: ReducedRun, factor: float) -> ReducedRun:
+    fits = {force: replace(fit, coefficients=fit.coefficients * factor) for force, fit in run.fits.items()}
+    return replace(run, fits=fits)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AlignmentEstimate:
+    """The angle by which the true drift exceeds the recorded one, rad."""
+
+    # `angle_rad`, `standard_error_rad`: Weighted mean of that by Y0 and that by N0
+    angle_rad: float
+    standard_error_rad: float
+    by_force: Mapping[str, tuple[float, float]]  # ``Y`` and ``N`` to angle and standard error
+    chance: float  # Probability of so large a difference of the two
+    shown: bool  # The angle is not zero, and Y0 and N0 agree on it
+
+
+def alignment_estimate(
+    campaign: Campaign, equations: Mapping[str, CampaignEquations], solutions: Mapping[str, Solution]
+) -> AlignmentEstimate | None:
+    """The zero of the drift angle by the side force and moment at zero drift; None without Y0, Yv, N0 or Nv.
+
+    A symmetric model that is turned by a small angle eps against the recorded drift has Y0 = -Yv eps and N0 = -Nv eps,
+    and terms such as Yvrr eps r^2 that the regression takes for more of both: their size is found by turning the
+    recorded drift and solving again. Y0 and N0 then give the same angle. A single screw or a bent hull has another
+    ratio of Y0 and N0, except by chance.
+
+    `equations`, `solutions`: ``Y`` and ``N`` to the equations of that force and their solution.
+    """
+    found: dict[str, tuple[float, float]] = {}
+    for force in "YN":
+        solution, zero = solutions[force], f"{force}0"
+        if not {zero, f"{force}v"} <= set(solution.names):
+            return None
+        turned = with_common_error(campaign, equations[force], "alignment_rad", _SMALL_RAD)
+        slope = moved_terms(turned, solution)[zero] / _SMALL_RAD
+        if not slope:
+            return None
+        found[force] = (-solution.value(zero) / slope, solution.error(zero) / abs(slope))
+    weights = {force: error**-2.0 for force, (_, error) in found.items()}
+    total = sum(weights.values())
+    mean = sum(weights[force] * angle for force, (angle, _) in found.items()) / total
+    scatter = sum(weights[force] * (angle - mean) ** 2 for force, (angle, _) in found.items())
+    chance, error = float(chdtrc(1, scatter)), total**-0.5
+    return AlignmentEstimate(
+        angle_rad=mean,
+        standard_error_rad=error,
+        by_force=found,
+        chance=chance,
+        shown=bool(abs(mean) > _SHOWN * error and chance > _SAME_ANGLE),
+    )

@@ -8,10 +8,11 @@ section 5; "ITTC" is the recommended procedure 7.5-02-06-02, Captive Model Tests
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from tank2sim.cards.plausibility import Caution
+from tank2sim.records.campaign_form import ModelSection, TankSection
 
 
 def lacking(kind: str, what: str, key: str) -> Caution:
@@ -71,9 +72,6 @@ POSSIBLE_CENTRE = 0.5
 CENTRES_OF_GRAVITY = 0.1
 """|x_G| in lengths of ships that float on even keel: some 0.05 at most; a project choice beyond it."""
 
-SIMILARITY = {"m'": (0.02, "relative"), "J_z'": (0.05, "relative"), "x_G'": (0.005, ""), "z_G'": (0.005, "")}
-"""Largest difference of model and ship, relative or in lengths: project choice, paper 2 requires equality."""
-
 
 @dataclass(frozen=True)
 class OscillationMotion:
@@ -82,41 +80,6 @@ class OscillationMotion:
     run: str
     motion: str
     frequency_radps: float
-
-
-@dataclass(frozen=True)
-class Tank:
-    """Breadth and depth of the basin, m; None if unknown."""
-
-    breadth_m: float | None = None
-    depth_m: float | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class CarriedBody:
-    """The body that the gauges carry, in the water density of the test; SI."""
-
-    length_m: float
-    mass_kg: float
-    density_kgpm3: float
-    yaw_inertia_kgm2: float | None = None
-    beam_m: float | None = None
-    draught_m: float | None = None
-    x_G_m: float = 0.0
-
-    @property
-    def block(self) -> float | None:
-        """Mass over rho L B T; None if beam or draught is not known."""
-        if self.beam_m is None or self.draught_m is None:
-            return None
-        return self.mass_kg / (self.density_kgpm3 * self.length_m * self.beam_m * self.draught_m)
-
-    @property
-    def radius(self) -> float | None:
-        """Radius of gyration in yaw, lengths; None if the yaw inertia is not known."""
-        if self.yaw_inertia_kgm2 is None:
-            return None
-        return math.sqrt(self.yaw_inertia_kgm2 / self.mass_kg) / self.length_m
 
 
 @dataclass(frozen=True)
@@ -232,32 +195,7 @@ def trim(trim_m: float | None, length_m: float) -> Iterator[Caution]:
         )
 
 
-def similarity(model: Mapping[str, float | None], ship: Mapping[str, float | None]) -> Iterator[Caution]:
-    """Differences of m', J_z', x_G', z_G' between model and ship; a missing number is reported.
-
-    Parameters
-    ----------
-    model, ship : mapping
-        Numbers by the names of :data:`SIMILARITY`, prime system, x_G' and z_G' in lengths.
-    """
-    keys = {"m'": "mass_kg", "J_z'": "yaw_inertia_kgm2", "x_G'": "x_G_m", "z_G'": "z_G_m"}
-    for name, (limit, kind) in SIMILARITY.items():
-        of_model, of_ship = model.get(name), ship.get(name)
-        if of_model is None or of_ship is None:
-            key = f"[model] {keys[name]}" if of_model is None else f"{name} of the ship card"
-            yield lacking("similarity", f"whether model and ship have the same {name}", key)
-            continue
-        difference = abs(of_model - of_ship) / (abs(of_ship) if kind else 1.0)
-        if difference > limit:
-            amount = f"{100 * difference:.2g} %" + ("" if kind else " of the length")
-            yield Caution(
-                "similarity",
-                f"{name} is {of_model:.4g} of the model and {of_ship:.4g} of the ship card, {amount} apart; "
-                "derivatives hold for the ship only if both are equal (Krezelewski and Misiag).",
-            )
-
-
-def tank_resonance(runs: tuple[OscillationMotion, ...], tank: Tank, gravity_mps2: float) -> Iterator[Caution]:
+def tank_resonance(runs: tuple[OscillationMotion, ...], tank: TankSection, gravity_mps2: float) -> Iterator[Caution]:
     """Runs whose motion or its third harmonic is near a transverse standing wave of the tank.
 
     A model on the centreline that sways or yaws excites the waves that are odd across the tank, modes 1, 3, 5.
@@ -282,7 +220,7 @@ def tank_resonance(runs: tuple[OscillationMotion, ...], tank: Tank, gravity_mps2
                 )
 
 
-def tank_size(tank: Tank) -> Iterator[Caution]:
+def tank_size(tank: TankSection) -> Iterator[Caution]:
     """A tank larger than any."""
     for what, size, most in (("breadth_m", tank.breadth_m, WIDEST_TANK_M), ("depth_m", tank.depth_m, DEEPEST_TANK_M)):
         if size is not None and size > most:
@@ -293,7 +231,7 @@ def tank_size(tank: Tank) -> Iterator[Caution]:
             )
 
 
-def blockage(beam_m: float | None, draught_m: float | None, tank: Tank) -> Iterator[Caution]:
+def blockage(beam_m: float | None, draught_m: float | None, tank: TankSection) -> Iterator[Caution]:
     """A tank too small in section or depth for the model to behave as in open water."""
     known = {"[model] beam_m": beam_m, "[model] draught_m": draught_m}
     known |= {"[tank] breadth_m": tank.breadth_m, "[tank] depth_m": tank.depth_m}
@@ -327,35 +265,50 @@ def depth_froude(speed_mps: float, depth_m: float | None, gravity_mps2: float) -
         yield Caution("depth Froude number", message + "waves of the model.")
 
 
-def impossible_body(body: CarriedBody) -> Iterator[tuple[str, str]]:
+def _block(model: ModelSection, density_kgpm3: float) -> float | None:
+    """Mass over rho L B T; None if beam or draught is not known."""
+    if model.beam_m is None or model.draught_m is None:
+        return None
+    return model.mass_kg / (density_kgpm3 * model.length_m * model.beam_m * model.draught_m)
+
+
+def _radius(model: ModelSection) -> float | None:
+    """Radius of gyration in yaw, lengths; None if the yaw inertia is not known."""
+    if model.yaw_inertia_kgm2 is None:
+        return None
+    return math.sqrt(model.yaw_inertia_kgm2 / model.mass_kg) / model.length_m
+
+
+def impossible_body(model: ModelSection, density_kgpm3: float) -> Iterator[tuple[str, str]]:
     """Impossible numbers of a body: the key under ``[model]`` and the problem, usually a wrong unit."""
-    if body.block is not None and not _within(body.block, POSSIBLE_BLOCKS):
+    block, radius, length = _block(model, density_kgpm3), _radius(model), model.length_m
+    if block is not None and not _within(block, POSSIBLE_BLOCKS):
         yield (
             "mass_kg",
-            f"is {body.mass_kg:.4g}, {body.block:.3g} times the water in L x B x T ({body.length_m:g} m x "
-            f"{body.beam_m:g} m x {body.draught_m:g} m at {body.density_kgpm3:g} kg/m3); ships have "
-            f"{BLOCK_COEFFICIENTS[0]:g} to {BLOCK_COEFFICIENTS[1]:g}",
+            f"is {model.mass_kg:.4g}, {block:.3g} times the water in L x B x T ({length:g} m x {model.beam_m:g} m x "
+            f"{model.draught_m:g} m at {density_kgpm3:g} kg/m3); ships have {BLOCK_COEFFICIENTS[0]:g} to "
+            f"{BLOCK_COEFFICIENTS[1]:g}",
         )
-    prime = body.mass_kg / (0.5 * body.density_kgpm3 * body.length_m**3)
-    if body.block is None and not _within(prime, POSSIBLE_MASSES):
+    prime = model.mass_kg / (0.5 * density_kgpm3 * length**3)
+    if block is None and not _within(prime, POSSIBLE_MASSES):
         yield (
             "mass_kg",
-            f"is {body.mass_kg:.4g}, m' = {prime:.3g} with L = {body.length_m:g} m at {body.density_kgpm3:g} kg/m3; "
-            f"floating bodies have {POSSIBLE_MASSES[0]:g} to {POSSIBLE_MASSES[1]:g}",
+            f"is {model.mass_kg:.4g}, m' = {prime:.3g} with L = {length:g} m at {density_kgpm3:g} kg/m3; floating "
+            f"bodies have {POSSIBLE_MASSES[0]:g} to {POSSIBLE_MASSES[1]:g}",
         )
-    if body.radius is not None and not _within(body.radius, POSSIBLE_RADII):
+    if radius is not None and not _within(radius, POSSIBLE_RADII):
         yield (
             "yaw_inertia_kgm2",
-            f"is {body.yaw_inertia_kgm2:.4g}: with {body.mass_kg:.4g} kg the radius of gyration is {body.radius:.3g} "
-            f"L, and ships have {RADII_OF_GYRATION[0]:g} to {RADII_OF_GYRATION[1]:g}",
+            f"is {model.yaw_inertia_kgm2:.4g}: with {model.mass_kg:.4g} kg the radius of gyration is {radius:.3g} L, "
+            f"and ships have {RADII_OF_GYRATION[0]:g} to {RADII_OF_GYRATION[1]:g}",
         )
-    if abs(body.x_G_m) >= POSSIBLE_CENTRE * body.length_m:
-        yield "x_G_m", f"is {body.x_G_m:.4g}: the centre of gravity is off the ship, {body.length_m:g} m long"
+    if abs(model.x_G_m) >= POSSIBLE_CENTRE * length:
+        yield "x_G_m", f"is {model.x_G_m:.4g}: the centre of gravity is off the ship, {length:g} m long"
 
 
-def carried_mass(body: CarriedBody, block_coefficient: float | None = None) -> Iterator[Caution]:
+def carried_mass(model: ModelSection, density_kgpm3: float) -> Iterator[Caution]:
     """A mass that does not fit the hull, a yaw inertia or a centre of gravity that does not fit a ship."""
-    block = body.block
+    block, radius, stated = _block(model, density_kgpm3), _radius(model), model.block_coefficient
     if block is not None and not _within(block, BLOCK_COEFFICIENTS):
         low, high = BLOCK_COEFFICIENTS
         yield Caution(
@@ -363,22 +316,21 @@ def carried_mass(body: CarriedBody, block_coefficient: float | None = None) -> I
             f"The mass is {block:.3g} times the mass of the water in L x B x T, and ships have {low:g} to {high:g}: "
             "check mass, length, beam and draught.",
         )
-    if block is not None and block_coefficient is not None and abs(block / block_coefficient - 1) > BLOCK_TOLERANCE:
+    if block is not None and stated is not None and abs(block / stated - 1) > BLOCK_TOLERANCE:
         yield Caution(
             "mass",
-            f"The mass corresponds to a block coefficient of {block:.3g}, and {block_coefficient:.3g} is given: do "
-            "the gauges carry a part of the model alone?",
+            f"The mass corresponds to a block coefficient of {block:.3g}, and {stated:.3g} is given: do the gauges "
+            "carry a part of the model alone?",
         )
-    if body.radius is not None and not _within(body.radius, RADII_OF_GYRATION):
+    if radius is not None and not _within(radius, RADII_OF_GYRATION):
         low, high = RADII_OF_GYRATION
         yield Caution(
-            "mass",
-            f"The radius of gyration in yaw is {body.radius:.3g} L; ships and their models have {low:g} to {high:g}.",
+            "mass", f"The radius of gyration in yaw is {radius:.3g} L; ships and their models have {low:g} to {high:g}."
         )
-    if abs(body.x_G_m) > CENTRES_OF_GRAVITY * body.length_m:
+    if abs(model.x_G_m) > CENTRES_OF_GRAVITY * model.length_m:
         yield Caution(
             "mass",
-            f"The centre of gravity is {abs(body.x_G_m) / body.length_m:.2g} L from midships, and ships have 0.05 "
+            f"The centre of gravity is {abs(model.x_G_m) / model.length_m:.2g} L from midships, and ships have 0.05 "
             "L at most: check [model] x_G_m.",
         )
 

@@ -51,30 +51,34 @@ _SOURCE_OF = {
 
 @dataclass(frozen=True, kw_only=True)
 class BudgetRow:
-    """The budget of one derivative, prime.
-
-    Parameters
-    ----------
-    name : str
-    value : float
-    combined, expanded : float
-        Standard uncertainty, and :data:`COVERAGE_FACTOR` times that.
-    parts, shares : mapping
-        Source, a key of :data:`BUDGET_SOURCES`, to its standard uncertainty, and to its share of the variance; the
-        shares add up to 1.
-    """
+    """The budget of one derivative, prime."""
 
     name: str
     value: float
+    # `combined`, `expanded`: Standard uncertainty, and :data:`COVERAGE_FACTOR` times that
     combined: float
     expanded: float
+    # `parts`, `shares`: Source, a key of :data:`BUDGET_SOURCES`, to its standard uncertainty, and to its share of the
+    # variance; the shares add up to 1
     parts: Mapping[str, float]
     shares: Mapping[str, float]
 
 
-def uncertainty_budget(reduction: Reduction) -> tuple[BudgetRow, ...]:
+@dataclass(frozen=True, kw_only=True)
+class UncertaintyBudget:
+    """The uncertainty budget after ITTC 7.5-02-06-04, prime."""
+
+    coverage_factor: float
+    sources: dict[str, str]  # Source to its words
+    not_stated: tuple[str, ...]  # Keys of ``[uncertainty]`` that the campaign does not state
+    # Relative increase of the speed past the model by the walls; None if a size is missing
+    blockage_speed_relative: float | None
+    derivatives: dict[str, BudgetRow]  # Derivative to its budget
+
+
+def uncertainty_budget(reduction: Reduction) -> UncertaintyBudget:
     """The budget of each derivative that the campaign gives."""
-    rows = []
+    campaign, derivatives = reduction.campaign, {}
     for result in reduction.forces.values():
         parts = regression_parts(result.selection, result.solution)
         for place, name in enumerate(result.solution.names):
@@ -88,17 +92,21 @@ def uncertainty_budget(reduction: Reduction) -> tuple[BudgetRow, ...]:
                 variances[_SOURCE_OF.get(source, "calibration")] += size**2
             total = sum(variances.values())
             combined = float(np.sqrt(total))
-            rows.append(
-                BudgetRow(
-                    name=name,
-                    value=found.value,
-                    combined=combined,
-                    expanded=COVERAGE_FACTOR * combined,
-                    parts={source: float(np.sqrt(variance)) for source, variance in variances.items()},
-                    shares={source: variance / total if total else 0.0 for source, variance in variances.items()},
-                )
+            derivatives[name] = BudgetRow(
+                name=name,
+                value=found.value,
+                combined=combined,
+                expanded=COVERAGE_FACTOR * combined,
+                parts={source: float(np.sqrt(variance)) for source, variance in variances.items()},
+                shares={source: variance / total if total else 0.0 for source, variance in variances.items()},
             )
-    return tuple(rows)
+    return UncertaintyBudget(
+        coverage_factor=COVERAGE_FACTOR,
+        sources=BUDGET_SOURCES,
+        not_stated=sources_not_stated(reduction),
+        blockage_speed_relative=blockage_speed(campaign.model, campaign.tank, campaign.test),
+        derivatives=derivatives,
+    )
 
 
 def regression_parts(selection: Selection, solution: Solution) -> dict[str, Array]:
@@ -107,13 +115,6 @@ def regression_parts(selection: Selection, solution: Solution) -> dict[str, Arra
 
     The estimate is C X' S S b with the weights S; b has the covariance noise I + zero z z' + gain g g'. All parts are
     widened alike for the finite number of runs (Student's t).
-
-    Parameters
-    ----------
-    selection : Selection
-        Its equations.
-    solution : Solution
-        Solution of these equations.
     """
     equations, spread = selection.equations, solution.spread
     weights = spread.weights or spread

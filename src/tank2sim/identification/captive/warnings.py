@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from tank2sim.cards import ManoeuvringCard
 from tank2sim.cards.plausibility import (
     ADDED_MASSES,
     DEEP_ADDED_SHARES,
@@ -21,9 +20,7 @@ from tank2sim.cards.plausibility import (
 )
 from tank2sim.identification.captive.tank_conditions import (
     LEAST_DEPTH_RATIO,
-    CarriedBody,
     OscillationMotion,
-    Tank,
     blockage,
     carried_mass,
     depth_froude,
@@ -31,13 +28,13 @@ from tank2sim.identification.captive.tank_conditions import (
     frequency_parameters,
     model_length,
     scale_effect,
-    similarity,
     tank_resonance,
     trim,
 )
+from tank2sim.records.campaign_form import ModelSection
 from tank2sim.records.campaigns import Campaign
 
-__all__ = ["Caution", "OscillationMotion", "body_of", "cautions_of_result", "cautions_of_test"]
+__all__ = ["Caution", "OscillationMotion", "cautions_of_result", "cautions_of_test"]
 
 ADDED_SHARE = (0.1, 3.0)
 """Range of added mass over mass, and of added yaw inertia over yaw inertia; about 0.9 and 0.7 are usual."""
@@ -68,24 +65,14 @@ _USUAL_BLOCK = 0.7
 """Block coefficient of the estimate of Y_v. Project choice: 0.5 to 0.85 change it by 20 %."""
 
 
-def cautions_of_test(
-    campaign: Campaign, runs: tuple[OscillationMotion, ...], ship: ManoeuvringCard | None = None
-) -> tuple[Caution, ...]:
+def cautions_of_test(campaign: Campaign, runs: tuple[OscillationMotion, ...]) -> tuple[Caution, ...]:
     """Cautions on the test conditions of a campaign, without its forces.
 
-    Parameters
-    ----------
-    campaign : Campaign
-        As read.
-    runs : tuple of OscillationMotion
-        Its oscillating runs, with frequencies as measured.
-    ship : ManoeuvringCard, optional
-        The ship of the model.
+    `runs`: Its oscillating runs, with frequencies as measured.
     """
-    model, test = campaign.model, campaign.test
+    model, test, tank = campaign.model, campaign.test, campaign.tank
     gravity, speed, length = test.gravity_mps2, test.speed_mps, model.length_m
-    tank = Tank(campaign.tank.breadth_m, campaign.tank.depth_m)
-    found = [
+    return (
         *model_length(length),
         *frequency_parameters(runs, speed, gravity),
         *flow_memory(runs, speed, length),
@@ -94,29 +81,25 @@ def cautions_of_test(
         *blockage(model.beam_m, model.draught_m, tank),
         *depth_froude(speed, tank.depth_m, gravity),
         scale_effect(model.scale, length, speed, test.kinematic_viscosity_m2ps),
-    ]
-    if ship is not None:
-        found += similarity(_numbers(campaign), _card_numbers(ship))
-    return tuple(found)
+    )
 
 
 def cautions_of_result(
     derivatives: Mapping[str, float], standard_errors: Mapping[str, float], campaign: Campaign
 ) -> tuple[Caution, ...]:
     """Cautions on derivatives (prime, "hydrodynamic", starboard), with standard errors by the same names."""
-    numbers = _numbers(campaign)
-    mass, inertia = numbers["m'"], numbers["J_z'"]
-    assert mass is not None
-    body = body_of(campaign)
-    deep = not (campaign.tank.depth_m and body.draught_m) or campaign.tank.depth_m >= LEAST_DEPTH_RATIO * body.draught_m
-    draught_ratio = body.draught_m / body.length_m if body.draught_m else None
-    if deep and (foreign := tuple(foreign_units(derivatives, mass, inertia, campaign.inertia_removed, body))):
+    model, scales, depth = campaign.model, campaign.scales, campaign.tank.depth_m
+    mass = model.mass_kg / float(scales.mass)
+    inertia = None if model.yaw_inertia_kgm2 is None else model.yaw_inertia_kgm2 / float(scales.inertia)
+    deep = not (depth and model.draught_m) or depth >= LEAST_DEPTH_RATIO * model.draught_m
+    draught_ratio = model.draught_m / model.length_m if model.draught_m else None
+    if deep and (foreign := tuple(foreign_units(derivatives, mass, inertia, campaign.inertia_removed, model))):
         return foreign  # which is the cause of what else is wrong
     # A positive added mass is reported once, with its likely cause.
     other_derivatives = {name: value for name, value in derivatives.items() if name not in ADDED_MASSES}
     return (
         *force_convention(derivatives, mass, inertia or 0.0, campaign.test.force_convention),
-        *carried_mass(body, campaign.model.block_coefficient),
+        *carried_mass(model, campaign.test.water_density_kgpm3),
         *(added_masses(derivatives, standard_errors, mass, inertia) if deep else ()),
         *unusual_signs(other_derivatives, standard_errors),
         *yaw_force(derivatives, mass),
@@ -125,49 +108,14 @@ def cautions_of_result(
     )
 
 
-def body_of(campaign: Campaign) -> CarriedBody:
-    """The body that the gauges carry."""
-    model = campaign.model
-    return CarriedBody(
-        length_m=model.length_m,
-        mass_kg=model.mass_kg,
-        density_kgpm3=campaign.test.water_density_kgpm3,
-        yaw_inertia_kgm2=model.yaw_inertia_kgm2,
-        beam_m=model.beam_m,
-        draught_m=model.draught_m,
-        x_G_m=model.x_G_m,
-    )
-
-
-def _numbers(campaign: Campaign) -> dict[str, float | None]:
-    model, scales = campaign.model, campaign.scales
-    return {
-        "m'": model.mass_kg / float(scales.mass),
-        "J_z'": None if model.yaw_inertia_kgm2 is None else model.yaw_inertia_kgm2 / float(scales.inertia),
-        "x_G'": model.x_G_m / model.length_m,
-        "z_G'": None if model.z_G_m is None else model.z_G_m / model.length_m,
-    }
-
-
-def _card_numbers(ship: ManoeuvringCard) -> dict[str, float | None]:
-    body = ship.rigid_body
-    return {"m'": body.mass, "J_z'": body.yaw_inertia, "x_G'": body.x_G, "z_G'": None}
-
-
 def force_convention(
     derivatives: Mapping[str, float], mass_prime: float, inertia_prime: float, convention: str
 ) -> Iterator[Caution]:
     """Added masses that no body has, and whether the opposite sign of the forces would correct them.
 
-    Parameters
-    ----------
-    derivatives : mapping
-        Prime values; Yvdot and Nrdot are checked.
-    mass_prime, inertia_prime : float
-        m' and J_z'. With forces of the wrong sign Y_vdot comes out as 2 m' - Y_vdot and N_rdot as 2 J_z' - N_rdot,
-        by (4.4) of paper 2 and its equivalent for yaw.
-    convention : str
-        ``force_convention`` of the campaign.
+    `derivatives`: Prime values; Yvdot and Nrdot are checked; `mass_prime`, `inertia_prime`: m' and J_z'. With forces of
+    the wrong sign Y_vdot comes out as 2 m' - Y_vdot and N_rdot as 2 J_z' - N_rdot, by (4.4) of paper 2 and its
+    equivalent for yaw; `convention`: ``force_convention`` of the campaign.
     """
     inertias = ((mass_prime, "mass"), (inertia_prime, "yaw inertia"))
     for name, (inertia, what) in zip(ADDED_MASSES, inertias, strict=True):
@@ -180,22 +128,15 @@ def force_convention(
 
 
 def foreign_units(
-    derivatives: Mapping[str, float], mass_prime: float, inertia_prime: float | None, removed: bool, body: CarriedBody
+    derivatives: Mapping[str, float], mass_prime: float, inertia_prime: float | None, removed: bool, model: ModelSection
 ) -> Iterator[Caution]:
     """Other units of force and moment, with which derivatives that no ship has become those of one, in deep water.
 
-    Parameters
-    ----------
-    derivatives : mapping
-        Prime values; with a unit that is k newtons Y_v is k times as large, Y_vdot is m' - k (m' - Y_vdot).
-    mass_prime, inertia_prime : float
-        m' and J_z', None if unknown.
-    removed : bool
-        The forces were recorded without the inertia of the model.
-    body : CarriedBody
-        Its length, beam and draught scale the estimates.
+    `derivatives`: Prime values; with a unit that is k newtons Y_v is k times as large, Y_vdot is m' - k (m' - Y_vdot);
+    `mass_prime`, `inertia_prime`: m' and J_z', None if unknown; `removed`: The forces were recorded without the inertia
+    of the model; `model`: Its length, beam and draught scale the estimates.
     """
-    hull = _HullShares.of(derivatives, mass_prime, inertia_prime, removed, body)
+    hull = _HullShares.of(derivatives, mass_prime, inertia_prime, removed, model)
     force, moment = "", ""
     if not _of_a_ship(hull.forces(1.0)):
         force = _nearest(FORCE_UNITS, hull.forces)
@@ -235,14 +176,14 @@ class _HullShares:
         mass_prime: float,
         inertia_prime: float | None,
         removed: bool,
-        body: CarriedBody,
+        model: ModelSection,
     ) -> _HullShares:
         """As the arguments of :func:`foreign_units`."""
-        length, beam, draught = body.length_m, body.beam_m, body.draught_m
+        length, beam, draught = model.length_m, model.beam_m, model.draught_m
         slender = math.pi * (draught / length) ** 2 if draught else 0.0
         sway = slender * (1.0 + 0.4 * _USUAL_BLOCK * beam / draught) if draught and beam else 0.0
         inertias = {"Yvdot": mass_prime, "Nrdot": inertia_prime or 0.0}
-        carried = {} if removed else {**inertias, "Nr": mass_prime * body.x_G_m / length}
+        carried = {} if removed else {**inertias, "Nr": mass_prime * model.x_G_m / length}
         return cls(derivatives, carried, {**inertias, "Yv": sway, "Nr": slender})
 
     def forces(self, factor: float) -> dict[str, float]:

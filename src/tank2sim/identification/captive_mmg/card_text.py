@@ -14,8 +14,7 @@ from tank2sim.dynamics.mmg.hull import HULL_TERMS
 from tank2sim.errors import InputError
 from tank2sim.escaping import one_line
 from tank2sim.identification.captive.result_card import model_particulars, model_yaw_inertia
-from tank2sim.identification.captive_mmg.contradicted_tests import place_of_column
-from tank2sim.identification.captive_mmg.steady_tests import SteadyTests
+from tank2sim.identification.captive_mmg.steady_tests import SteadyTests, place_of_column
 
 _CAUSES = {
     "derivatives.Y": ("Y", "drift"),
@@ -36,13 +35,8 @@ MASS_KEYS = {"Xudot": "mx", "Yvdot": "my", "Nrdot": "Jz"}
 def mmg_card_text(tests: SteadyTests, values: Mapping[str, float], errors: Mapping[str, float], note: str) -> str:
     """The text of a card.
 
-    Parameters
-    ----------
-    tests : SteadyTests
-    values, errors : mapping
-        Coefficients of hull (prime II, by 1/2 rho L d U^2), propeller and rudder by name, and their standard errors.
-    note : str
-        Sentence that says where the numbers are from.
+    `values`, `errors`: Coefficients of hull (prime II, by 1/2 rho L d U^2), propeller and rudder by name, and their
+    standard errors; `note`: Sentence that says where the numbers are from.
     """
     form = tests.form
     model = form.model
@@ -79,13 +73,13 @@ def mmg_card_text(tests: SteadyTests, values: Mapping[str, float], errors: Mappi
 
 def _coefficients(
     tests: SteadyTests, values: Mapping[str, float], errors: Mapping[str, float]
-) -> dict[str, tomlkit.items.Table]:
+) -> dict[str, dict[str, object]]:
     """Tables of derivatives, propeller, rudder and standard errors."""
     form, rudder = tests.form, tests.form.rudder
     assert rudder is not None
-    derivatives, uncertainty = tomlkit.table(), tomlkit.table()
-    of_hull = [name for names in HULL_TERMS.values() for name in names if name in values]
-    for name in of_hull:
+    derivatives: dict[str, object] = {}
+    uncertainty: dict[str, object] = {}
+    for name in (name for names in HULL_TERMS.values() for name in names if name in values):
         key, sign = ("R0", -1.0) if name == "X0" else (name, 1.0)
         derivatives[key] = _rounded(sign * values[name])
         if name in errors:
@@ -94,14 +88,12 @@ def _coefficients(
         number = tomlkit.item(_rounded(-values.get(name, value)))
         derivatives[MASS_KEYS[name]] = number.comment("ESTIMATED, not from steady tests")
         uncertainty[MASS_KEYS[name]] = _rounded(errors.get(name, error), 3)
-    propeller, of_rudder = tomlkit.table(), tomlkit.table()
-    propeller["x_P"] = form.propeller.x_P
-    of_rudder["height_m"] = rudder.height_m
-    of_rudder["f_alpha"] = rudder.f_alpha or _rounded(fujii(rudder.aspect_ratio or 0.0))
-    of_rudder["x_R"] = rudder.x_R
+    propeller: dict[str, object] = {"x_P": form.propeller.x_P}
+    f_alpha = rudder.f_alpha or _rounded(fujii(rudder.aspect_ratio or 0.0))
+    of_rudder: dict[str, object] = {"height_m": rudder.height_m, "f_alpha": f_alpha, "x_R": rudder.x_R}
     if form.propeller.number == 2:
-        propeller["number"] = of_rudder["number"] = 2
-        propeller["y_P"], of_rudder["y_R"] = form.propeller.y_P, rudder.y_R
+        propeller |= {"number": 2, "y_P": form.propeller.y_P}
+        of_rudder |= {"number": 2, "y_R": rudder.y_R}
     for name in (name for name in values if name in PROPELLER_COEFFICIENTS or name in RUDDER_COEFFICIENTS):
         (propeller if name in PROPELLER_COEFFICIENTS else of_rudder)[name] = _rounded(values[name])
         if name in errors:
@@ -112,10 +104,8 @@ def _coefficients(
 def tested_card(tests: SteadyTests, values: Mapping[str, float], errors: Mapping[str, float], note: str) -> MmgCard:
     """The card of :func:`mmg_card_text`, with the same `tests`, `values`, `errors` and `note`.
 
-    Raises
-    ------
-    InputError
-        The coefficients are not those of a ship; it names the campaign, and the columns that give the one at fault.
+    Raises InputError: The coefficients are not those of a ship; it names the campaign, and the columns that give the
+    one at fault.
     """
     try:
         card = parse_card(mmg_card_text(tests, values, errors, note), "the reduced card")

@@ -103,40 +103,19 @@ a condition."""
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MmgFit:
-    """Coefficients of the MMG method from steady tests.
-
-    Parameters
-    ----------
-    tests : SteadyTests
-    names : tuple of str, (k,)
-        Coefficients; those of the hull in prime II; ``rudder_offset`` in rad.
-    values : array, (k,)
-    covariance : array, (k, k)
-        Covariance of both types.
-    random : array, (k,)
-        Standard errors by the scatter alone (Type A).
-    common : mapping
-        Key of ``[uncertainty]`` to the standard errors by it (Type B), (k,).
-    sigmas : array, (channels + 1 or 2,)
-        Standard deviation of what is left of the channels (N, N m), of K_T, and with torque of K_Q.
-    residuals : array, (conditions, channels)
-        Measured less computed, N and N m.
-    explained : array, (channels,)
-        Share of the variance of each channel that is explained.
-    not_excited : tuple of str
-        Coefficients of the hull that no condition shows; zero.
-    """
+    """Coefficients of the MMG method from steady tests."""
 
     tests: SteadyTests
-    names: tuple[str, ...]
-    values: Array
-    covariance: Array
-    random: Array
-    common: Mapping[str, Array]
+    names: tuple[str, ...]  # Coefficients; those of the hull in prime II; ``rudder_offset`` in rad
+    values: Array  # (k,)
+    covariance: Array  # (k, k): Covariance of both types
+    random: Array  # (k,): Standard errors by the scatter alone (Type A)
+    common: Mapping[str, Array]  # Key of ``[uncertainty]`` to the standard errors by it (Type B), (k,)
+    # (channels + 1 or 2,): Standard deviation of what is left of the channels (N, N m), of K_T, and with torque of K_Q
     sigmas: Array
-    residuals: Array
-    explained: Array
-    not_excited: tuple[str, ...]
+    residuals: Array  # (conditions, channels): Measured less computed, N and N m
+    explained: Array  # (channels,): Share of the variance of each channel that is explained
+    not_excited: tuple[str, ...]  # Coefficients of the hull that no condition shows; zero
 
     @cached_property
     def errors(self) -> Array:
@@ -185,10 +164,8 @@ class MmgFit:
 def fit_mmg(tests: SteadyTests) -> MmgFit:
     """Fit all coefficients that the tests show.
 
-    Raises
-    ------
-    InputError
-        There are too few conditions, or none with the rudder over, or none at drift: no hull or no rudder is found.
+    Raises InputError: There are too few conditions, or none with the rudder over, or none at drift: no hull or no
+    rudder is found.
     """
     _refuse_poor(tests)
     names, not_excited = _fitted_names(tests)
@@ -254,14 +231,7 @@ def computed_readings(model: Model, names: Sequence[str], units: Array, channels
 
     The torque is among the c channels if its coefficients are among the names.
 
-    Parameters
-    ----------
-    model : Model
-        Model of an MMG card.
-    names : sequence of str, (k,)
-    units : array, (k,)
-        What one of a coefficient is in the model: L/d of those of the hull.
-    channels : sequence of str, (c,)
+    `model`: Model of an MMG card; `units` (k,): What one of a coefficient is in the model: L/d of those of the hull.
     """
     theta, motion = ca.SX.sym("theta", len(names)), ca.SX.sym("motion", len(_MOTION))
     given = {name: motion[i] for i, name in enumerate(_MOTION)}

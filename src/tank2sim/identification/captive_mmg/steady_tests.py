@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -14,15 +15,97 @@ from tank2sim.errors import InputError
 from tank2sim.files import named_in
 from tank2sim.identification.captive.harmonics import reduced_run
 from tank2sim.identification.captive.run_faults import record_faults, reduced_faults
-from tank2sim.identification.captive_mmg.contradicted_tests import (
-    refuse_astern,
-    refuse_impossible_sizes,
-    refuse_other_curve,
-)
 from tank2sim.notices import Notice
-from tank2sim.records.averages import Condition, read_averages, read_columns
+from tank2sim.records.averages import read_columns
 from tank2sim.records.campaign_form import CampaignFile
-from tank2sim.records.campaigns import CaptiveRun, read_campaign, read_campaign_file, together
+from tank2sim.records.campaigns import Campaign, read_campaign, read_campaign_form, together
+from tank2sim.records.captive_record import FORCE_COLUMNS, CaptiveRun
+
+_RUDDER_AREA = (0.002, 0.1)
+"""Range of the area of one rudder over L d. Project choice: ships have 0.01 to 0.04 (the KVLCC2 0.017), one of two
+half of it; an area of the ship next to the length of its model is hundreds of times too large."""
+_RUDDER_HEIGHT = 1.5
+"""Largest height of a rudder over the draught. Project choice: it ends at the keel, and a part may be out of the
+water."""
+_DIAMETER = (0.1, 1.5)
+"""Range of D_P over the draught. Project choice: merchant ships have 0.4 to 0.8, a fast hull of little draught 1."""
+_AT_STERN = (-0.65, -0.25)
+"""Range of the place of propeller and rudder over L. Project choice: both are about the after perpendicular, -0.5; the
+method is of a propeller in the wake of the hull and a rudder in its race."""
+_K_T_AT_REST = (0.05, 1.2)
+"""Range of K_T at J = 0. Project choice: from Wageningen B screws of a pitch ratio of 0.5 to 1.4, 0.2 to 0.65, a
+factor of two and more away."""
+
+
+def refuse_impossible_sizes(form: CampaignFile, path: Path) -> None:
+    """Raise InputError for the first size or place of propeller or rudder that no ship has."""
+    for key, problem, remedy in _impossible_sizes(form):
+        raise InputError(path, key, problem, remedy)
+
+
+def _impossible_sizes(form: CampaignFile) -> Iterator[tuple[str, str, str]]:
+    model, rudder, propeller = form.model, form.rudder, form.propeller
+    assert rudder is not None and model.draught_m and model.rudder_area_m2 and model.propeller_diameter_m
+    draught = model.draught_m
+    of_model = "give that of the model"
+    share = model.rudder_area_m2 / (model.length_m * draught)
+    if not _RUDDER_AREA[0] <= share <= _RUDDER_AREA[1]:
+        problem = f"is {share:.2g} times length_m times draught_m; ships have 0.01 to 0.04"
+        yield "model.rudder_area_m2", problem, of_model
+    if rudder.height_m > _RUDDER_HEIGHT * draught:
+        yield "rudder.height_m", f"is {rudder.height_m / draught:.2g} times draught_m", of_model
+    share = model.propeller_diameter_m / draught
+    if not _DIAMETER[0] <= share <= _DIAMETER[1]:
+        yield "model.propeller_diameter_m", f"is {share:.2g} times draught_m; ships have 0.4 to 0.8", of_model
+    for key, place in (("propeller.x_P", propeller.x_P), ("rudder.x_R", rudder.x_R)):
+        if not _AT_STERN[0] <= place <= _AT_STERN[1]:
+            where = "forward" if place > 0 else "abaft"
+            problem = f"is {abs(place):.3g} L {where} of midships" if place else "is at midships"
+            remedy = "over L, positive forward of midships: at the stern it is about -0.5"
+            yield key, problem, remedy
+
+
+def refuse_other_curve(points: Array, path: Path) -> None:
+    """Raise InputError for open-water points that are not K_T of a propeller.
+
+    `points` (points, 2 or more): J, K_T; `path`: File of the campaign, for the message.
+    """
+    J, K_T = points[:, :2].T
+    remedy = "name the column of K_T = T/(rho n² D⁴), positive ahead"
+    first, last = int(np.argmin(J)), int(np.argmax(J))
+    if not K_T[first] > K_T[last]:
+        problem = (
+            f"is {K_T[first]:.3g} at J = {J[first]:.3g} and {K_T[last]:.3g} at J = {J[last]:.3g}; K_T falls with J"
+        )
+        raise InputError(path, "open_water.K_T", problem, remedy)
+    at_rest = float(np.polyfit(J, K_T, 2)[-1])
+    if not _K_T_AT_REST[0] <= at_rest <= _K_T_AT_REST[1]:
+        problem = f"is {at_rest:.3g} at J = 0; propellers have 0.2 to 0.65"
+        raise InputError(path, "open_water.K_T", problem, remedy)
+
+
+def refuse_astern(form: CampaignFile, path: Path, revolutions: Array, thrusts: dict[str, Array]) -> None:
+    """Raise InputError if the propeller turns, or pushes, astern in most conditions.
+
+    `path`: File of the campaign, for the message; `revolutions` (conditions,): rad/s; `thrusts`: ``thrust``, and
+    ``thrust_left`` of two, to its values, N, (conditions,).
+    """
+    for key, values in {"propeller": revolutions, **thrusts}.items():
+        if not np.median(values) > 0:
+            what = "the propeller turns" if key == "propeller" else "the propeller pushes"
+            remedy = "both are positive ahead: change the sign of the column"
+            raise InputError(path, place_of_column(form, key), f"{what} astern in most conditions", remedy)
+
+
+def place_of_column(form: CampaignFile, key: str) -> str:
+    """Where a campaign names a column: its key in ``[averages.columns]``, without a unit, and heading, or ``runs``."""
+    if form.averages is None:
+        return f"runs, column {key}"
+    given = form.averages.columns.model_dump(exclude_none=True)
+    headings = [heading for name, heading in given.items() if name == key or name.startswith(f"{key}_r")]
+    headings += [given["yaw_rate_prime"]] if key == "yaw_rate" and "yaw_rate_prime" in given else []
+    return f"averages.columns.{key}" + "".join(f" (column {heading})" for heading in headings)
+
 
 CHANNELS = ("X", "Y", "N", "T", "F_N")
 """Surge and sway force (N), yaw moment (N m), thrust (N), normal force of the rudder (N, positive to port)."""
@@ -37,33 +120,18 @@ factor of three away; 10 K_Q is."""
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SteadyTests:
-    """Steady conditions of one campaign and the open-water curve of its propeller.
+    """Steady conditions of one campaign and the open-water curve of its propeller."""
 
-    Parameters
-    ----------
-    path : Path
-        File of the campaign.
-    form : CampaignFile
-        What it states.
-    names : tuple of str, (conditions,)
-        File of each condition, and line in a table of averages.
-    motion : array, (conditions, 5)
-        u, v (m/s), r (rad/s), rudder angle (rad, positive to starboard), revolutions (rad/s).
-    readings : array, (conditions, 5 to 7)
-        :attr:`channels`, as a gauge on the model shows them: of the water, and of the body's own inertia in turning.
-    open_water : array, (points, 2 or 3)
-        J, K_T, and K_Q if the torque was measured.
-    remarks : tuple of Notice
-        Remarks from reading the files.
-    """
-
-    path: Path
-    form: CampaignFile
-    names: tuple[str, ...]
+    path: Path  # File of the campaign
+    form: CampaignFile  # What it states
+    names: tuple[str, ...]  # File of each condition, and line in a table of averages
+    # (conditions, 5): u, v (m/s), r (rad/s), rudder angle (rad, positive to starboard), revolutions (rad/s)
     motion: Array
+    # (conditions, 5 to 7): :attr:`channels`, as a gauge on the model shows them: of the water, and of the body's own
+    # inertia in turning
     readings: Array
-    open_water: Array
-    remarks: tuple[Notice, ...]
+    open_water: Array  # (points, 2 or 3): J, K_T, and K_Q if the torque was measured
+    remarks: tuple[Notice, ...]  # Remarks from reading the files
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -85,35 +153,31 @@ class SteadyTests:
 def read_steady_tests(path: Path) -> SteadyTests:
     """The conditions of a campaign with thrust and normal force: rows of ``[averages]``, or means of steady runs.
 
-    Raises
-    ------
-    InputError
-        A file is at fault, or the campaign lacks what the MMG method needs: thrust, normal force, revolutions, the
-        open-water curve, and the sizes of model, propeller and rudder.
+    Raises InputError: A file is at fault, or the campaign lacks what the MMG method needs: thrust, normal force,
+    revolutions, the open-water curve, and the sizes of model, propeller and rudder.
     """
-    form, spelt = read_campaign_file(path)
+    form = read_campaign_form(path)
     _refuse_missing(form, path)
     refuse_impossible_sizes(form, path)
-    if form.averages:
-        _refuse_impossible_rows(path)
-    conditions, remarks = read_averages(form, spelt, path) if form.averages else _averaged_runs(form, path)
-    with_torque = all(condition.torque_Nm is not None for condition in conditions)
-    if not with_torque and any(condition.torque_Nm is not None for condition in conditions):
-        first = next(condition.name for condition in conditions if condition.torque_Nm is None)
-        raise InputError(path, "runs", f"{first} has no torque, and others have", "record it in all runs, or in none")
-    if heeled := next((condition.name for condition in conditions if condition.heel_rad), ""):
-        remedy = "reduce such tests to a polynomial, without --mmg"
-        raise InputError(
-            path, "averages.columns.heel_rad", f"{heeled} has a heel; the method is of an upright hull", remedy
-        )
+    campaign = read_campaign(path)
+    steady = [run for run in campaign.runs if not run.oscillates]
+    if faults := [fault for run in steady for fault in islice(_faults(campaign, run), 1)]:
+        raise together(faults, can_leave_out=False)
+    without_torque = [run.name for run in steady if run.torque_Nm is None]
+    if 0 < len(without_torque) < len(steady):
+        problem = f"{without_torque[0]} has no torque, and others have"
+        raise InputError(path, "runs", problem, "record it in all runs, or in none")
+    if heeled := next((run.name for run in steady if run.heel_rad), ""):
+        problem = f"{heeled} has a heel; the method is of an upright hull"
+        raise InputError(path, "averages.columns.heel_rad", problem, "reduce such tests to a polynomial, without --mmg")
     tests = SteadyTests(
         path=path,
         form=form,
-        names=tuple(condition.name for condition in conditions),
-        motion=np.array([_motion(condition) for condition in conditions]),
-        readings=np.array([_readings(condition, form) for condition in conditions]),
-        open_water=_open_water(form, path, with_torque=with_torque),
-        remarks=tuple(remarks),
+        names=tuple(run.name for run in steady),
+        motion=np.array([_motion(run) for run in steady]),
+        readings=np.array([_readings(run, form) for run in steady]),
+        open_water=_open_water(form, path, with_torque=not without_torque),
+        remarks=(*campaign.remarks, *_oscillating(campaign)),
     )
     thrusts = {"T": "thrust", "T_left": "thrust_left"}
     refuse_astern(
@@ -125,11 +189,19 @@ def read_steady_tests(path: Path) -> SteadyTests:
     return tests
 
 
-def _refuse_impossible_rows(path: Path) -> None:
-    """Refuse averages that cannot be, as the polynomial reduction does."""
-    campaign = read_campaign(path)
-    if faults := [fault for run in campaign.runs for fault in list(record_faults(campaign, run))[:1]]:
-        raise together(faults, can_leave_out=False)
+def _faults(campaign: Campaign, run: CaptiveRun) -> Iterator[InputError]:
+    """Faults of a steady run; those that only its reduction shows come last."""
+    if not run.is_average:
+        yield from _lacking(run)
+    yield from record_faults(campaign, run)
+    if not run.is_average:
+        yield from reduced_faults(reduced_run(run))
+
+
+def _oscillating(campaign: Campaign) -> Iterator[Notice]:
+    """A notice of the runs that the method does not take."""
+    if names := [run.name for run in campaign.runs if run.oscillates]:
+        yield Notice(f"Left out, because MMG takes steady tests: {len(names)} oscillating runs, {names[0]} first.")
 
 
 def _refuse_missing(form: CampaignFile, path: Path) -> None:
@@ -189,24 +261,6 @@ def _needed_of_two(form: CampaignFile, path: Path) -> dict[str, tuple[object, st
     }
 
 
-def _averaged_runs(form: CampaignFile, path: Path) -> tuple[list[Condition], list[Notice]]:
-    """Means of the steady runs; oscillating ones are left out and named, all runs with faults are refused together."""
-    campaign = read_campaign(path)
-    steady = [run for run in campaign.runs if not run.oscillates]
-    faults = []
-    for run in steady:
-        found = [*_lacking(run), *record_faults(campaign, run)]
-        faults += (found or [*reduced_faults(reduced_run(run))])[:1]
-    if faults:
-        raise together(faults, can_leave_out=False)
-    oscillating = [run.name for run in campaign.runs if run.oscillates]
-    remarks = []
-    if oscillating:
-        runs = f"{len(oscillating)} oscillating runs, {oscillating[0]} first"
-        remarks = [Notice(f"Left out, because MMG takes steady tests: {runs}.")]
-    return [_condition(run, form) for run in steady], [*campaign.remarks, *remarks]
-
-
 def _lacking(run: CaptiveRun) -> Iterator[InputError]:
     """What a steady run must have for the MMG method and does not."""
     remedy = "record it, or name its column in [columns]"
@@ -219,45 +273,27 @@ def _lacking(run: CaptiveRun) -> Iterator[InputError]:
         yield InputError(run.name, "header", "there are no revolutions, which the MMG method needs", remedy)
 
 
-def _condition(run: CaptiveRun, form: CampaignFile) -> Condition:
-    """Means of a steady run; forces in the sense of the file again, as those of a table."""
-    assert run.thrust_N is not None and run.rudder_normal_force_N is not None
-    speed, sense = float(np.mean(run.speed_mps)), form.test.sense
-    return Condition(
-        name=run.name,
-        drift_rad=float(-np.arcsin(np.clip(np.mean(run.v_mps) / speed, -1.0, 1.0))),
-        rudder_rad=float(np.mean(run.delta_rad)),
-        speed_mps=speed,
-        X_N=sense * float(np.mean(run.X_N)),
-        Y_N=sense * float(np.mean(run.Y_N)),
-        N_Nm=sense * float(np.mean(run.N_Nm)),
-        propeller_radps=run.propeller_radps,
-        yaw_rate_radps=float(np.mean(run.r_radps)),
-        thrust_N=float(np.mean(run.thrust_N)),
-        rudder_normal_force_N=float(np.mean(run.rudder_normal_force_N)),
-        heel_rad=run.heel_rad,
-        torque_Nm=None if run.torque_Nm is None else float(np.mean(run.torque_Nm)),
-    )
+def _motion(run: CaptiveRun) -> tuple[float, ...]:
+    """u, v (m/s), r (rad/s), rudder (rad), revolutions (rad/s) of a steady run."""
+    assert run.propeller_radps is not None
+    speed, drift = float(np.mean(run.speed_mps)), run.sheet.drift_rad
+    if not run.is_average or drift is None:
+        drift = float(-np.arcsin(np.clip(np.mean(run.v_mps) / speed, -1.0, 1.0)))
+    u, v = speed * np.cos(drift), -speed * np.sin(drift)
+    return u, v, float(np.mean(run.r_radps)), float(np.mean(run.delta_rad)), run.propeller_radps
 
 
-def _motion(condition: Condition) -> tuple[float, ...]:
-    u, v = condition.speed_mps * np.cos(condition.drift_rad), -condition.speed_mps * np.sin(condition.drift_rad)
-    assert condition.propeller_radps is not None
-    return u, v, condition.yaw_rate_radps, condition.rudder_rad, condition.propeller_radps
-
-
-def _readings(condition: Condition, form: CampaignFile) -> tuple[float, ...]:
-    """Readings as the force of the model on its gauge, positive as the water pushes it."""
-    forces = form.test.sense * np.array([condition.X_N, condition.Y_N, condition.N_Nm])
+def _readings(run: CaptiveRun, form: CampaignFile) -> tuple[float, ...]:
+    """Means as the force of the model on its gauge, positive as the water pushes it."""
+    forces = np.array([np.mean(run.force(force)) for force in FORCE_COLUMNS])
     if form.test.force_convention == "hydrodynamic":
-        u, v, r, _, _ = _motion(condition)
+        u, v, r, _, _ = _motion(run)
         forces += inertial_forces(form.model.mass_kg, form.model.x_G_m, u, v, r)
-    assert condition.thrust_N is not None and condition.rudder_normal_force_N is not None
-    others: tuple[float, ...] = () if condition.torque_Nm is None else (condition.torque_Nm,)
+    others = [run.thrust_N, run.rudder_normal_force_N]
     if form.propeller.number == 2:
-        assert condition.thrust_left_N is not None and condition.rudder_normal_force_left_N is not None
-        others = condition.thrust_left_N, condition.rudder_normal_force_left_N
-    return *map(float, forces), condition.thrust_N, condition.rudder_normal_force_N, *others
+        others += [run.thrust_left_N, run.rudder_normal_force_left_N]
+    others.append(run.torque_Nm)
+    return *map(float, forces), *(float(np.mean(values)) for values in others if values is not None)
 
 
 def _open_water(form: CampaignFile, path: Path, *, with_torque: bool) -> Array:

@@ -17,8 +17,8 @@ from tank2sim.errors import InputError
 from tank2sim.identification.captive.study import PrimeValue
 from tank2sim.identification.captive.uncertainty_budget import blockage_speed
 from tank2sim.identification.captive_mmg.card_text import MASS_KEYS, tested_card
-from tank2sim.identification.captive_mmg.contradicted_tests import place_of_column
 from tank2sim.identification.captive_mmg.regression import ORDINARY, MmgFit
+from tank2sim.identification.captive_mmg.steady_tests import place_of_column
 from tank2sim.notices import Notice, caution
 
 _UNEXPLAINED = 0.5
@@ -41,23 +41,11 @@ _UNITS = {"X": "N", "Y": "N", "N": "N.m", "T": "N", "F_N": "N", "T_left": "N", "
 
 @dataclass(frozen=True, kw_only=True)
 class MmgCoefficient(PrimeValue):
-    """One coefficient of the method.
+    """A coefficient: of the hull by 1/2 rho L d U^2 (prime II), R0 positive aft; others as the method has them."""
 
-    Parameters
-    ----------
-    value, standard_error : float
-        Hull: by 1/2 rho L d U^2 (prime II), R0 positive aft; others as the method has them.
-    origin : str
-        ``measured``, ``estimated`` (m_x, m_y by a published formula) or ``open`` (taken from ordinary ships).
-    type_a : float
-        Standard error by the scatter of the tests alone.
-    type_b : dict
-        Key of ``[uncertainty]`` to the standard error by it.
-    """
-
-    origin: str
-    type_a: float
-    type_b: dict[str, float]
+    origin: str  # ``measured``, ``estimated`` (m_x, m_y by a published formula) or ``open`` (taken from ordinary ships)
+    type_a: float  # Standard error by the scatter of the tests alone
+    type_b: dict[str, float]  # Key of ``[uncertainty]`` to the standard error by it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,39 +68,19 @@ class ChannelReadings:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MmgStudy:
-    """Coefficients of the MMG method from steady tests.
-
-    Parameters
-    ----------
-    campaign, model : str
-        File of the campaign, and name of the model.
-    coefficients : dict
-        By the names of an MMG card: R0 = -X0, mx = -Xudot, my = -Yvdot.
-    yaw_arm : PrimeValue
-        x_R' + a_H x_H', which tests show better than x_H' itself.
-    rudder_angle_of_no_force_deg : float, optional
-        Positive to starboard, straight ahead; None if the tests do not show it.
-    channels : dict
-        Channel (``X``, ``Y``, ``N``, ``T``, ``F_N`` ...) to its residual.
-    open_water_points : int
-    open_water : dict
-        ``K_T``, and with torque ``K_Q``, to the residual of the open-water points.
-    readings : dict
-        Channel to its readings.
-    conditions, not_excited : tuple of str
-        Names of the conditions, and of the terms that none of them shows.
-    notices : tuple of Notice
-    """
+    """Coefficients of the MMG method from steady tests."""
 
     campaign: str
     model: str
-    coefficients: dict[str, MmgCoefficient]
-    yaw_arm: PrimeValue
+    coefficients: dict[str, MmgCoefficient]  # By the names of an MMG card: R0 = -X0, mx = -Xudot, my = -Yvdot
+    yaw_arm: PrimeValue  # x_R' + a_H x_H', which tests show better than x_H' itself
+    # Positive to starboard, straight ahead; None if the tests do not show it
     rudder_angle_of_no_force_deg: float | None
-    channels: dict[str, ChannelFit]
+    channels: dict[str, ChannelFit]  # Channel (``X``, ``Y``, ``N``, ``T``, ``F_N`` ...) to its residual
     open_water_points: int
-    open_water: dict[str, ChannelFit]
-    readings: dict[str, ChannelReadings]
+    open_water: dict[str, ChannelFit]  # ``K_T``, and with torque ``K_Q``, to the residual of the open-water points
+    readings: dict[str, ChannelReadings]  # Channel to its readings
+    # `conditions`, `not_excited`: Names of the conditions, and of the terms that none of them shows
     conditions: tuple[str, ...]
     not_excited: tuple[str, ...]
     notices: tuple[Notice, ...]
@@ -121,10 +89,7 @@ class MmgStudy:
 def study_mmg(fit: MmgFit) -> MmgStudy:
     """The study of a fit.
 
-    Raises
-    ------
-    InputError
-        The method does not describe a channel: its sign, unit or scale is another.
+    Raises InputError: The method does not describe a channel: its sign, unit or scale is another.
     """
     tests, channels = fit.tests, fit.tests.channels
     left = np.sqrt(np.mean(fit.residuals**2, axis=0) / np.mean(tests.readings**2, axis=0))
@@ -245,10 +210,7 @@ def mmg_coefficients(fit: MmgFit) -> dict[str, MmgCoefficient]:
 def mmg_card(fit: MmgFit) -> Card:
     """The MMG card of a fit, with the covariance of its coefficients.
 
-    Raises
-    ------
-    InputError
-        No ship has these coefficients.
+    Raises InputError: No ship has these coefficients.
     """
     values = {name: mean for name, (mean, _) in ORDINARY.items()} | dict(
         zip(fit.names, map(float, fit.values), strict=True)

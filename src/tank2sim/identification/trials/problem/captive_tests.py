@@ -24,7 +24,8 @@ from tank2sim.dynamics.rigid_body import inertial_forces
 from tank2sim.errors import InputError
 from tank2sim.identification.captive.equations import axial_speed, rigid_body_force
 from tank2sim.identification.captive.harmonics import ReducedRun
-from tank2sim.records.campaigns import FORCE_COLUMNS, Campaign
+from tank2sim.records.campaigns import Campaign
+from tank2sim.records.captive_record import FORCE_COLUMNS
 
 GAIN_ERROR = 0.05
 """Standard error of the gain of each force between tank and ship: Froude-scaled forces of one hull in different tanks
