@@ -44,10 +44,7 @@ class Residual:
 def force_chart(plot: ForcePlot) -> ChartSpec:
     """A force against angle or amplitude: measured points with their intervals, the fits as lines in their bands.
 
-    Parameters
-    ----------
-    plot : ForcePlot
-        Its series have one colour each; angles are shown in degrees.
+    `plot`: its series have one colour each; angles are shown in degrees.
     """
     unit, factor = shown_unit(plot.unit)
     lines = [_force_series(each, factor, fit=True) for each in plot.series if len(vector(each.fit_x))]
@@ -83,12 +80,8 @@ def _force_series(each: ForceSeries, factor: float, *, fit: bool) -> PlotSeries:
 def loop_chart(plot: LoopPlot, forces: Mapping[str, str]) -> ChartSpec:
     """Hysteresis loops: forces over the motion, one panel a force; measured as points, the fit as a line.
 
-    Parameters
-    ----------
-    plot : LoopPlot
-        Its loops have one colour each.
-    forces : mapping
-        Name of a force in the loops to its title with unit; the panels from top to bottom.
+    `plot`: its loops have one colour each; `forces`: name of a force in the loops to its title with unit; the panels
+    from top to bottom.
     """
     unit, factor = shown_unit(plot.unit)
     plots = [
@@ -124,12 +117,7 @@ def _loops(loops: Sequence[ForceLoop], force: str, factor: float) -> list[PlotSe
 
 
 def harmonic_chart(plot: HarmonicsPlot) -> ChartSpec:
-    """Amplitudes of a force's harmonics as bars, one panel a harmonic, the runs side by side; strokes are the fit.
-
-    Parameters
-    ----------
-    plot : HarmonicsPlot
-    """
+    """Amplitudes of a force's harmonics as bars, one panel a harmonic, the runs side by side; strokes are the fit."""
     runs, up = plot.runs, plot.up
     count = max(len(vector(run.amplitude)) for run in runs)
     panels = []
@@ -158,12 +146,7 @@ def residual_chart(residuals: Sequence[Residual], *, title: str = "") -> ChartSp
 
     Dotted lines mark two standard errors, within which nineteen of twenty should lie.
 
-    Parameters
-    ----------
-    residuals : sequence of Residual
-        Runs are in the order of their first appearance.
-    title : str
-        Title of the chart.
+    `residuals`: runs are in the order of their first appearance.
     """
     runs = list(dict.fromkeys(residual.run for residual in residuals))
     kinds = list(dict.fromkeys(residual.kind for residual in residuals))
@@ -214,12 +197,7 @@ class _Estimated(Protocol):
 def derivative_certainty_chart(found: Mapping[str, _Estimated], *, title: str) -> ChartSpec:
     """Standard error of each number in % of its value, on a logarithmic scale, those without one left out.
 
-    Parameters
-    ----------
-    found : mapping
-        Name to an object with ``value``, ``standard_error`` and ``origin``.
-    title : str
-        Title of the chart.
+    `found`: name to an object with ``value``, ``standard_error`` and ``origin``.
     """
     rows: list[ChartRecord] = [
         {"name": name, "run": entry.origin, "v": plain(100 * abs(entry.standard_error / entry.value))}

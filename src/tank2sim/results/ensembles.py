@@ -52,26 +52,15 @@ _RARE = (
 
 
 def ensemble_heading(found: Members) -> str:
-    """Return the heading of the section of an ensemble.
-
-    Parameters
-    ----------
-    found : Members
-    """
+    """Return the heading of the section of an ensemble."""
     return f"Ensemble of {found.members}{', standard errors assumed' * found.assumed_errors}"
 
 
 def members_frame(found: Members | None) -> pd.DataFrame:
     """The members of an ensemble, one row each: numbers drawn, by the dotted keys of the card; figures; ``usable``.
 
-    Parameters
-    ----------
-    found : Members or None
-
-    Raises
-    ------
-    InputError
-        There is no ensemble, the result was read from its JSON, or the frame does not fit into the memory.
+    Raises InputError: there is no ensemble, the result was read from its JSON, or the frame does not fit into the
+    memory.
     """
     import pandas as pd
 
@@ -89,11 +78,7 @@ def members_frame(found: Members | None) -> pd.DataFrame:
 def band_table(found: Members, figures: Mapping[str, Band]) -> Table:
     """Quantiles (5, 50, 95 %) of figures over the members of an ensemble.
 
-    Parameters
-    ----------
-    found : Members
-    figures : mapping
-        Name of each figure to its band.
+    `figures`: name of each figure to its band.
     """
     rows: list[list[Cell]] = []
     for name, band in figures.items():
@@ -105,24 +90,12 @@ def band_table(found: Members, figures: Mapping[str, Band]) -> Table:
 
 
 def figures_section(found: FigureBands | StabilityBands) -> Section:
-    """Return the section with bands of figures by name.
-
-    Parameters
-    ----------
-    found : FigureBands or StabilityBands
-    """
+    """Return the section with bands of figures by name."""
     return Section(heading=ensemble_heading(found), text=MEMBERS_TEXT, tables=[band_table(found, found.figures)])
 
 
 def stability_section(found: StabilityBands, criteria: Sequence[ImoCriterion]) -> Section:
-    """Return the section of an ensemble judged by IMO criteria.
-
-    Parameters
-    ----------
-    found : StabilityBands
-    criteria : sequence of ImoCriterion
-        Of the card's own ship.
-    """
+    """Return the section of an ensemble judged by IMO criteria. `criteria`: of the card's own ship."""
     rare = {chance.name: chance.tail for chance in found.imo if chance.tail}
     if found.imo_all and found.imo_all.tail:
         rare["any of these"] = found.imo_all.tail
@@ -141,12 +114,7 @@ def stability_section(found: StabilityBands, criteria: Sequence[ImoCriterion]) -
 
 
 def chance_sentences(found: StabilityBands) -> list[str]:
-    """Return sentences on the probability of stability, and on that of meeting all criteria together.
-
-    Parameters
-    ----------
-    found : StabilityBands
-    """
+    """Return sentences on the probability of stability, and on that of meeting all criteria together."""
     sentences = []
     if found.probability_stable is not None and found.probability_stable_interval_95:
         interval = _interval(found.probability_stable_interval_95)

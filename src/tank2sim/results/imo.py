@@ -22,11 +22,7 @@ _BARS = "Bars: the worse of both sides, over the limit (red). Pale: beyond the r
 def imo_section(criteria: Sequence[ImoCriterion], *, heading: str = "IMO criteria", text: str = _IMO) -> Section:
     """Return the criteria of IMO MSC.137(76): bars, a table with verdicts, and remarks.
 
-    Parameters
-    ----------
-    criteria : sequence of ImoCriterion
-    heading, text : str
-        Of the section.
+    `heading`, `text`: of the section.
     """
     remarks: dict[Notice, list[str]] = {}
     for criterion in criteria:
@@ -50,12 +46,7 @@ def imo_section(criteria: Sequence[ImoCriterion], *, heading: str = "IMO criteri
 
 
 def imo_verdict(criterion: ImoCriterion) -> Cell:
-    """Return the verdict on a criterion as a cell.
-
-    Parameters
-    ----------
-    criterion : ImoCriterion
-    """
+    """Return the verdict on a criterion as a cell."""
     if criterion.beyond_card and criterion.found is not None:
         return BEYOND_THE_CARD
     return "open" if criterion.passed is None else Verdict.PASSED if criterion.passed else Verdict.FAILED

@@ -204,13 +204,7 @@ class MmgReductionResult(Result[MmgStudy]):
 def computed_chart(name: str, readings: ChannelReadings, *, size_px: int = 300) -> ChartSpec:
     """Computed over measured readings of one channel, with the line on which both are the same.
 
-    Parameters
-    ----------
-    name : str
-        Name of the channel.
-    readings : ChannelReadings
-    size_px : int
-        Width and height.
+    `name`: name of the channel; `size_px`: width and height.
     """
     unit = readings.unit.replace(".", " ")
     ends = [float(readings.measured.min()), float(readings.measured.max())]

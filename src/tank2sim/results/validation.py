@@ -114,35 +114,12 @@ class TrialReplay:
 class ValidationStudy:
     """Validation of a card.
 
-    Parameters
-    ----------
-    ship, source : str
-        Name of the ship, and source of its coefficients.
-    documentation : dict
-        Statements on the model by item.
-    coefficients : dict
-        Derivatives by name.
-    steered_by : SteeredBy
-        Coefficients of a craft with thrusters are in SI, others are prime.
-    propulsion : bool
-        Whether the card has propulsion.
-    verdict : str
-    counts : dict
-        Number of figures by outcome.
-    figures : tuple of Validated
-    members : int
-        Size of the ensemble for u_input.
-    verification : tuple of Verified
-        Figures of standard trials.
-    imo : tuple of ImoCriterion
-    replays : tuple of TrialReplay
-    predictions : PredictionStudy, optional
-        Trials of a craft with thrusters.
-    one_sided : tuple of OneSidedError
-        Figures whose errors are on one side in nearly all trials, the most significant first.
-    notices : tuple of Notice
-    kind : str
-        Always ``validate``.
+    `ship`, `source`: name of the ship, and source of its coefficients; `documentation`: statements on the model by
+    item; `coefficients`: derivatives by name; `steered_by`: coefficients of a craft with thrusters are in SI, others
+    are prime; `propulsion`: whether the card has propulsion; `counts`: number of figures by outcome; `members`: size of
+    the ensemble for u_input; `verification`: figures of standard trials; `predictions`: trials of a craft with
+    thrusters; `one_sided`: figures whose errors are on one side in nearly all trials, the most significant first;
+    `kind`: always ``validate``.
     """
 
     ship: str

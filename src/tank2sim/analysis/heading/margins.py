@@ -139,10 +139,7 @@ def closed_loop_transfer(ship: Model, autopilot: Model, speed_mps: float | None 
 def loop_margins(ship: Model, autopilot: Model, speed_mps: float | None = None) -> LoopMargins:
     """Margins at a speed, by default that of expansion.
 
-    Raises
-    ------
-    InputError
-        The model is not a ship, or has no straight course.
+    Raises InputError: the model is not a ship, or has no straight course.
     """
     loop = loop_transfer(ship, autopilot, speed_mps)
     whole = closed_loop_transfer(ship, autopilot, speed_mps)

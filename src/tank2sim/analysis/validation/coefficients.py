@@ -84,14 +84,8 @@ class CoefficientRow:
 class Expansion:
     """A card's coefficients in the convention of another.
 
-    Parameters
-    ----------
-    coefficients : mapping
-        Name to coefficient; terms that the model lacks are absent.
-    refused : mapping
-        Name to the reason that prevents a comparison.
-    notes : tuple of Notice
-        What was converted.
+    `coefficients`: name to coefficient; terms that the model lacks are absent; `refused`: name to the reason that
+    prevents a comparison; `notes`: what was converted.
     """
 
     coefficients: Mapping[str, CardCoefficient]

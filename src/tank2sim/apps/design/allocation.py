@@ -37,14 +37,8 @@ in the plan with whole numbers."""
 class InformationBlock:
     """Coefficients that are estimated together, independent of those of other blocks (a force of the captive tests).
 
-    Parameters
-    ----------
-    prior : array (k, k)
-        Information before any test, positive definite.
-    tests : array (n, k, k)
-        Information of each test.
-    targets : array (m, k, k)
-        L of each target, for the coefficients of this block.
+    `prior` (k, k): information before any test, positive definite; `tests` (n, k, k): information of each test;
+    `targets` (m, k, k): L of each target, for the coefficients of this block.
     """
 
     prior: Array
@@ -64,14 +58,7 @@ class InformationBlock:
 
 @dataclass(frozen=True, eq=False)
 class Allocation:
-    """Tests to choose from, their cost, and the targets.
-
-    Parameters
-    ----------
-    blocks : tuple of InformationBlock
-    cost : array (n,)
-        Time of each test, s.
-    """
+    """Tests to choose from, their cost, and the targets. `cost` (n,): time of each test, s."""
 
     blocks: tuple[InformationBlock, ...]
     cost: Array

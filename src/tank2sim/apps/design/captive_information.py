@@ -45,14 +45,7 @@ information of a plan without such runs invertible."""
 class GaugeErrors:
     """Errors of a gauge, one standard deviation, N or N m.
 
-    Parameters
-    ----------
-    noise : float
-        Noise of an independent reading.
-    zero : float
-        Constant in a run.
-    largest : float
-        Its range to either side.
+    `noise`: noise of an independent reading; `zero`: constant in a run; `largest`: its range to either side.
     """
 
     noise: float
@@ -64,16 +57,8 @@ class GaugeErrors:
 class PlannedCampaign:
     """A model in a tank, with the coefficients known beforehand.
 
-    Parameters
-    ----------
-    model : ModelSection
-    speed_mps, water_density_kgpm3, gravity_mps2 : float
-    derivatives : mapping
-        Prime.
-    gauges : mapping
-        ``X``, ``Y``, ``N`` to the errors of the gauge.
-    gain_relative, rate_hz : float
-        Error of the gain from run to run; independent readings a second.
+    `derivatives`: prime; `gauges`: ``X``, ``Y``, ``N`` to the errors of the gauge; `gain_relative`, `rate_hz`: error of
+    the gain from run to run; independent readings a second.
     """
 
     model: ModelSection

@@ -55,13 +55,7 @@ def plan_csv(rows: Sequence[PlannedRow | PlannedManoeuvre]) -> str:
 
 
 def campaign_template(design: CaptiveDesign, rows: Sequence[PlannedRow]) -> str:
-    """``campaign.toml`` of the planned runs: it lacks only their files, and what the tank alone knows.
-
-    Parameters
-    ----------
-    design : CaptiveDesign
-    rows : sequence of PlannedRow
-    """
+    """``campaign.toml`` of the planned runs: it lacks only their files, and what the tank alone knows."""
     runs, ship, planned = design.tank_runs, design.card.ship, design.planned
     scale = runs.length_m / ship.length_m
     document = tomlkit.document()
@@ -110,10 +104,7 @@ def _sheet(row: PlannedRow) -> dict[str, object]:
 def runs_of_campaign(path: Path, runs: TankRuns) -> tuple[RunGroup, ...]:
     """The runs of a campaign's sheet, as this tank would make them; the records of oscillations are as long as it can.
 
-    Raises
-    ------
-    InputError
-        The campaign is at fault, has no ``[[runs]]``, or a run lacks its frequency or amplitude.
+    Raises InputError: the campaign is at fault, has no ``[[runs]]``, or a run lacks its frequency or amplitude.
     """
     form = read_campaign_form(path)
     if not form.runs:

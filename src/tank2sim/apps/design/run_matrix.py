@@ -38,16 +38,8 @@ def runs_of_matrix(path: Path, runs: TankRuns) -> tuple[tuple[RunGroup, ...], li
     Angles are in deg, rudder positive to starboard; amplitudes of sway and yaw are v' and r'. A row is a yaw with an
     r', a sway with a v', else a steady run with drift and rudder; it is made as often as its repeats say.
 
-    Parameters
-    ----------
-    path : Path
-        CSV with a header.
-    runs : TankRuns
-
-    Raises
-    ------
-    InputError
-        The file has neither drift nor rudder nor amplitudes, or a number that cannot be read.
+    `path`: CSV with a header. Raises InputError: the file has neither drift nor rudder nor amplitudes, or a number that
+    cannot be read.
     """
     table = list(csv.reader(io.StringIO(read_text(path).removeprefix("\ufeff"))))
     names = [re.sub(r"\(.*\)|\s", "", name).lower() for name in (table[0] if table else [])]

@@ -52,15 +52,9 @@ _USUAL = ("turn:35", "turn:-35", "zigzag:10/10", "zigzag:20/20")
 class TrialManoeuvre:
     """A manoeuvre of a trial.
 
-    Parameters
-    ----------
-    name : str
-    manoeuvre : str
-        As ``simulate --manoeuvre`` takes it; empty for one that only its orders state.
-    duration_s, total_s : float
-        Duration of the manoeuvre, and with its approach.
-    orders : str
-        CSV of its orders by the card, for ``simulate --manoeuvre file:``.
+    `manoeuvre`: as ``simulate --manoeuvre`` takes it; empty for one that only its orders state; `duration_s`,
+    `total_s`: duration of the manoeuvre, and with its approach; `orders`: CSV of its orders by the card, for ``simulate
+    --manoeuvre file:``.
     """
 
     name: str
@@ -74,27 +68,12 @@ class TrialManoeuvre:
 class TrialDesign:
     """A designed trial.
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-    slopes : FigureSlopes
-    minutes : float
-        At most.
-    manoeuvres : tuple of (TrialManoeuvre, int)
-        With repeats.
-    usual : tuple of TrialManoeuvre
-        The usual set, once.
-    prior_errors, standard_errors, usual_standard_errors : array (m,)
-        Errors of each figure before the trial, after it, and after the usual set in the same time.
-    curve : Certainty
-    unstable : bool
-        The card's ship is unstable on a straight course: its figures are not linear in the coefficients.
-    minutes_needed : float or None
-        Least time of a plan with every figure as certain as by the usual set in `minutes`.
-    coefficients : mapping
-        Parameter to its standard error before, by the plan and by the usual set, relative to that before.
-    sensors : mapping
-        Variable to the standard deviation of a reading, SI.
+    `minutes`: at most; `manoeuvres`: with repeats; `usual`: the usual set, once; `prior_errors`,
+    `standard_errors`, `usual_standard_errors` (m,): errors of each figure before the trial, after it, and after the
+    usual set in the same time; `unstable`: the card's ship is unstable on a straight course: its figures are not linear
+    in the coefficients; `minutes_needed`: least time of a plan with every figure as certain as by the usual set in
+    `minutes`; `coefficients`: parameter to its standard error before, by the plan and by the usual set, relative to
+    that before; `sensors`: variable to the standard deviation of a reading, SI.
     """
 
     card: ManoeuvringCard
@@ -132,22 +111,10 @@ def design_of_trial(
 ) -> TrialDesign:
     """The trial that makes the worst figure most certain in a time.
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-        Its errors are the prior; a derivative without a stated one has :data:`.RELATIVE_ERROR`.
-    figures : sequence of InfluenceFigure
-    minutes : float or None
-        By default the time of the usual set.
-    sensors : mapping
-        Variable (``motion.*``) to the standard deviation of a reading a second, SI.
-    one_side : bool
-        Figures to the side of the given rudder, in place of the mean over both sides.
-
-    Raises
-    ------
-    InputError
-        The ship does not show a figure, leaves all bounds in every manoeuvre, or the time is too short.
+    `card`: its errors are the prior; a derivative without a stated one has :data:`.RELATIVE_ERROR`; `minutes`: by
+    default the time of the usual set; `sensors`: variable (``motion.*``) to the standard deviation of a reading a
+    second, SI; `one_side`: figures to the side of the given rudder, in place of the mean over both sides. Raises
+    InputError: the ship does not show a figure, leaves all bounds in every manoeuvre, or the time is too short.
     """
     slopes = figure_slopes(card, figures, (), draws=0, seed=0, one_side=one_side)
     stated = {name: RELATIVE_ERROR * abs(value) for name, value in card.derivatives.items() if value}

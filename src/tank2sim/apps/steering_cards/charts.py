@@ -13,12 +13,7 @@ from tank2sim.apps.steering_cards.comparison import SteeringDiagrams
 
 
 def steering_diagram_chart(diagrams: SteeringDiagrams) -> ChartSpec:
-    """Yaw rate (deg/min) against rudder (deg): the models as lines, the tuned one too, the card's points on top.
-
-    Parameters
-    ----------
-    diagrams : SteeringDiagrams
-    """
+    """Yaw rate (deg/min) against rudder (deg): the models as lines, the tuned one too, the card's points on top."""
     series = [
         PlotSeries(label=label, x=line.rudder_deg, y=line.yaw_rate_degpmin, closed=True)
         for label, line in diagrams.models.items()
@@ -48,10 +43,7 @@ def steering_diagram_chart(diagrams: SteeringDiagrams) -> ChartSpec:
 def influence_bars(models: Mapping[str, Mapping[str, float]]) -> ChartSpec:
     """K % of every coefficient as bars, the models side by side.
 
-    Parameters
-    ----------
-    models : mapping
-        Words of each model to its K by coefficient.
+    `models`: words of each model to its K by coefficient.
     """
     rows: list[ChartRecord] = [
         {"run": title, "name": name, "v": plain(value)} for title, K in models.items() for name, value in K.items()

@@ -28,10 +28,7 @@ RUDDERS_DEG = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0)
 def form_of(card: SteeringCard, name: str) -> SteeringForm:
     """The form of a model of the card.
 
-    Raises
-    ------
-    InputError
-        The model is not on the card, or its form is not in the catalogue.
+    Raises InputError: the model is not on the card, or its form is not in the catalogue.
     """
     if name not in card.models:
         raise InputError(card.source, "models", f"none is called {name!r}", f"one of {', '.join(card.models)}")
@@ -60,11 +57,8 @@ def complete(card: SteeringCard) -> tuple[str, ...]:
 def model_of(card: SteeringCard, name: str) -> Model:
     """The model of an entry of the card, with parameters ``coefficients.*``; its messages name the card's file.
 
-    Raises
-    ------
-    InputError
-        The model does not exist, a coefficient is missing (the message names those that the source does not print), or
-        one is not part of the form.
+    Raises InputError: the model does not exist, a coefficient is missing (the message names those that the source does
+    not print), or one is not part of the form.
     """
     form = form_of(card, name)
     place = f"{card.place(name)}.coefficients"
@@ -100,16 +94,8 @@ def turns_of(card: SteeringCard, name: str, rudders_deg: Sequence[float] = RUDDE
 class InfluenceTable:
     """Influence of coefficients on the steady radius: Tables 2 and 3.
 
-    Parameters
-    ----------
-    model : str
-        Name in the card.
-    rudder_rad, radius_m : float
-        The turn.
-    change_percent : float
-        Change of each coefficient.
-    K_percent, radii_m : dict
-        By coefficient: change of the radius, and the radius after it.
+    `model`: name in the card; `rudder_rad`, `radius_m`: the turn; `change_percent`: change of each coefficient;
+    `K_percent`, `radii_m`: by coefficient: change of the radius, and the radius after it.
     """
 
     model: str
@@ -154,22 +140,11 @@ def agreed_variation(card: SteeringCard, base: str, target: str) -> dict[str, fl
 class CombinedPrediction:
     """The radius after an agreed variation: Table 5, with its error and without.
 
-    Parameters
-    ----------
-    agreed_percent : dict
-        Kc by coefficient.
-    radius_m : float
-        Before the variation, computed.
-    percent, predicted_m : float
-        Sum of Kc K / 10 with the printed K of each coefficient, and the printed radius changed by it.
-    misread_percent, misread_m : float
-        With the K of other coefficients where the source confused them.
-    own_percent, own_m : float
-        With the K computed here.
-    direct_m : float
-        By the model of the other draught.
-    direct_misread_m : float
-        By that model with the variations applied to the confused coefficients.
+    `agreed_percent`: Kc by coefficient; `radius_m`: before the variation, computed; `percent`, `predicted_m`: sum of Kc
+    K / 10 with the printed K of each coefficient, and the printed radius changed by it; `misread_percent`, `misread_m`:
+    with the K of other coefficients where the source confused them; `own_percent`, `own_m`: with the K computed here;
+    `direct_m`: by the model of the other draught; `direct_misread_m`: by that model with the variations applied to the
+    confused coefficients.
     """
 
     agreed_percent: dict[str, float]
@@ -187,10 +162,7 @@ class CombinedPrediction:
 def combined_prediction(card: SteeringCard, changed: str) -> CombinedPrediction:
     """Table 5: prediction by K for another model of the card (another draught), and the result of that model.
 
-    Raises
-    ------
-    InputError
-        The card has no ``[influence]``, or as :func:`turns_of`.
+    Raises InputError: the card has no ``[influence]``, or as :func:`turns_of`.
     """
     printed = _influence(card)
     base, rudder = printed.model, math.degrees(printed.rudder_rad)
@@ -232,10 +204,7 @@ def _direct_misread(card: SteeringCard, printed: PrintedInfluence, target: str, 
 def draught_polynomials(card: SteeringCard) -> dict[str, tuple[float, ...]]:
     """K over the draught T in m, through its printed values: (4). Coefficients of 1, T, T^2 by name.
 
-    Raises
-    ------
-    InputError
-        The card has no ``[influence]``.
+    Raises InputError: the card has no ``[influence]``.
     """
     printed = _influence(card)
     powers = np.vander(printed.draughts_m, increasing=True)
