@@ -15,12 +15,13 @@ from paper_numbers import PaperNumbers
 
 from tank2sim.analysis.influence.percent import change_percent
 from tank2sim.apps.steering_cards.card import SteeringCard, read_steering_card
-from tank2sim.apps.steering_cards.comparison import missing_of, tuned
-from tank2sim.apps.steering_cards.tables import (
+from tank2sim.apps.steering_cards.comparison import (
     agreed_variation,
     combined_prediction,
     draught_polynomials,
     influence_of,
+    missing_of,
+    tuned,
     turns_of,
 )
 from tank2sim.apps.steering_cards.two_point_tuning import TwoPointTuning

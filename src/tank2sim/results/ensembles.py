@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,11 @@ from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_panels
 from tank2sim.answer.charts.vega import ChartSpec, PlotAxis
 from tank2sim.answer.parts import Cell, Illustration, Section, Table, table
+from tank2sim.answer.result import Result
 from tank2sim.arrays import Array
 from tank2sim.errors import ArgumentError
 from tank2sim.memory import refuse_beyond_memory
+from tank2sim.notices import Notice
 from tank2sim.results.imo import BEYOND_THE_CARD
 from tank2sim.simulation.bands import Band
 from tank2sim.units import in_words
@@ -56,23 +59,46 @@ def ensemble_heading(found: Members) -> str:
     return f"Ensemble of {found.members}{', standard errors assumed' * found.assumed_errors}"
 
 
-def members_frame(found: Members | None) -> pd.DataFrame:
-    """The members of an ensemble, one row each: numbers drawn, by the dotted keys of the card; figures; ``usable``.
+_S = TypeVar("_S")
 
-    Raises InputError: there is no ensemble, the result was read from its JSON, or the frame does not fit into the
-    memory.
-    """
-    import pandas as pd
 
-    if found is None:
-        raise ArgumentError("members", "", "is 0: this result has no ensemble", "give members=100 or more")
-    if found.drawn is None:
-        remedy = "compute the result again with the same members and seed"
-        raise ArgumentError("members", "", "the JSON of a result has the bands, not the members", remedy)
-    columns = len(found.drawn.draws.names) + len(found.drawn.figures)
-    refuse_beyond_memory("members", found.members, 2 * 8 * columns)
-    values = {**found.drawn.coefficients(), **found.drawn.figures, "usable": found.drawn.usable}
-    return pd.DataFrame(values).rename_axis("member")
+class EnsembleResult(Result[_S]):
+    """A result whose study may have an ensemble."""
+
+    study: Any
+
+    @property
+    def notices(self) -> tuple[Notice, ...]:
+        """Notices of the study and of its ensemble."""
+        drawn: tuple[Notice, ...] = self.study.ensemble.notices if self.study.ensemble else ()
+        return tuple(dict.fromkeys([*self.study.notices, *drawn]))
+
+    @cached_property
+    def members(self) -> pd.DataFrame:
+        """The ships of the ensemble, one row each: the numbers drawn, by the dotted keys of the card and as its file
+        has them; the figures (of a manoeuvre, of the straight course, or those asked for); the value of each IMO
+        criterion, if it was judged; and whether the ship is ``usable``.
+
+        A column "...: beyond the card" is 1 where the trial of a criterion left the card's range before its value.
+
+        Raises
+        ------
+        InputError
+            The result has no ensemble, was read from its JSON, which has only the bands, or the frame does not fit
+            into the memory.
+        """
+        import pandas as pd
+
+        found: Members | None = self.study.ensemble
+        if found is None:
+            raise ArgumentError("members", "", "is 0: this result has no ensemble", "give members=100 or more")
+        if found.drawn is None:
+            remedy = "compute the result again with the same members and seed"
+            raise ArgumentError("members", "", "the JSON of a result has the bands, not the members", remedy)
+        columns = len(found.drawn.draws.names) + len(found.drawn.figures)
+        refuse_beyond_memory("members", found.members, 2 * 8 * columns)
+        values = {**found.drawn.coefficients(), **found.drawn.figures, "usable": found.drawn.usable}
+        return pd.DataFrame(values).rename_axis("member")
 
 
 def band_table(found: Members, figures: Mapping[str, Band]) -> Table:

@@ -9,7 +9,7 @@ import pytest
 from tank2sim.analysis.influence.percent import change_percent
 from tank2sim.analysis.turning.points import TurningPoints
 from tank2sim.apps.steering_cards.card import SteeringCard, read_steering_card
-from tank2sim.apps.steering_cards.tables import (
+from tank2sim.apps.steering_cards.comparison import (
     agreed_variation,
     combined_prediction,
     complete,

@@ -14,14 +14,16 @@ from pydantic import Field
 from tank2sim.analysis.ensemble.draws import draws_of
 from tank2sim.analysis.ensemble.questions import (
     BEYOND_CARD_MARK,
+    STEP_TOLERANCE,
+    TRIED_MEMBERS,
     OfCriteria,
     OfFigures,
     OfManoeuvre,
     ShipText,
+    fastest_pace,
     signals_with_bands,
 )
 from tank2sim.analysis.ensemble.steering import Grid, SteeringBands, steering_bands
-from tank2sim.analysis.ensemble.steps import STEP_TOLERANCE, TRIED_MEMBERS, fastest_pace
 from tank2sim.analysis.ensemble.tails import Tail, tails
 from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.analysis.stability.straight_line import answering_states

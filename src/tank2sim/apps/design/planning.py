@@ -10,8 +10,7 @@ from pathlib import Path
 from tank2sim.analysis.influence.figures import InfluenceFigure, parse_figure
 from tank2sim.apps.design.captive_design import CaptiveDesign, CaptiveDesigner, CaptiveDesignSettings, tank_runs
 from tank2sim.apps.design.figure_slopes import range_of_figures
-from tank2sim.apps.design.plan_files import run_rows, runs_of_campaign
-from tank2sim.apps.design.run_matrix import runs_of_matrix
+from tank2sim.apps.design.plan_files import run_rows, runs_of_campaign, runs_of_matrix
 from tank2sim.apps.design.study import (
     CampaignStudy,
     GaugeStudy,
