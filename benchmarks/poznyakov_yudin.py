@@ -101,7 +101,7 @@ def numbers(report: PaperNumbers) -> None:
 def turning(card: SteeringCard, report: PaperNumbers) -> None:
     for name, printed in TABLE_1.items():
         report.heading(f"Table 1, {card.models[name].title}")
-        for place, turn in enumerate(turns_of(card, name, RUDDERS).turns):
+        for place, turn in enumerate(turns_of(card, name, RUDDERS)):
             for key, values in printed.items():
                 report(f"{RUDDERS[place]:2} deg, {key}", values[place], asdict(turn.in_degrees())[key], TOLERANCES[key])
             speed = turn.radius_m * turn.yaw_rate_radps

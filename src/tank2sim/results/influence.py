@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -90,27 +89,23 @@ class InfluenceResult(EnsembleResult[InfluenceStudy]):
     @property
     def coefficients(self) -> pd.DataFrame:
         """K %, the change of a figure (columns) for 10 % more of a number of the card (rows), by exact slopes."""
-        return self._frame(self._data.exact)
+        return self._frame(self.study.exact)
 
     @property
     def differences(self) -> pd.DataFrame:
         """As :attr:`coefficients`, computed with 10 % more; nan where the changed ship does not show the figure."""
-        return self._frame(self._data.difference)
+        return self._frame(self.study.difference)
 
     @property
     def variance_shares(self) -> pd.DataFrame:
         """Share of the variance of each figure (columns) that would go if a number (rows) were known exactly."""
-        return self._frame(self._data.shares)
+        return self._frame(self.study.shares)
 
     def _frame(self, values: Array) -> pd.DataFrame:
         import pandas as pd
 
         index = pd.Index(list(self.study.parameters), name="parameter")
         return pd.DataFrame(values.T, index=index, columns=list(self.study.figures))
-
-    @cached_property
-    def _data(self) -> InfluenceData:
-        return InfluenceData.of(self.study)
 
     @property
     def headline(self) -> tuple[str, ...]:
@@ -119,9 +114,9 @@ class InfluenceResult(EnsembleResult[InfluenceStudy]):
             return self._tuned_headline(self.study.tuned)
         parts = []
         for row, text in list(enumerate(self.study.figures))[:3]:
-            if order := most_influential(self._data, row):
-                change = f"{self._data.exact[row][order[0]]:+.2g} %".replace("-", "−")
-                parts.append(f"{figure_label(text)} by {self._data.names[order[0]]} ({change})")
+            if order := most_influential(self.study, row):
+                change = f"{self.study.exact[row][order[0]]:+.2g} %".replace("-", "−")
+                parts.append(f"{figure_label(text)} by {self.study.names[order[0]]} ({change})")
         if not parts:
             return (f"{self.study.ship}: no number of the card moves these figures.",)
         return (f"{self.study.ship}: most influential numbers, for 10 % more: {'; '.join(parts)}.",)
@@ -199,7 +194,7 @@ class InfluenceResult(EnsembleResult[InfluenceStudy]):
 
     def _coefficients(self) -> Section:
         """Charts, and coefficients of the most influential parameters, a few figures in each table."""
-        data = self._data
+        data, figures = self.study, list(self.study.figures)
         largest = np.nan_to_num(np.abs(data.exact)).max(axis=0)
         order = [place for place in np.argsort(-largest, kind="stable") if largest[place] > 0][:ROWS]
         tables = []
@@ -207,7 +202,7 @@ class InfluenceResult(EnsembleResult[InfluenceStudy]):
             cells: list[list[Cell]] = [
                 [data.names[k], *(_pair(data.exact[row, k], data.difference[row, k]) for row in rows)] for k in order
             ]
-            heads = ("parameter", *(data.figures[row] for row in rows))
+            heads = ("parameter", *(figures[row] for row in rows))
             tables.append(table("K %: change for 10 % more, by exact slopes | by the 10 % difference", heads, cells))
         drawn = influence_charts(data)
         charts = [Illustration(chart=chart, half=len(drawn) > 1) for chart in drawn]
@@ -225,7 +220,7 @@ class InfluenceResult(EnsembleResult[InfluenceStudy]):
             heading=f"Errors of the figures{', standard errors assumed' * self.study.assumed_errors}",
             text=f"By the delta method: {self.study.standard_errors}. The share of a number is the part of the "
             "variance that would go if it were known exactly; shares of correlated numbers overlap.",
-            charts=[Illustration(chart=variance_chart(self._data))] if known else [],
+            charts=[Illustration(chart=variance_chart(self.study))] if known else [],
             tables=[table("Figures and their standard errors", heads, rows)],
         )
 
@@ -254,10 +249,10 @@ class InfluenceResult(EnsembleResult[InfluenceStudy]):
         )
 
     def _all_coefficients(self) -> Section:
-        data, tables = self._data, []
+        data, tables, figures = self.study, list[Table](), list(self.study.figures)
         for caption, K in (("K by exact slopes", data.exact), ("K by the 10 % difference", data.difference)):
             for rows in _parts(len(data.figures), PAGE_FIGURES):
-                labels = [figure_label(data.figures[row]) for row in rows]
+                labels = [figure_label(figures[row]) for row in rows]
                 part = f", from {labels[0]} on" if len(rows) < len(data.figures) else ""
                 tables.append(_all_of(f"{caption}{part}", data, K, rows))
         return Section(heading="Coefficients of all parameters", tables=tables)
@@ -353,8 +348,9 @@ def _pair(exact: float, difference: float) -> str:
     return " | ".join(f"{round(value, 2) + 0.0:+.2f}" if math.isfinite(value) else "-" for value in (exact, difference))
 
 
-def _all_of(caption: str, data: InfluenceData, K: Array, rows: Sequence[int]) -> Table:
-    heads = [Column(title=figure_label(data.figures[row]), unit="%", digits=3) for row in rows]
+def _all_of(caption: str, data: InfluenceStudy, K: Array, rows: Sequence[int]) -> Table:
+    figures = list(data.figures)
+    heads = [Column(title=figure_label(figures[row]), unit="%", digits=3) for row in rows]
     cells: list[list[Cell]] = [
         [name, *(_rounded(K[row, place]) for row in rows)] for place, name in enumerate(data.names)
     ]
@@ -388,45 +384,20 @@ screen high."""
 _WIDTH = 600
 
 
-@dataclass(frozen=True, eq=False)
-class InfluenceData:
-    """What is drawn of a result: names of the figures (nf,) and of the parameters (k,), and K % by exact slopes and by
-    the 10 % difference and shares of the variance, (nf, k); nan where there is none."""
-
-    figures: tuple[str, ...]
-    names: tuple[str, ...]
-    exact: Array
-    difference: Array
-    shares: Array
-
-    @staticmethod
-    def of(study: InfluenceStudy) -> InfluenceData:
-        """From the study."""
-        rows = [[row[key] for key in study.parameters] for row in study.influence_percent.values()]
-        shares = [[figure.share_of_variance[key] for key in study.parameters] for figure in study.figures.values()]
-        return InfluenceData(
-            figures=tuple(study.figures),
-            names=tuple(number.name for number in study.parameters.values()),
-            exact=np.array([[cell.exact for cell in row] for row in rows]),
-            difference=np.array([[cell.difference for cell in row] for row in rows]),
-            shares=np.array(shares),
-        )
-
-
-def most_influential(result: InfluenceData, row: int) -> list[int]:
+def most_influential(result: InfluenceStudy, row: int) -> list[int]:
     """Places of the parameters with the largest K % on one figure, largest first."""
     sizes = np.nan_to_num(np.abs(result.exact[row]))
     order = [int(place) for place in np.argsort(-sizes, kind="stable") if sizes[place] > 1e-3 * sizes.max()]
     return order[:_MOST_BARS]
 
 
-def influence_charts(result: InfluenceData) -> list[ChartSpec]:
+def influence_charts(result: InfluenceStudy) -> list[ChartSpec]:
     """One chart for each figure, of the parameters that move it most: bars by exact slopes, points by the 10 %
     difference."""
     return [_bars(result, row) for row in range(len(result.figures))]
 
 
-def _bars(result: InfluenceData, row: int) -> ChartSpec:
+def _bars(result: InfluenceStudy, row: int) -> ChartSpec:
     order = most_influential(result, row)
     names = [result.names[place] for place in order]
     values = {EXACT: result.exact[row], DIFFERENCE: result.difference[row]}
@@ -450,7 +421,7 @@ def _bars(result: InfluenceData, row: int) -> ChartSpec:
     bars = row_layers(exact, mark="bar", height=9, opacity=0.65)
     difference = replace(exact, rows=both[DIFFERENCE], rules=[Rule(at=[0.0])])
     points = row_layers(difference, size=34, strokeWidth=1.6)
-    figure = figure_label(result.figures[row])
+    figure = figure_label(list(result.figures)[row])
     return layered(
         [*bars, *points],
         size=(_WIDTH, 19 * len(names)),
@@ -459,7 +430,7 @@ def _bars(result: InfluenceData, row: int) -> ChartSpec:
     )
 
 
-def variance_chart(result: InfluenceData) -> ChartSpec:
+def variance_chart(result: InfluenceStudy) -> ChartSpec:
     """Share of each parameter in the variance of each figure, as a heat map of those with 1 % of any."""
     shares = 100 * result.shares
     order = [int(k) for k in np.argsort(-shares.max(axis=0), kind="stable") if shares[:, k].max() >= 1][:_MOST_ROWS]

@@ -51,12 +51,7 @@ ENSEMBLE_SIGNALS: Mapping[str, tuple[str, float]] = {
 
 
 def signals_with_bands(model: Model) -> Mapping[str, tuple[str, float]]:
-    """The :data:`ENSEMBLE_SIGNALS` of a model, ``phi_deg`` if it heels, and ``n_<name>_rpm`` of its thrusters.
-
-    Parameters
-    ----------
-    model : Model
-    """
+    """The :data:`ENSEMBLE_SIGNALS` of a model, ``phi_deg`` if it heels, and ``n_<name>_rpm`` of its thrusters."""
     heel = {"phi_deg": ("motion.phi", math.degrees(1.0))} if "motion.phi" in model else {}
     revolutions = {
         f"n_{name.split('.')[1]}_rpm": (name, from_si("n_rpm", 1.0))

@@ -64,8 +64,6 @@ class DrawnShips:
 
     Parameters
     ----------
-    card : SteeredCard
-    draws : Draws
     figures : mapping
         Name to the figure of each of the n ships (n,); nan where a ship does not show it.
     usable : array (n,)
@@ -299,11 +297,8 @@ def growth_bands(
 
     Parameters
     ----------
-    card : SteeredCard
     question : Question
         Each usable member shows ``growth_per_s``, the real part of the least damped mode.
-    request : EnsembleRequest
-    executor : Executor, optional
     """
     draws, messages = draws_of(card, request.seed)
     found = _ensemble(card, question, draws, request.members, executor)

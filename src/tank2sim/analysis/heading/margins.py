@@ -31,7 +31,6 @@ class LoopMargins:
 
     Parameters
     ----------
-    speed_mps : float
     gain_margin_up, gain_margin_down, gain_margin_dB : float
         Factor by which the loop gain may grow, and share to which it may fall; inf and 0 without a limit (null in
         JSON). For an unstable ship the second is above 0: the ship needs its helmsman. The first in dB.

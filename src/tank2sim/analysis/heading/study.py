@@ -149,12 +149,10 @@ class AutopilotStudy(PilotStudy):
     limits : dict
         ``largest_rudder_deg``, and with an integral ``anti_windup_time_s`` and ``integral_band_deg`` (for designs with
         their own states ``integral_limit_radps``, the band times its gain).
-    ship_alone : ShipAlone
     margins : tuple of LoopMargins
         At the speed of the design, then at others, all with the gains of the design.
     responses : tuple of LoopResponse
         At the speed of the design, and at the slowest and the fastest of `margins`.
-    closed_loop : ClosedLoop
     """
 
     design: str
@@ -192,7 +190,6 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
     ----------
     card, ship : ManoeuvringCard, Model
         The card, and the model built of it.
-    settings : StudySettings
 
     Raises
     ------
@@ -268,7 +265,6 @@ def not_held(
     Parameters
     ----------
     kept : CourseKeeping or CraftKeeping
-    weather : Weather
     speed_mps : float
         Mean speed through the water.
     rudder_rad : float, optional
@@ -299,7 +295,6 @@ def keep_tracks(loop: HeadingLoop, waypoints: Array | None, inputs: Mapping[str,
 
     Parameters
     ----------
-    loop : HeadingLoop
     waypoints : array (n, 2), optional
     inputs : mapping
         Inputs of the model, by name (current, wind).

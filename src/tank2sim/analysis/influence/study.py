@@ -238,7 +238,6 @@ class EquilibriumFigures:
 
     Parameters
     ----------
-    model : Model
     problem : _Problem
         Expressions in its unknowns, the inputs and the parameters of the model.
     names : sequence of str

@@ -107,8 +107,6 @@ class CraftStabilityStudy:
 
     Parameters
     ----------
-    ship : str
-    length_m : float
     straight_run : CraftAtSpeed
         At the requested speed.
     nearly_straight : bool
@@ -119,8 +117,6 @@ class CraftStabilityStudy:
         Held by the thrusters at their largest revolutions.
     difference_turns : tuple of SteadyCraftTurn
         To starboard, about the revolutions of the straight run.
-    notices : tuple of Notice
-    ensemble : StabilityBands, optional
     """
 
     ship: str
@@ -139,7 +135,6 @@ def craft_stability(card: SteeredCard, speed_mps: float | None = None) -> CraftS
 
     Parameters
     ----------
-    card : SteeredCard
     speed_mps : float, optional
         Surge velocity through the water, positive.
 
@@ -170,13 +165,7 @@ def craft_stability(card: SteeredCard, speed_mps: float | None = None) -> CraftS
 
 @dataclass(frozen=True)
 class OfCraft:
-    """Straight run of the members of an ensemble at a speed, and their fastest turn.
-
-    Parameters
-    ----------
-    ship : ShipText
-    speed_mps : float
-    """
+    """Straight run of the members of an ensemble at a speed, and their fastest turn."""
 
     ship: ShipText
     speed_mps: float
@@ -210,7 +199,6 @@ def keeps_nearly_straight(run: CraftAtSpeed, turns: Sequence[SteadyCraftTurn], l
 
     Parameters
     ----------
-    run : CraftAtSpeed
     turns : sequence of SteadyCraftTurn
         About its revolutions; the one without a difference first.
     length_m : float
@@ -222,10 +210,6 @@ def keeps_nearly_straight(run: CraftAtSpeed, turns: Sequence[SteadyCraftTurn], l
 
 class CraftMotions:
     """Steady motions of a craft, by the revolutions of its sides.
-
-    Parameters
-    ----------
-    card : SteeredCard
 
     Raises
     ------

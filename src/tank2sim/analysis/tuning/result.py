@@ -81,8 +81,6 @@ class Tuned:
 
     Parameters
     ----------
-    targets : tuple of Target
-    means : Means
     values : array (k,)
         Values of all parameters of the study, tuned.
     before, after : array

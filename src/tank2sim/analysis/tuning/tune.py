@@ -49,8 +49,6 @@ def tune(study: Study, targets: Sequence[Target], means: Means) -> Tuned:
     ----------
     study : Study
         Study with at least the figures of the targets.
-    targets : sequence of Target
-    means : Means
 
     Raises
     ------

@@ -85,7 +85,6 @@ class SteadyTurning:
     arc : array (k,)
     straight : int
         Row of the straight course.
-    folds : tuple of TurningFold
     loop : HysteresisLoop or None
     ended : pair of str
         Why the curve ends to port and to starboard (:class:`tank2sim.analysis.turning.continuation.Curve`).

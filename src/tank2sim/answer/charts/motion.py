@@ -314,25 +314,19 @@ def motions(
     drawn = []
     if tracks := [_track(label, table, label in measured) for label, table in tables.items() if _moves(table)]:
         drawn.append(Illustration(chart=track_chart(tracks, title=f"Track: {title}")))
-    signals = _signals(runs)
-    if signals:
-        histories = [
-            History(label=label, time_s=table["t_s"], values=_by_stem(table), measured=label in measured)
-            for label, table in tables.items()
-        ]
-        height = 110 if len(signals) <= 6 else 80
-        chart = history_chart(histories, signals, title=f"Histories: {title}", height_px=height, marks=marks)
+    height = 110 if len(_signals(runs)) <= 6 else 80
+    if chart := columns_chart(runs, f"Histories: {title}", measured=measured, height_px=height, marks=marks):
         drawn.append(Illustration(chart=chart))
     return drawn
 
 
-def measured_histories(columns: _Columns, title: str) -> ChartSpec | None:
-    """The signals of a record over time, but its positions; None without any."""
-    return columns_chart({"measured": columns}, title)
-
-
 def columns_chart(
-    runs: Mapping[str, _Columns], title: str, *, measured: Sequence[str] = (), height_px: int = 60
+    runs: Mapping[str, _Columns],
+    title: str,
+    *,
+    measured: Sequence[str] = (),
+    height_px: int = 60,
+    marks: Sequence[TimeMark] = (),
 ) -> ChartSpec | None:
     """The signals of runs over time, but their positions, `measured` ones as points; None without any."""
     if not (signals := _signals(runs)):
@@ -342,7 +336,7 @@ def columns_chart(
         History(label=label, time_s=table["t_s"], values=_by_stem(table), measured=label in measured)
         for label, table in tables.items()
     ]
-    return history_chart(histories, signals, title=title, height_px=height_px)
+    return history_chart(histories, signals, title=title, height_px=height_px, marks=marks)
 
 
 def varying_histories(columns: _Columns, bands: Mapping[str, BandOverTime], band_t_s: Array) -> Illustration | None:

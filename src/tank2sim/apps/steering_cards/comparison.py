@@ -76,20 +76,10 @@ def model_of(card: SteeringCard, name: str) -> Model:
     return replace(model, source=card.source)
 
 
-@dataclass(frozen=True)
-class ModelTurns:
-    """Steady turns of a model over the rudder angle: a part of Table 1."""
-
-    model: str
-    title: str
-    turns: tuple[SteadyTurn, ...]
-
-
-def turns_of(card: SteeringCard, name: str, rudders_deg: Sequence[float] = RUDDERS_DEG) -> ModelTurns:
-    """Steady turns of a model at rudder angles (deg). Raises InputError as :func:`model_of`, or where none exists."""
+def turns_of(card: SteeringCard, name: str, rudders_deg: Sequence[float] = RUDDERS_DEG) -> tuple[SteadyTurn, ...]:
+    """Steady turns of a model at rudder angles (deg), as in Table 1. Raises as :func:`model_of`, or without one."""
     points = TurningPoints(model_of(card, name))
-    turns = tuple(points.turn_at(math.radians(rudder))[0] for rudder in rudders_deg)
-    return ModelTurns(name, card.models[name].title, turns)
+    return tuple(points.turn_at(math.radians(rudder))[0] for rudder in rudders_deg)
 
 
 @dataclass(frozen=True)
@@ -176,7 +166,7 @@ def combined_prediction(card: SteeringCard, changed: str) -> CombinedPrediction:
     percents = [combined_percent(percents_of, agreed) for percents_of in (K, swapped, table.K_percent)]
     radii = (printed.radius_m, printed.radius_m, table.radius_m)
     predicted = [radius * (1 + percent / 100) for radius, percent in zip(radii, percents, strict=True)]
-    direct = turns_of(card, changed, [rudder]).turns[0].radius_m
+    direct = turns_of(card, changed, [rudder])[0].radius_m
     return CombinedPrediction(
         agreed_percent=agreed,
         radius_m=table.radius_m,
@@ -196,7 +186,7 @@ def _direct_misread(card: SteeringCard, printed: PrintedInfluence, target: str, 
     values = card.models[printed.model].coefficients
     largest = max(printed.misread_as, key=lambda name: abs(agreed.get(name, 0.0)), default=None)
     if largest is None:
-        return turns_of(card, target, [math.degrees(printed.rudder_rad)]).turns[0].radius_m
+        return turns_of(card, target, [math.degrees(printed.rudder_rad)])[0].radius_m
     wrong = printed.misread_as[largest]
     points = TurningPoints(model_of(card, target))
     changed = {f"coefficients.{wrong}": values[wrong] * (1 + agreed[largest] / 100)}
@@ -309,7 +299,6 @@ class SteeringComparison:
         Model to its missing data.
     titles : dict
         Model to its words.
-    diagrams : SteeringDiagrams
     histories : dict
         Words of the models of `manoeuvres` to their turning circles, thinned for a chart.
     """
@@ -348,7 +337,7 @@ def compare_steering_models(card: SteeringCard, rudder_deg: float | None = None)
     main = printed.model if printed else names[0]
     same = [name for name in names if card.models[name].draught_m == card.models[main].draught_m]
     candidates = [name for name in names if name not in same and card.models[name].form == card.models[main].form]
-    turns = {name: turns_of(card, name, RUDDERS_DEG).turns for name in names}
+    turns = {name: turns_of(card, name) for name in names}
     runs = {name: _runs(card, name, rudder) for name in same}
     tuning = tuned(card, main)
     largest = max(turn.rudder_rad for row in turns.values() for turn in row)
