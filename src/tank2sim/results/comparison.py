@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from tank2sim.analysis.validation.coefficients import BEYOND_STANDARD_ERRORS, CoefficientRow, Difference
+from tank2sim.analysis.validation.coefficients import BEYOND_STANDARD_ERRORS, CoefficientRow
 from tank2sim.analysis.validation.comparison import CardComparison, CardSummary, ComparedFigure, TrialComparison
 from tank2sim.answer.charts.motion import TrackData, track_chart
 from tank2sim.answer.charts.parts import plain, series_look, with_unit
@@ -301,11 +301,7 @@ def _coefficient_row(row: CoefficientRow, factor: float) -> list[Cell]:
         cells += [None if card.value is None else factor * card.value, shown]
     for difference in row.differences:
         cells += [difference.percent, difference.standard_errors]
-    return [*cells, _remarks(row.differences)]
-
-
-def _remarks(differences: Sequence[Difference]) -> str:
-    return "; ".join(dict.fromkeys(difference.why for difference in differences if difference.why))
+    return [*cells, ("; ".join(dict.fromkeys(difference.why for difference in row.differences if difference.why)))]
 
 
 def _with_deviations(row: ComparedFigure) -> list[str | None]:

@@ -70,7 +70,7 @@ class OfSteering:
             drawn = model.with_values({name: value for name, value in values.items() if name in model.parameter_names})
             turning = steady_turning(drawn)
             rows = [*branches(turning, self.grid.rudder_rad), *_responses(drawn, self.speed_mps, self.grid)]
-            width = math.degrees(turning.loop.width_rad) if turning.loop else 0.0
+            width = turning.loop.width_deg if turning.loop else 0.0
             return MemberResult({"loop_width_deg": width}, np.array(rows, dtype=np.float32))
 
         return each_ship(one_ship(model, curves))

@@ -72,6 +72,8 @@ _BUSY_PERCENT = 10.0
 Project choice: well above what a calm sea needs.
 """
 
+_BEGUN_AT = "the runs begin at {:g} m/s, with the engine as it is at the card's speed"
+
 
 @dataclass(frozen=True, kw_only=True)
 class StudySettings:
@@ -248,7 +250,7 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
             *not_held(kept, weather, float(np.mean(later["motion.u"])), float(np.mean(later["rudder.angle"]))),
             *outside.notices,
             *notices,
-            *_begun_at(settings.speed_mps),
+            *([] if settings.speed_mps is None else [Notice(_BEGUN_AT.format(settings.speed_mps))]),
             *_notices(margins, runs, changes),
             *unfinished(tracks),
             *_of_the_gear(ship, design, kept, weather),
@@ -422,11 +424,3 @@ def _of_the_gear(ship: Model, design: HeadingDesign, kept: CourseKeeping, weathe
             f"SOLAS II-1, regulation 29, requires of a gear; this gear goes to {math.degrees(limit):.3g} deg"
         )
     return [Notice(text) for text in notices]
-
-
-def _begun_at(speed: float | None) -> list[Notice]:
-    return (
-        []
-        if speed is None
-        else [Notice(f"the runs begin at {speed:g} m/s, with the engine as it is at the card's speed")]
-    )

@@ -72,18 +72,15 @@ def _maps(rows: Sequence[ChartRecord], signals: Sequence[str], models: Sequence[
         legend={"title": "misfit (noise units)", "gradientLength": 180},
         shown={"trial:N": "trial", "signal:N": "signal", "text:N": "misfit (noise units)"},
     ).layers
+    cell_px = max(40, 6 * max((len(name) for name in signals), default=0) + 8)
     head = {"title": None, "labelFontSize": 11, "labelAnchor": "start", "labelLimit": 260}
     return {
         "data": {"values": cells},
         "transform": [{"filter": before_after_switch({model: model for model in models}, "model")}],
         "facet": {"column": channel("head:N", sort=list(heads.values()), header=head)},
-        "spec": {"layer": layers, "width": _cell_width(signals) * len(signals), "height": ROW_PX * len(trials)},
+        "spec": {"layer": layers, "width": cell_px * len(signals), "height": ROW_PX * len(trials)},
         "spacing": 16,
     }
-
-
-def _cell_width(signals: Sequence[str]) -> int:
-    return max(40, 6 * max((len(name) for name in signals), default=0) + 8)
 
 
 def in_noise(misfit: float) -> str:
