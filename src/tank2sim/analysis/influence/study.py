@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
@@ -224,39 +223,29 @@ _ACCURACY = 1e-9
 """Residuals, scaled to about one, of an accepted equilibrium; Newton's last step is far below it."""
 
 
-@dataclass(frozen=True)
-class _Problem:
-    """f(z, p) = 0 in scaled unknowns z (nz, 1), and the values there."""
-
-    unknown: ca.SX
-    residual: ca.SX
-    shown: ca.SX
-
-
 class EquilibriumFigures:
     """An equilibrium of a model and its values.
 
     Parameters
     ----------
-    problem : _Problem
-        Expressions in its unknowns, the inputs and the parameters of the model.
-    names : sequence of str
-        What is shown.
+    unknown, residual : SX (nz, 1)
+        f(z, p) = 0 in scaled unknowns z, of these, the inputs and the parameters of the model.
+    shown : mapping
+        Name of each value to its expression.
     """
 
-    def __init__(self, model: Model, problem: _Problem, names: Sequence[str]):
-        self.names = tuple(names)
-        self._model = model
+    def __init__(self, model: Model, unknown: ca.SX, residual: ca.SX, shown: Mapping[str, ca.SX]):
+        self.names, self._model = tuple(shown), model
         given = ca.vertcat(model.u, model.p)
-        equations = {"x": problem.unknown, "p": given, "g": problem.residual}
+        equations = {"x": unknown, "p": given, "g": residual}
         options = {"abstol": 1e-13, "error_on_fail": False, "max_iter": 30}
         root = ca.rootfinder("rest", "newton", equations, options)
-        arguments = [problem.unknown, model.u, model.p]
-        self._residual = ca.Function("residual", arguments, [problem.residual])
-        shown = ca.Function("shown", arguments, [problem.shown], {"cse": True})
+        arguments = [unknown, model.u, model.p]
+        self._residual = ca.Function("residual", arguments, [residual])
+        show = ca.Function("shown", arguments, [ca.vcat(list(shown.values()))], {"cse": True})
         z, u, p = (ca.MX.sym(name, len_) for name, len_ in zip("zup", (s.numel() for s in arguments), strict=True))
         found = root(z, ca.vertcat(u, p))
-        values = shown(found, u, p)
+        values = show(found, u, p)
         self._values = ca.Function("values", [z, u, p], [found, values])
         self._slopes = ca.Function("slopes", [z, u, p], [ca.jacobian(values, p)])
 
@@ -301,8 +290,7 @@ def steady_turns(model: Model) -> EquilibriumFigures:
     felt = ca.sumsqr(ca.jacobian(scaled, place))
     residual, felt = ca.substitute([scaled, felt], [model.x], [x])
     u, v, r = (fixed[name] for name in ("motion.u", "motion.v", "motion.r"))
-    problem = _Problem(unknown, residual, ca.vertcat(u, v, r, felt))
-    return EquilibriumFigures(model, problem, ("u", "v", "r", "place"))
+    return EquilibriumFigures(model, unknown, residual, {"u": u, "v": v, "r": r, "place": felt})
 
 
 def turn_figures(u: float, v: float, r: float, side: float, approach: float) -> tuple[dict[str, float], Array]:
@@ -346,7 +334,7 @@ def straight_courses(model: Model) -> tuple[EquilibriumFigures, Array]:
     at = dict(zip(model.state_names, point.x.tolist(), strict=True))
     speed = model.parameter_values()[model.parameter_names.index("ship.speed")]
     near = np.array([at["motion.v"] / speed, at["rudder.angle"]])
-    return EquilibriumFigures(model, _Problem(unknown, residual, values), tuple(shown)), near
+    return EquilibriumFigures(model, unknown, residual, dict(zip(shown, ca.vertsplit(values), strict=True))), near
 
 
 def _linear_figures(model: Model) -> dict[str, ca.SX]:

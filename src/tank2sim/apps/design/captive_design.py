@@ -11,10 +11,10 @@ import numpy as np
 
 from tank2sim.analysis.influence.figures import InfluenceFigure
 from tank2sim.apps.design.allocation import Allocation, InformationBlock, certainty, least_time, target_matrices
-from tank2sim.apps.design.captive_information import GaugeErrors, PlannedCampaign
+from tank2sim.apps.design.captive_information import PlannedCampaign
 from tank2sim.apps.design.captive_runs import PlannedRun, RunGroup, TankRuns, time_of
 from tank2sim.apps.design.figure_slopes import FigureSlopes, figure_slopes, hydrodynamic_derivatives, range_of_figures
-from tank2sim.apps.design.study import Certainty, PlannedCoefficient
+from tank2sim.apps.design.study import Certainty, GaugeStudy, PlannedCoefficient
 from tank2sim.apps.design.tank_form import TankFile, refuse_contradictions
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
@@ -251,18 +251,18 @@ class CaptiveDesigner:
                 )
                 remedy = f"give noise or zero of at least {_LEAST_ERROR:g} of the range"
                 raise InputError(self.settings.source, "gauges", problem, remedy)
-            gauges[force] = GaugeErrors(noise=max(noise, 1e-9 * span), zero=zero, largest=span if stated else math.inf)
+            gauges[force] = GaugeStudy(noise=max(noise, 1e-9 * span), zero=zero, range=span if stated else math.inf)
         return replace(bare, gauges=gauges)
 
     def _within_gauges(self, groups: Sequence[RunGroup]) -> tuple[RunGroup, ...]:
         gauges = self.planned.gauges
-        if all(math.isinf(gauge.largest) for gauge in gauges.values()):
+        if all(math.isinf(gauge.range) for gauge in gauges.values()):
             return tuple(groups)
         return tuple(
             group
             for group in groups
             if all(
-                value <= gauges[force].largest
+                value <= gauges[force].range
                 for run in group
                 for force, value in self.planned.largest_forces(run).items()
             )

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.apps.design.captive_runs import PlannedRun, RunGroup
+from tank2sim.apps.design.study import GaugeStudy
 from tank2sim.arrays import Array
 from tank2sim.cards.terms import parse_term
 from tank2sim.identification.captive.equations import (
@@ -42,18 +43,6 @@ information of a plan without such runs invertible."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class GaugeErrors:
-    """Errors of a gauge, one standard deviation, N or N m.
-
-    `noise`: noise of an independent reading; `zero`: constant in a run; `largest`: its range to either side.
-    """
-
-    noise: float
-    zero: float
-    largest: float
-
-
-@dataclass(frozen=True, kw_only=True)
 class PlannedCampaign:
     """A model in a tank, with the coefficients known beforehand.
 
@@ -66,7 +55,7 @@ class PlannedCampaign:
     water_density_kgpm3: float
     gravity_mps2: float
     derivatives: Mapping[str, float]
-    gauges: Mapping[str, GaugeErrors]
+    gauges: Mapping[str, GaugeStudy]
     gain_relative: float
     rate_hz: float
 

@@ -114,7 +114,7 @@ class PlannedModel:
 
 @dataclass(frozen=True)
 class GaugeStudy:
-    """A gauge: standard deviations of its noise and zero, and its range; N or N m."""
+    """A gauge: standard deviations of an independent reading and of its zero in a run, and its range; N or N m."""
 
     noise: float
     zero: float
