@@ -207,10 +207,6 @@ class ComparisonResult(Result[CardComparison]):
             percents, self.labels, ", standard errors assumed" * any(card.assumed_errors for card in self.study.cards)
         )
         drawn = Illustration(chart=chart, caption=_PERCENT, name="figures_of_manoeuvres")
-        tables = [self._main_figures(), *map(self._trial_table, self.study.trials)]
-        return [Section(heading="Figures of manoeuvres", text=_TRIALS, charts=[drawn], tables=tables)]
-
-    def _main_figures(self) -> Table:
         shown = _SHOWN_OF_CRAFT if self.study.craft else _SHOWN
         rows: list[list[Cell]] = [
             [trial.name, with_unit(*in_words(name)), *_with_deviations(row)]
@@ -218,7 +214,9 @@ class ComparisonResult(Result[CardComparison]):
             for name, row in trial.figures.items()
             if name in shown
         ]
-        return table("Main figures (standard deviation)", ("trial", "figure", *self.labels), rows)
+        main = table("Main figures (standard deviation)", ("trial", "figure", *self.labels), rows)
+        tables = [main, *map(self._trial_table, self.study.trials)]
+        return [Section(heading="Figures of manoeuvres", text=_TRIALS, charts=[drawn], tables=tables)]
 
     def _trial_table(self, trial: TrialComparison) -> Table:
         heads: list[str | Column] = ["figure", "unit", *self.labels]

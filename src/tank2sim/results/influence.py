@@ -213,7 +213,9 @@ class InfluenceResult(EnsembleResult[InfluenceStudy]):
         for text, figure in self.study.figures.items():
             relative = 100 * abs(figure.standard_error / figure.value) if figure.value else None
             error = figure.standard_error
-            rows.append([figure_label(text), figure.value, _unit(text), error, relative, self._largest_shares(figure)])
+            shares = sorted(figure.share_of_variance.items(), key=lambda item: -item[1])[:3]
+            names = [f"{self.study.parameters[key].name} {100 * share:.0f} %" for key, share in shares if share]
+            rows.append([figure_label(text), figure.value, _unit(text), error, relative, ", ".join(names)])
         heads = ("figure", "value", "unit", "standard error", "relative (%)", "most of it from")
         known = any(figure.standard_error > 0 for figure in self.study.figures.values())
         return Section(
@@ -223,10 +225,6 @@ class InfluenceResult(EnsembleResult[InfluenceStudy]):
             charts=[Illustration(chart=variance_chart(self.study))] if known else [],
             tables=[table("Figures and their standard errors", heads, rows)],
         )
-
-    def _largest_shares(self, figure: FigureErrors) -> str:
-        shares = sorted(figure.share_of_variance.items(), key=lambda item: -item[1])[:3]
-        return ", ".join(f"{self.study.parameters[key].name} {100 * share:.0f} %" for key, share in shares if share)
 
     def _agreed(self) -> Section:
         agreed = self.study.agreed

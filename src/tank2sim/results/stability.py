@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from tank2sim.analysis.stability.craft import STRAIGHT_FROM_LENGTHS, CraftStabilityStudy
+from tank2sim.analysis.stability.response import FIRST_ORDER
 from tank2sim.analysis.stability.study import StabilityStudy
+from tank2sim.answer.charts.analysis import FrequencyResponse, PolesZeros, bode_chart, pole_zero_chart
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import (
     Cell,
@@ -27,9 +29,7 @@ from tank2sim.results.stability_charts import (
     characteristic_chart,
     criterion_by_speed_chart,
     influence_chart,
-    steering_bode,
     steering_diagram,
-    steering_poles,
     step_chart,
     trim_chart,
 )
@@ -300,12 +300,22 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
         heading, responses = "Response to the rudder", self.study.responses
         if not responses:
             return Section(heading=heading, text="The yaw rate does not answer to the rudder.")
-        charts = [
-            Illustration(chart=steering_poles(responses, title="Poles and zeros")),
-            Illustration(chart=steering_bode(responses, title="Bode diagram")),
-            Illustration(chart=step_chart(responses, title="Step of the rudder")),
+        # Poles of the gear lie far out and are left out.
+        systems = [
+            PolesZeros(label=one.label, poles=one.poles.tolist(), zeros=one.zeros.tolist())
+            for one in responses
+            if one.label in (responses[0].label, FIRST_ORDER)
         ]
-        return Section(heading=heading, text=_RESPONSE, charts=charts, folded=True)
+        curves = [
+            FrequencyResponse(label=one.label, omega_radps=one.omega_radps, response=one.response) for one in responses
+        ]
+        charts = [
+            pole_zero_chart(systems, title="Poles and zeros"),
+            bode_chart(curves, title="Bode diagram"),
+            step_chart(responses, title="Step of the rudder"),
+        ]
+        drawn = [Illustration(chart=chart) for chart in charts]
+        return Section(heading=heading, text=_RESPONSE, charts=drawn, folded=True)
 
     def _characteristic(self) -> Section:
         found = self.study.characteristic
