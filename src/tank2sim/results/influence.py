@@ -1,4 +1,4 @@
-"""Results of ``influence``: coefficients of each number on a card, and the card tuned to targets."""
+"""Results of ``influence``: coefficients of each number on a card, the card tuned to targets, and their charts."""
 
 from __future__ import annotations
 

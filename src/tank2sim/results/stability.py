@@ -1,4 +1,4 @@
-"""Result of ``stability`` of a ship: straight course, steady turning and the IMO criteria."""
+"""Results of ``stability``: straight course, turning and IMO criteria of a ship; straight runs and turns of a craft."""
 
 from __future__ import annotations
 

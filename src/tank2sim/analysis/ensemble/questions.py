@@ -1,4 +1,4 @@
-"""Evaluations of the members of an ensemble: a manoeuvre, named figures, the IMO criteria."""
+"""Evaluations of the members of an ensemble: a manoeuvre at the fastest pace, named figures, the IMO criteria."""
 
 from __future__ import annotations
 

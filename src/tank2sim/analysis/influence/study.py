@@ -224,7 +224,9 @@ _ACCURACY = 1e-9
 
 
 class EquilibriumFigures:
-    """An equilibrium of a model and its values.
+    """An equilibrium of a model, f(z, p) = 0, and its values g(z, p) with their exact slopes by the parameters.
+
+    By the implicit function theorem dg/dp = g_p - g_z f_z^-1 f_p, which CasADi derives through its ``rootfinder``.
 
     Parameters
     ----------

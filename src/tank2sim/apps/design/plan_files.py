@@ -1,4 +1,4 @@
-"""Files of a captive plan: the list of runs, the campaign template that ``reduce`` reads, and runs of a campaign."""
+"""Files of a captive plan: runs, the campaign template for ``reduce``; and runs of a campaign or a tank's own table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Comparison of the models of a steering card: steady turns, manoeuvres, influence, and missing data."""
+"""Comparison of the models of a steering card: steady turns, manoeuvres, influence, and missing data.
+
+The tables are those of paper 4 (Poznyakov and Yudin 2007). K of a coefficient is the change of the steady radius in per
+cent when it grows by 10 %; Kc is the change of a coefficient in per cent when the draught grows by 1 %
+(:mod:`tank2sim.analysis.influence.percent`).
+"""
 
 from __future__ import annotations
 
