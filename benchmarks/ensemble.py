@@ -41,9 +41,15 @@ import numpy as np
 
 from tank2sim.analysis.ensemble import questions
 from tank2sim.analysis.ensemble.draws import draws_of
-from tank2sim.analysis.ensemble.questions import ENSEMBLE_SIGNALS, OfCriteria, OfFigures, OfManoeuvre, ShipText
+from tank2sim.analysis.ensemble.questions import (
+    ENSEMBLE_SIGNALS,
+    OfCriteria,
+    OfFigures,
+    OfManoeuvre,
+    ShipText,
+    fastest_pace,
+)
 from tank2sim.analysis.ensemble.results import EnsembleRequest, manoeuvre_bands
-from tank2sim.analysis.ensemble.steps import fastest_pace
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.dynamics import build
 from tank2sim.executors import executing

@@ -86,7 +86,7 @@ def main() -> None:
             begin = time.perf_counter()
             found = tune(Study(read_card_of_the_mariner(), [wish.figure for wish in wishes]), wishes, Means(by=by))
             seconds = time.perf_counter() - begin
-            told = f"{len(found.moves)} moved, reached {found.reached}"
+            told = f"{len(found.parameters)} moved, reached {found.reached}"
             print(f"tuning {len(wishes)} figures, {by}: {seconds:.1f} s, {told}")
 
 

@@ -15,12 +15,13 @@ from paper_numbers import PaperNumbers
 
 from tank2sim.analysis.influence.percent import change_percent
 from tank2sim.apps.steering_cards.card import SteeringCard, read_steering_card
-from tank2sim.apps.steering_cards.comparison import missing_of, tuned
-from tank2sim.apps.steering_cards.tables import (
+from tank2sim.apps.steering_cards.comparison import (
     agreed_variation,
     combined_prediction,
     draught_polynomials,
     influence_of,
+    missing_of,
+    tuned,
     turns_of,
 )
 from tank2sim.apps.steering_cards.two_point_tuning import TwoPointTuning
@@ -100,7 +101,7 @@ def numbers(report: PaperNumbers) -> None:
 def turning(card: SteeringCard, report: PaperNumbers) -> None:
     for name, printed in TABLE_1.items():
         report.heading(f"Table 1, {card.models[name].title}")
-        for place, turn in enumerate(turns_of(card, name, RUDDERS).turns):
+        for place, turn in enumerate(turns_of(card, name, RUDDERS)):
             for key, values in printed.items():
                 report(f"{RUDDERS[place]:2} deg, {key}", values[place], asdict(turn.in_degrees())[key], TOLERANCES[key])
             speed = turn.radius_m * turn.yaw_rate_radps

@@ -36,12 +36,10 @@ class ManoeuvreStudy:
 
     Parameters
     ----------
-    ship : str
     length_m, beam_m : float, optional
         Dimensions of the ship; None if its card does not state them.
     manoeuvre : str
         Name with its argument: ``zigzag:20/20``.
-    figures : dict
     limits : dict
         Largest figures that IMO MSC.137(76) allows, by name with unit; empty for manoeuvres without any.
     left_card_range_s : float, optional
@@ -52,10 +50,8 @@ class ManoeuvreStudy:
         Names of the figures outside the card's range; entries of lists as ``overshoot_1_deg``.
     histories : dict
         Columns of a trial file, thinned for charts.
-    notices : tuple of Notice
     other_side : OtherSide, optional
         Of a pull-out.
-    ensemble : ManoeuvreBands, optional
     """
 
     ship: str
@@ -94,7 +90,6 @@ def study_manoeuvre(
         The ship, at the speed of its card.
     words : str
         Name of the manoeuvre with its argument.
-    run : Run
     particulars : object
         Section of the card with ``length_m`` and ``beam_m``, where it has them.
     other_side : Run, optional

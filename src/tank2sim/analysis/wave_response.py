@@ -46,18 +46,10 @@ _SOLVER_FORCES = {"X": ("drift_force_surge", 1.0), "Y": ("drift_force_sway", -1.
 class HullInWaves:
     """What the mesh does not show of a hull, and what is to be computed.
 
-    Parameters
-    ----------
-    metacentric_height_m : float
-        GM, m.
-    roll_gyradius_m, pitch_gyradius_m : float
-        Radii of gyration about the centre of gravity, m; that of yaw is taken as that of pitch.
-    roll_damping : float
-        Damping of roll over the critical one, in addition to that by waves.
-    frequencies_radps : sequence of float, optional
-        Rising; by default :data:`FREQUENCIES` of them.
-    directions_deg : sequence of float
-        From 0 to 180 in equal steps, the direction from which the waves come, clockwise from the bow.
+    `metacentric_height_m`: GM, m; `roll_gyradius_m`, `pitch_gyradius_m`: radii of gyration about the centre of gravity,
+    m; that of yaw is taken as that of pitch; `roll_damping`: damping of roll over the critical one, in addition to that
+    by waves; `frequencies_radps`: rising; by default :data:`FREQUENCIES` of them; `directions_deg`: from 0 to 180 in
+    equal steps, the direction from which the waves come, clockwise from the bow.
     """
 
     metacentric_height_m: float
@@ -71,10 +63,7 @@ class HullInWaves:
 def hull_of(card: ManoeuvringCard, given: Mapping[str, Any]) -> HullInWaves:
     """What a card knows of a hull, with what is `given` in its place (names of :class:`HullInWaves`).
 
-    Raises
-    ------
-    InputError
-        Metacentric height or beam is neither given nor on the card, or the height is not above zero.
+    Raises InputError: metacentric height or beam is neither given nor on the card, or the height is not above zero.
     """
     height = given.get("metacentric_height_m", card.ship.metacentric_height_m)
     if height is None or height <= 0:
@@ -94,16 +83,9 @@ def hull_of(card: ManoeuvringCard, given: Mapping[str, Any]) -> HullInWaves:
 def read_hull(path: str | Path) -> Any:
     """The wetted part of a hull as a body of the solver, with its lid.
 
-    Parameters
-    ----------
-    path : str or path
-        Mesh in m (``gdf``, ``hst``, ``pnl``, ``mar``, ``stl``, ``obj``, ``vtk``): x forward of midships, y to port, z
-        above the waterline.
-
-    Raises
-    ------
-    InputError
-        The library is not installed, or the file is missing, broken, or no closed hull about the origin.
+    `path`: mesh in m (``gdf``, ``hst``, ``pnl``, ``mar``, ``stl``, ``obj``, ``vtk``): x forward of midships, y to port,
+    z above the waterline. Raises InputError: the library is not installed, or the file is missing, broken, or no closed
+    hull about the origin.
     """
     try:
         solver = importlib.import_module("capytaine")
@@ -130,13 +112,8 @@ def read_hull(path: str | Path) -> Any:
 def wave_rows(body: Any, hull: HullInWaves, density: float, gravity: float, length: float) -> tuple[list[str], Array]:
     """Columns and rows of ``[waves]`` (:mod:`tank2sim.cards.wave_table`) of a hull.
 
-    Parameters
-    ----------
-    body
-        As :func:`read_hull` returns it.
-    hull : HullInWaves
-    density, gravity, length : float
-        Density of the water, kg/m^3; gravity, m/s^2; L, m, for the default frequencies.
+    `body`: as :func:`read_hull` returns it; `density`, `gravity`, `length`: density of the water, kg/m^3; gravity,
+    m/s^2; L, m, for the default frequencies.
     """
     solver, rao = (importlib.import_module(f"capytaine{part}") for part in ("", ".post_pro.rao"))
     drift = importlib.import_module("capytaine.post_pro.mean_drift_force")
@@ -225,10 +202,7 @@ _DIGITS = 5
 def card_in_waves(card: ManoeuvringCard, path: str | Path, hull: HullInWaves) -> ManoeuvringCard:
     """The card with the table ``[waves]`` of the hull with the mesh at `path`, in place of one that it has.
 
-    Raises
-    ------
-    InputError
-        As :func:`read_hull`; or the mesh is not of a hull of the card's length.
+    Raises InputError: as :func:`read_hull`; or the mesh is not of a hull of the card's length.
     """
     body = read_hull(path)
     ends = body.mesh.vertices[:, 0]
@@ -246,14 +220,8 @@ def card_in_waves(card: ManoeuvringCard, path: str | Path, hull: HullInWaves) ->
 def with_waves_section(text: str, source: str, columns: Sequence[str], rows: Array) -> str:
     """The text of a card with ``[waves]`` at its end.
 
-    Parameters
-    ----------
-    text : str
-        Text of the card; a table that it has is replaced.
-    source : str
-        Where the numbers come from.
-    columns : sequence of str
-    rows : numpy.ndarray, (n, len(columns))
+    `text`: text of the card; a table that it has is replaced; `source`: where the numbers come from; `rows`:
+    (n, len(columns)).
     """
     document = tomlkit.parse(text)
     document.pop("waves", None)

@@ -9,7 +9,8 @@ from __future__ import annotations
 import functools
 import importlib.metadata
 import importlib.resources
-from collections.abc import Iterable, Sequence
+import itertools
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -52,10 +53,12 @@ class Page:
 
 def render_page(page: Page) -> str:
     """The page as one HTML file, about 1 MB and its data. It opens without a network and can be printed."""
-    counter = _Counter()
+    numbers = {"chart": itertools.count(1), "table": itertools.count(1)}
     cautions = foremost(_messages(page))
-    sections = [_section(section, counter) for section in page.sections]
-    sections = [section for section in sections if _has_content(section)]
+    sections = [_section(section, numbers) for section in page.sections]
+    # What is left of a section whose notices are at the top of the page.
+    parts = ("notes", "tables", "charts")
+    sections = [section for section in sections if any(section[part] for part in parts) or section["content"].text]
     specifications = [chart["specification"] for section in sections for chart in section["charts"]]
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("tank2sim", "answer"), autoescape=True, undefined=jinja2.StrictUndefined
@@ -77,11 +80,6 @@ def render_page(page: Page) -> str:
     )
 
 
-def _has_content(section: dict[str, Any]) -> bool:
-    """Whether anything is left in a section whose notices are at the top of the page."""
-    return bool(section["notes"] or section["tables"] or section["charts"] or section["content"].text)
-
-
 def _messages(page: Page) -> Iterable[object]:
     """The notes of all sections and tables, and the cells of tables."""
     for section in page.sections:
@@ -96,28 +94,13 @@ def _cards_across(count: int) -> int:
     return max(3, count) if count <= 5 else min((4, 5, 3), key=lambda across: -count % across)
 
 
-class _Counter:
-    """Numbers of figures and tables, from 1 through the whole page."""
-
-    def __init__(self) -> None:
-        self.charts = self.tables = 0
-
-    def next_chart(self) -> int:
-        self.charts += 1
-        return self.charts
-
-    def next_table(self) -> int:
-        self.tables += 1
-        return self.tables
-
-
-def _section(section: Section, counter: _Counter) -> dict[str, Any]:
+def _section(section: Section, numbers: Mapping[str, Iterator[int]]) -> dict[str, Any]:
     """The parts of a section; cautions are at the top of the page, and not repeated."""
     return {
         "content": section,
         "notes": _without_cautions(section.notes),
-        "tables": [_table(table, counter.next_table()) for table in section.tables],
-        "charts": [_chart(illustration, counter.next_chart()) for illustration in section.charts],
+        "tables": [_table(table, next(numbers["table"])) for table in section.tables],
+        "charts": [_chart(illustration, next(numbers["chart"])) for illustration in section.charts],
     }
 
 

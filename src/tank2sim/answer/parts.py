@@ -272,6 +272,29 @@ def records_table(
     return table(caption, heads, rows, **options)
 
 
+def records_frame(
+    records: Mapping[str, Any] | Iterable[Any], fields: Iterable[str], *, index: str = ""
+) -> pd.DataFrame:
+    """Return a data frame with one row a record, whose columns are fields of it.
+
+    Parameters
+    ----------
+    records : mapping or iterable
+        Records; those with names have them as the index.
+    fields : iterable of str
+    index : str
+        Name of the index of names.
+    """
+    import pandas as pd
+
+    names = list(fields)
+    named = records if isinstance(records, Mapping) else dict(enumerate(records))
+    rows = [[getattr(record, name) for name in names] for record in named.values()]
+    if not isinstance(records, Mapping):
+        return pd.DataFrame(rows, columns=names)
+    return pd.DataFrame(rows, columns=names, index=pd.Index(list(named), name=index or None))
+
+
 def cell_text(value: object, digits: int = 5) -> str:
     """A value as the screen shows it: numbers with `digits` significant digits, ``-`` for None and NaN."""
     match value:

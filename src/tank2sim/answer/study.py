@@ -44,10 +44,8 @@ def study_schema(kind: type[object]) -> dict[str, Any]:
 def read_study(kind: type[_S], values: dict[str, Any], source: str) -> _S:
     """Return the study that JSON values hold.
 
-    Raises
-    ------
-    InputError
-        A key is missing or unknown, or its value is of another type than the command writes; the key is named.
+    Raises InputError: a key is missing or unknown, or its value is of another type than the command writes; the key is
+    named.
     """
     try:
         study: _S = _adapter(kind).validate_json(json.dumps(values), strict=True)

@@ -166,11 +166,10 @@ def tune_ship(
     study = Study(card, list(dict.fromkeys(asked)))
     tuned = tune(study, parsed, means)
     found = influence(study, means.agreed)
-    after = dict(zip((figure.text for figure in study.figures), study.figures_at(tuned.values).tolist(), strict=True))
     changed, notices = derived_card(card, tuned_text(card, tuned), "the tuned card") if tuned.reached else (None, ())
     if found.errors.together:
         notices = (Notice(_INDEPENDENT), *notices)
-    reported = replace(_reported(found, notices), tuned=tuned.reported(after), ensemble=_bands(ship, study, ensemble))
+    reported = replace(_reported(found, notices), tuned=tuned, ensemble=_bands(ship, study, ensemble))
     return TuningResult(reported, ship, changed)
 
 

@@ -10,8 +10,7 @@ from tank2sim.arguments import PROCESSES, EnsembleSize, Seed, SpeedArgument
 
 if TYPE_CHECKING:
     from tank2sim.dynamics.vessel import Vessel
-    from tank2sim.results.craft_stability import CraftStabilityResult
-    from tank2sim.results.stability import StabilityResult
+    from tank2sim.results.stability import CraftStabilityResult, StabilityResult
 
 
 @verb(
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     name="stability",
     results=(
         "tank2sim.results.stability:StabilityResult",
-        "tank2sim.results.craft_stability:CraftStabilityResult",
+        "tank2sim.results.stability:CraftStabilityResult",
     ),
 )
 def judge_stability(
@@ -61,15 +60,15 @@ def judge_stability(
     >>> t2s.load("mariner").stability(spirals=False).stable
     True
     """
-    from tank2sim.analysis.ensemble.results import EnsembleRequest, stability_bands
+    from tank2sim.analysis.ensemble.questions import ShipText
+    from tank2sim.analysis.ensemble.results import EnsembleRequest, growth_bands, stability_bands
     from tank2sim.analysis.ensemble.steering import Grid
-    from tank2sim.analysis.stability.craft import craft_bands, craft_stability
+    from tank2sim.analysis.stability.craft import OfCraft, craft_stability
     from tank2sim.analysis.stability.study import stability_study
     from tank2sim.api.ensemble import EnsembleOptions
     from tank2sim.cards import SteeredBy
     from tank2sim.native.compiler import find_compiler
-    from tank2sim.results.craft_stability import CraftStabilityResult
-    from tank2sim.results.stability import StabilityResult
+    from tank2sim.results.stability import CraftStabilityResult, StabilityResult
     from tank2sim.simulation.integrator import NO_COMPILER
 
     ensemble = EnsembleOptions(members, seed, executor)
@@ -77,9 +76,9 @@ def judge_stability(
     if card.steered_by is SteeredBy.THRUSTERS:
         craft = craft_stability(card, speed_mps)
         if members:
-            speed, request = craft.straight_run.speed_mps, EnsembleRequest(members, seed)
+            question = OfCraft(ShipText.of(card), craft.straight_run.speed_mps)
             with ensemble.computing() as computing:
-                craft = replace(craft, ensemble=craft_bands(card, speed, request, computing))
+                craft = replace(craft, ensemble=growth_bands(card, question, EnsembleRequest(members, seed), computing))
         return CraftStabilityResult(craft, ship)
     study = stability_study(ship.model, speed_mps, spirals=spirals)
     compiler = () if find_compiler() else (NO_COMPILER,)

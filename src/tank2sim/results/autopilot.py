@@ -14,6 +14,7 @@ from tank2sim.analysis.heading.control import INTEGRAL_BAND_RAD
 from tank2sim.analysis.heading.craft import CraftAutopilotStudy
 from tank2sim.analysis.heading.margins import LoopResponse
 from tank2sim.analysis.heading.piloted import AutopilotExport, Piloted
+from tank2sim.analysis.heading.runs import CourseKeeping, CraftKeeping
 from tank2sim.analysis.heading.study import HELD_DEG, AutopilotStudy
 from tank2sim.answer.charts.analysis import (
     FrequencyResponse,
@@ -31,7 +32,6 @@ from tank2sim.answer.parts import (
     Illustration,
     KeyFigure,
     Section,
-    Table,
     Verdict,
     quantities,
     records_table,
@@ -193,15 +193,36 @@ class ResultWithController(Result[_S]):
         )
         return [section]
 
-    def _in_words(self) -> str:
-        """Weather of the course keeping."""
-        weather = self.study.weather
-        return (
+    def _keeping(self, kept: CourseKeeping | CraftKeeping, chart: Illustration, **more: float) -> Section:
+        """The weather of the course keeping, its figures with `more`, and its histories."""
+        weather, figures = self.study.weather, asdict(kept) | more
+        caption = f"Course keeping, over the last {figures.pop('duration_s'):.0f} s"
+        text = (
             f"Steering north in a current of {weather['current_mps']:.3g} m/s towards "
             f"{weather['current_towards_deg']:.0f} deg, wind of {weather['wind_mps']:.3g} m/s from "
             f"{weather['wind_from_deg']:.0f} deg, and waves of {weather['wave_radps']:.3g} rad/s that alone would "
             f"yaw the ship by {weather['wave_yaw_deg']:.3g} deg (standard deviation); seed {weather['seed']:.0f}."
         )
+        tables = [quantities(caption, figures)]
+        return Section(heading="Course keeping", text=text, tables=tables, charts=[chart])
+
+    def _fmu_line(self) -> tuple[str, ...]:
+        """The FMU in a line, if there is one."""
+        export = self.study.export
+        return (f"{export.path}: FMI {export.fmi}, {export.size_bytes / 1000:.0f} kB",) if export else ()
+
+    def _fmu(self) -> list[Section]:
+        """The section on the FMU, if there is one."""
+        if (export := self.study.export) is None:
+            return []
+        facts: dict[str, Cell] = {"fmi": export.fmi, "model_identifier": export.model_identifier, "token": export.token}
+        facts["size_bytes"] = export.size_bytes
+        tables = [quantities("The controller as an FMU", facts, on_screen=False)]
+        if found := export.co_simulation:
+            caption = f"Ship and autopilot co-simulated, against one model: order {found.order:.2f}"
+            words = {"step_s": "communication step", "error_deg": "largest difference of heading"}
+            tables.append(records_table(caption, found.steps, fields=words))
+        return [Section(heading="FMU", tables=tables)]
 
     @property
     def cross_track(self) -> pd.DataFrame:
@@ -257,7 +278,7 @@ class AutopilotResult(ResultWithController[AutopilotStudy]):
             f"A change of course by {change.ordered_deg:.3g} deg {settled} with {change.overshoot_deg:.2g} deg of "
             f"overshoot. {weather}. The loop has {study.margins[0].phase_margin_deg:.3g} deg of phase margin.",
             f"{study.source}.",
-            *fmu_line(study.export),
+            *self._fmu_line(),
         )
 
     @property
@@ -301,10 +322,12 @@ class AutopilotResult(ResultWithController[AutopilotStudy]):
         return [
             self._course_changes(),
             *self._tracks(),
-            self._course_keeping(),
+            self._keeping(
+                self.study.closed_loop.course_keeping, self._histories("Course keeping, the last waves", "keeping")
+            ),
             self._loop(),
             self._controller(),
-            *fmu_section(self.study.export),
+            *self._fmu(),
         ]
 
     def _course_changes(self) -> Section:
@@ -328,16 +351,6 @@ class AutopilotResult(ResultWithController[AutopilotStudy]):
                     "past.",
                 ),
             ],
-        )
-
-    def _course_keeping(self) -> Section:
-        kept = self.study.closed_loop.course_keeping
-        figures = {name: value for name, value in asdict(kept).items() if name != "duration_s"}
-        return Section(
-            heading="Course keeping",
-            text=self._in_words(),
-            tables=[quantities(f"Course keeping, over the last {kept.duration_s:.0f} s", figures)],
-            charts=[self._histories("Course keeping, the last waves", "keeping")],
         )
 
     def _loop(self) -> Section:
@@ -454,7 +467,7 @@ class CraftAutopilotResult(ResultWithController[CraftAutopilotStudy]):
         """Changes of course and speed, and the thrusters at their limits."""
         course, speed = self.study.course_change, self.study.speed_change
         turned = f"A change of course by {course.ordered:.3g} deg"
-        more = (f"{self.study.source}.", *fmu_line(self.study.export))
+        more = (f"{self.study.source}.", *self._fmu_line())
         if course.settling_time_s is None or speed.settling_time_s is None:
             return (f"{turned}, or one of speed by {speed.ordered:.3g} m/s, does not settle in the run.", *more)
         share = max(self.study.at_limit_percent[name] for name in ("course", "speed"))
@@ -487,23 +500,18 @@ class CraftAutopilotResult(ResultWithController[CraftAutopilotStudy]):
         return [
             self._changes(),
             *self._tracks(),
-            self._course_keeping(),
+            self._keeping(
+                self.study.course_keeping,
+                self._drawn("keeping", [_HEADING, _SPEED, *self._revolutions], "Course keeping"),
+                at_limit_percent=self.study.at_limit_percent["keeping"],
+            ),
             self._controller(),
-            *fmu_section(self.study.export),
+            *self._fmu(),
         ]
 
-    def _course_keeping(self) -> Section:
-        kept, columns = self.study.course_keeping, self.study.histories["keeping"]
-        signals = [_HEADING, _SPEED, *self._revolutions]
-        figures = {name: value for name, value in asdict(kept).items() if name != "duration_s"}
-        figures["at_limit_percent"] = self.study.at_limit_percent["keeping"]
-        drawn = history_chart([_history("keeping", columns, signals)], signals, title="Course keeping")
-        return Section(
-            heading="Course keeping",
-            text=self._in_words(),
-            tables=[quantities(f"Course keeping, over the last {kept.duration_s:.0f} s", figures)],
-            charts=[Illustration(chart=drawn)],
-        )
+    def _drawn(self, name: str, signals: Sequence[Signal], title: str) -> Illustration:
+        drawn = [_history(name, self.study.histories[name], signals)]
+        return Illustration(chart=history_chart(drawn, signals, title=title))
 
     @property
     def _revolutions(self) -> list[Signal]:
@@ -514,13 +522,8 @@ class CraftAutopilotResult(ResultWithController[CraftAutopilotStudy]):
     def _changes(self) -> Section:
         study, turning = self.study, self._revolutions
         charts = [
-            Illustration(
-                chart=history_chart([_history(name, study.histories[name], signals)], signals, title=title), half=True
-            )
-            for name, signals, title in (
-                ("course", [_HEADING, _SPEED, *turning], "Change of course"),
-                ("speed", [_SPEED, *turning], "Change of speed"),
-            )
+            self._drawn("course", [_HEADING, _SPEED, *turning], "Change of course"),
+            self._drawn("speed", [_SPEED, *turning], "Change of speed"),
         ]
         rows: list[list[Cell]] = [
             [
@@ -542,7 +545,7 @@ class CraftAutopilotResult(ResultWithController[CraftAutopilotStudy]):
         return Section(
             heading="Changes of course and speed",
             text="On the nonlinear craft in calm water, from a steady course.",
-            charts=charts,
+            charts=[replace(chart, half=True) for chart in charts],
             tables=[table("Changes of course and speed", heads, rows, digits=3)],
         )
 
@@ -557,27 +560,6 @@ class CraftAutopilotResult(ResultWithController[CraftAutopilotStudy]):
             tables=[quantities("Gains", self.study.gains)],
             charts=[Illustration(chart=pole_zero_chart(drawn, title="Poles of the closed loop"))],
         )
-
-
-def fmu_line(export: AutopilotExport | None) -> tuple[str, ...]:
-    """The FMU of an autopilot in a line, if there is one."""
-    return (f"{export.path}: FMI {export.fmi}, {export.size_bytes / 1000:.0f} kB",) if export else ()
-
-
-def fmu_section(export: AutopilotExport | None) -> list[Section]:
-    """The section on the FMU of an autopilot, if there is one."""
-    if export is None:
-        return []
-    facts: dict[str, Cell] = {"fmi": export.fmi, "model_identifier": export.model_identifier, "token": export.token}
-    tables: list[Table] = [
-        quantities("The controller as an FMU", {**facts, "size_bytes": export.size_bytes}, on_screen=False)
-    ]
-    if export.co_simulation:
-        steps: list[list[Cell]] = [[one.step_s, one.error_deg] for one in export.co_simulation.steps]
-        heads = ("communication step (s)", "largest difference of heading (deg)")
-        caption = f"Ship and autopilot co-simulated, against one model: order {export.co_simulation.order:.2f}"
-        tables.append(table(caption, heads, steps))
-    return [Section(heading="FMU", tables=tables)]
 
 
 def _settles(seconds: float) -> str:

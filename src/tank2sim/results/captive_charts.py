@@ -44,7 +44,7 @@ class Residual:
 def force_chart(plot: ForcePlot) -> ChartSpec:
     """A force against angle or amplitude: measured points with their intervals, the fits as lines in their bands.
 
-    `plot`: Its series have one colour each; angles are shown in degrees.
+    `plot`: its series have one colour each; angles are shown in degrees.
     """
     unit, factor = shown_unit(plot.unit)
     lines = [_force_series(each, factor, fit=True) for each in plot.series if len(vector(each.fit_x))]
@@ -80,7 +80,7 @@ def _force_series(each: ForceSeries, factor: float, *, fit: bool) -> PlotSeries:
 def loop_chart(plot: LoopPlot, forces: Mapping[str, str]) -> ChartSpec:
     """Hysteresis loops: forces over the motion, one panel a force; measured as points, the fit as a line.
 
-    `plot`: Its loops have one colour each; `forces`: Name of a force in the loops to its title with unit; the panels
+    `plot`: its loops have one colour each; `forces`: name of a force in the loops to its title with unit; the panels
     from top to bottom.
     """
     unit, factor = shown_unit(plot.unit)
@@ -145,6 +145,8 @@ def residual_chart(residuals: Sequence[Residual], *, title: str = "") -> ChartSp
     """What the fit leaves, over its standard error, by run: one panel a force, a colour a type of run.
 
     Dotted lines mark two standard errors, within which nineteen of twenty should lie.
+
+    `residuals`: runs are in the order of their first appearance.
     """
     runs = list(dict.fromkeys(residual.run for residual in residuals))
     kinds = list(dict.fromkeys(residual.kind for residual in residuals))
@@ -195,7 +197,7 @@ class _Estimated(Protocol):
 def derivative_certainty_chart(found: Mapping[str, _Estimated], *, title: str) -> ChartSpec:
     """Standard error of each number in % of its value, on a logarithmic scale, those without one left out.
 
-    `found`: Name to an object with ``value``, ``standard_error`` and ``origin``.
+    `found`: name to an object with ``value``, ``standard_error`` and ``origin``.
     """
     rows: list[ChartRecord] = [
         {"name": name, "run": entry.origin, "v": plain(100 * abs(entry.standard_error / entry.value))}

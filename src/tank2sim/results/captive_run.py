@@ -330,7 +330,10 @@ def _words(kind: str) -> str:
 
 
 def cycle_chart(runs: Mapping[str, SingleRun], *, title: str = "") -> ChartSpec:
-    """Averaged cycles over the phase of the motion, one panel a force, in bands of one standard deviation."""
+    """Averaged cycles over the phase of the motion, one panel a force, in bands of one standard deviation.
+
+    `runs`: label to the run, in one colour each.
+    """
     labels, plots = list(runs), []
     for force, up in _FORCES.items():
         series = []

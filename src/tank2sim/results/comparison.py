@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from tank2sim.analysis.validation.coefficients import BEYOND_STANDARD_ERRORS, CoefficientRow, Difference
+from tank2sim.analysis.validation.coefficients import BEYOND_STANDARD_ERRORS, CoefficientRow
 from tank2sim.analysis.validation.comparison import CardComparison, CardSummary, ComparedFigure, TrialComparison
 from tank2sim.answer.charts.motion import TrackData, track_chart
 from tank2sim.answer.charts.parts import plain, series_look, with_unit
@@ -207,10 +207,6 @@ class ComparisonResult(Result[CardComparison]):
             percents, self.labels, ", standard errors assumed" * any(card.assumed_errors for card in self.study.cards)
         )
         drawn = Illustration(chart=chart, caption=_PERCENT, name="figures_of_manoeuvres")
-        tables = [self._main_figures(), *map(self._trial_table, self.study.trials)]
-        return [Section(heading="Figures of manoeuvres", text=_TRIALS, charts=[drawn], tables=tables)]
-
-    def _main_figures(self) -> Table:
         shown = _SHOWN_OF_CRAFT if self.study.craft else _SHOWN
         rows: list[list[Cell]] = [
             [trial.name, with_unit(*in_words(name)), *_with_deviations(row)]
@@ -218,7 +214,9 @@ class ComparisonResult(Result[CardComparison]):
             for name, row in trial.figures.items()
             if name in shown
         ]
-        return table("Main figures (standard deviation)", ("trial", "figure", *self.labels), rows)
+        main = table("Main figures (standard deviation)", ("trial", "figure", *self.labels), rows)
+        tables = [main, *map(self._trial_table, self.study.trials)]
+        return [Section(heading="Figures of manoeuvres", text=_TRIALS, charts=[drawn], tables=tables)]
 
     def _trial_table(self, trial: TrialComparison) -> Table:
         heads: list[str | Column] = ["figure", "unit", *self.labels]
@@ -301,11 +299,7 @@ def _coefficient_row(row: CoefficientRow, factor: float) -> list[Cell]:
         cells += [None if card.value is None else factor * card.value, shown]
     for difference in row.differences:
         cells += [difference.percent, difference.standard_errors]
-    return [*cells, _remarks(row.differences)]
-
-
-def _remarks(differences: Sequence[Difference]) -> str:
-    return "; ".join(dict.fromkeys(difference.why for difference in differences if difference.why))
+    return [*cells, ("; ".join(dict.fromkeys(difference.why for difference in row.differences if difference.why)))]
 
 
 def _with_deviations(row: ComparedFigure) -> list[str | None]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,11 @@ from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_panels
 from tank2sim.answer.charts.vega import ChartSpec, PlotAxis
 from tank2sim.answer.parts import Cell, Illustration, Section, Table, table
+from tank2sim.answer.result import Result
 from tank2sim.arrays import Array
 from tank2sim.errors import ArgumentError
 from tank2sim.memory import refuse_beyond_memory
+from tank2sim.notices import Notice
 from tank2sim.results.imo import BEYOND_THE_CARD
 from tank2sim.simulation.bands import Band
 from tank2sim.units import in_words
@@ -52,48 +55,56 @@ _RARE = (
 
 
 def ensemble_heading(found: Members) -> str:
-    """Return the heading of the section of an ensemble.
-
-    Parameters
-    ----------
-    found : Members
-    """
+    """Return the heading of the section of an ensemble."""
     return f"Ensemble of {found.members}{', standard errors assumed' * found.assumed_errors}"
 
 
-def members_frame(found: Members | None) -> pd.DataFrame:
-    """The members of an ensemble, one row each: numbers drawn, by the dotted keys of the card; figures; ``usable``.
+_S = TypeVar("_S")
 
-    Parameters
-    ----------
-    found : Members or None
 
-    Raises
-    ------
-    InputError
-        There is no ensemble, the result was read from its JSON, or the frame does not fit into the memory.
-    """
-    import pandas as pd
+class EnsembleResult(Result[_S]):
+    """A result whose study may have an ensemble."""
 
-    if found is None:
-        raise ArgumentError("members", "", "is 0: this result has no ensemble", "give members=100 or more")
-    if found.drawn is None:
-        remedy = "compute the result again with the same members and seed"
-        raise ArgumentError("members", "", "the JSON of a result has the bands, not the members", remedy)
-    columns = len(found.drawn.draws.names) + len(found.drawn.figures)
-    refuse_beyond_memory("members", found.members, 2 * 8 * columns)
-    values = {**found.drawn.coefficients(), **found.drawn.figures, "usable": found.drawn.usable}
-    return pd.DataFrame(values).rename_axis("member")
+    study: Any
+
+    @property
+    def notices(self) -> tuple[Notice, ...]:
+        """Notices of the study and of its ensemble."""
+        drawn: tuple[Notice, ...] = self.study.ensemble.notices if self.study.ensemble else ()
+        return tuple(dict.fromkeys([*self.study.notices, *drawn]))
+
+    @cached_property
+    def members(self) -> pd.DataFrame:
+        """The ships of the ensemble, one row each: the numbers drawn, by the dotted keys of the card and as its file
+        has them; the figures (of a manoeuvre, of the straight course, or those asked for); the value of each IMO
+        criterion, if it was judged; and whether the ship is ``usable``.
+
+        A column "...: beyond the card" is 1 where the trial of a criterion left the card's range before its value.
+
+        Raises
+        ------
+        InputError
+            The result has no ensemble, was read from its JSON, which has only the bands, or the frame does not fit
+            into the memory.
+        """
+        import pandas as pd
+
+        found: Members | None = self.study.ensemble
+        if found is None:
+            raise ArgumentError("members", "", "is 0: this result has no ensemble", "give members=100 or more")
+        if found.drawn is None:
+            remedy = "compute the result again with the same members and seed"
+            raise ArgumentError("members", "", "the JSON of a result has the bands, not the members", remedy)
+        columns = len(found.drawn.draws.names) + len(found.drawn.figures)
+        refuse_beyond_memory("members", found.members, 2 * 8 * columns)
+        values = {**found.drawn.coefficients(), **found.drawn.figures, "usable": found.drawn.usable}
+        return pd.DataFrame(values).rename_axis("member")
 
 
 def band_table(found: Members, figures: Mapping[str, Band]) -> Table:
     """Quantiles (5, 50, 95 %) of figures over the members of an ensemble.
 
-    Parameters
-    ----------
-    found : Members
-    figures : mapping
-        Name of each figure to its band.
+    `figures`: name of each figure to its band.
     """
     rows: list[list[Cell]] = []
     for name, band in figures.items():
@@ -105,24 +116,12 @@ def band_table(found: Members, figures: Mapping[str, Band]) -> Table:
 
 
 def figures_section(found: FigureBands | StabilityBands) -> Section:
-    """Return the section with bands of figures by name.
-
-    Parameters
-    ----------
-    found : FigureBands or StabilityBands
-    """
+    """Return the section with bands of figures by name."""
     return Section(heading=ensemble_heading(found), text=MEMBERS_TEXT, tables=[band_table(found, found.figures)])
 
 
 def stability_section(found: StabilityBands, criteria: Sequence[ImoCriterion]) -> Section:
-    """Return the section of an ensemble judged by IMO criteria.
-
-    Parameters
-    ----------
-    found : StabilityBands
-    criteria : sequence of ImoCriterion
-        Of the card's own ship.
-    """
+    """Return the section of an ensemble judged by IMO criteria. `criteria`: of the card's own ship."""
     rare = {chance.name: chance.tail for chance in found.imo if chance.tail}
     if found.imo_all and found.imo_all.tail:
         rare["any of these"] = found.imo_all.tail
@@ -141,12 +140,7 @@ def stability_section(found: StabilityBands, criteria: Sequence[ImoCriterion]) -
 
 
 def chance_sentences(found: StabilityBands) -> list[str]:
-    """Return sentences on the probability of stability, and on that of meeting all criteria together.
-
-    Parameters
-    ----------
-    found : StabilityBands
-    """
+    """Return sentences on the probability of stability, and on that of meeting all criteria together."""
     sentences = []
     if found.probability_stable is not None and found.probability_stable_interval_95:
         interval = _interval(found.probability_stable_interval_95)

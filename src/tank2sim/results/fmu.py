@@ -24,18 +24,7 @@ MOST_PROBLEMS = 8
 class ExportStudy:
     """An FMU that was made.
 
-    Parameters
-    ----------
-    ship : str
-    fmu : str
-        Path of the FMU.
-    ssp : str, optional
-        Path of the SSP package in which a heading autopilot steers the ship.
-    fmi : int
-    model_identifier, token : str
-    platforms : tuple of str
-    size_bytes : int
-    notices : tuple of Notice
+    `fmu`: path of the FMU; `ssp`: path of the SSP package in which a heading autopilot steers the ship.
     """
 
     ship: str

@@ -22,11 +22,7 @@ _BARS = "Bars: the worse of both sides, over the limit (red). Pale: beyond the r
 def imo_section(criteria: Sequence[ImoCriterion], *, heading: str = "IMO criteria", text: str = _IMO) -> Section:
     """Return the criteria of IMO MSC.137(76): bars, a table with verdicts, and remarks.
 
-    Parameters
-    ----------
-    criteria : sequence of ImoCriterion
-    heading, text : str
-        Of the section.
+    `heading`, `text`: of the section.
     """
     remarks: dict[Notice, list[str]] = {}
     for criterion in criteria:
@@ -35,7 +31,7 @@ def imo_section(criteria: Sequence[ImoCriterion], *, heading: str = "IMO criteri
             remarks.setdefault(Notice(criterion.remark, level), []).append(criterion.name)
     rows: list[list[Cell]] = [
         [
-            *(one.name, one.found, one.allowed, one.unit, imo_verdict(one)),
+            *(one.name, one.found, one.allowed, one.unit, _verdict(one)),
             None if one.beyond_card else one.margin_percent,
         ]
         for one in criteria
@@ -49,13 +45,7 @@ def imo_section(criteria: Sequence[ImoCriterion], *, heading: str = "IMO criteri
     return Section(heading=heading, text=text, tables=tables, charts=charts)
 
 
-def imo_verdict(criterion: ImoCriterion) -> Cell:
-    """Return the verdict on a criterion as a cell.
-
-    Parameters
-    ----------
-    criterion : ImoCriterion
-    """
+def _verdict(criterion: ImoCriterion) -> Cell:
     if criterion.beyond_card and criterion.found is not None:
         return BEYOND_THE_CARD
     return "open" if criterion.passed is None else Verdict.PASSED if criterion.passed else Verdict.FAILED

@@ -1,11 +1,10 @@
-"""Results of ``influence``: coefficients of each number on a card, and the card tuned to targets."""
+"""Results of ``influence``: coefficients of each number on a card, the card tuned to targets, and their charts."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from functools import cached_property
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -13,21 +12,16 @@ import numpy as np
 from tank2sim.analysis.influence.card_influence import FigureErrors, InfluenceStudy
 from tank2sim.analysis.influence.figures import figure_label
 from tank2sim.analysis.tuning.result import FEWEST, TunedStudy, TunedTarget
+from tank2sim.answer.charts.matrix import Matrix
+from tank2sim.answer.charts.parts import plain, series_look
+from tank2sim.answer.charts.rows import RowPlot, row_chart, row_layers
+from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, Rule, layered
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
-from tank2sim.answer.result import Result
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, records_frame, table
 from tank2sim.arrays import Array
 from tank2sim.cards import Card
 from tank2sim.errors import ArgumentError
-from tank2sim.notices import Notice
-from tank2sim.results.ensembles import figures_section, members_frame
-from tank2sim.results.influence_charts import (
-    InfluenceData,
-    influence_charts,
-    most_influential,
-    moves_chart,
-    variance_chart,
-)
+from tank2sim.results.ensembles import EnsembleResult, figures_section
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
@@ -51,7 +45,7 @@ _COEFFICIENTS = (
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class InfluenceResult(Result[InfluenceStudy]):
+class InfluenceResult(EnsembleResult[InfluenceStudy]):
     """Influence of each number on a card on figures of the ship.
 
     Parameters
@@ -83,65 +77,35 @@ class InfluenceResult(Result[InfluenceStudy]):
         return f"Parameters: {len(self.study.parameters)}. Figures: {len(self.study.figures)}."
 
     @property
-    def notices(self) -> tuple[Notice, ...]:
-        """Those of the study, and of its ensemble."""
-        members = self.study.ensemble.notices if self.study.ensemble else ()
-        return tuple(dict.fromkeys([*self.study.notices, *members]))
-
-    @property
     def figures(self) -> pd.DataFrame:
         """The figures by name, in the units of their names: value and standard error."""
-        import pandas as pd
-
-        columns = ["value", "standard_error"]
-        rows = {text: (figure.value, figure.standard_error) for text, figure in self.study.figures.items()}
-        return pd.DataFrame.from_dict(rows, orient="index", columns=columns).rename_axis("figure")
+        return records_frame(self.study.figures, ("value", "standard_error"), index="figure")
 
     @property
     def parameters(self) -> pd.DataFrame:
         """The numbers of the card by dotted key, as its file has them: value and standard error."""
-        import pandas as pd
-
-        columns = ["value", "standard_error"]
-        rows = {key: (number.value, number.standard_error) for key, number in self.study.parameters.items()}
-        return pd.DataFrame.from_dict(rows, orient="index", columns=columns).rename_axis("parameter")
+        return records_frame(self.study.parameters, ("value", "standard_error"), index="parameter")
 
     @property
     def coefficients(self) -> pd.DataFrame:
         """K %, the change of a figure (columns) for 10 % more of a number of the card (rows), by exact slopes."""
-        return self._frame(self._data.exact)
+        return self._frame(self.study.exact)
 
     @property
     def differences(self) -> pd.DataFrame:
         """As :attr:`coefficients`, computed with 10 % more; nan where the changed ship does not show the figure."""
-        return self._frame(self._data.difference)
+        return self._frame(self.study.difference)
 
     @property
     def variance_shares(self) -> pd.DataFrame:
         """Share of the variance of each figure (columns) that would go if a number (rows) were known exactly."""
-        return self._frame(self._data.shares)
-
-    @cached_property
-    def members(self) -> pd.DataFrame:
-        """The ships of the ensemble, one row each: the numbers drawn, by the dotted keys of the card and as its file
-        has them; the figures asked for; and whether the ship is ``usable``.
-
-        Raises
-        ------
-        InputError
-            The result has no ensemble, or was read from its JSON, which has only the bands.
-        """
-        return members_frame(self.study.ensemble)
+        return self._frame(self.study.shares)
 
     def _frame(self, values: Array) -> pd.DataFrame:
         import pandas as pd
 
         index = pd.Index(list(self.study.parameters), name="parameter")
         return pd.DataFrame(values.T, index=index, columns=list(self.study.figures))
-
-    @cached_property
-    def _data(self) -> InfluenceData:
-        return InfluenceData.of(self.study)
 
     @property
     def headline(self) -> tuple[str, ...]:
@@ -150,9 +114,9 @@ class InfluenceResult(Result[InfluenceStudy]):
             return self._tuned_headline(self.study.tuned)
         parts = []
         for row, text in list(enumerate(self.study.figures))[:3]:
-            if order := most_influential(self._data, row):
-                change = f"{self._data.exact[row][order[0]]:+.2g} %".replace("-", "−")
-                parts.append(f"{figure_label(text)} by {self._data.names[order[0]]} ({change})")
+            if order := most_influential(self.study, row):
+                change = f"{self.study.exact[row][order[0]]:+.2g} %".replace("-", "−")
+                parts.append(f"{figure_label(text)} by {self.study.names[order[0]]} ({change})")
         if not parts:
             return (f"{self.study.ship}: no number of the card moves these figures.",)
         return (f"{self.study.ship}: most influential numbers, for 10 % more: {'; '.join(parts)}.",)
@@ -230,7 +194,7 @@ class InfluenceResult(Result[InfluenceStudy]):
 
     def _coefficients(self) -> Section:
         """Charts, and coefficients of the most influential parameters, a few figures in each table."""
-        data = self._data
+        data, figures = self.study, list(self.study.figures)
         largest = np.nan_to_num(np.abs(data.exact)).max(axis=0)
         order = [place for place in np.argsort(-largest, kind="stable") if largest[place] > 0][:ROWS]
         tables = []
@@ -238,7 +202,7 @@ class InfluenceResult(Result[InfluenceStudy]):
             cells: list[list[Cell]] = [
                 [data.names[k], *(_pair(data.exact[row, k], data.difference[row, k]) for row in rows)] for k in order
             ]
-            heads = ("parameter", *(data.figures[row] for row in rows))
+            heads = ("parameter", *(figures[row] for row in rows))
             tables.append(table("K %: change for 10 % more, by exact slopes | by the 10 % difference", heads, cells))
         drawn = influence_charts(data)
         charts = [Illustration(chart=chart, half=len(drawn) > 1) for chart in drawn]
@@ -249,20 +213,18 @@ class InfluenceResult(Result[InfluenceStudy]):
         for text, figure in self.study.figures.items():
             relative = 100 * abs(figure.standard_error / figure.value) if figure.value else None
             error = figure.standard_error
-            rows.append([figure_label(text), figure.value, _unit(text), error, relative, self._largest_shares(figure)])
+            shares = sorted(figure.share_of_variance.items(), key=lambda item: -item[1])[:3]
+            names = [f"{self.study.parameters[key].name} {100 * share:.0f} %" for key, share in shares if share]
+            rows.append([figure_label(text), figure.value, _unit(text), error, relative, ", ".join(names)])
         heads = ("figure", "value", "unit", "standard error", "relative (%)", "most of it from")
         known = any(figure.standard_error > 0 for figure in self.study.figures.values())
         return Section(
             heading=f"Errors of the figures{', standard errors assumed' * self.study.assumed_errors}",
             text=f"By the delta method: {self.study.standard_errors}. The share of a number is the part of the "
             "variance that would go if it were known exactly; shares of correlated numbers overlap.",
-            charts=[Illustration(chart=variance_chart(self._data))] if known else [],
+            charts=[Illustration(chart=variance_chart(self.study))] if known else [],
             tables=[table("Figures and their standard errors", heads, rows)],
         )
-
-    def _largest_shares(self, figure: FigureErrors) -> str:
-        shares = sorted(figure.share_of_variance.items(), key=lambda item: -item[1])[:3]
-        return ", ".join(f"{self.study.parameters[key].name} {100 * share:.0f} %" for key, share in shares if share)
 
     def _agreed(self) -> Section:
         agreed = self.study.agreed
@@ -285,10 +247,10 @@ class InfluenceResult(Result[InfluenceStudy]):
         )
 
     def _all_coefficients(self) -> Section:
-        data, tables = self._data, []
+        data, tables, figures = self.study, list[Table](), list(self.study.figures)
         for caption, K in (("K by exact slopes", data.exact), ("K by the 10 % difference", data.difference)):
             for rows in _parts(len(data.figures), PAGE_FIGURES):
-                labels = [figure_label(data.figures[row]) for row in rows]
+                labels = [figure_label(figures[row]) for row in rows]
                 part = f", from {labels[0]} on" if len(rows) < len(data.figures) else ""
                 tables.append(_all_of(f"{caption}{part}", data, K, rows))
         return Section(heading="Coefficients of all parameters", tables=tables)
@@ -354,19 +316,12 @@ class TuningResult(InfluenceResult):
     @property
     def targets(self) -> pd.DataFrame:
         """The targets by their text, in the units of the figures: value before and after."""
-        import pandas as pd
-
-        rows = {text: (target.before, target.after) for text, target in self.tuned.targets.items()}
-        return pd.DataFrame.from_dict(rows, orient="index", columns=["before", "after"]).rename_axis("target")
+        return records_frame(self.tuned.targets, ("before", "after"), index="target")
 
     @property
     def moves(self) -> pd.DataFrame:
         """The numbers of the card that changed, as its file has them: before, after, the move in standard errors."""
-        import pandas as pd
-
-        columns = ["before", "after", "standard_errors"]
-        rows = {key: (move.before, move.after, move.standard_errors) for key, move in self.tuned.parameters.items()}
-        return pd.DataFrame.from_dict(rows, orient="index", columns=columns).rename_axis("parameter")
+        return records_frame(self.tuned.parameters, ("before", "after", "standard_errors"), index="parameter")
 
 
 def _targets_of(tuned: TunedStudy) -> dict[str, tuple[TunedTarget, Verdict]]:
@@ -391,8 +346,9 @@ def _pair(exact: float, difference: float) -> str:
     return " | ".join(f"{round(value, 2) + 0.0:+.2f}" if math.isfinite(value) else "-" for value in (exact, difference))
 
 
-def _all_of(caption: str, data: InfluenceData, K: Array, rows: Sequence[int]) -> Table:
-    heads = [Column(title=figure_label(data.figures[row]), unit="%", digits=3) for row in rows]
+def _all_of(caption: str, data: InfluenceStudy, K: Array, rows: Sequence[int]) -> Table:
+    figures = list(data.figures)
+    heads = [Column(title=figure_label(figures[row]), unit="%", digits=3) for row in rows]
     cells: list[list[Cell]] = [
         [name, *(_rounded(K[row, place]) for row in rows)] for place, name in enumerate(data.names)
     ]
@@ -411,4 +367,122 @@ def _moves(tuned: TunedStudy) -> Section:
     caption = "Parameters that changed, as the card's file has them"
     return Section(
         heading="Numbers that tuning changed", tables=[table(caption, heads, rows, digits=6, on_screen=False)]
+    )
+
+
+EXACT, DIFFERENCE = "exact slope", "10 % difference"
+
+_MOST_ROWS = 24
+"""Parameters in a chart of all figures, or of tuning. The table has all."""
+
+_MOST_BARS = 12
+"""Parameters in the chart of one figure: those that move it most. Project choice: two charts side by side are half a
+screen high."""
+
+_WIDTH = 600
+
+
+def most_influential(result: InfluenceStudy, row: int) -> list[int]:
+    """Places of the parameters with the largest K % on one figure, largest first."""
+    sizes = np.nan_to_num(np.abs(result.exact[row]))
+    order = [int(place) for place in np.argsort(-sizes, kind="stable") if sizes[place] > 1e-3 * sizes.max()]
+    return order[:_MOST_BARS]
+
+
+def influence_charts(result: InfluenceStudy) -> list[ChartSpec]:
+    """One chart for each figure, of the parameters that move it most: bars by exact slopes, points by the 10 %
+    difference."""
+    return [_bars(result, row) for row in range(len(result.figures))]
+
+
+def _bars(result: InfluenceStudy, row: int) -> ChartSpec:
+    order = most_influential(result, row)
+    names = [result.names[place] for place in order]
+    values = {EXACT: result.exact[row], DIFFERENCE: result.difference[row]}
+    both = {
+        run: [
+            {"run": run, "name": result.names[place], "v": plain(sizes[place])}
+            | {"exact": plain(values[EXACT][place]), "step": plain(values[DIFFERENCE][place])}
+            for place in order
+        ]
+        for run, sizes in values.items()
+    }
+    look = series_look([EXACT, DIFFERENCE], as_points=[EXACT, DIFFERENCE])
+    across = PlotAxis(title="K (%)", zero=True, ticks=4)
+    exact = RowPlot(
+        rows=both[EXACT],
+        across=across,
+        shown={"name:N": "parameter", "exact:Q": f"K, {EXACT} (%)", "step:Q": f"K, {DIFFERENCE} (%)"},
+        look=look,
+        side={"labelLimit": 170},
+    )
+    bars = row_layers(exact, mark="bar", height=9, opacity=0.65)
+    difference = replace(exact, rows=both[DIFFERENCE], rules=[Rule(at=[0.0])])
+    points = row_layers(difference, size=34, strokeWidth=1.6)
+    figure = figure_label(list(result.figures)[row])
+    return layered(
+        [*bars, *points],
+        size=(_WIDTH, 19 * len(names)),
+        title=f"Influence on {figure}",
+        description=f"K per cent of {len(names)} parameters on {figure}, by exact slopes and by a 10 % difference.",
+    )
+
+
+def variance_chart(result: InfluenceStudy) -> ChartSpec:
+    """Share of each parameter in the variance of each figure, as a heat map of those with 1 % of any."""
+    shares = 100 * result.shares
+    order = [int(k) for k in np.argsort(-shares.max(axis=0), kind="stable") if shares[:, k].max() >= 1][:_MOST_ROWS]
+    names = [result.names[place] for place in order]
+    figures = [figure_label(text) for text in result.figures]
+    rows: list[ChartRecord] = [
+        {"figure": figures[row], "name": result.names[place], "share": plain(float(shares[row, place]))}
+        for row in range(len(figures))
+        for place in order
+    ]
+    cells = Matrix(
+        colour="share",
+        rows=figures,
+        columns=names,
+        names=("figure", "name"),
+        scale={"domain": [0, max(10.0, float(shares.max(initial=0.0)))], "scheme": "blues"},
+        legend={"title": "share of the variance (%)"},
+        side={"labelLimit": 200, "ticks": False},
+        foot={"labelAngle": -90, "ticks": False},
+        shown={"figure:N": "figure", "name:N": "parameter", "share:Q": ("share (%)", ".1f")},
+        written=False,
+    ).layers
+    return layered(
+        cells,
+        size=(_WIDTH, 28 * len(figures)),
+        data={"values": rows},
+        title="Standard errors behind those of the figures",
+        description=f"Shares of {len(names)} parameters in the variances of {len(figures)} figures.",
+    )
+
+
+def moves_chart(tuned: TunedStudy) -> ChartSpec:
+    """Numbers that tuning changed, in standard errors of the card, with the bounds."""
+    rows: list[ChartRecord] = [
+        {"name": one.name, "v": plain(one.standard_errors), "before": plain(one.before), "after": plain(one.after)}
+        for one in tuned.parameters.values()
+        if one.standard_errors is not None
+    ][:_MOST_ROWS]
+    within = tuned.within_standard_errors
+    return row_chart(
+        RowPlot(
+            rows=rows,
+            across=PlotAxis(title="move (standard errors of the card)", zero=True),
+            side={"labelLimit": 170},
+            rules=[Rule(at=[0.0]), Rule(at=[-within, within], style="limit", dash=(5, 3))],
+            shown={
+                "name:N": "parameter",
+                "before:Q": ("before", ".6~g"),
+                "after:Q": ("after", ".6~g"),
+                "v:Q": ("standard errors", ".3f"),
+            },
+        ),
+        title="What tuning changed",
+        described=f"Moves of {len(rows)} parameters in standard errors; the bounds are at {within:g}.",
+        width_px=_WIDTH,
+        mark="bar",
     )

@@ -26,12 +26,10 @@ from tank2sim.answer.charts.manoeuvre import (
 from tank2sim.answer.charts.motion import SpiralData, spiral_chart, varying_histories
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
-from tank2sim.answer.result import Result
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
-from tank2sim.notices import Notice
-from tank2sim.results.ensembles import band_table, members_frame
+from tank2sim.results.ensembles import EnsembleResult, band_table
 from tank2sim.simulation.card_range import entry_name, single_figures
 from tank2sim.simulation.figures import zero_rate_rudders
 from tank2sim.simulation.run import Run
@@ -68,7 +66,7 @@ _OUTSIDE = "outside"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ManoeuvreResult(Result[ManoeuvreStudy]):
+class ManoeuvreResult(EnsembleResult[ManoeuvreStudy]):
     """A simulated manoeuvre.
 
     Parameters
@@ -106,12 +104,6 @@ class ManoeuvreResult(Result[ManoeuvreStudy]):
         return f"Simulated manoeuvre {self.study.manoeuvre}{members}"
 
     @property
-    def notices(self) -> tuple[Notice, ...]:
-        """Those of the run, and of its ensemble."""
-        members = self.study.ensemble.notices if self.study.ensemble else ()
-        return tuple(dict.fromkeys([*self.study.notices, *members]))
-
-    @property
     def inputs(self) -> tuple[Path, ...]:
         """The file of the orders."""
         kind, _, file = self.study.manoeuvre.partition(":")
@@ -141,18 +133,6 @@ class ManoeuvreResult(Result[ManoeuvreStudy]):
         import pandas as pd
 
         return pd.DataFrame(trial_columns(self.run.trajectory) if self.run else self.study.histories)
-
-    @cached_property
-    def members(self) -> pd.DataFrame:
-        """The ships of the ensemble, one row each: the numbers drawn, by the dotted keys of the card and as its file
-        has them; the figures of its run; and whether the ship is ``usable``.
-
-        Raises
-        ------
-        InputError
-            The result has no ensemble, or was read from its JSON, which has only the bands.
-        """
-        return members_frame(self.study.ensemble)
 
     def to_csv(self, path: str | Path | None = None) -> str:
         """The motion as text of a trial CSV, also written to `path`: readable wherever a measured trial is.

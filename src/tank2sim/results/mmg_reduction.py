@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from tank2sim.answer.charts.curves import PlotSeries
 from tank2sim.answer.charts.vega import ChartSpec, PlotAxis, layer, layered, tooltips
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, records_frame, table
 from tank2sim.answer.result import Result
 from tank2sim.cards import Card
 from tank2sim.identification.captive_mmg.regression import MmgFit
@@ -67,11 +67,7 @@ class MmgReductionResult(Result[MmgStudy]):
     @property
     def derivatives(self) -> pd.DataFrame:
         """Coefficients by name: value, standard error, origin; hull in prime II."""
-        import pandas as pd
-
-        columns = ("value", "standard_error", "origin")
-        rows = {name: {key: getattr(found, key) for key in columns} for name, found in self.coefficients.items()}
-        return pd.DataFrame.from_dict(rows, orient="index")
+        return records_frame(self.coefficients, ("value", "standard_error", "origin"))
 
     @property
     def unexplained(self) -> tuple[float, ...]:
@@ -202,7 +198,10 @@ class MmgReductionResult(Result[MmgStudy]):
 
 
 def computed_chart(name: str, readings: ChannelReadings, *, size_px: int = 300) -> ChartSpec:
-    """Computed over measured readings of one channel, with the line on which both are the same."""
+    """Computed over measured readings of one channel, with the line on which both are the same.
+
+    `name`: name of the channel; `size_px`: width and height.
+    """
     unit = readings.unit.replace(".", " ")
     ends = [float(readings.measured.min()), float(readings.measured.max())]
     equal = PlotSeries(label="equal", x=ends, y=ends)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from tank2sim.answer.charts.vega import ChartSpec
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, records_frame, table
 from tank2sim.answer.result import Result
 from tank2sim.cards import Card, parse_card
 from tank2sim.cards.covariance import Covariance
@@ -90,11 +90,8 @@ class ReductionResult(Result[ReductionStudy]):
     @property
     def derivatives(self) -> pd.DataFrame:
         """Derivatives by name: prime value, standard error, origin; rudder positive to starboard."""
-        import pandas as pd
-
         every = self.study.derivatives | self.study.heel_derivatives
-        rows = [(name, found.value, found.standard_error, found.origin) for name, found in every.items()]
-        return pd.DataFrame(rows, columns=["name", "value", "standard_error", "origin"]).set_index("name")
+        return records_frame(every, ("value", "standard_error", "origin"), index="name")
 
     @property
     def budget(self) -> pd.DataFrame:

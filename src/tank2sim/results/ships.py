@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, ClassVar
 
-from tank2sim.answer.parts import Section, records_table
+from tank2sim.answer.parts import Section, records_frame, records_table
 from tank2sim.answer.result import Result
 from tank2sim.cards import Card
 
@@ -61,10 +61,8 @@ class ShipsResult(Result[BundledShips]):
     @property
     def df(self) -> pd.DataFrame:
         """Name (index), ship, kind of model, length (m) and source."""
-        import pandas as pd
-
-        rows = [(one.name, one.ship, one.kind, one.length_m, one.source) for one in self.study.ships]
-        return pd.DataFrame(rows, columns=["name", "ship", "model", "length_m", "source"]).set_index("name")
+        frame = records_frame(self.study.ships, ("name", "ship", "kind", "length_m", "source"))
+        return frame.rename(columns={"kind": "model"}).set_index("name")
 
     @property
     def sections(self) -> Sequence[Section]:

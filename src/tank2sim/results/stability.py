@@ -1,27 +1,35 @@
-"""Result of ``stability`` of a ship: straight course, steady turning and the IMO criteria."""
+"""Results of ``stability``: straight course, turning and IMO criteria of a ship; straight runs and turns of a craft."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
-from tank2sim.analysis.stability.craft import CraftStabilityStudy
+from tank2sim.analysis.stability.craft import STRAIGHT_FROM_LENGTHS, CraftStabilityStudy
+from tank2sim.analysis.stability.response import FIRST_ORDER
 from tank2sim.analysis.stability.study import StabilityStudy
+from tank2sim.answer.charts.analysis import FrequencyResponse, PolesZeros, bode_chart, pole_zero_chart
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Verdict, records_table, table
-from tank2sim.answer.result import Result
-from tank2sim.notices import Notice
-from tank2sim.results.ensembles import chance_sentences, members_frame, stability_section
+from tank2sim.answer.parts import (
+    Cell,
+    Illustration,
+    KeyFigure,
+    Section,
+    Table,
+    Verdict,
+    records_frame,
+    records_table,
+    table,
+)
+from tank2sim.results.ensembles import EnsembleResult, chance_sentences, figures_section, stability_section
 from tank2sim.results.imo import imo_section
 from tank2sim.results.stability_charts import (
     characteristic_chart,
     criterion_by_speed_chart,
     influence_chart,
-    steering_bode,
     steering_diagram,
-    steering_poles,
     step_chart,
     trim_chart,
 )
@@ -67,7 +75,7 @@ _S = TypeVar("_S", StabilityStudy, CraftStabilityStudy)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ResultOnCourse(Result[_S]):
+class ResultOnCourse(EnsembleResult[_S]):
     """Stability of a ship or craft on a straight course.
 
     Parameters
@@ -85,27 +93,6 @@ class ResultOnCourse(Result[_S]):
     def title(self) -> str:
         """The ship."""
         return self.study.ship
-
-    @property
-    def notices(self) -> tuple[Notice, ...]:
-        """Notices of the study and of its ensemble."""
-        drawn: tuple[Notice, ...] = self.study.ensemble.notices if self.study.ensemble else ()
-        return tuple(dict.fromkeys([*self.study.notices, *drawn]))
-
-    @cached_property
-    def members(self) -> pd.DataFrame:
-        """The ships of the ensemble, one row each: the numbers drawn, by the dotted keys of the card and as its file
-        has them; the value of each IMO criterion, if it has a rudder; figures of the straight course; and whether the
-        ship is ``usable``.
-
-        A column "...: beyond the card" is 1 where the trial of a criterion left the card's range before its value.
-
-        Raises
-        ------
-        InputError
-            The result has no ensemble, or was read from its JSON, which has only the bands.
-        """
-        return members_frame(self.study.ensemble)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -140,11 +127,8 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
     @property
     def imo(self) -> pd.DataFrame:
         """The IMO criteria (MSC.137(76)), worse side: found, allowed, unit, met, margin (%)."""
-        import pandas as pd
-
-        names = {"name": "criterion", "passed": "met"}
-        columns = ["name", "found", "allowed", "unit", "passed", "margin_percent"]
-        return pd.DataFrame(list(self.study.imo))[columns].rename(columns=names).set_index("criterion")
+        frame = records_frame(self.study.imo, ("name", "found", "allowed", "unit", "passed", "margin_percent"))
+        return frame.rename(columns={"name": "criterion", "passed": "met"}).set_index("criterion")
 
     @property
     def headline(self) -> tuple[str, ...]:
@@ -261,9 +245,6 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
     def _straight_line(self) -> Section:
         straight, margins, nomoto = self.study.stability_criterion, self.study.margins, self.study.nomoto
         states = straight.settled_states
-        eigenvalues: list[list[Cell]] = [
-            [value.real, value.imag, -1 / value.real if value.real else None] for value in self.study.eigenvalues
-        ]
         levers: list[list[Cell]] = [
             ["yaw damping lever", margins.damping_lever_lengths, "L"],
             ["sway lever", margins.sway_lever_lengths, "L"],
@@ -280,11 +261,7 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
             text=_CRITERION,
             tables=[
                 table("Margin of stability", ("quantity", "value", "unit"), levers, on_screen=False),
-                table(
-                    f"Eigenvalues of surge, sway and yaw{''.join(f', {name}' for name in states)}",
-                    ("real part (1/s)", "imaginary part (1/s)", "time constant (s)"),
-                    eigenvalues,
-                ),
+                _eigenvalues(self.study.eigenvalues, "".join(f", {name}" for name in states)),
                 table(f"Nomoto's coefficients{slow}", ("units", "K", "T", "T1", "T2", "T3"), models),
             ],
         )
@@ -323,12 +300,22 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
         heading, responses = "Response to the rudder", self.study.responses
         if not responses:
             return Section(heading=heading, text="The yaw rate does not answer to the rudder.")
-        charts = [
-            Illustration(chart=steering_poles(responses, title="Poles and zeros")),
-            Illustration(chart=steering_bode(responses, title="Bode diagram")),
-            Illustration(chart=step_chart(responses, title="Step of the rudder")),
+        # Poles of the gear lie far out and are left out.
+        systems = [
+            PolesZeros(label=one.label, poles=one.poles.tolist(), zeros=one.zeros.tolist())
+            for one in responses
+            if one.label in (responses[0].label, FIRST_ORDER)
         ]
-        return Section(heading=heading, text=_RESPONSE, charts=charts, folded=True)
+        curves = [
+            FrequencyResponse(label=one.label, omega_radps=one.omega_radps, response=one.response) for one in responses
+        ]
+        charts = [
+            pole_zero_chart(systems, title="Poles and zeros"),
+            bode_chart(curves, title="Bode diagram"),
+            step_chart(responses, title="Step of the rudder"),
+        ]
+        drawn = [Illustration(chart=chart) for chart in charts]
+        return Section(heading=heading, text=_RESPONSE, charts=drawn, folded=True)
 
     def _characteristic(self) -> Section:
         found = self.study.characteristic
@@ -347,3 +334,120 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
             charts=[Illustration(chart=chart)],
             folded=True,
         )
+
+
+def _eigenvalues(values: Sequence[complex], further: str = "") -> Table:
+    rows: list[list[Cell]] = [[one.real, one.imag, -1 / one.real if one.real else None] for one in values]
+    heads = ("real part (1/s)", "imaginary part (1/s)", "time constant (s)")
+    return table(f"Eigenvalues of surge, sway and yaw{further}", heads, rows)
+
+
+_DEGPS_PER_100_RPM = 600.0
+"""Yaw rate in deg/s for a difference of 100 rpm, over the same in rad/s by rad/s."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CraftStabilityResult(ResultOnCourse[CraftStabilityStudy]):
+    """Straight-line stability, surge and turning of a craft with thrusters at both sides.
+
+    Parameters as of :class:`ResultOnCourse`, with the study :class:`.CraftStabilityStudy`.
+
+    Examples
+    --------
+    >>> import tank2sim as t2s
+    >>> t2s.load("otter").stability().stable
+    True
+    """
+
+    @property
+    def subtitle(self) -> str:
+        """Speed of the straight run."""
+        return f"Stability and turning, {self.study.straight_run.speed_mps:.4g} m/s"
+
+    @property
+    def stable(self) -> bool:
+        """True if the craft holds a straight course with its revolutions held: every mode decays."""
+        return self.study.straight_run.stable
+
+    @property
+    def nearly_straight(self) -> bool:
+        """True if the craft, with no difference of revolutions, holds a straight course or a very wide loop."""
+        return self.study.nearly_straight
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """Stability on a straight course, the time constant of surge, and the fastest steady turn."""
+        study, run = self.study, self.study.straight_run
+        verdict = "stable" if run.stable else "unstable"
+        surge = "" if run.surge_time_constant_s is None else f"; surge time constant {run.surge_time_constant_s:.3g} s"
+        unstable = [f"{one.speed_mps:.3g}" for one in study.speeds if not one.stable]
+        others = f"; at {', '.join(unstable)} m/s it is unstable" if unstable else ""
+        lines = [
+            f"{study.ship} at {run.speed_mps:.4g} m/s ({run.revolutions_rpm:.4g} rpm) is {verdict} on a straight "
+            f"course, revolutions held{surge}{others}."
+        ]
+        turns = study.difference_turns
+        if turns and not turns[0].difference_rpm:
+            lines.append(self._left_alone())
+        if turns and (last := turns[-1]).difference_rpm:
+            lines.append(
+                f"Steady turns: up to {last.yaw_rate_degps:.3g} deg/s, {last.diameter_m:.3g} m wide, at "
+                f"{last.difference_rpm:.4g} rpm of difference."
+            )
+        return (*lines, *(chance_sentences(study.ensemble) if study.ensemble else []))
+
+    def _left_alone(self) -> str:
+        """Motion of an unstable craft without a difference of revolutions."""
+        turn, length = self.study.difference_turns[0], self.study.length_m
+        if turn.diameter_m > STRAIGHT_FROM_LENGTHS * length:
+            per_length = math.degrees(2 * length / turn.diameter_m)
+            return (
+                f"Left alone it stays nearly straight: it settles on a curve of {per_length:.1g} deg for each length."
+            )
+        return f"It turns by itself, to either side: {turn.yaw_rate_degps:.3g} deg/s, {turn.diameter_m:.3g} m wide."
+
+    @property
+    def key_figures(self) -> Sequence[KeyFigure]:
+        """The straight run, surge, and the highest speed."""
+        run = self.study.straight_run
+        figures = [
+            KeyFigure(
+                label="Straight course",
+                value="stable" if run.stable else "unstable",
+                verdict=Verdict.PASSED if run.stable else Verdict.CAUTION,
+            )
+        ]
+        if run.surge_time_constant_s is not None:
+            figures.append(KeyFigure(label="Surge time constant", value=run.surge_time_constant_s, unit="s"))
+        figures.append(KeyFigure(label="Highest speed", value=self.study.highest_speed_mps, unit="m/s"))
+        return figures
+
+    @property
+    def sections(self) -> Sequence[Section]:
+        """The straight run, other speeds, and steady turns by difference."""
+        study, run = self.study, self.study.straight_run
+        runs = sorted((run, *study.speeds), key=lambda one: one.speed_mps)
+        surge = {"speed_mps": "", "revolutions_rpm": "", "stable": "", "surge_time_constant_s": ""}
+        steering: list[list[Cell]] = [
+            [one.speed_mps, one.K * _DEGPS_PER_100_RPM, one.T_s, one.T1_s, one.T2_s, one.T3_s] for one in runs
+        ]
+        nomoto = table(
+            "Nomoto's coefficients; K: yaw rate for 100 rpm of port less starboard",
+            ("speed (m/s)", "K (deg/s)", "T (s)", "T1 (s)", "T2 (s)", "T3 (s)"),
+            steering,
+        )
+        caption = f"Steady turns about {run.revolutions_rpm:.4g} rpm, positive to starboard"
+        turn = dict.fromkeys(("difference_rpm", "yaw_rate_degps", "speed_mps", "drift_deg", "diameter_m"), "")
+        turns = records_table(caption, study.difference_turns, fields=turn | {"difference_rpm": "port less starboard"})
+        return [
+            Section(
+                heading="Straight course",
+                tables=[
+                    _eigenvalues(run.eigenvalues),
+                    records_table("Straight runs by speed", runs, fields=surge),
+                    nomoto,
+                ],
+            ),
+            Section(heading="Steady turning", tables=[turns]),
+            *([figures_section(study.ensemble)] if study.ensemble else []),
+        ]

@@ -9,11 +9,10 @@ import numpy as np
 
 from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.analysis.stability.margin import CriterionBySpeed, Margin, TrimEffect
-from tank2sim.analysis.stability.response import FIRST_ORDER, SteeringResponse
+from tank2sim.analysis.stability.response import SteeringResponse
 from tank2sim.analysis.stability.study import Spirals
 from tank2sim.analysis.turning.characteristic import SteeringCharacteristic
 from tank2sim.analysis.turning.diagram import TurningDiagram
-from tank2sim.answer.charts.analysis import FrequencyResponse, PolesZeros, bode_chart, pole_zero_chart
 from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_panels, gapped
 from tank2sim.answer.charts.parts import plain
 from tank2sim.answer.charts.rows import RowPlot, row_chart, row_layers
@@ -106,21 +105,6 @@ def step_chart(responses: Sequence[SteeringResponse], *, title: str = "") -> Cha
     series = [PlotSeries(label=one.label, x=one.time_s, y=one.step_per_s) for one in responses]
     up, described = "yaw rate per degree of rudder (deg/s)", "Yaw rate over time after a step of the rudder."
     return _curves(series, ("time after the step (s)", up), title=title, described=described, zero=False)
-
-
-def steering_bode(responses: Sequence[SteeringResponse], *, title: str = "") -> ChartSpec:
-    """Bode diagram of the yaw rate by the rudder."""
-    drawn = [
-        FrequencyResponse(label=one.label, omega_radps=one.omega_radps, response=one.response) for one in responses
-    ]
-    return bode_chart(drawn, title=title)
-
-
-def steering_poles(responses: Sequence[SteeringResponse], *, title: str = "") -> ChartSpec:
-    """Poles and zeros of the hull, and of Nomoto's first order; those of the gear lie far out and are left out."""
-    shown = [response for response in responses if response.label in (responses[0].label, FIRST_ORDER)]
-    systems = [PolesZeros(label=one.label, poles=one.poles.tolist(), zeros=one.zeros.tolist()) for one in shown]
-    return pole_zero_chart(systems, title=title)
 
 
 def influence_chart(margins: Margin, *, title: str = "") -> ChartSpec:

@@ -149,12 +149,7 @@ def whole_range(rows: Sequence[ChartRecord], field: str, included: Sequence[floa
 def window_chart(sets: Mapping[str, Sequence[TrialErrors]], *, title: str = "") -> ChartSpec:
     """Error over windows of each signal in each trial, as a share of the signal, as a heat map.
 
-    Parameters
-    ----------
-    sets : mapping
-        ``fitted`` and ``held out`` to their trials.
-    title : str
-        Of the chart.
+    `sets`: ``fitted`` and ``held out`` to their trials.
     """
     every = [errors for trials in sets.values() for trial in trials for errors in (trial.before, trial.found)]
     signals = [symbol for name, symbol in SYMBOLS.items() if any(name in errors for errors in every)]
@@ -200,12 +195,7 @@ def _window_map(
 def figure_chart(sets: Mapping[str, Sequence[PredictedFigure]], *, title: str = "") -> ChartSpec | None:
     """Figures of turns and zigzags, predicted against measured, and their errors; None without a figure.
 
-    Parameters
-    ----------
-    sets : mapping
-        ``fitted`` and ``held out`` to their figures.
-    title : str
-        Of the chart.
+    `sets`: ``fitted`` and ``held out`` to their figures.
     """
     panels = []
     for ending, words, unit, error_unit in (("_deg", "overshoot", "deg", "deg"), ("_m", "distance", "m", "%")):

@@ -17,7 +17,18 @@ from tank2sim.answer.charts.parts import with_unit
 from tank2sim.answer.charts.rows import RowPlot, names_of, row_layers
 from tank2sim.answer.charts.vega import SIDE, ChartSpec, PlotAxis, Rule, channel, layer, layered
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, records_table, table
+from tank2sim.answer.parts import (
+    Cell,
+    Column,
+    Illustration,
+    KeyFigure,
+    Section,
+    Table,
+    Verdict,
+    records_frame,
+    records_table,
+    table,
+)
 from tank2sim.answer.result import Result
 from tank2sim.arrays import Columns, Number
 from tank2sim.cards import SteeredBy, SteeredCard
@@ -114,35 +125,12 @@ class TrialReplay:
 class ValidationStudy:
     """Validation of a card.
 
-    Parameters
-    ----------
-    ship, source : str
-        Name of the ship, and source of its coefficients.
-    documentation : dict
-        Statements on the model by item.
-    coefficients : dict
-        Derivatives by name.
-    steered_by : SteeredBy
-        Coefficients of a craft with thrusters are in SI, others are prime.
-    propulsion : bool
-        Whether the card has propulsion.
-    verdict : str
-    counts : dict
-        Number of figures by outcome.
-    figures : tuple of Validated
-    members : int
-        Size of the ensemble for u_input.
-    verification : tuple of Verified
-        Figures of standard trials.
-    imo : tuple of ImoCriterion
-    replays : tuple of TrialReplay
-    predictions : PredictionStudy, optional
-        Trials of a craft with thrusters.
-    one_sided : tuple of OneSidedError
-        Figures whose errors are on one side in nearly all trials, the most significant first.
-    notices : tuple of Notice
-    kind : str
-        Always ``validate``.
+    `ship`, `source`: name of the ship, and source of its coefficients; `documentation`: statements on the model by
+    item; `coefficients`: derivatives by name; `steered_by`: coefficients of a craft with thrusters are in SI, others
+    are prime; `propulsion`: whether the card has propulsion; `counts`: number of figures by outcome; `members`: size of
+    the ensemble for u_input; `verification`: figures of standard trials; `predictions`: trials of a craft with
+    thrusters; `one_sided`: figures whose errors are on one side in nearly all trials, the most significant first;
+    `kind`: always ``validate``.
     """
 
     ship: str
@@ -190,20 +178,15 @@ class ValidationResult(Result[ValidationStudy]):
     @property
     def figures(self) -> pd.DataFrame:
         """Compared figures, a row each, in the unit of the name: measured D, simulated S, E = S - D, U_val, outcome."""
-        import pandas as pd
-
-        names = ["trial", "manoeuvre", "name", "measured", "simulated", "error", "uncertainty", "outcome"]
-        rows = [[getattr(figure, name) for name in names] for figure in self.study.figures]
-        frame = pd.DataFrame(rows, columns=names).rename(columns={"name": "figure"})
+        names = ("trial", "manoeuvre", "name", "measured", "simulated", "error", "uncertainty", "outcome")
+        frame = records_frame(self.study.figures, names).rename(columns={"name": "figure"})
         return frame.assign(outcome=frame["outcome"].map(str))
 
     @property
     def verification(self) -> pd.DataFrame:
         """Figures of standard trials, a row each: value, numerical uncertainty U_num, deviation by the inputs."""
-        import pandas as pd
-
-        rows = [(row.trial, row.name, row.value, row.U_num, row.deviation) for row in self.study.verification]
-        return pd.DataFrame(rows, columns=["trial", "figure", "value", "numerical", "deviation"])
+        frame = records_frame(self.study.verification, ("trial", "name", "value", "U_num", "deviation"))
+        return frame.rename(columns={"name": "figure", "U_num": "numerical"})
 
     @property
     def title(self) -> str:

@@ -86,7 +86,7 @@ def test_branches_are_those_of_the_diagram_and_part_in_the_loop_alone(found) -> 
     starboard, port = branches(turning, grid.rudder_rad)
     own = bands.steady_turning.yaw_rate_from_starboard_degps.own
     np.testing.assert_allclose(own, starboard, rtol=1e-6)
-    edge = math.degrees(turning.loop.width_rad) / 2 if turning.loop else 0.0
+    edge = turning.loop.width_deg / 2 if turning.loop else 0.0
     middle = math.degrees(turning.rudder_rad[turning.straight])
     parts = np.abs(starboard - port) > 1e-6
     inside = np.abs(np.degrees(grid.rudder_rad) - middle) < max(edge - 0.6, 0.0)

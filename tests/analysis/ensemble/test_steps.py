@@ -8,11 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tank2sim.analysis.ensemble import results, steps
+from tank2sim.analysis.ensemble import questions, results
 from tank2sim.analysis.ensemble.draws import draws_of
-from tank2sim.analysis.ensemble.questions import OfManoeuvre, ShipText
+from tank2sim.analysis.ensemble.questions import (
+    STEP_FACTORS,
+    STEP_TOLERANCE,
+    OfManoeuvre,
+    ShipText,
+    fastest_pace,
+    same_figures,
+)
 from tank2sim.analysis.ensemble.results import EnsembleRequest, manoeuvre_bands
-from tank2sim.analysis.ensemble.steps import STEP_FACTORS, STEP_TOLERANCE, fastest_pace, same_figures
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.dynamics import build
 from tank2sim.native.lanes import widest_lanes
@@ -35,9 +41,9 @@ def test_the_longest_step_with_the_same_figures_is_taken(mariner_card, monkeypat
     draws, _ = draws_of(mariner_card, 1)
     assert fastest_pace(question(mariner_card), draws) == Pace(STEP_FACTORS[0], single=True)
     assert fastest_pace(question(mariner_card, Zigzag(0.2, 0.2)), draws) == Pace(1, single=True)
-    monkeypatch.setattr(steps, "STEP_TOLERANCE", 5e-8)  # single precision is not as exact
+    monkeypatch.setattr(questions, "STEP_TOLERANCE", 5e-8)  # single precision is not as exact
     assert fastest_pace(question(mariner_card), draws) == Pace(4)
-    monkeypatch.setattr(steps, "STEP_TOLERANCE", 1e-13)
+    monkeypatch.setattr(questions, "STEP_TOLERANCE", 1e-13)
     assert fastest_pace(question(mariner_card), draws) == USUAL_PACE
 
 
@@ -46,9 +52,9 @@ def test_a_step_at_the_edge_of_the_stable_ones_is_not_taken(monkeypatch) -> None
     card = read_card("kvlcc2")
     assert isinstance(card, ManoeuvringCard)
     draws, _ = draws_of(card, 1)
-    monkeypatch.setattr(steps, "STEP_FACTORS", (5,))
+    monkeypatch.setattr(questions, "STEP_FACTORS", (5,))
     assert fastest_pace(question(card), draws).step_factor == 1
-    monkeypatch.setattr(steps, "EDGE_TOLERANCE", 1.0)
+    monkeypatch.setattr(questions, "EDGE_TOLERANCE", 1.0)
     assert fastest_pace(question(card), draws).step_factor == 5
 
 

@@ -12,7 +12,7 @@ import tank2sim as t2s
 from tank2sim.analysis.stability.craft import CraftMotions, craft_stability, keeps_nearly_straight
 from tank2sim.cards import parse_card
 from tank2sim.errors import InputError
-from tank2sim.results.craft_stability import CraftStabilityResult
+from tank2sim.results.stability import CraftStabilityResult
 
 CARD = """
 format = "tank2sim-ship/1"

@@ -10,7 +10,7 @@ import pytest
 
 from tank2sim.analysis.stability.straight_line import stability
 from tank2sim.analysis.turning.continuation import EDGE, OUTSIDE, Bounds, follow_branch
-from tank2sim.analysis.turning.diagram import TurningEquations, hull_states, steady_turning
+from tank2sim.analysis.turning.diagram import CurveEnds, TurningEquations, hull_states, steady_turning
 from tank2sim.cards import parse_card, read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
@@ -57,8 +57,9 @@ def test_the_folds_of_a_cubic_ship_are_where_they_are_in_closed_form() -> None:
     assert rudder < 0 < rate  # to starboard she goes on turning against a little port rudder
     assert [one.yaw_rate_radps for one in found.folds] == pytest.approx([-rate, rate], rel=1e-9)
     assert [one.rudder_rad for one in found.folds] == pytest.approx([-rudder, rudder], rel=1e-9)
-    assert found.loop is not None and found.loop.width_rad == pytest.approx(2 * abs(rudder), rel=1e-9)
-    assert found.loop.height_radps == pytest.approx(2 * math.sqrt(3) * rate, rel=1e-5)  # r'^2 = -N_r/N_rrr at no rudder
+    assert found.loop is not None and found.loop.width_deg == pytest.approx(math.degrees(2 * abs(rudder)), rel=1e-9)
+    height = math.degrees(2 * math.sqrt(3) * rate)  # r'^2 = -N_r/N_rrr at no rudder
+    assert found.loop.height_degps == pytest.approx(height, rel=1e-5)
 
 
 @pytest.mark.parametrize("N_r", [STABLE, UNSTABLE])
@@ -149,6 +150,6 @@ def test_a_ship_without_a_steady_speed_is_reported() -> None:
 def test_a_polynomial_that_runs_away_ends_the_diagram_with_a_notice() -> None:
     """With X_u > 0 a turn is no end to the speed: the diagram leaves all bounds before 35 deg of rudder."""
     found = steady_turning(build(read_card("mariner", {"derivatives.Xu": 0.002})))
-    assert found.ended == (OUTSIDE, OUTSIDE) and sum("runs away" in one for one in found.notices) == 2
+    assert found.ended == CurveEnds(OUTSIDE, OUTSIDE) and sum("runs away" in one for one in found.notices) == 2
     assert np.max(np.abs(found.rudder_rad)) < math.radians(34) and np.isfinite(found.growth_per_s).all()
     assert found.loop is None  # unstable in surge, not in yaw

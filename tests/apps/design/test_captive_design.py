@@ -184,8 +184,8 @@ def test_few_hours_are_compared_with_one_whole_usual_matrix_with_a_caution():
     once = plan(hours=None)  # the time of the usual matrix
     assert few.design.usual_hours == once.design.usual_hours
     assert few.figures["usual"].to_numpy() == pytest.approx(once.figures["usual"].to_numpy(), rel=1e-9)
-    assert few.content()["usual_matrix"]["repeats"] == 1.0
-    assert few.design.curve.usual_time_s == (3600 * few.design.usual_hours,)
+    assert few.study.usual_matrix.repeats == 1.0
+    assert few.design.curve.usual_time_s == pytest.approx((3600 * few.design.usual_hours,), rel=1e-12)
     assert any("hours" in text for text in foremost(few.notices))
     assert not any("too few" in text for text in once.notices)
 
@@ -226,7 +226,9 @@ def test_derivatives_without_a_stated_error_are_a_caution_where_ships_are_drawn(
     card = plan().design.card
     bare = replace(card, uncertainty={})
     count = sum(1 for value in card.derivatives.values() if value)
-    assert f"{count} derivatives: 30 %" in " ".join(foremost(_assumptions(replace(plan().design, card=bare), 2)))
+    assert f"none of {count} derivatives, and 30 %" in " ".join(
+        foremost(_assumptions(replace(plan().design, card=bare), 2))
+    )
     assert not any("of the card" in text for text in _assumptions(replace(plan().design, card=bare), 0))
 
 

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tank2sim.apps.design.captive_information import GaugeErrors, PlannedCampaign
+from tank2sim.apps.design.captive_information import PlannedCampaign
 from tank2sim.apps.design.captive_runs import PlannedRun
+from tank2sim.apps.design.study import GaugeStudy
 from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
 from tank2sim.records.campaign_form import ModelSection
 from tank2sim.records.campaigns import read_campaign
@@ -22,7 +23,7 @@ def planned(made=MADE, **changes):
     model = generator.ship(made)
     force, arm = NOISE_SHARE * model.force_N, 0.3 * model.length_m
     sizes = {"X": force, "Y": force, "N": force * arm}
-    gauges = {name: GaugeErrors(noise=size, zero=size / 6, largest=np.inf) for name, size in sizes.items()}
+    gauges = {name: GaugeStudy(noise=size, zero=size / 6, range=np.inf) for name, size in sizes.items()}
     return PlannedCampaign(
         **{
             "model": ModelSection(
@@ -103,7 +104,7 @@ def test_twice_the_noise_has_a_quarter_of_the_information_and_twice_the_readings
 def test_a_gain_error_limits_what_one_run_shows_of_a_force():
     """A run with a gain that is known to 1 % shows no force to better than that, however quiet its gauge."""
     run = as_planned(generator.Run("drift", "static_drift", drift=0.2))
-    quiet = {name: GaugeErrors(noise=1e-9, zero=1e-9, largest=np.inf) for name in FORCE_COLUMNS}
+    quiet = {name: GaugeStudy(noise=1e-9, zero=1e-9, range=np.inf) for name in FORCE_COLUMNS}
     plan = planned(gauges=quiet, gain_relative=0.01)
     names, information = plan.information([(run,)])["Y"]
     place = names.index("Yv")

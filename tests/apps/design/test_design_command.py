@@ -37,7 +37,8 @@ def test_a_campaign_is_written_as_plan_template_page_and_json(tmp_path):
     assert result.stdout.startswith("CHECK: the hours, 4 h")
     assert "\nCHECK: ASSUMED standard errors of the gauges" in result.stdout
     assert "<html" in (tmp_path / "p.html").read_text(encoding="utf-8")
-    assert found["range"] == pytest.approx({"drift_deg": 12.0, "rudder_deg": 25.0, "yaw_rate_prime": 0.6})
+    reach = {"drift_deg": 12.0, "rudder_deg": 25.0, "yaw_rate_prime": 0.6}
+    assert {key: found["model"][key] for key in reach} == pytest.approx(reach)
     assert max(abs(run["drift_deg"]) for run in found["runs"]) <= 12.0 + 1e-6
     again = tank2sim("report", "d.json", "-o", "again.html", cwd=tmp_path)
     assert again.returncode == 0, again.stderr

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tank2sim.apps.design.captive_runs import TankRuns
-from tank2sim.apps.design.run_matrix import runs_of_matrix
+from tank2sim.apps.design.plan_files import runs_of_matrix
 from tank2sim.apps.design.tank_form import TankFile
 from tank2sim.cards import writing
 from tank2sim.errors import InputError

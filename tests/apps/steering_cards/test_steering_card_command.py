@@ -58,7 +58,7 @@ def test_two_points_have_a_page_and_a_steering_card_a_picture(tmp_path: Path) ->
     found = json.loads((tmp_path / "out.json").read_text(encoding="utf-8"))
     assert found["schema"] == "tank2sim/influence/1" and found["after"][1]["radius_m"] == pytest.approx(1400)
     assert "tuned to two turns" in (tmp_path / "page.html").read_text(encoding="utf-8")
-    refused(tank2sim(*points, "--plot", "p.png", cwd=tmp_path), "--plot", "does not go with --through")
+    refused(tank2sim(*points, "--plot", "p.png", cwd=tmp_path), "--plot", "there is no chart to draw")
     assert tank2sim("influence", "poznyakov-yudin", "--plot", "p.png", cwd=tmp_path).returncode == 0
     assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
 

@@ -11,9 +11,8 @@ from tank2sim.analysis.turning.points import TurnInDegrees
 from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.answer.parts import Verdict
 from tank2sim.apps.steering_cards.card import read_steering_card
-from tank2sim.apps.steering_cards.charts import steering_diagram_chart
 from tank2sim.apps.steering_cards.comparison import SteeringComparison, compare_steering_models
-from tank2sim.apps.steering_cards.result import SteeringModelsResult
+from tank2sim.apps.steering_cards.result import SteeringModelsResult, steering_diagram_chart
 from tank2sim.apps.steering_cards.tuning_result import TurnTuningResult
 from tank2sim.apps.steering_cards.two_point_tuning import TwoPointStudy
 from tests.answer.drawn import rows_of

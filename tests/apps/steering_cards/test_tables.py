@@ -9,7 +9,7 @@ import pytest
 from tank2sim.analysis.influence.percent import change_percent
 from tank2sim.analysis.turning.points import TurningPoints
 from tank2sim.apps.steering_cards.card import SteeringCard, read_steering_card
-from tank2sim.apps.steering_cards.tables import (
+from tank2sim.apps.steering_cards.comparison import (
     agreed_variation,
     combined_prediction,
     complete,
@@ -62,7 +62,7 @@ def card() -> SteeringCard:
 
 
 def test_the_japanese_model_gives_table_1(card: SteeringCard) -> None:
-    for turn, (radius, drift, rate) in zip(turns_of(card, "inoue-hirano").turns, TABLE_1.values(), strict=True):
+    for turn, (radius, drift, rate) in zip(turns_of(card, "inoue-hirano"), TABLE_1.values(), strict=True):
         found = asdict(turn.in_degrees())
         assert found["radius_m"] == pytest.approx(radius, abs=0.25)
         assert found["drift_deg"] == pytest.approx(drift, abs=0.2)
@@ -71,7 +71,7 @@ def test_the_japanese_model_gives_table_1(card: SteeringCard) -> None:
 
 def test_the_base_model_restored_by_fit_gives_its_tables_1_and_2(card: SteeringCard) -> None:
     """Its radii and drift angles to the printed digits; Table 2 but for C_m_b and C_m_w, which are 0.5 m off."""
-    for turn, (radius, drift) in zip(turns_of(card, "base-restored").turns, BASE_TABLE_1.values(), strict=True):
+    for turn, (radius, drift) in zip(turns_of(card, "base-restored"), BASE_TABLE_1.values(), strict=True):
         assert turn.radius_m == pytest.approx(radius, abs=0.15)
         assert turn.in_degrees().drift_deg == pytest.approx(drift, abs=0.06)
     found = influence_of(card, "base-restored").radii_m
@@ -121,7 +121,7 @@ def test_influence_over_draught_is_equation_4(card: SteeringCard) -> None:
 
 
 def test_curve_3_meets_the_trial_at_35_deg_and_misses_that_at_15(card: SteeringCard) -> None:
-    slow, fast = (turn.in_degrees().yaw_rate_degpmin for turn in turns_of(card, "curve-3", [15, 35]).turns)
+    slow, fast = (turn.in_degrees().yaw_rate_degpmin for turn in turns_of(card, "curve-3", [15, 35]))
     assert fast == pytest.approx(61.5, abs=0.05)
     assert slow == pytest.approx(38.4, abs=0.05)
 

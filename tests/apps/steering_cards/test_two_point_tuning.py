@@ -8,7 +8,7 @@ import pytest
 
 from tank2sim.analysis.turning.points import TurningPoints
 from tank2sim.apps.steering_cards.card import read_steering_card
-from tank2sim.apps.steering_cards.tables import form_of, model_of
+from tank2sim.apps.steering_cards.comparison import form_of, model_of
 from tank2sim.apps.steering_cards.two_point_tuning import (
     Levers,
     WantedTurn,

@@ -261,7 +261,7 @@ def test_steady_turns_are_found_to_both_sides_of_the_kink(ship: t2s.Ship) -> Non
     assert turning.rudder_rad[-1] == pytest.approx(math.radians(35))
     (fold,) = [fold for fold in turning.folds if fold.place != turning.straight]
     assert fold.rudder_rad > 0 > fold.yaw_rate_radps
-    assert turning.loop is not None and turning.loop.width_rad == pytest.approx(fold.rudder_rad)
+    assert turning.loop is not None and turning.loop.width_deg == pytest.approx(math.degrees(fold.rudder_rad))
     assert turning.growth_per_s[turning.straight - 1] > 0 > turning.growth_per_s[turning.straight + 1]
 
 

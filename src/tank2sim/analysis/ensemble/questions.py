@@ -1,4 +1,4 @@
-"""Evaluations of the members of an ensemble: a manoeuvre, named figures, the IMO criteria."""
+"""Evaluations of the members of an ensemble: a manoeuvre at the fastest pace, named figures, the IMO criteria."""
 
 from __future__ import annotations
 
@@ -27,15 +27,13 @@ from tank2sim.dynamics.ship import mass_fault, mass_faults
 from tank2sim.errors import InputError
 from tank2sim.native.lanes import NoLanesError
 from tank2sim.simulation.card_range import Numbers, single_figures
-from tank2sim.simulation.ensemble import BATCH, Ask, AskTogether, BatchResult, MemberResult, gathered
-from tank2sim.simulation.figures import Figures
+from tank2sim.simulation.ensemble import BATCH, Ask, AskTogether, BatchResult, Draws, MemberResult, gathered
 from tank2sim.simulation.integrator import Integrator
-from tank2sim.simulation.lane_figures import USUAL_PACE, LaneManoeuvre, LaneManoeuvres, Pace, runs_in_lanes
-from tank2sim.simulation.manoeuvres import Manoeuvre, Stop, Turn, Zigzag
+from tank2sim.simulation.lane_figures import USUAL_PACE, LaneFigures, LaneManoeuvre, LaneManoeuvres, Pace, runs_in_lanes
+from tank2sim.simulation.manoeuvres import Manoeuvre, SpiralManoeuvre, Stop, Turn, Zigzag
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.running import RUNAWAY
 from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, StraightRun
-from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.units import from_si
 
 AskOne = Callable[[Mapping[str, float]], MemberResult]
@@ -53,12 +51,7 @@ ENSEMBLE_SIGNALS: Mapping[str, tuple[str, float]] = {
 
 
 def signals_with_bands(model: Model) -> Mapping[str, tuple[str, float]]:
-    """The :data:`ENSEMBLE_SIGNALS` of a model, ``phi_deg`` if it heels, and ``n_<name>_rpm`` of its thrusters.
-
-    Parameters
-    ----------
-    model : Model
-    """
+    """The :data:`ENSEMBLE_SIGNALS` of a model, ``phi_deg`` if it heels, and ``n_<name>_rpm`` of its thrusters."""
     heel = {"phi_deg": ("motion.phi", math.degrees(1.0))} if "motion.phi" in model else {}
     revolutions = {
         f"n_{name.split('.')[1]}_rpm": (name, from_si("n_rpm", 1.0))
@@ -104,7 +97,7 @@ class OfManoeuvre:
     """Figures of a manoeuvre, and :func:`signals_with_bands` at `times` (n,), s.
 
     Members whose histories are not kept are integrated, in lanes, at a `pace` of their own
-    (:func:`tank2sim.analysis.ensemble.steps.fastest_pace`).
+    (:func:`tank2sim.analysis.ensemble.questions.fastest_pace`).
     """
 
     ship: ShipText
@@ -125,23 +118,21 @@ class OfManoeuvre:
         shown = signals <= set(model.state_names)
         if shown and runs_in_lanes(self.manoeuvre, self.duration_s) and (lanes := lanes_of(model)) is not None:
             return AskTogether(self._in_lanes(self.manoeuvre, model, lanes))
-        return _each(self._driven(_reading_off(model, *_READ_OFF.get(type(self.manoeuvre), ()))))
+        return each_ship(self._driven(_reading_off(model, *_READ_OFF.get(type(self.manoeuvre), ()))))
 
     def _driven(self, model: Model) -> AskOne:
         """Single runs of the members, for a manoeuvre or a model without lanes."""
-        integrator, defaults = Integrator(model), _parameters(model)
+        integrator, signals = Integrator(model), signals_with_bands(model).values()
 
-        def ask(values: Mapping[str, float]) -> MemberResult:
-            if fault := mass_fault(model, defaults | dict(values)):
-                return MemberResult({}, trouble=fault)
+        def run(values: Mapping[str, float]) -> MemberResult:
             duration = self.duration_s
-            try:
-                run = simulate(model, self.manoeuvre, duration_s=duration, parameters=values, integrator=integrator)
-            except InputError as error:
-                return MemberResult({}, trouble=error.problem)
-            return MemberResult(_numbers(run.figures), _sampled(run.trajectory, self.times))
+            run = simulate(model, self.manoeuvre, duration_s=duration, parameters=values, integrator=integrator)
+            figures = {name: math.nan for name, value in run.figures.items() if value is None}
+            path = run.trajectory
+            sampled = [factor * np.interp(self.times, path.t, path[name], right=np.nan) for name, factor in signals]
+            return MemberResult(figures | single_figures(run.figures), np.array(sampled, dtype=np.float32))
 
-        return ask
+        return one_ship(model, run)
 
     def _in_lanes(
         self, manoeuvre: LaneManoeuvre, model: Model, lanes: LaneManoeuvres
@@ -187,17 +178,14 @@ class OfFigures:
         joint = [figure for figure in asked if lanes and _lane_figure(figure)]
         single = [figure for figure in asked if figure not in joint]
         one_by_one = Study(card, single) if joint and single else study
-        names, defaults = [parameter.name for parameter in study.parameters], _parameters(study.model)
+        names = [parameter.name for parameter in study.parameters]
 
-        def ask_one(values: Mapping[str, float]) -> MemberResult:
-            if fault := mass_fault(study.model, defaults | dict(values)):
-                return MemberResult({}, trouble=fault)
+        def figures_of(values: Mapping[str, float]) -> MemberResult:
             given = dict(zip(names, study.values.tolist(), strict=True)) | dict(values)
-            try:
-                found = one_by_one.figures_at(np.array([given[name] for name in names]))
-            except InputError as error:
-                return MemberResult({}, trouble=error.problem)
+            found = one_by_one.figures_at(np.array([given[name] for name in names]))
             return MemberResult(dict(zip([figure.text for figure in one_by_one.figures], found.tolist(), strict=True)))
+
+        ask_one = one_ship(study.model, figures_of)
 
         def ask(count: int, values: Mapping[str, Array], kept: int) -> BatchResult:
             p, troubles = ships_of(study.model, count, values)
@@ -238,22 +226,21 @@ class OfCriteria:
         """See :class:`tank2sim.simulation.ensemble.Question`."""
         whole = build(self.ship.card())
         model = _reading_off(whole, *(name for names in _READ_OFF.values() for name in names))
-        each_step, parameters = Integrator(model), _parameters(model)
+        each_step, parameters = Integrator(model), parameters_of(model)
 
-        def ask_one(values: Mapping[str, float]) -> MemberResult:
-            # What is an input (a current) is calm in these trials.
-            given = {name: value for name, value in values.items() if name in parameters}
-            if fault := mass_fault(model, parameters | given):
-                return MemberResult({}, trouble=fault)
+        def criteria_of(values: Mapping[str, float]) -> MemberResult:
             figures: Numbers = {}
-            for criterion in imo_criteria(model, given, each_step):
+            # What is an input (a current) is calm in these trials.
+            for criterion in imo_criteria(
+                model, {name: values[name] for name in values.keys() & parameters}, each_step
+            ):
                 figures[criterion.name] = math.nan if criterion.found is None else criterion.found
                 figures[criterion.name + BEYOND_CARD_MARK] = float(criterion.beyond_card)
             return MemberResult(figures)
 
-        lanes = lanes_of(whole)
+        ask_one, lanes = one_ship(model, criteria_of), lanes_of(whole)
         if lanes is None:
-            return _each(ask_one)
+            return each_ship(ask_one)
         trials = manoeuvring_trials(largest_trial_rudder(parameters))
 
         def ask(count: int, values: Mapping[str, Array], kept: int) -> BatchResult:
@@ -330,16 +317,28 @@ def _with_runaways(troubles: Sequence[str], fine: Sequence[bool] | NDArray[np.bo
     return [trouble or ("" if well else RUNAWAY) for trouble, well in zip(troubles, fine, strict=True)]
 
 
-def _each(ask: AskOne) -> Ask:
+def one_ship(model: Model, answer: AskOne) -> AskOne:
+    """What is asked of a member: its `answer` to values in place of the model's, or the reason without one."""
+    defaults = parameters_of(model)
+
+    def ask(values: Mapping[str, float]) -> MemberResult:
+        if fault := mass_fault(model, defaults | dict(values)):
+            return MemberResult({}, trouble=fault)
+        try:
+            return answer(values)
+        except InputError as error:
+            return MemberResult({}, trouble=error.problem)
+
+    return ask
+
+
+def each_ship(ask: AskOne) -> Ask:
+    """The members one after the other, by `ask`."""
     return lambda members: [ask(values) for values in members]
 
 
-def _numbers(figures: Figures) -> Numbers:
-    """Figures as single numbers, nan where the run does not show them."""
-    return {name: math.nan for name, value in figures.items() if value is None} | single_figures(figures)
-
-
-def _parameters(model: Model) -> dict[str, float]:
+def parameters_of(model: Model) -> dict[str, float]:
+    """Values of a model by name."""
     return dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
 
 
@@ -349,7 +348,71 @@ def _reading_off(model: Model, *names: str) -> Model:
     return replace(model, outputs=tuple(dict.fromkeys(name for name in wanted if name not in states)))
 
 
-def _sampled(run: Trajectory, times: Array) -> np.ndarray[tuple[int, int], np.dtype[np.float32]]:
-    signals = signals_with_bands(run.model).values()
-    rows = [factor * np.interp(times, run.t, run[name], right=np.nan) for name, factor in signals]
-    return np.array(rows, dtype=np.float32)
+STEP_FACTORS = (6, 4, 3, 2)
+"""Lengths of steps of turns and stops over the model's that are tried, the longest first (project choice)."""
+
+STEP_TOLERANCE = 1e-5
+"""Largest relative change of a figure by another pace: at most a unit of its fifth digit, and the sampling error of a
+5 % quantile (2.1 standard deviations over the root of the number of members) among a million ships with a standard
+deviation of 0.5 % (project choice)."""
+
+EDGE_TOLERANCE = 1e-4
+"""The same for a step that is longer by one step of the model: beyond the stable steps of the steering gear figures
+change by 1e-3 and more, and a step next to that edge is not taken (project choice)."""
+
+TRIED_MEMBERS = 64
+"""Members, the first, that are run at each pace: eight registers of the widest lanes (project choice)."""
+
+
+def fastest_pace(question: OfManoeuvre, draws: Draws) -> Pace:
+    """The fastest pace with which figures of a turn, zigzag or stop are the same.
+
+    The first :data:`TRIED_MEMBERS` members of the ensemble are run with the model's step in double precision, and at
+    other paces: in single precision with each of :data:`STEP_FACTORS`, longest first, and with the model's step, then
+    in double precision with each of them; zigzags, whose overshoots need it, keep the model's step. A pace is taken if
+    each of their figures agrees within :data:`STEP_TOLERANCE` or is none at both, if fewer than half of them are
+    doubtful, which are run twice, and if with the next longer step figures still agree within :data:`EDGE_TOLERANCE`.
+    The result depends on the card, the manoeuvre and the seed alone. It is the usual pace for other manoeuvres and for
+    ships without lanes.
+
+    Parameters
+    ----------
+    question : OfManoeuvre
+        The manoeuvre.
+    draws : Draws
+        Draws of the members.
+    """
+    manoeuvre = question.manoeuvre
+    if isinstance(manoeuvre, SpiralManoeuvre) or not runs_in_lanes(manoeuvre, question.duration_s):
+        return USUAL_PACE
+    model = study_model(question.ship.card())
+    lanes = lanes_of(model)
+    if lanes is None:
+        return USUAL_PACE
+    p, troubles = ships_of(
+        model, TRIED_MEMBERS, dict(zip(draws.names, draws.members(0, TRIED_MEMBERS).values.T, strict=True))
+    )
+    p = p[[not trouble for trouble in troubles]]
+    usual = lanes.run(manoeuvre, p, question.duration_s)
+    if 2 * int(usual.doubtful.sum()) >= len(p):
+        return USUAL_PACE
+
+    def same(pace: Pace, tolerance: float) -> bool:
+        runs = lanes.run(manoeuvre, p, question.duration_s, pace=pace)
+        return 2 * int(runs.doubtful.sum()) < len(p) and same_figures(usual, runs, tolerance)
+
+    factors = () if isinstance(manoeuvre, Zigzag) else STEP_FACTORS
+    for pace in (*(Pace(factor, single=True) for factor in (*factors, 1)), *map(Pace, factors)):
+        edge = Pace(pace.step_factor + 1, pace.single)
+        if same(pace, STEP_TOLERANCE) and (pace.step_factor == 1 or same(edge, EDGE_TOLERANCE)):
+            return pace
+    return USUAL_PACE
+
+
+def same_figures(usual: LaneFigures, others: LaneFigures, tolerance: float) -> bool:
+    """Whether all figures agree within `tolerance` of themselves, and are none for the same ships."""
+
+    def agree(name: str, values: Array) -> bool:
+        return np.allclose(others.figures[name], values, rtol=tolerance, atol=0.0, equal_nan=True)
+
+    return set(usual.figures) == set(others.figures) and all(agree(name, usual.figures[name]) for name in usual.figures)

@@ -14,14 +14,16 @@ from pydantic import Field
 from tank2sim.analysis.ensemble.draws import draws_of
 from tank2sim.analysis.ensemble.questions import (
     BEYOND_CARD_MARK,
+    STEP_TOLERANCE,
+    TRIED_MEMBERS,
     OfCriteria,
     OfFigures,
     OfManoeuvre,
     ShipText,
+    fastest_pace,
     signals_with_bands,
 )
 from tank2sim.analysis.ensemble.steering import Grid, SteeringBands, steering_bands
-from tank2sim.analysis.ensemble.steps import STEP_TOLERANCE, TRIED_MEMBERS, fastest_pace
 from tank2sim.analysis.ensemble.tails import Tail, tails
 from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.analysis.stability.straight_line import answering_states
@@ -62,8 +64,6 @@ class DrawnShips:
 
     Parameters
     ----------
-    card : SteeredCard
-    draws : Draws
     figures : mapping
         Name to the figure of each of the n ships (n,); nan where a ship does not show it.
     usable : array (n,)
@@ -297,11 +297,8 @@ def growth_bands(
 
     Parameters
     ----------
-    card : SteeredCard
     question : Question
         Each usable member shows ``growth_per_s``, the real part of the least damped mode.
-    request : EnsembleRequest
-    executor : Executor, optional
     """
     draws, messages = draws_of(card, request.seed)
     found = _ensemble(card, question, draws, request.members, executor)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tank2sim.analysis.ensemble.questions import ShipText
+from tank2sim.analysis.ensemble.questions import ShipText, each_ship, one_ship
 from tank2sim.analysis.linearisation import state_space, straight_course
 from tank2sim.analysis.stability.response import SteeringResponse
 from tank2sim.analysis.stability.straight_line import steering_states
@@ -17,8 +17,6 @@ from tank2sim.analysis.turning.diagram import SteadyTurning, largest_rudder, ste
 from tank2sim.arrays import Array
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
-from tank2sim.dynamics.ship import mass_fault
-from tank2sim.errors import InputError
 from tank2sim.notices import Notice
 from tank2sim.simulation.bands import QUANTILES, STILL_RUNNING, Band, BandOverTime, figure_bands
 from tank2sim.simulation.ensemble import Ask, Draws, Ensemble, MemberResult, ensemble
@@ -66,25 +64,16 @@ class OfSteering:
     def prepared(self) -> Ask:
         """See :class:`tank2sim.simulation.ensemble.Question`."""
         model = build(self.ship.card())
-        known = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
 
-        def ask(values: Mapping[str, float]) -> MemberResult:
+        def curves(values: Mapping[str, float]) -> MemberResult:
             # What is an input (a current) is calm in these curves.
-            given = {name: value for name, value in values.items() if name in known}
-            if fault := mass_fault(model, known | given):
-                return MemberResult({}, trouble=fault)
-            return self._answer(model.with_values(given))
+            drawn = model.with_values({name: value for name, value in values.items() if name in model.parameter_names})
+            turning = steady_turning(drawn)
+            rows = [*branches(turning, self.grid.rudder_rad), *_responses(drawn, self.speed_mps, self.grid)]
+            width = turning.loop.width_deg if turning.loop else 0.0
+            return MemberResult({"loop_width_deg": width}, np.array(rows, dtype=np.float32))
 
-        return lambda members: [ask(values) for values in members]
-
-    def _answer(self, model: Model) -> MemberResult:
-        try:
-            turning = steady_turning(model)
-            rows = [*branches(turning, self.grid.rudder_rad), *_responses(model, self.speed_mps, self.grid)]
-        except InputError as error:
-            return MemberResult({}, trouble=error.problem)
-        width = math.degrees(turning.loop.width_rad) if turning.loop else 0.0
-        return MemberResult({"loop_width_deg": width}, np.array(rows, dtype=np.float32))
+        return each_ship(one_ship(model, curves))
 
 
 @dataclass(frozen=True, eq=False)

@@ -175,7 +175,6 @@ def tails(
         Ensemble of this question.
     limits : mapping
         Name to the largest allowed value of each criterion that counts.
-    executor : Executor, optional
 
     Returns
     -------

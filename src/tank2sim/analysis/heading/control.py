@@ -25,14 +25,10 @@ LARGEST_RUDDER_RAD = math.radians(35.0)
 def heading_gains(nomoto: Nomoto, largest_rudder_rad: float = LARGEST_RUDDER_RAD) -> HeadingGains:
     """Gains that put the poles of heading, yaw rate and integral where (s^2 + 2 z w s + w^2)(s + a) = 0.
 
-    With T dr/dt + r = K delta the loop is T s^3 + (1 + K Kd) s^2 + K Kp s + K Ki; w = sqrt(K/T), which makes the
-    rudder that a heading error orders about as large as the error (project choice, amid the 0.5 to 2 of practice),
-    z is :data:`DAMPING` and a is :data:`SLOWNESS` w. It also holds for a ship that is unstable (K and T negative).
-
-    Raises
-    ------
-    ValueError
-        K/T is not positive: the rudder turns the ship the wrong way.
+    With T dr/dt + r = K delta the loop is T s^3 + (1 + K Kd) s^2 + K Kp s + K Ki; w = sqrt(K/T), which makes the rudder
+    that a heading error orders about as large as the error (project choice, amid the 0.5 to 2 of practice), z is
+    :data:`DAMPING` and a is :data:`SLOWNESS` w. It also holds for a ship that is unstable (K and T negative). Raises
+    ValueError: K/T is not positive: the rudder turns the ship the wrong way.
     """
     K, T = nomoto.K_per_s, nomoto.T_s
     if not K / T > 0:
@@ -54,10 +50,7 @@ def heading_gains(nomoto: Nomoto, largest_rudder_rad: float = LARGEST_RUDDER_RAD
 def heading_autopilot(ship: Model) -> Model:
     """The autopilot of a ship, at its speed of expansion.
 
-    Raises
-    ------
-    InputError
-        The model is not a ship, has no straight course, or its rudder turns it the wrong way.
+    Raises InputError: the model is not a ship, has no straight course, or its rudder turns it the wrong way.
     """
     limits = [parameter.start for parameter in ship.parameters if parameter.name == "steering.max_angle"]
     try:

@@ -93,7 +93,6 @@ def study_craft_autopilot(
 
     Parameters
     ----------
-    card, model : SteeredCard, Model
     settings : StudySettings
         Way of design, weights and wave filter belong to a rudder, and are not used.
 

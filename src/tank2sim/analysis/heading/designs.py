@@ -94,12 +94,10 @@ class SteeringPlant:
 
     Parameters
     ----------
-    found : Stability
     frequency_radps : float
         w = sqrt(K/T), the frequency of the design by pole placement, which scales the other designs.
     A, B : arrays (4, 4), (4, 1)
         Rates of sway velocity (m/s), yaw rate (rad/s), heading (rad) and rudder (rad), by these and by the order (rad).
-    largest_rudder_rad, step_s : float
     """
 
     found: Stability
@@ -122,7 +120,6 @@ def design_heading(
 
     Parameters
     ----------
-    ship : Model
     kind : str
         ``pd`` and ``pid``: poles placed on Nomoto's model; ``lqr``: the linear quadratic regulator of sway, yaw,
         heading, rudder and integral, with an observer of sway and rudder; ``robust``: mixed sensitivity.
@@ -288,7 +285,6 @@ def robust_design(plant: SteeringPlant, name: str, origin: str) -> HeadingDesign
 
     Parameters
     ----------
-    plant : SteeringPlant
     name : str
         Name of the controller.
     origin : str

@@ -24,16 +24,9 @@ class Weather:
     The defaults are project choices for a ship of 160 m on a northerly course: a fresh breeze (Beaufort 5) and its sea
     on the bow, and a knot of current across.
 
-    Parameters
-    ----------
-    current_mps, current_towards_rad : float
-    wind_mps, wind_from_rad : float
-    wave_yaw_rad : float
-        Standard deviation of the heading that the waves alone give the ship at their frequency.
-    wave_radps, wave_damping : float
-        Frequency of encounter, and relative damping of the shaping filter: 0.1 for a narrow band (Fossen 2011, 8.2).
-    seed : int
-        Seed of the noise that drives the filter.
+    `wave_yaw_rad`: standard deviation of the heading that the waves alone give the ship at their frequency;
+    `wave_radps`, `wave_damping`: frequency of encounter, and relative damping of the shaping filter: 0.1 for a narrow
+    band (Fossen 2011, 8.2); `seed`: seed of the noise that drives the filter.
     """
 
     current_mps: float = 0.5
@@ -59,12 +52,7 @@ def weather_for(length_m: float, **given: float | None) -> Weather:
 
 
 def angles_in_degrees(values: Mapping[str, float]) -> dict[str, float]:
-    """Numbers by name, with ``_deg`` in place of ``_rad``.
-
-    Parameters
-    ----------
-    values : mapping
-    """
+    """Numbers by name, with ``_deg`` in place of ``_rad``."""
     converted: dict[str, float] = {}
     for name, value in values.items():
         stem, _, unit = name.rpartition("_")

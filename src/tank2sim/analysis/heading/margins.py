@@ -29,24 +29,12 @@ _TAKES_PART = 0.1
 class LoopMargins:
     """Margins of a heading loop at one speed, broken at the rudder order.
 
-    Parameters
-    ----------
-    speed_mps : float
-    gain_margin_up, gain_margin_down, gain_margin_dB : float
-        Factor by which the loop gain may grow, and share to which it may fall; inf and 0 without a limit (null in
-        JSON). For an unstable ship the second is above 0: the ship needs its helmsman. The first in dB.
-    phase_margin_deg : float
-        The least of all crossovers.
-    delay_margin_s : float
-        Largest delay in the loop that keeps it stable.
-    sensitivity_peak : float
-        Ms, the largest \\|1/(1 + L)\\|: 1/Ms is the least distance of the Nyquist curve from -1.
-    crossover_radps, bandwidth_radps : float
-        Last crossover of the loop gain; and where the heading answers its order by 3 dB less than slow ones.
-    stable : bool
-        Whether every mode of the closed loop decays.
-    poles : tuple of complex
-        Poles of the closed loop, 1/s, slowest first.
+    `gain_margin_up`, `gain_margin_down`: factor by which the loop gain may grow, and share to which it may fall; inf
+    and 0 without a limit (null in JSON). For an unstable ship the second is above 0: the ship needs its helmsman.
+    `phase_margin_deg`: the least of all crossovers; `delay_margin_s`: largest delay in the loop that keeps it stable;
+    `sensitivity_peak`: Ms, the largest 1/abs(1 + L), 1/Ms is the least distance of the Nyquist curve from -1;
+    `crossover_radps`, `bandwidth_radps`: last crossover of the loop gain, and where the heading answers its order by
+    3 dB less than slow ones; `stable`: every mode of the closed loop decays; `poles`: 1/s, slowest first.
     """
 
     speed_mps: float
@@ -139,10 +127,7 @@ def closed_loop_transfer(ship: Model, autopilot: Model, speed_mps: float | None 
 def loop_margins(ship: Model, autopilot: Model, speed_mps: float | None = None) -> LoopMargins:
     """Margins at a speed, by default that of expansion.
 
-    Raises
-    ------
-    InputError
-        The model is not a ship, or has no straight course.
+    Raises InputError: the model is not a ship, or has no straight course.
     """
     loop = loop_transfer(ship, autopilot, speed_mps)
     whole = closed_loop_transfer(ship, autopilot, speed_mps)

@@ -24,12 +24,7 @@ class StepError:
 class CoSimulated:
     """Ship and autopilot co-simulated, against one model of both.
 
-    Parameters
-    ----------
-    steps : tuple of StepError
-        Rising communication steps.
-    order : float
-        Power of the step by which the difference falls.
+    `steps`: rising communication steps; `order`: power of the step by which the difference falls.
     """
 
     steps: tuple[StepError, ...]
@@ -53,23 +48,11 @@ class AutopilotExport:
 class PilotStudy:
     """A controller and its runs, by rudder or by thrusters.
 
-    Parameters
-    ----------
-    ship, source : str
-        Name of the ship, and how the controller was found, in a sentence.
-    gains : dict
-        Figures of the controller by name with their unit.
-    weather : dict
-        Fields of :class:`.Weather`, angles in degrees.
-    track : dict
-        Figures of the track by guidance (``line of sight``, ``with integral``); empty without waypoints.
-    waypoints_m : array (n, 2)
-        North and east; empty without a track.
-    histories, track_histories : dict
-        Columns to draw by run, and by guidance.
-    notices : tuple of Notice
-    export : AutopilotExport, optional
-        The controller as an FMU, if one was made.
+    `ship`, `source`: name of the ship, and how the controller was found, in a sentence; `gains`: figures of the
+    controller by name with their unit; `weather`: fields of :class:`.Weather`, angles in degrees; `track`: figures of
+    the track by guidance (``line of sight``, ``with integral``); empty without waypoints; `waypoints_m` (n, 2): north
+    and east; empty without a track; `histories`, `track_histories`: columns to draw by run, and by guidance; `export`:
+    the controller as an FMU, if one was made.
     """
 
     ship: str

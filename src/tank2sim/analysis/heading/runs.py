@@ -23,14 +23,7 @@ _SETTLED = 0.02
 
 
 class HeadingLoop:
-    """A ship and its autopilot as one model, ready to run.
-
-    Parameters
-    ----------
-    ship : Model
-    autopilot : Model
-        Input ``heading.command`` stays free.
-    """
+    """A ship and its autopilot as one model, ready to run. `autopilot`: input ``heading.command`` stays free."""
 
     def __init__(self, ship: Model, autopilot: Model):
         self.model = closed_loop_model(ship, autopilot)
@@ -61,10 +54,7 @@ class HeadingLoop:
     ) -> Trajectory:
         """Simulate from the model's start, or from the state `begin` (nx,), classical Runge-Kutta at the model's step.
 
-        Raises
-        ------
-        InputError
-            The motion leaves all bounds.
+        Raises InputError: the motion leaves all bounds.
         """
         steps = round(duration_s / self.model.step_s)
         x, u = self.advance(self.start(parameters) if begin is None else begin, inputs, steps, parameters)
@@ -102,17 +92,9 @@ class HeadingLoop:
 class CourseChange:
     """Figures of a change of course.
 
-    Parameters
-    ----------
-    ordered_deg : float
-    rise_time_s : float or None
-        From 10 to 90 % of the change; None if not reached.
-    overshoot_deg : float
-    settling_time_s : float or None
-        Time after which it stays within :data:`_SETTLED` of the change; None if it does not.
-    largest_rudder_deg : float
-    rate_limited_s : float
-        Time of rudder motion at the largest rate.
+    `rise_time_s`: from 10 to 90 % of the change; None if not reached; `settling_time_s`: time after which it stays
+    within :data:`_SETTLED` of the change; None if it does not; `rate_limited_s`: time of rudder motion at the largest
+    rate.
     """
 
     ordered_deg: float
@@ -127,17 +109,10 @@ class CourseChange:
 class CourseKeeping:
     """Figures of keeping a course, over `duration_s`.
 
-    Parameters
-    ----------
-    duration_s : float
-    heading_error_deg2s, rudder_deg2s : float
-        Integrals of the square of the heading error and of the rudder angle about its mean.
-    heading_error_rms_deg, heading_error_mean_deg, rudder_rms_deg : float
-        The same as root mean squares (the rudder about its mean), and the remaining mean error.
-    rudder_travel_degps : float
-        Mean absolute rudder rate: the wear of the gear.
-    rate_limited_percent : float
-        Share of the time of rudder motion at the largest rate.
+    `heading_error_deg2s`, `rudder_deg2s`: integrals of the square of the heading error and of the rudder angle about
+    its mean; `heading_error_rms_deg`, `heading_error_mean_deg`, `rudder_rms_deg`: the same as root mean squares (the
+    rudder about its mean), and the remaining mean error; `rudder_travel_degps`: mean absolute rudder rate: the wear of
+    the gear; `rate_limited_percent`: share of the time of rudder motion at the largest rate.
     """
 
     duration_s: float
@@ -154,11 +129,8 @@ class CourseKeeping:
 class CraftKeeping:
     """Figures of keeping a course and a speed through the water, over `duration_s`.
 
-    Parameters
-    ----------
-    duration_s : float
-    heading_error_rms_deg, heading_error_mean_deg, speed_error_rms_mps : float
-        Root mean squares, and the mean error of heading that remains.
+    `heading_error_rms_deg`, `heading_error_mean_deg`, `speed_error_rms_mps`: root mean squares, and the mean error of
+    heading that remains.
     """
 
     duration_s: float
@@ -195,16 +167,9 @@ def course_change(run: Trajectory, ordered_rad: float) -> CourseChange:
 class StepFigures:
     """Figures of the response to an order that steps.
 
-    Parameters
-    ----------
-    ordered : float
-        Size of the step, in the unit of the signal.
-    rise_time_s : float or None
-        From 10 to 90 % of the step; None if not reached.
-    overshoot : float
-        Beyond the step, not negative, in the unit of the signal.
-    settling_time_s : float or None
-        Time after which it stays within :data:`_SETTLED` of the step; None if it does not.
+    `ordered`: size of the step, in the unit of the signal; `rise_time_s`: from 10 to 90 % of the step; None if not
+    reached; `overshoot`: beyond the step, not negative, in the unit of the signal; `settling_time_s`: time after which
+    it stays within :data:`_SETTLED` of the step; None if it does not.
     """
 
     ordered: float

@@ -72,6 +72,8 @@ _BUSY_PERCENT = 10.0
 Project choice: well above what a calm sea needs.
 """
 
+_BEGUN_AT = "the runs begin at {:g} m/s, with the engine as it is at the card's speed"
+
 
 @dataclass(frozen=True, kw_only=True)
 class StudySettings:
@@ -149,12 +151,10 @@ class AutopilotStudy(PilotStudy):
     limits : dict
         ``largest_rudder_deg``, and with an integral ``anti_windup_time_s`` and ``integral_band_deg`` (for designs with
         their own states ``integral_limit_radps``, the band times its gain).
-    ship_alone : ShipAlone
     margins : tuple of LoopMargins
         At the speed of the design, then at others, all with the gains of the design.
     responses : tuple of LoopResponse
         At the speed of the design, and at the slowest and the fastest of `margins`.
-    closed_loop : ClosedLoop
     """
 
     design: str
@@ -192,7 +192,6 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
     ----------
     card, ship : ManoeuvringCard, Model
         The card, and the model built of it.
-    settings : StudySettings
 
     Raises
     ------
@@ -251,7 +250,7 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
             *not_held(kept, weather, float(np.mean(later["motion.u"])), float(np.mean(later["rudder.angle"]))),
             *outside.notices,
             *notices,
-            *_begun_at(settings.speed_mps),
+            *([] if settings.speed_mps is None else [Notice(_BEGUN_AT.format(settings.speed_mps))]),
             *_notices(margins, runs, changes),
             *unfinished(tracks),
             *_of_the_gear(ship, design, kept, weather),
@@ -268,7 +267,6 @@ def not_held(
     Parameters
     ----------
     kept : CourseKeeping or CraftKeeping
-    weather : Weather
     speed_mps : float
         Mean speed through the water.
     rudder_rad : float, optional
@@ -299,7 +297,6 @@ def keep_tracks(loop: HeadingLoop, waypoints: Array | None, inputs: Mapping[str,
 
     Parameters
     ----------
-    loop : HeadingLoop
     waypoints : array (n, 2), optional
     inputs : mapping
         Inputs of the model, by name (current, wind).
@@ -427,11 +424,3 @@ def _of_the_gear(ship: Model, design: HeadingDesign, kept: CourseKeeping, weathe
             f"SOLAS II-1, regulation 29, requires of a gear; this gear goes to {math.degrees(limit):.3g} deg"
         )
     return [Notice(text) for text in notices]
-
-
-def _begun_at(speed: float | None) -> list[Notice]:
-    return (
-        []
-        if speed is None
-        else [Notice(f"the runs begin at {speed:g} m/s, with the engine as it is at the card's speed")]
-    )

@@ -62,7 +62,6 @@ class TrackKeeping:
         Length of all its legs.
     duration_s : float
         Until the end of the last leg, or of the run.
-    finished : bool
     largest_error_m, rms_error_m : float
         Cross-track errors, corners in between.
     largest_error_on_legs_m : float
@@ -196,9 +195,7 @@ def keep_track(
 
     Parameters
     ----------
-    loop : HeadingLoop
     waypoints : array (n, 2)
-    guidance : Guidance
     inputs : mapping, optional
         Inputs of the model, by name (current, wind); held.
 

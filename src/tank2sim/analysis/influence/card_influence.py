@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -29,25 +30,12 @@ REPORTED_FROM = 0.5
 """... where either is at least this percentage of the figure. Project choice: less does not change a decision."""
 
 
-@dataclass(frozen=True)
-class Agreed:
-    """An agreed variation: Kc % by parameter, and for each figure the prediction by the sum of Kc K / 10, with exact
-    slopes and with 10 % differences, and the direct result; per cent of the figure."""
-
-    percent: Mapping[str, float]
-    predicted: tuple[float, ...]
-    predicted_by_difference: tuple[float, ...]
-    direct: tuple[float, ...]
-
-
 @dataclass(frozen=True, eq=False)
 class CardInfluence:
     """Influence coefficients of a card.
 
     Parameters
     ----------
-    ship : str
-    figures : tuple of InfluenceFigure
     values : array (nf,)
         Values of the figures.
     errors : JointErrors
@@ -56,8 +44,7 @@ class CardInfluence:
         Exact slopes dF/dc.
     difference : array (nf, k)
         K % by the 10 % difference; nan where the changed ship does not show the figure, or the parameter is zero.
-    agreed : Agreed or None
-    notices : tuple of Notice
+    agreed : AgreedVariation or None
     """
 
     ship: str
@@ -66,7 +53,7 @@ class CardInfluence:
     errors: JointErrors
     slopes: Array
     difference: Array
-    agreed: Agreed | None = None
+    agreed: AgreedVariation | None = None
     notices: tuple[Notice, ...] = field(default=())
 
     @property
@@ -144,16 +131,8 @@ class CardInfluence:
                 }
                 for text, slopes, steps in zip(texts, exact.tolist(), self.difference.tolist(), strict=True)
             },
-            agreed=self._reported_agreed(self.agreed) if self.agreed else None,
+            agreed=self.agreed,
             notices=self.notices,
-        )
-
-    def _reported_agreed(self, agreed: Agreed) -> AgreedVariation:
-        columns = zip(self.figures, agreed.predicted, agreed.predicted_by_difference, agreed.direct, strict=True)
-        keys = {parameter.name: parameter.key for parameter in self.parameters}
-        return AgreedVariation(
-            percent={keys[name]: percent for name, percent in agreed.percent.items()},
-            figures={figure.text: AgreedChange(*changes) for figure, *changes in columns},
         )
 
 
@@ -209,7 +188,6 @@ class InfluenceStudy:
 
     Parameters
     ----------
-    ship : str
     standard_errors : str
         Origin of the standard errors of the figures.
     figures : dict
@@ -218,11 +196,8 @@ class InfluenceStudy:
         By their keys on the card.
     influence_percent : dict
         Figure to parameter to its coefficient.
-    notices : tuple of Notice
-    agreed : AgreedVariation, optional
     tuned : TunedStudy, optional
         The card tuned to targets.
-    ensemble : FigureBands, optional
     assumed_errors : bool
         Whether all standard errors are assumed.
     """
@@ -238,13 +213,32 @@ class InfluenceStudy:
     ensemble: FigureBands | None = None
     assumed_errors: bool = False
 
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Short names of the parameters (k,)."""
+        return tuple(number.name for number in self.parameters.values())
+
+    @cached_property
+    def exact(self) -> Array:
+        """K % (nf, k) by exact slopes; nan where there is none."""
+        return np.array([[row[key].exact for key in self.parameters] for row in self.influence_percent.values()])
+
+    @cached_property
+    def difference(self) -> Array:
+        """K % (nf, k) by the 10 % difference; nan where there is none."""
+        return np.array([[row[key].difference for key in self.parameters] for row in self.influence_percent.values()])
+
+    @cached_property
+    def shares(self) -> Array:
+        """Shares of the variances (nf, k)."""
+        return np.array([[one.share_of_variance[key] for key in self.parameters] for one in self.figures.values()])
+
 
 def influence(study: Study, agreed: Mapping[str, float] | None = None) -> CardInfluence:
     """Influence coefficients of every parameter of a card on the figures of a study.
 
     Parameters
     ----------
-    study : Study
     agreed : mapping, optional
         An agreed variation: Kc %, by names as a user writes them.
 
@@ -284,16 +278,21 @@ def _change(study: Study, values: Array) -> list[float]:
     return [change_percent(float(new), float(old)) for new, old in zip(figures, study.base, strict=True)]
 
 
-def _agreed(study: Study, found: CardInfluence, percent: Mapping[str, float]) -> Agreed:
+def _agreed(study: Study, found: CardInfluence, percent: Mapping[str, float]) -> AgreedVariation:
     names = [parameter.name for parameter in study.parameters]
     values = dict(zip(names, study.values.tolist(), strict=True))
     changed = changed_together(values, percent)
     direct = _change(study, np.array([changed[name] for name in names]))
 
-    def predicted(K: Array) -> tuple[float, ...]:
-        return tuple(combined_percent(dict(zip(names, row.tolist(), strict=True)), percent) for row in K)
+    def predicted(K: Array) -> list[float]:
+        return [combined_percent(dict(zip(names, row.tolist(), strict=True)), percent) for row in K]
 
-    return Agreed(percent, predicted(found.exact), predicted(found.difference), tuple(direct))
+    changes = map(AgreedChange, predicted(found.exact), predicted(found.difference), direct)
+    keys = {parameter.name: parameter.key for parameter in study.parameters}
+    return AgreedVariation(
+        percent={keys[name]: value for name, value in percent.items()},
+        figures=dict(zip([figure.text for figure in study.figures], changes, strict=True)),
+    )
 
 
 def _differing(study: Study, sloped: Array) -> Iterable[Notice]:

@@ -64,12 +64,7 @@ class Event:
 class MotionSlopes:
     """Slopes of the figures of turning circles, zigzags and manoeuvres by thrusters.
 
-    Parameters
-    ----------
-    integrator : Integrator
-        Integrator of the model of the simulations.
-    free : sequence of str
-        Names of the k parameters.
+    `integrator`: integrator of the model of the simulations; `free`: names of the k parameters.
     """
 
     def __init__(self, integrator: Integrator, free: Sequence[str]):

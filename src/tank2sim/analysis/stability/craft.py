@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
@@ -22,15 +21,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import root
 
-from tank2sim.analysis.ensemble.questions import ShipText
-from tank2sim.analysis.ensemble.results import EnsembleRequest, StabilityBands, growth_bands
+from tank2sim.analysis.ensemble.questions import ShipText, each_ship, one_ship
+from tank2sim.analysis.ensemble.results import StabilityBands
 from tank2sim.analysis.linearisation import OperatingPoint
 from tank2sim.analysis.stability.straight_line import steering_constants
 from tank2sim.arrays import Array, ComplexNumber, Unbounded
 from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.effects import undisturbed_inputs
-from tank2sim.dynamics.ship import mass_fault
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.notices import Notice
 from tank2sim.simulation.ensemble import Ask, MemberResult
@@ -109,8 +107,6 @@ class CraftStabilityStudy:
 
     Parameters
     ----------
-    ship : str
-    length_m : float
     straight_run : CraftAtSpeed
         At the requested speed.
     nearly_straight : bool
@@ -121,8 +117,6 @@ class CraftStabilityStudy:
         Held by the thrusters at their largest revolutions.
     difference_turns : tuple of SteadyCraftTurn
         To starboard, about the revolutions of the straight run.
-    notices : tuple of Notice
-    ensemble : StabilityBands, optional
     """
 
     ship: str
@@ -141,7 +135,6 @@ def craft_stability(card: SteeredCard, speed_mps: float | None = None) -> CraftS
 
     Parameters
     ----------
-    card : SteeredCard
     speed_mps : float, optional
         Surge velocity through the water, positive.
 
@@ -172,13 +165,7 @@ def craft_stability(card: SteeredCard, speed_mps: float | None = None) -> CraftS
 
 @dataclass(frozen=True)
 class OfCraft:
-    """Straight run of the members of an ensemble at a speed, and their fastest turn.
-
-    Parameters
-    ----------
-    ship : ShipText
-    speed_mps : float
-    """
+    """Straight run of the members of an ensemble at a speed, and their fastest turn."""
 
     ship: ShipText
     speed_mps: float
@@ -187,17 +174,12 @@ class OfCraft:
         """See :class:`tank2sim.simulation.ensemble.Question`."""
         card = self.ship.card()
         craft = CraftMotions(card)
-        defaults = dict(zip(craft.model.parameter_names, craft.p.tolist(), strict=True))
 
-        def ask(values: Mapping[str, float]) -> MemberResult:
-            if fault := mass_fault(craft.model, defaults | dict(values)):
-                return MemberResult({}, trouble=fault)
+        def figures(values: Mapping[str, float]) -> MemberResult:
             member = craft.drawn(values)
-            try:
-                run, highest = member.straight(self.speed_mps), member.highest_speed(card.model.speed_mps)
-            except InputError as error:
-                return MemberResult({}, trouble=error.problem)
-            turn = member.fastest_turn(run)
+            run, highest = member.straight(self.speed_mps), member.highest_speed(card.model.speed_mps)
+            mean = to_si("n_rpm", run.revolutions_rpm)[1]
+            turn = member.turn(run, 2 * min(member.high - mean, mean - member.low))
             return MemberResult(
                 {
                     "growth_per_s": max(mode.real for mode in (*run.eigenvalues, *run.steering_modes)),
@@ -208,23 +190,7 @@ class OfCraft:
                 }
             )
 
-        return lambda members: [ask(values) for values in members]
-
-
-def craft_bands(
-    card: SteeredCard, speed_mps: float, request: EnsembleRequest, executor: Executor | None = None
-) -> StabilityBands:
-    """Bands of stability, speed and the fastest turn of a craft over the errors of its card.
-
-    Parameters
-    ----------
-    card : SteeredCard
-    speed_mps : float
-        Surge velocity of the straight run.
-    request : EnsembleRequest
-    executor : Executor, optional
-    """
-    return growth_bands(card, OfCraft(ShipText.of(card), speed_mps), request, executor)
+        return each_ship(one_ship(craft.model, figures))
 
 
 def keeps_nearly_straight(run: CraftAtSpeed, turns: Sequence[SteadyCraftTurn], length_m: float) -> bool:
@@ -233,7 +199,6 @@ def keeps_nearly_straight(run: CraftAtSpeed, turns: Sequence[SteadyCraftTurn], l
 
     Parameters
     ----------
-    run : CraftAtSpeed
     turns : sequence of SteadyCraftTurn
         About its revolutions; the one without a difference first.
     length_m : float
@@ -245,10 +210,6 @@ def keeps_nearly_straight(run: CraftAtSpeed, turns: Sequence[SteadyCraftTurn], l
 
 class CraftMotions:
     """Steady motions of a craft, by the revolutions of its sides.
-
-    Parameters
-    ----------
-    card : SteeredCard
 
     Raises
     ------
@@ -376,15 +337,11 @@ class CraftMotions:
         mean = to_si("n_rpm", run.revolutions_rpm)[1]
         most = 2 * min(self.high - mean, mean - self.low)
         shares = DIFFERENCE_SHARES if run.stable else (0.0, *DIFFERENCE_SHARES)
-        found = [self._turn(run, share * most) for share in shares]
+        found = [self.turn(run, share * most) for share in shares]
         return [turn for turn in found if turn is not None]
 
-    def fastest_turn(self, run: CraftAtSpeed) -> SteadyCraftTurn | None:
-        """The steady turn to starboard by the largest difference about the revolutions of a straight run."""
-        mean = to_si("n_rpm", run.revolutions_rpm)[1]
-        return self._turn(run, 2 * min(self.high - mean, mean - self.low))
-
-    def _turn(self, run: CraftAtSpeed, difference: float) -> SteadyCraftTurn | None:
+    def turn(self, run: CraftAtSpeed, difference: float) -> SteadyCraftTurn | None:
+        """The steady turn to starboard by a `difference` (rad/s) about the revolutions of a straight run."""
         mean = to_si("n_rpm", run.revolutions_rpm)[1]
         for curvature in _CURVATURES:
             rate = curvature * run.speed_mps / self.p[self.model.parameter_names.index("ship.length")]

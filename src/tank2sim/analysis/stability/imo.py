@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
@@ -115,54 +116,38 @@ class _Trials:
     integrator: Integrator
     parameters: Mapping[str, float]
 
-    def run(self, manoeuvre: Manoeuvre) -> _Trial:
-        """A trial, or the reason for its absence."""
+    def run(self, manoeuvre: Manoeuvre) -> tuple[Numbers, str, CardRangeReading]:
+        """Figures of a trial, the reason without any, and where it left the card's range."""
         # MSC.137(76) requires calm water: a current on the card belongs to a location, not to the ship.
         calm = undisturbed_inputs(self.model)
         defaults, integrator = self.parameters, self.integrator
         try:
             run = simulate(self.model, manoeuvre, inputs=calm, parameters=defaults, integrator=integrator)
         except InputError as error:
-            return _Trial({}, f"{error.place}: {error.problem}" if error.place else error.problem)
-        return _Trial(single_figures(run.figures), _wrong_way(manoeuvre, run.trajectory), run.reading)
+            return {}, f"{error.place}: {error.problem}" if error.place else error.problem, NOTHING_READ
+        return single_figures(run.figures), _wrong_way(manoeuvre, run.trajectory), run.reading
 
     def worst(self, manoeuvres: Sequence[Manoeuvre], *names: str) -> list[_Worse]:
         """The larger of each figure over the trials, with a remark on its absence or validity."""
         runs = [self.run(manoeuvre) for manoeuvre in manoeuvres]
-        trouble = next((run.trouble for run in runs if run.trouble), "")
+        trouble = next((trouble for _, trouble, _ in runs if trouble), "")
         found: list[_Worse] = []
         for name in names:
-            values = [run.figures.get(name) for run in runs]
-            shown = [value for value in values if value is not None]
-            outside = next((str(each) for run in runs if run.reading.outside(name) for each in run.reading.notices), "")
-            if len(shown) == len(values):
-                found.append(_Worse(max(shown), outside))
-            else:
-                missing = trouble or "; ".join(part for part in ("the run does not show it", outside) if part)
-                found.append(_Worse(None, missing, bool(outside)))
+            shown = [figures[name] for figures, _, _ in runs if name in figures]
+            outside = next((str(each) for *_, read in runs if read.outside(name) for each in read.notices), "")
+            remark = outside
+            if len(shown) < len(runs):
+                remark = trouble or "; ".join(part for part in ("the run does not show it", outside) if part)
+            found.append(_Worse(max(shown) if len(shown) == len(runs) else None, remark, bool(outside)))
         return found
 
 
-@dataclass(frozen=True)
-class _Trial:
-    """Figures of a trial, the reason without any, and the names of those outside the card's range."""
-
-    figures: Numbers
-    trouble: str
-    reading: CardRangeReading = NOTHING_READ
-
-
-@dataclass(frozen=True)
-class _Worse:
-    """The worse figure of trials (or None), its remark if outside the card's range, and whether they left it first."""
+class _Worse(NamedTuple):
+    """The worse figure of trials (or None), its remark, and whether a trial left the card's range before it."""
 
     value: float | None
     remark: str
-    beyond_range: bool = False
-
-    @property
-    def beyond(self) -> bool:
-        return self.beyond_range or (self.value is not None and bool(self.remark))
+    beyond: bool
 
 
 def _wrong_way(manoeuvre: Manoeuvre, run: Trajectory) -> str:
@@ -203,8 +188,8 @@ def imo_criteria(
     limits = largest_allowed(time)
 
     def criterion(name: str, unit: str, remark: str = "") -> ImoCriterion:
-        text = "; ".join(text_part for text_part in (worst[name].remark, remark) if text_part)
-        return ImoCriterion.judged(name, worst[name].value, limits[name], unit, text, worst[name].beyond)
+        value, left, beyond = worst[name]
+        return ImoCriterion.judged(name, value, limits[name], unit, "; ".join(filter(None, (left, remark))), beyond)
 
     return (
         criterion(ADVANCE, "L"),
@@ -264,10 +249,9 @@ def _stopping(trials: _Trials) -> ImoCriterion:
     if "propeller.speed" not in trials.model.input_names:
         remark = "the card has no [propulsion]: its engine cannot be reversed"
         return ImoCriterion.judged(name, None, STOPPING, "L", remark)
-    (worse,) = trials.worst([Stop()], "track_reach_lengths")
-    found = worse.value
+    ((found, left, beyond),) = trials.worst([Stop()], "track_reach_lengths")
     remark = f"at {FULL_ASTERN:.0%} of the nominal revolutions astern, reached at once: an assumption of the simulation"
     if found is not None and STOPPING < found <= STOPPING_OF_LARGE_SHIPS:
         remark += "; up to 20 L may be allowed to a ship of large displacement"
-    remark = "; ".join(text_part for text_part in (worse.remark, remark if found is not None else "") if text_part)
-    return ImoCriterion.judged(name, found, STOPPING, "L", remark, worse.beyond)
+    remark = "; ".join(filter(None, (left, remark if found is not None else "")))
+    return ImoCriterion.judged(name, found, STOPPING, "L", remark, beyond)

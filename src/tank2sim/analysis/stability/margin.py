@@ -91,7 +91,6 @@ class Margin:
 
     Parameters
     ----------
-    C_prime : float
     damping_lever_lengths, sway_lever_lengths : float
         (N'_r - m' x'_G)/(Y'_r - m') and N'_v/Y'_v, in ship lengths forward of midships.
     lever_margin_lengths : float

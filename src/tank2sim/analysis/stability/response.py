@@ -35,18 +35,9 @@ _STABLE_STEP, _UNSTABLE_STEP = 5.0, 2.5
 class SteeringResponse:
     """Response of the yaw rate (rad/s) to the rudder (rad), + to starboard.
 
-    Parameters
-    ----------
-    label : str
-        The system: :data:`HULL`, :data:`GEAR` or :data:`FIRST_ORDER`.
-    poles, zeros : arrays of complex
-        1/s.
-    gain_per_s : float
-        r/delta at rest, 1/s; for an unstable ship that of an unstable steady turn.
-    omega_radps, response : arrays (n,)
-        Frequency, and r/delta (complex, 1/s).
-    time_s, step_per_s : arrays (m,)
-        Yaw rate after a step of the rudder, per rad of it.
+    `label`: the system: :data:`HULL`, :data:`GEAR` or :data:`FIRST_ORDER`; `poles`, `zeros`: 1/s; `gain_per_s`: r/delta
+    at rest, 1/s; for an unstable ship that of an unstable steady turn; `omega_radps`, `response` (n,): frequency, and
+    r/delta (complex, 1/s); `time_s`, `step_per_s` (m,): yaw rate after a step of the rudder, per rad of it.
     """
 
     label: str

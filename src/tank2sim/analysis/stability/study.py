@@ -59,14 +59,12 @@ class StabilityStudy(StraightLine):
         Results of the straight course.
     steady_turning, characteristic : optional
         At the speed of expansion; None without a steady motion, which `notices` state.
-    spirals : Spirals
     imo : tuple of ImoCriterion
         At the speed of expansion.
     steady_speeds : tuple of SteadySpeed
         Speeds straight ahead that the engine holds at the revolutions of the start.
     notices : tuple of Notice
         Messages for the user.
-    ensemble : StabilityBands, optional
     """
 
     margins: Margin

@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import tomlkit
+from pydantic import Field
 
-from tank2sim.analysis.tuning.targets import Target
-from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.reading import changed_text, parse_card
-from tank2sim.dynamics.card_parameters import CardParameter
 from tank2sim.errors import ArgumentError
 from tank2sim.escaping import one_line
 from tank2sim.files import BYTE_ORDER_MARK
@@ -60,89 +58,6 @@ class Means:
             raise ArgumentError("within", "", f"is {self.within:g}", "give a positive number")
 
 
-@dataclass(frozen=True)
-class Move:
-    """A parameter that changed: values in the model's unit."""
-
-    parameter: CardParameter
-    before: float
-    after: float
-
-    @property
-    def in_standard_errors(self) -> float | None:
-        """The move over the standard error of the card, with its sign in the file; None for an exact parameter."""
-        error, sign = self.parameter.standard_error, math.copysign(1.0, self.parameter.factor)
-        return sign * (self.after - self.before) / error if error > 0 else None
-
-
-@dataclass(frozen=True)
-class Tuned:
-    """A card tuned to targets, or as near to them as possible.
-
-    Parameters
-    ----------
-    targets : tuple of Target
-    means : Means
-    values : array (k,)
-        Values of all parameters of the study, tuned.
-    before, after : array
-        The figures of the targets.
-    moves : tuple of Move
-        Parameters that changed, the largest move first.
-    agreed_times : float or None
-        Multiple of the agreed variation.
-    contradiction : tuple of Target
-        Targets that contradict each other within the bounds (one alone cannot be reached); empty if all are reached.
-    """
-
-    targets: tuple[Target, ...]
-    means: Means
-    values: Array
-    before: Array
-    after: Array
-    moves: tuple[Move, ...]
-    agreed_times: float | None
-    contradiction: tuple[Target, ...] = ()
-
-    @property
-    def reached(self) -> bool:
-        """True if all targets are met."""
-        return not self.contradiction
-
-    def reported(self, figures: Mapping[str, float]) -> TunedStudy:
-        """Return the part that results report.
-
-        Parameters
-        ----------
-        figures : mapping
-            All requested figures of the tuned card.
-        """
-        pairs = zip(self.targets, self.before.tolist(), self.after.tolist(), strict=True)
-        return TunedStudy(
-            reached=self.reached,
-            by=self.means.by,
-            within_standard_errors=self.means.within,
-            targets={
-                target.text: TunedTarget(
-                    figure=target.figure.text, wanted=target.value, relation=target.relation, before=old, after=new
-                )
-                for target, old, new in pairs
-            },
-            parameters={
-                move.parameter.key: TunedNumber(
-                    name=move.parameter.short,
-                    before=move.before * move.parameter.factor,
-                    after=move.after * move.parameter.factor,
-                    standard_errors=move.in_standard_errors,
-                )
-                for move in self.moves
-            },
-            agreed_times=self.agreed_times,
-            contradiction=tuple(target.text for target in self.contradiction),
-            figures=dict(figures),
-        )
-
-
 @dataclass(frozen=True, kw_only=True)
 class TunedTarget:
     """A target: figure, relation (``=``, ``<=``, ``>=``) and value, and the figure before and after."""
@@ -166,9 +81,26 @@ class TunedNumber:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TunedStudy:
-    """A card tuned to targets, as results report it; fields as of :class:`Means` and :class:`Tuned`.
+    """A card tuned to targets, or as near to them as possible.
 
-    Targets are by their text, parameters by their keys, the largest move first; `figures` are those of the tuned card.
+    Parameters
+    ----------
+    reached : bool
+        All targets are met.
+    by, within_standard_errors
+        As of :class:`Means`.
+    targets : dict
+        By their text.
+    parameters : dict
+        Numbers that changed, by their keys on the card, the largest move first.
+    agreed_times : float or None
+        Multiple of the agreed variation.
+    contradiction : tuple of str
+        Targets that contradict each other within the bounds (one alone cannot be reached); empty if all are reached.
+    figures : dict
+        All requested figures of the tuned card.
+    values : array (k,), optional
+        Values of all parameters of the study, tuned; not part of the JSON.
     """
 
     reached: bool
@@ -179,6 +111,7 @@ class TunedStudy:
     agreed_times: float | None
     contradiction: tuple[str, ...]
     figures: dict[str, float]
+    values: Annotated[Any, Field(exclude=True)] = None
 
     @property
     def contradiction_text(self) -> str:
@@ -195,26 +128,23 @@ _DIGITS = 10
 """Significant digits of a tuned number: rounding does not change a printed figure."""
 
 
-def tuned_text(card: SteeredCard, tuned: Tuned) -> str:
-    """Text of a card with the moves made: each changed key has its old value as a comment."""
-    targets = ", ".join(target.text for target in tuned.targets)
-    how = f"tuned by tank2sim influence to {targets}"
+def tuned_text(card: SteeredCard, tuned: TunedStudy) -> str:
+    """Text of a card with its numbers changed: each changed key has its old value as a comment."""
+    how = f"tuned by tank2sim influence to {', '.join(tuned.targets)}"
     text = card.text
-    for move in tuned.moves:
-        comment = _comment(card, move) if _takes_comment(card, move.parameter.key) else None
-        value = float(f"{move.after * move.parameter.factor:.{_DIGITS}g}")
-        text = changed_text(text, card.source, {move.parameter.key: value}, comment=comment)
+    for key, number in tuned.parameters.items():
+        comment = _comment(card, key, number.standard_errors) if _takes_comment(card, key) else None
+        text = changed_text(text, card.source, {key: float(f"{number.after:.{_DIGITS}g}")}, comment=comment)
     text = changed_text(text, card.source, {"ship.source": f"{card.ship.source}; {how}"})
     parse_card(text, card.source)
     mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
-    head = f"# {one_line(how[0].upper() + how[1:])} ({tuned.means.by}).\n"
+    head = f"# {one_line(how[0].upper() + how[1:])} ({tuned.by}).\n"
     head += "# Keys that changed have their old values in comments.\n"
     return mark + head + text.removeprefix(mark)
 
 
-def _comment(card: SteeredCard, move: Move) -> str:
-    old = _found(card, move.parameter.key)
-    moved = move.in_standard_errors
+def _comment(card: SteeredCard, key: str, moved: float | None) -> str:
+    old = _found(card, key)
     far = "" if moved is None else f", moved {moved:+.2f} standard errors"
     return f"not stated before tuning{far}" if old is None else f"was {old.as_string()} before tuning{far}"
 

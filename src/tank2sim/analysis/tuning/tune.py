@@ -14,6 +14,7 @@ For targets that cannot all be reached: the smallest contradictory set, by a del
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import lru_cache
 
@@ -23,7 +24,7 @@ from scipy.linalg import qr
 from scipy.optimize import Bounds, LinearConstraint, least_squares, milp, minimize
 
 from tank2sim.analysis.influence.study import Study
-from tank2sim.analysis.tuning.result import FEWEST, Means, Move, Tuned
+from tank2sim.analysis.tuning.result import FEWEST, Means, TunedNumber, TunedStudy, TunedTarget
 from tank2sim.analysis.tuning.targets import AT_LEAST, AT_MOST, EQUAL, Target
 from tank2sim.arrays import Array
 from tank2sim.dynamics.card_parameters import CardParameter, agreed_by_name, find_parameter
@@ -42,15 +43,13 @@ _ROUNDS = 8  # sets of parameters that are tried
 _LONGEST_SEARCH_S = 20.0  # of one set; the best so far is taken then
 
 
-def tune(study: Study, targets: Sequence[Target], means: Means) -> Tuned:
+def tune(study: Study, targets: Sequence[Target], means: Means) -> TunedStudy:
     """Change a card until its figures reach their targets.
 
     Parameters
     ----------
     study : Study
         Study with at least the figures of the targets.
-    targets : sequence of Target
-    means : Means
 
     Raises
     ------
@@ -305,26 +304,42 @@ class _Problem:
                 kept = fewer
         return tuple(self.targets[row] for row in kept)
 
-    def result(self, z: Array, contradiction: tuple[Target, ...]) -> Tuned:
+    def result(self, z: Array, contradiction: tuple[Target, ...]) -> TunedStudy:
         """Result of moves `z`."""
         z = np.where(np.abs(z) < _MOVED, 0.0, z)
-        values = self.values(z)
-        moves = [
-            Move(parameter, parameter.value, float(after))
-            for parameter, after in zip(self.study.parameters, values, strict=True)
+        study, values = self.study, self.values(z)
+        before_after = zip(self.targets, study.base[self._rows].tolist(), self.figures(z).tolist(), strict=True)
+        moved = {
+            parameter.key: _changed(parameter, float(after))
+            for parameter, after in zip(study.parameters, values, strict=True)
             if after != parameter.value
-        ]
-        moves.sort(key=lambda move: -abs(move.in_standard_errors or np.inf))
-        return Tuned(
-            targets=self.targets,
-            means=self.means,
-            values=values,
-            before=self.study.base[self._rows],
-            after=self.figures(z),
-            moves=tuple(moves),
+        }
+        names = [figure.text for figure in study.figures]
+        return TunedStudy(
+            reached=not contradiction,
+            by=self.means.by,
+            within_standard_errors=self.means.within,
+            targets={
+                one.text: TunedTarget(
+                    figure=one.figure.text, wanted=one.value, relation=one.relation, before=old, after=new
+                )
+                for one, old, new in before_after
+            },
+            parameters=dict(sorted(moved.items(), key=lambda item: -abs(item[1].standard_errors or np.inf))),
             agreed_times=float(z[-1]) if self._agreed else None,
-            contradiction=contradiction,
+            contradiction=tuple(target.text for target in contradiction),
+            figures=dict(zip(names, study.figures_at(values).tolist(), strict=True)),
+            values=values,
         )
+
+
+def _changed(parameter: CardParameter, after: float) -> TunedNumber:
+    """A parameter with another value, as the card's file has it."""
+    error, factor = parameter.standard_error, parameter.factor
+    moved = math.copysign(1.0, factor) * (after - parameter.value) / error if error > 0 else None
+    return TunedNumber(
+        name=parameter.short, before=parameter.value * factor, after=after * factor, standard_errors=moved
+    )
 
 
 def _independent(slopes: Array) -> list[int]:

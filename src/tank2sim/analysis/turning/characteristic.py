@@ -83,7 +83,6 @@ class SteeringCharacteristic:
     ----------
     norrbin, bech : NorrbinCubic, BechCubic
         The nearest cubic with the position and slope of the straight course, and the nearest one.
-    curve : CharacteristicCurve
     slope_on_straight_course_s : float
         dH/dr, exact, s: the reciprocal of Nomoto's K if surge does not change with the rudder.
     fitted_up_to_degps : float

@@ -103,7 +103,6 @@ def follow_branch(equations: ContinuationEquations, start: Array, direction: Arr
     equations : callable
         Residual (n,) and Jacobian (n, n + 1) at a point (n + 1,).
     start, direction : array (n + 1,)
-    bounds : Bounds
     """
     curve = _follow(equations, start, tangent(equations(start)[1], direction), direction, bounds)
     if curve.ended == STALLED and len(curve.points) == 1:

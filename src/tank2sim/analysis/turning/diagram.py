@@ -61,12 +61,20 @@ class TurningFold:
 class HysteresisLoop:
     """The hysteresis loop of a ship that is unstable on a straight course.
 
-    `width_rad` is the rudder between the two folds around the straight course; `height_radps` the difference of the
+    `width_deg` is the rudder between the two folds around the straight course; `height_degps` the difference of the
     two stable yaw rates at the rudder of the straight course, None if the curve does not reach both.
     """
 
-    width_rad: float
-    height_radps: float | None
+    width_deg: float
+    height_degps: float | None
+
+
+@dataclass(frozen=True)
+class CurveEnds:
+    """Why the curve ends to port and to starboard (:class:`tank2sim.analysis.turning.continuation.Curve`)."""
+
+    port: str
+    starboard: str
 
 
 @dataclass(frozen=True)
@@ -85,10 +93,7 @@ class SteadyTurning:
     arc : array (k,)
     straight : int
         Row of the straight course.
-    folds : tuple of TurningFold
     loop : HysteresisLoop or None
-    ended : pair of str
-        Why the curve ends to port and to starboard (:class:`tank2sim.analysis.turning.continuation.Curve`).
     notices : tuple of Notice
         Messages for the user.
     """
@@ -104,7 +109,7 @@ class SteadyTurning:
     straight: int
     folds: tuple[TurningFold, ...]
     loop: HysteresisLoop | None
-    ended: tuple[str, str]
+    ended: CurveEnds
     notices: tuple[Notice, ...]
 
     @cached_property
@@ -143,10 +148,6 @@ class SteadyTurning:
             for rudder in _REPORTED_RUDDERS_DEG
             for rate, stable in self.turns_at(math.copysign(max(0.0, abs(math.radians(rudder)) - 1e-9), rudder))
         ]
-        loop = None
-        if self.loop is not None:
-            height = self.loop.height_radps
-            loop = ReportedLoop(math.degrees(self.loop.width_rad), None if height is None else math.degrees(height))
         return TurningDiagram(
             points=DiagramPoints(
                 rudder_deg=np.degrees(self.rudder_rad),
@@ -161,8 +162,8 @@ class SteadyTurning:
             folds=tuple(
                 ReportedFold(math.degrees(fold.rudder_rad), math.degrees(fold.yaw_rate_radps)) for fold in self.folds
             ),
-            loop=loop,
-            ended=CurveEnds(*self.ended),
+            loop=self.loop,
+            ended=self.ended,
         )
 
 
@@ -197,22 +198,6 @@ class ReportedFold:
     yaw_rate_degps: float
 
 
-@dataclass(frozen=True)
-class ReportedLoop:
-    """Width (rudder) and height (yaw rate) of a hysteresis loop, as of :class:`HysteresisLoop`."""
-
-    width_deg: float
-    height_degps: float | None
-
-
-@dataclass(frozen=True)
-class CurveEnds:
-    """Why the curve ends to port and to starboard."""
-
-    port: str
-    starboard: str
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TurningDiagram:
     """The steady-turning diagram of a ship as results report it: all points, turns at round rudder angles, folds."""
@@ -220,7 +205,7 @@ class TurningDiagram:
     points: DiagramPoints
     turns: tuple[ReportedTurn, ...]
     folds: tuple[ReportedFold, ...]
-    loop: ReportedLoop | None
+    loop: HysteresisLoop | None
     ended: CurveEnds
 
 
@@ -364,7 +349,7 @@ def _diagram(equations: TurningEquations, port: Curve, starboard: Curve) -> Stea
         straight=straight,
         folds=folds,
         loop=None,
-        ended=(port.ended, starboard.ended),
+        ended=CurveEnds(port.ended, starboard.ended),
         notices=(),
     )
     return _judged(equations.model, found)
@@ -406,8 +391,8 @@ def _judged(model: Model, found: SteadyTurning) -> SteadyTurning:
     backwards = bool(corner) or found.slope[found.straight, 0] < 0
     if not found.stable[found.straight] and backwards and before and after:
         rates = [rate for rate, stable in found.turns_at(float(found.rudder_rad[found.straight])) if stable]
-        height = max(rates) - min(rates) if len(rates) > 1 else None
-        loop = HysteresisLoop(abs(before[-1].rudder_rad - after[0].rudder_rad), height)
+        height = math.degrees(max(rates) - min(rates)) if len(rates) > 1 else None
+        loop = HysteresisLoop(math.degrees(abs(before[-1].rudder_rad - after[0].rudder_rad)), height)
     return replace(found, loop=loop, notices=(*_end_notices(found), *_out_of_range(model, found)))
 
 
@@ -418,7 +403,7 @@ def _end_notices(found: SteadyTurning) -> list[Notice]:
         continuation.LONG: "goes on beyond the steps allowed, from",
     }
     messages = []
-    for side, row, ended in (("port", 0, found.ended[0]), ("starboard", -1, found.ended[1])):
+    for side, row, ended in (("port", 0, found.ended.port), ("starboard", -1, found.ended.starboard)):
         if ended in words:
             rudder, rate = np.degrees([found.rudder_rad[row], found.yaw_rate_radps[row]])
             place = f"{rudder:.3g} deg of rudder and {rate:.3g} deg/s (to {side})"

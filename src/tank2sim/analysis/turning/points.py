@@ -106,17 +106,8 @@ class TurningPoints:
 
         With the rudder amidships it is the turn of an unstable ship to starboard.
 
-        Parameters
-        ----------
-        rudder_rad : float
-            Rudder, positive to starboard.
-        parameters : mapping, optional
-            Values in place of the model's, by name.
-
-        Raises
-        ------
-        InputError
-            The ship does not turn at that rudder, or no steady turn was found.
+        `rudder_rad`: rudder, positive to starboard; `parameters`: values in place of the model's, by name. Raises
+        InputError: the ship does not turn at that rudder, or no steady turn was found.
         """
         p = self.model.parameter_values(parameters)
         straight = self._straight(p)

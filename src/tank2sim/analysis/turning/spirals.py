@@ -48,15 +48,9 @@ _LONGEST = 60.0
 class SpiralPoints:
     """Points of a simulated spiral in the order of the run.
 
-    Parameters
-    ----------
-    rudder_deg, yaw_rate_degps : arrays (n,)
-        Positive to starboard.
-    steady : tuple of bool
-        False where the turn (or the rudder) was still changing at the end.
-    distance_to_diagram_degps : array (n,)
-        To the nearest turn of the diagram at that rudder, yaw rate, nan where the diagram has none: for a direct spiral
-        only stable turns count.
+    `rudder_deg`, `yaw_rate_degps` (n,): positive to starboard; `steady`: false where the turn (or the rudder) was still
+    changing at the end; `distance_to_diagram_degps` (n,): to the nearest turn of the diagram at that rudder, yaw rate,
+    nan where the diagram has none: for a direct spiral only stable turns count.
     """
 
     rudder_deg: Array
@@ -68,10 +62,7 @@ class SpiralPoints:
 def direct_spiral(model: Model, turning: SteadyTurning, integrator: Integrator | None = None) -> SpiralPoints:
     """The direct spiral of a ship, within the rudder angles of the diagram.
 
-    Raises
-    ------
-    InputError
-        The motion leaves all bounds.
+    Raises InputError: the motion leaves all bounds.
     """
     largest = float(np.min(np.abs(turning.rudder_rad[[0, -1]])))
     orders = [math.radians(angle) for angle in SPIRAL_RUDDERS_DEG if abs(math.radians(angle)) <= largest * (1 + 1e-9)]
@@ -90,10 +81,7 @@ def direct_spiral(model: Model, turning: SteadyTurning, integrator: Integrator |
 def reverse_spiral(model: Model, turning: SteadyTurning, nomoto: Nomoto) -> SpiralPoints | None:
     """The reverse spiral of a ship over the yaw rates of the diagram; None if its rudder has no linear effect.
 
-    Raises
-    ------
-    InputError
-        The motion leaves all bounds.
+    Raises InputError: the motion leaves all bounds.
     """
     if not nomoto.T_s / nomoto.K_per_s > 0:
         return None

@@ -15,7 +15,7 @@ the standard errors follow.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -24,7 +24,7 @@ import numpy as np
 from tank2sim.cards.card import ManoeuvringCard, MmgCard, SteeredBy, SteeredCard
 from tank2sim.cards.craft_terms import CRAFT_TERMS
 from tank2sim.cards.scaling import file_factor
-from tank2sim.cards.terms import Term, known_term
+from tank2sim.cards.terms import known_term
 from tank2sim.dynamics import build
 from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS, ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS, polynomial
 from tank2sim.dynamics.card_parameters import CardParameter, card_parameters
@@ -84,14 +84,8 @@ class CoefficientRow:
 class Expansion:
     """A card's coefficients in the convention of another.
 
-    Parameters
-    ----------
-    coefficients : mapping
-        Name to coefficient; terms that the model lacks are absent.
-    refused : mapping
-        Name to the reason that prevents a comparison.
-    notes : tuple of Notice
-        What was converted.
+    `coefficients`: name to coefficient; terms that the model lacks are absent; `refused`: name to the reason that
+    prevents a comparison; `notes`: what was converted.
     """
 
     coefficients: Mapping[str, CardCoefficient]
@@ -183,7 +177,8 @@ def _difference(first: CardCoefficient, second: CardCoefficient) -> Difference:
         return Difference(why="not in the reference's model" if first.value is None else "not in this model")
     apart = second.value - first.value
     percent = 100 * apart / abs(first.value) if first.value else None
-    if first.standard_error and second.standard_error and _same(first.value, second.value):
+    same = math.isclose(first.value, second.value, rel_tol=1e-9, abs_tol=1e-15)  # apart from rounding
+    if first.standard_error and second.standard_error and same:
         return Difference(None, percent, SAME)
     if first.standard_error is None or second.standard_error is None:
         return Difference(None, percent, "" if apart == 0 else "no standard error")
@@ -229,11 +224,6 @@ def _error_of(parameter: CardParameter) -> float | None:
     return None if exact else parameter.standard_error
 
 
-def _same(first: float, second: float) -> bool:
-    """True for numbers that are equal except for rounding by a change of convention."""
-    return math.isclose(first, second, rel_tol=1e-9, abs_tol=1e-15)
-
-
 def expanded_as(card: ManoeuvringCard, reference: ManoeuvringCard) -> Expansion:
     """The coefficients of a card in the speed, scaling and inertial convention of another."""
     ratio = _froude(reference) / _froude(card)
@@ -249,7 +239,8 @@ def expanded_as(card: ManoeuvringCard, reference: ManoeuvringCard) -> Expansion:
     stated = {name for name in sources if name in card.uncertainty}
     found: dict[str, CardCoefficient] = {name: CardCoefficient(getattr(card.rigid_body, name)) for name in _RIGID_BODY}
     refused = _refused(card, reference, ratio, linear)
-    outside = not _holds_at(card, ratio)
+    slowest, fastest = card.model.speed_range_mps
+    outside = not slowest <= ratio * card.model.speed_mps <= fastest
     for row, name in enumerate(names):
         weights = matrix[row, columns]
         if linear and name not in _linear_names():
@@ -269,11 +260,6 @@ def expanded_as(card: ManoeuvringCard, reference: ManoeuvringCard) -> Expansion:
     return Expansion(found, refused, _notes(card, reference, ratio))
 
 
-def _holds_at(card: ManoeuvringCard, ratio: float) -> bool:
-    slowest, fastest = card.model.speed_range_mps
-    return slowest <= ratio * card.model.speed_mps <= fastest
-
-
 def _froude(card: ManoeuvringCard) -> float:
     return card.model.speed_mps / math.sqrt(card.environment.gravity_mps2 * card.ship.length_m)
 
@@ -288,14 +274,9 @@ def _refused(card: ManoeuvringCard, reference: ManoeuvringCard, ratio: float, li
         found = {name: "not in the linear model" for name in ALL_TERMS if name not in _linear_names()}
     if ratio != 1 and not (card.propulsion and reference.propulsion):
         why = "another speed, and the revolutions are not known"
-        found |= {
-            name: why for name in ABKOWITZ_TERMS["X"] if not (known_term(name).v or known_term(name).r or _d(name))
-        }
+        terms = map(known_term, ABKOWITZ_TERMS["X"])
+        found |= {term.name: why for term in terms if not (term.v or term.r or term.d)}
     return found
-
-
-def _d(name: str) -> int:
-    return known_term(name).d
 
 
 def _notes(card: ManoeuvringCard, reference: ManoeuvringCard, ratio: float) -> tuple[Notice, ...]:
@@ -367,10 +348,8 @@ def _taylor(forces: ca.SX, at: tuple[ca.SX, ...], names: Sequence[str]) -> ca.SX
             known[powers] = ca.jacobian(derivative(lower), at[place])
         return known[powers]
 
-    return ca.vertcat(*(_coefficient(known_term(name), derivative) for name in names))
-
-
-def _coefficient(term: Term, derivative: Callable[[tuple[int, ...]], ca.SX]) -> ca.SX:
-    powers = (term.v, term.r, term.d, term.u)
-    taylor: ca.SX = derivative(powers)["XYN".index(term.force)] / math.prod(math.factorial(power) for power in powers)
-    return taylor
+    rows = []
+    for term in map(known_term, names):
+        powers = (term.v, term.r, term.d, term.u)
+        rows.append(derivative(powers)["XYN".index(term.force)] / math.prod(map(math.factorial, powers)))
+    return ca.vertcat(*rows)

@@ -127,17 +127,14 @@ class CardComparison:
 
     Parameters
     ----------
-    cards : tuple of ComparedCard
     summary : tuple of CardSummary
         One for each card but the reference.
     coefficients, effects : tuple of CoefficientRow
         Coefficients in the reference's convention (those of craft in SI), and parameters of effects and thrusters, SI.
-    trials : tuple of TrialComparison
     craft : bool
         Whether thrusters steer all of them.
     members : int
         Size of the ensembles behind the deviations of the figures.
-    notices : tuple of Notice
     kind : str
         Always ``compare``.
     """
@@ -231,12 +228,7 @@ def _refuse_unlike(cards: Sequence[SteeredCard]) -> SteeredBy:
 
 
 def labels_of(cards: Sequence[SteeredCard]) -> tuple[str, ...]:
-    """Label of each card: its file's stem, or that of its folder for a bundled one, with a number for duplicates.
-
-    Parameters
-    ----------
-    cards : sequence of SteeredCard
-    """
+    """Label of each card: its file's stem, or that of its folder for a bundled one, with a number for duplicates."""
     stems = []
     for card in cards:
         path = Path(card.source)
@@ -250,7 +242,6 @@ def differences_of_size(first: SteeredCard, second: SteeredCard, scale: float = 
 
     Parameters
     ----------
-    first, second : SteeredCard
     scale : float
         Factor on the sizes of `first`.
     """

@@ -29,20 +29,10 @@ class TrackMark:
 class ShipTrack:
     """A track from the order, in axes of the first course: ahead and to starboard, m.
 
-    Parameters
-    ----------
-    name : str
-    ahead_m, starboard_m : array (n,)
-    marks : tuple of TrackMark
-        At each quarter of a turn (turns), or at equal times (stops).
-    figures : mapping
-        Figures, including those outside the card's range.
-    reading : CardRangeReading
-        Figures outside the card's range.
-    inside : int
-        Points of the track until it leaves the card's range.
-    range_exit : TrackMark, optional
-        The first point outside the card's range; None if there is none.
+    `ahead_m`, `starboard_m` (n,); `marks`: at each quarter of a turn (turns), or at equal times (stops); `figures`:
+    figures, including those outside the card's range; `reading`: figures outside the card's range; `inside`: points of
+    the track until it leaves the card's range; `range_exit`: the first point outside the card's range; None if there is
+    none.
     """
 
     name: str

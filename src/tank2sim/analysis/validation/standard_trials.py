@@ -45,14 +45,7 @@ _SIGMA_QUANTILES = (0.158655, 0.841345)
 
 @dataclass(frozen=True)
 class TrialShip:
-    """A card ready to run.
-
-    Parameters
-    ----------
-    card : SteeredCard
-    model : Model
-    integrator : Integrator
-    """
+    """A card ready to run."""
 
     card: SteeredCard
     model: Model
@@ -129,10 +122,6 @@ def craft_trials(cards: Sequence[SteeredCard]) -> dict[str, ThrusterManoeuvre]:
 
     The revolutions are those that all craft reach, in tens of rpm. A craft without thrusters at both sides has the
     straight run alone.
-
-    Parameters
-    ----------
-    cards : sequence of SteeredCard
     """
     ahead = [
         [thruster for thruster, holds in zip(card.thrusters, pushes_ahead(card), strict=True) if holds]

@@ -158,8 +158,6 @@ class Verified:
 
     Parameters
     ----------
-    trial, name : str
-    value : float
     halving : float or None
         Change when the step is halved.
     deviation : float or None

@@ -110,12 +110,7 @@ def nyquist_chart(
 ) -> ChartSpec:
     """Nyquist curves near the critical point (cross), with the circle of radius 1/Ms that the first one touches.
 
-    Parameters
-    ----------
-    loops : sequence of FrequencyResponse
-        Loop transfer L; 1 + L is what feedback divides by.
-    sensitivity_peak : float
-        Ms of the first.
+    `loops`: loop transfer L; 1 + L is what feedback divides by; `sensitivity_peak`: Ms of the first.
     """
     series = []
     for loop in loops:

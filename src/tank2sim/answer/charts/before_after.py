@@ -27,12 +27,8 @@ def switch(words: Sequence[str]) -> list[ChartSpec]:
 def before_after_switch(series: Mapping[str, str], field: str = "run") -> str:
     """The filter of a chart with a :func:`switch`: rows whose `field` is the series chosen, or no series of it.
 
-    Parameters
-    ----------
-    series : mapping
-        Word of the switch to the name of the series in the rows.
-    field : str
-        Field of the rows that names the series.
+    `series`: word of the switch to the name of the series in the rows; `field`: field of the rows that names the
+    series.
     """
     if len(series) < 2:
         return "true"
@@ -43,14 +39,8 @@ def before_after_switch(series: Mapping[str, str], field: str = "run") -> str:
 def misfit_maps(rows: Sequence[ChartRecord], models: Sequence[str], *, title: str = "") -> ChartSpec:
     """Misfit of each signal in each trial in noise units, in one scale of colours, to switch between models.
 
-    Parameters
-    ----------
-    rows : sequence of record
-        ``group`` (words for a kind of trials, or nothing), ``trial``, ``signal``, ``model`` and ``misfit`` (-) each.
-    models : sequence of str
-        Names to switch between, in their order from left to right.
-    title : str
-        Of the chart.
+    `rows`: ``group`` (words for a kind of trials, or nothing), ``trial``, ``signal``, ``model`` and ``misfit`` (-)
+    each; `models`: names to switch between, in their order from left to right.
     """
     groups = list(dict.fromkeys(row["group"] for row in rows))
     signals = list(dict.fromkeys(row["signal"] for row in rows))
@@ -82,18 +72,15 @@ def _maps(rows: Sequence[ChartRecord], signals: Sequence[str], models: Sequence[
         legend={"title": "misfit (noise units)", "gradientLength": 180},
         shown={"trial:N": "trial", "signal:N": "signal", "text:N": "misfit (noise units)"},
     ).layers
+    cell_px = max(40, 6 * max((len(name) for name in signals), default=0) + 8)
     head = {"title": None, "labelFontSize": 11, "labelAnchor": "start", "labelLimit": 260}
     return {
         "data": {"values": cells},
         "transform": [{"filter": before_after_switch({model: model for model in models}, "model")}],
         "facet": {"column": channel("head:N", sort=list(heads.values()), header=head)},
-        "spec": {"layer": layers, "width": _cell_width(signals) * len(signals), "height": ROW_PX * len(trials)},
+        "spec": {"layer": layers, "width": cell_px * len(signals), "height": ROW_PX * len(trials)},
         "spacing": 16,
     }
-
-
-def _cell_width(signals: Sequence[str]) -> int:
-    return max(40, 6 * max((len(name) for name in signals), default=0) + 8)
 
 
 def in_noise(misfit: float) -> str:

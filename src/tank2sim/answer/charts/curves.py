@@ -38,18 +38,9 @@ from tank2sim.records.thinning import thin_line
 class PlotSeries:
     """Values `y` (n,) over `x` (n,) under one name: a line, or points (measured); NaN leaves a gap.
 
-    Parameters
-    ----------
-    label : str
-        A line and points of one name have one colour.
-    x, y : array (n,)
-    low, high : array (n,), optional
-        Edges of the band of a line, or ends of the intervals of points.
-    points : bool
-    closed : bool
-        Whether `x` goes back and forth: the extremes of both are kept.
-    more : mapping
-        Further columns (n,), for the tooltip.
+    `label`: a line and points of one name have one colour; `x`, `y` (n,); `low`, `high` (n,): edges of the band of a
+    line, or ends of the intervals of points; `closed`: whether `x` goes back and forth: the extremes of both are kept;
+    `more`: further columns (n,), for the tooltip.
     """
 
     label: str
@@ -77,17 +68,7 @@ class PlotSeries:
 
 @dataclass(frozen=True, kw_only=True)
 class Plot:
-    """One panel: series along a vertical axis, with rules.
-
-    Parameters
-    ----------
-    series : sequence of PlotSeries
-    up : PlotAxis
-    height_px : int
-    rules : sequence of Rule
-    over : sequence of ChartSpec
-        Layers drawn over the series.
-    """
+    """One panel: series along a vertical axis, with rules. `over`: layers drawn over the series."""
 
     series: Sequence[PlotSeries]
     up: PlotAxis
@@ -113,17 +94,8 @@ def curve_layers(
 ) -> list[ChartSpec]:
     """Return the layers of a plot: rules, lines, bands, intervals, points, and places that answer to the pointer.
 
-    Parameters
-    ----------
-    plot : Plot
-    across : PlotAxis
-    look : SeriesLook
-    shown : TooltipFields, optional
-        Further fields of the tooltip, or other titles.
-    point_px : int, optional
-        Area of a point.
-    shaded : bool
-        Whether the intervals of points are drawn as a band.
+    `shown`: further fields of the tooltip, or other titles; `point_px`: area of a point; `shaded`: whether the
+    intervals of points are drawn as a band.
     """
     x, y = across.channel("x"), plot.up.channel("v")
     place = {"x": x, "y": y, "color": look.colour}
@@ -168,19 +140,8 @@ def curve_chart(
 ) -> ChartSpec:
     """Return one plot.
 
-    Parameters
-    ----------
-    plot : Plot
-    across : PlotAxis
-        Horizontal axis.
-    title : str or title with a line below
-    width_px : int
-    window : sequence of str
-        Axes along which a reader pans and zooms.
-    described : str
-        For those who do not see the chart; by default the axes and the names of the series.
-    **options
-        As of :func:`curve_layers`, and ``usermeta``.
+    `across`: horizontal axis; `window`: axes along which a reader pans and zooms; `described`: for those who do not see
+    the chart; by default the axes and the names of the series; **options: as of :func:`curve_layers`, and ``usermeta``.
     """
     usermeta = options.pop("usermeta", None)
     names = ", ".join(dict.fromkeys(each.label for each in plot.series))
@@ -205,12 +166,7 @@ def curve_panels(
 ) -> ChartSpec:
     """Return plots under each other with one horizontal axis, named at the last; the title of each is above it.
 
-    Parameters
-    ----------
-    plots : sequence of Plot
-        From top to bottom.
-    across, title, width_px, described, options
-        As of :func:`curve_chart`.
+    `plots`: from top to bottom; `across`, `title`, `width_px`, `described`, `options`: as of :func:`curve_chart`.
     """
     look = options.pop("look", None) or look_of([each for plot in plots for each in plot.series])
     panels = []

@@ -80,12 +80,7 @@ def place_labels(
 ) -> list[tuple[str, Spot]]:
     """Choose a place for each label, in their order; one without a free place is left out.
 
-    Parameters
-    ----------
-    labels : sequence of Label
-    frame : Frame
-    lines : sequence of pairs of arrays (n,)
-        Lines, across and up in units of the data, that labels should leave free.
+    `lines` (n,): lines, across and up in units of the data, that labels should leave free.
     """
     drawn = np.concatenate([np.empty((0, 2)), *(_traced(frame, *line) for line in lines)])
     chosen: list[tuple[str, Spot]] = []
@@ -109,12 +104,7 @@ def label_layers(
 ) -> list[ChartSpec]:
     """Return labels in their places, over a rim in the colour of the paper that keeps them legible.
 
-    Parameters
-    ----------
-    labels, frame, lines
-        As of :func:`place_labels`.
-    position : mapping
-        The channels ``x`` and ``y``.
+    `labels`, `frame`, `lines`: as of :func:`place_labels`; `position`: the channels ``x`` and ``y``.
     """
     fields = [position[axis]["field"] for axis in ("x", "y")]
     groups: dict[tuple[float, float, str], list[ChartRecord]] = {}

@@ -51,17 +51,9 @@ _ROUND = 3
 class Motion:
     """Motion of a ship in a manoeuvre, from the order on: arrays (n,), turns and offsets positive to starboard.
 
-    Parameters
-    ----------
-    time_s, ahead_m, starboard_m : array
-        Distances along and across the course at the order.
-    heading_deg, rudder_deg, rate_degps : array
-        Heading from that course, rudder angle and yaw rate.
-    speed_mps : array
-        Through the water.
-    revolutions_rpm : array, optional
-    length_m, beam_m : float, optional
-        Of the ship, for its outlines.
+    `time_s`, `ahead_m`, `starboard_m`: distances along and across the course at the order; `heading_deg`, `rudder_deg`,
+    `rate_degps`: heading from that course, rudder angle and yaw rate; `speed_mps`: through the water; `length_m`,
+    `beam_m`: of the ship, for its outlines.
     """
 
     time_s: Array
@@ -97,10 +89,7 @@ class Motion:
 def motion_of(columns: Mapping[str, Any], length_m: float | None = None, beam_m: float | None = None) -> Motion:
     """Return the motion from columns of the trial format: ``t_s``, ``x_m``, ``y_m``, ``psi_deg``, ``u_mps``, ...
 
-    Raises
-    ------
-    KeyError
-        A column is missing.
+    Raises KeyError: a column is missing.
     """
     way = along_course(columns, np.column_stack([vector(columns["x_m"]), vector(columns["y_m"])]))
     psi = vector(columns["psi_deg"])
@@ -179,16 +168,8 @@ def turn_chart(
 ) -> ChartSpec:
     """A turning circle with advance, transfer and tactical diameter, and the ship at equal times.
 
-    Parameters
-    ----------
-    motion : Motion
-    figures : mapping
-        ``advance_m``, ``transfer_m``, ``tactical_diameter_m``, ``time_180_s``.
-    bands : mapping, optional
-        NamedBands of the figures over an ensemble.
-    edges_m : pair of arrays (n, 2), optional
-        Edges of the band of the track: distance ahead and to starboard, m.
-    title : str
+    `figures`: ``advance_m``, ``transfer_m``, ``tactical_diameter_m``, ``time_180_s``; `bands`: bands of the
+    figures over an ensemble; `edges_m` (n, 2): edges of the band of the track: distance ahead and to starboard, m.
     """
     turned = np.abs(motion.heading_deg) <= _FULL_TURN
     dimensions = turn_dimensions(motion, figures, bands or {})
@@ -206,14 +187,8 @@ def way_chart(
 ) -> ChartSpec:
     """The track of a manoeuvre, both axes in one scale, with figures on it and the ship at equal times.
 
-    Parameters
-    ----------
-    motion : Motion
-    dimensions : sequence of Dimension
-    hulls_until : Motion, optional
-        The part of the motion with outlines of the ship; by default all of it.
-    edges_m, title
-        As of :func:`turn_chart`.
+    `hulls_until`: the part of the motion with outlines of the ship; by default all of it; `edges_m`, `title`: as of
+    :func:`turn_chart`.
     """
     polygon = _polygon(edges_m) if edges_m is not None else np.empty((0, 2))
     step, outlines = hull_rows(hulls_until or motion)
@@ -269,18 +244,9 @@ def zigzag_chart(
 ) -> ChartSpec:
     """Heading and rudder of a zigzag over time, each overshoot marked from the heading of the order to the peak.
 
-    Parameters
-    ----------
-    motion : Motion
-    figures : mapping
-        ``overshoots_deg``, ``execute_times_s`` and ``overshoot_times_s``, each a list.
-    heading_deg : float
-        Heading at which the rudder is reversed, positive.
-    bands : mapping, optional
-        NamedBands over an ensemble of ``overshoot_1_deg``, ...
-    edges_deg : three arrays (n,), optional
-        Times (s), and the edges of the band of the heading (deg).
-    title : str
+    `figures`: ``overshoots_deg``, ``execute_times_s`` and ``overshoot_times_s``, each a list; `heading_deg`: heading at
+    which the rudder is reversed, positive; `bands`: bands over an ensemble of ``overshoot_1_deg``, ...; `edges_deg`
+    (n,): times (s), and the edges of the band of the heading (deg).
     """
     peaks = overshoot_marks(motion, figures, heading_deg, bands or {})
     beyond = [peak[name] for peak in peaks for name in ("v", "low", "high") if name in peak]
@@ -341,13 +307,7 @@ def overshoot_marks(
 def pull_out_chart(sides: Mapping[str, Motion], neutral_deg: float, *, title: str = "") -> ChartSpec:
     """Yaw rate of pull-outs over the time from the order of the neutral rudder; both sides of a stable ship meet.
 
-    Parameters
-    ----------
-    sides : mapping
-        Label to motion, of the pull-out from each side.
-    neutral_deg : float
-        The neutral rudder.
-    title : str
+    `sides`: label to motion, of the pull-out from each side.
     """
     series = [
         PlotSeries(label=label, x=motion.time_s - pull_out_time(motion, neutral_deg), y=motion.rate_degps)

@@ -26,22 +26,10 @@ LOG_BLUES = {"type": "log", "domain": [1, DARKEST], "scheme": "blues", "clamp": 
 class Matrix:
     """Cells of a matrix, and their numbers; the data are those of the chart that they are in.
 
-    Parameters
-    ----------
-    colour : str
-        Field of the data that colours a cell.
-    rows, columns : sequence of str
-        In their order.
-    shown : TooltipFields
-        Fields of the tooltip.
-    names : pair of str
-        Fields of the data with the row and the column.
-    scale, legend : mapping
-        Scale of the colours, and their legend.
-    side, foot : mapping
-        Words of Vega-Lite for the axes of rows and columns.
-    written : bool
-        Whether the field ``text`` is written in each cell.
+    `colour`: field of the data that colours a cell; `rows`, `columns`: in their order; `shown`: fields of the tooltip;
+    `names`: fields of the data with the row and the column; `scale`, `legend`: scale of the colours, and their legend;
+    `side`, `foot`: words of Vega-Lite for the axes of rows and columns; `written`: whether the field ``text`` is
+    written in each cell.
     """
 
     colour: str

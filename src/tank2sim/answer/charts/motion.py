@@ -149,14 +149,8 @@ def track_chart(
 ) -> ChartSpec:
     """Tracks over each other, x north up and y east to the right, both axes in one scale (also when zoomed).
 
-    Parameters
-    ----------
-    tracks : sequence of TrackData
-        Measured ones are drawn as open points, the others as lines. The start is marked.
-    title : str
-        Title of the chart.
-    width_px, height_px : int
-        Size of the plot at most; it takes the shape of the tracks.
+    `tracks`: measured ones are drawn as open points, the others as lines. The start is marked. `title`: title of the
+    chart; `width_px`, `height_px`: size of the plot at most; it takes the shape of the tracks.
     """
     paths = [(track, vector(track.x_m), vector(track.y_m)) for track in tracks]
     frame = equal_frame(
@@ -206,18 +200,8 @@ def history_chart(
 ) -> ChartSpec:
     """Signals over each other with one time axis, the runs overlaid in each; angles in degrees.
 
-    Parameters
-    ----------
-    runs : sequence of History
-        Measured ones are drawn as open points, the others as lines.
-    signals : sequence of Signal
-        The panels from top to bottom.
-    title : str
-        Title of the chart.
-    width_px, height_px : int
-        Size of one panel.
-    marks : sequence of TimeMark
-        Places to tint.
+    `runs`: measured ones are drawn as open points, the others as lines; `signals`: the panels from top to bottom;
+    `width_px`, `height_px`: size of one panel; `marks`: places to tint.
     """
     span = np.concatenate([vector(run.time_s) for run in runs])
     across = PlotAxis(title="time (s)", domain=(float(np.nanmin(span)), float(np.nanmax(span))), nice=False)
@@ -234,13 +218,7 @@ def spiral_chart(
 ) -> ChartSpec:
     """Yaw rate against rudder angle, in degrees, the points joined in the order they were run.
 
-    Parameters
-    ----------
-    spirals : sequence of SpiralData
-    loop_rad : pair of float, optional
-        Rudder angles between which the ship has two steady turns, rad: the width of the loop is marked.
-    title : str
-        Title of the chart.
+    `loop_rad`: rudder angles between which the ship has two steady turns, rad: the width of the loop is marked.
     """
     degree = shown_unit("rad")[1]
     drawn = [(degree * vector(one.rudder_rad), degree * vector(one.yaw_rate_radps)) for one in spirals]
@@ -329,38 +307,26 @@ def motions(
 ) -> list[Illustration]:
     """The tracks of some runs in one chart, where positions are known, and their time histories in another.
 
-    Parameters
-    ----------
-    title : str
-        What the runs are.
-    runs : mapping
-        Label to columns; those in `measured` are drawn as points.
-    marks : sequence of TimeMark
-        By the name of the column without its unit.
+    `title`: what the runs are; `runs`: label to columns; those in `measured` are drawn as points; `marks`: by the name
+    of the column without its unit.
     """
     tables = {label: _in_si(columns) for label, columns in runs.items()}
     drawn = []
     if tracks := [_track(label, table, label in measured) for label, table in tables.items() if _moves(table)]:
         drawn.append(Illustration(chart=track_chart(tracks, title=f"Track: {title}")))
-    signals = _signals(runs)
-    if signals:
-        histories = [
-            History(label=label, time_s=table["t_s"], values=_by_stem(table), measured=label in measured)
-            for label, table in tables.items()
-        ]
-        height = 110 if len(signals) <= 6 else 80
-        chart = history_chart(histories, signals, title=f"Histories: {title}", height_px=height, marks=marks)
+    height = 110 if len(_signals(runs)) <= 6 else 80
+    if chart := columns_chart(runs, f"Histories: {title}", measured=measured, height_px=height, marks=marks):
         drawn.append(Illustration(chart=chart))
     return drawn
 
 
-def measured_histories(columns: _Columns, title: str) -> ChartSpec | None:
-    """The signals of a record over time, but its positions; None without any."""
-    return columns_chart({"measured": columns}, title)
-
-
 def columns_chart(
-    runs: Mapping[str, _Columns], title: str, *, measured: Sequence[str] = (), height_px: int = 60
+    runs: Mapping[str, _Columns],
+    title: str,
+    *,
+    measured: Sequence[str] = (),
+    height_px: int = 60,
+    marks: Sequence[TimeMark] = (),
 ) -> ChartSpec | None:
     """The signals of runs over time, but their positions, `measured` ones as points; None without any."""
     if not (signals := _signals(runs)):
@@ -370,7 +336,7 @@ def columns_chart(
         History(label=label, time_s=table["t_s"], values=_by_stem(table), measured=label in measured)
         for label, table in tables.items()
     ]
-    return history_chart(histories, signals, title=title, height_px=height_px)
+    return history_chart(histories, signals, title=title, height_px=height_px, marks=marks)
 
 
 def varying_histories(columns: _Columns, bands: Mapping[str, BandOverTime], band_t_s: Array) -> Illustration | None:

@@ -64,12 +64,8 @@ def every(rows: Sequence[ChartRecord], limit: int) -> list[ChartRecord]:
 def shown_unit(unit: str, display_unit: str | None = None) -> tuple[str, float]:
     """Unit in which a value is shown, and the factor to it; angles are shown in degrees.
 
-    Parameters
-    ----------
-    unit : str
-        Unit of the value; a unit that :data:`tank2sim.units.UNITS` lacks is shown as it is.
-    display_unit : str, optional
-        The unit to show it in instead, one of ``UNITS[unit].displays``.
+    `unit`: unit of the value; a unit that :data:`tank2sim.units.UNITS` lacks is shown as it is; `display_unit`: the
+    unit to show it in instead, one of ``UNITS[unit].displays``.
     """
     if unit not in UNITS:
         return unit, 1.0

@@ -77,10 +77,7 @@ def altair_chart(chart: ChartSpec | alt.TopLevelMixin) -> alt.TopLevelMixin:
 class AltairCharts(Mapping[str, "alt.TopLevelMixin"]):
     """Charts by name as objects of Altair, each made when it is first asked for: that takes a quarter of a second.
 
-    Parameters
-    ----------
-    charts : mapping
-        Chart by its name.
+    `charts`: chart by its name.
     """
 
     def __init__(self, charts: Mapping[str, ChartSpec | alt.TopLevelMixin]):
@@ -104,11 +101,7 @@ class AltairCharts(Mapping[str, "alt.TopLevelMixin"]):
 def chart_picture(chart: ChartSpec | alt.TopLevelMixin, ending: str = ".png") -> bytes:
     """The chart as a picture on white; needs no network and no browser.
 
-    Parameters
-    ----------
-    chart : ChartSpec or Chart of Altair
-    ending : str
-        ``.svg`` or ``.pdf``; else it is a PNG.
+    `ending`: ``.svg`` or ``.pdf``; else it is a PNG.
     """
     import vl_convert
 

@@ -39,23 +39,10 @@ def runs_of(rows: Sequence[ChartRecord]) -> list[str]:
 class RowPlot:
     """Rows along a horizontal axis, with rules.
 
-    Parameters
-    ----------
-    rows : sequence of ChartRecord
-        ``name`` and ``v`` (None: no mark) each; ``run`` (series), ``low``, ``high``, and what the tooltip shows.
-    across : PlotAxis
-    shown : TooltipFields, optional
-        Fields of the tooltip; by default the name and the value.
-    look : SeriesLook, optional
-        By default of the series of the rows, in their order.
-    names : sequence of str
-        The rows from top to bottom; by default as they come.
-    rules : sequence of Rule
-        Upright lines.
-    side : mapping
-        Words of Vega-Lite for the axis of the names.
-    apart : bool
-        Whether the series of a name are side by side in its row.
+    `rows`: ``name`` and ``v`` (None: no mark) each; ``run`` (series), ``low``, ``high``, and what the tooltip shows;
+    `shown`: fields of the tooltip; by default the name and the value; `look`: by default of the series of the rows, in
+    their order; `names`: the rows from top to bottom; by default as they come; `rules`: upright lines; `side`: words of
+    Vega-Lite for the axis of the names; `apart`: whether the series of a name are side by side in its row.
     """
 
     rows: Sequence[ChartRecord]
@@ -73,15 +60,8 @@ def row_layers(
 ) -> list[ChartSpec]:
     """Return the layers of rows: rules, the interval from ``low`` to ``high`` where rows have one, and their value.
 
-    Parameters
-    ----------
-    plot : RowPlot
-    mark : str
-        Whether the value is a point or a bar from zero.
-    span_px : float
-        Width of an interval.
-    **style
-        Of the mark: ``size``, ``height``, ``opacity``, ``filled`` ...
+    `mark`: whether the value is a point or a bar from zero; `span_px`: width of an interval; **style: of the mark:
+    ``size``, ``height``, ``opacity``, ``filled`` ...
     """
     rows, runs = plot.rows, runs_of(plot.rows)
     look = plot.look or (series_look(runs, as_points=runs) if runs else None)
@@ -117,16 +97,8 @@ def row_chart(
 ) -> ChartSpec:
     """Return a chart of rows.
 
-    Parameters
-    ----------
-    plot : RowPlot
-    title : str or title with a line below
-    described : str
-        For those who do not see the chart.
-    width_px, step_px : int
-        Width of the plot, and height of a row.
-    **marks
-        As of :func:`row_layers`.
+    `described`: for those who do not see the chart; `width_px`, `step_px`: width of the plot, and height of a row;
+    **marks: as of :func:`row_layers`.
     """
     size = (width_px, {"step": step_px} if plot.apart else step_px * max(1, len(names_of(plot.rows))))
     return layered(row_layers(plot, **marks), size=size, title=title, description=described)

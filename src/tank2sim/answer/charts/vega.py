@@ -54,26 +54,10 @@ def tooltips(shown: TooltipFields) -> list[ChartSpec]:
 class PlotAxis:
     """An axis with its scale.
 
-    Parameters
-    ----------
-    title : str
-        With the unit.
-    log : bool
-    domain : pair of float, optional
-    nice, zero : bool
-        Whether the scale is widened to round numbers, or to zero.
-    padding : float, optional
-        Room at both ends, px.
-    ticks : int or sequence of float, optional
-        How many ticks there are, about, or where they are.
-    form : str
-        Format of the numbers (d3-format).
-    above : bool
-        Whether the title is above the axis, across.
-    hidden : bool
-        Whether numbers and title are left out, for another panel has them.
-    scale : mapping, optional
-        Further words of Vega-Lite for the scale.
+    `title`: with the unit; `nice`, `zero`: whether the scale is widened to round numbers, or to zero; `padding`: room
+    at both ends, px; `ticks`: how many ticks there are, about, or where they are; `form`: format of the numbers
+    (d3-format); `above`: whether the title is above the axis, across; `hidden`: whether numbers and title are left out,
+    for another panel has them; `scale`: further words of Vega-Lite for the scale.
     """
 
     title: str
@@ -158,15 +142,8 @@ def layered(
 ) -> ChartSpec:
     """Return layers over each other.
 
-    Parameters
-    ----------
-    layers : sequence
-    size : pair
-        Width and height, px; a height ``{"step": 19}`` is that of one name.
-    window : sequence of str
-        Axes along which a reader pans and zooms.
-    **properties
-        ``title``, ``description``, ``usermeta``, ``data``, ``resolve``.
+    `size`: width and height, px; a height ``{"step": 19}`` is that of one name; `window`: axes along which a reader
+    pans and zooms; **properties: ``title``, ``description``, ``usermeta``, ``data``, ``resolve``.
     """
     found = {**given(**properties), "layer": list(layers), "width": size[0], "height": size[1]}
     if window:

@@ -10,13 +10,14 @@ target counts: its weight is raised until no other is worse.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tank2sim.apps.design.study import Certainty
 from tank2sim.arrays import Array
 
 _ROUNDS = 400
@@ -37,14 +38,8 @@ in the plan with whole numbers."""
 class InformationBlock:
     """Coefficients that are estimated together, independent of those of other blocks (a force of the captive tests).
 
-    Parameters
-    ----------
-    prior : array (k, k)
-        Information before any test, positive definite.
-    tests : array (n, k, k)
-        Information of each test.
-    targets : array (m, k, k)
-        L of each target, for the coefficients of this block.
+    `prior` (k, k): information before any test, positive definite; `tests` (n, k, k): information of each test;
+    `targets` (m, k, k): L of each target, for the coefficients of this block.
     """
 
     prior: Array
@@ -64,14 +59,7 @@ class InformationBlock:
 
 @dataclass(frozen=True, eq=False)
 class Allocation:
-    """Tests to choose from, their cost, and the targets.
-
-    Parameters
-    ----------
-    blocks : tuple of InformationBlock
-    cost : array (n,)
-        Time of each test, s.
-    """
+    """Tests to choose from, their cost, and the targets. `cost` (n,): time of each test, s."""
 
     blocks: tuple[InformationBlock, ...]
     cost: Array
@@ -193,6 +181,45 @@ class Allocation:
                 best = fewer.copy()
                 best[fitting[int(np.argmin(worst))]] += 1
         return None if best is None else self._filled(best, budget, likely)
+
+
+def certainty(
+    figures: Sequence[str], tests: Allocation, plans: Mapping[float, Array], usual: Array, usual_s: Sequence[float]
+) -> Certainty:
+    """Standard errors of figures by plans (share of the time to counts), and by the `usual` counts in `usual_s` s."""
+    shares = sorted(plans)
+    design = np.sqrt([tests.variances(plans[share]) for share in shares])
+    by_usual = np.sqrt([tests.variances(usual * each / float(usual @ tests.cost)) for each in usual_s])
+    return Certainty(
+        time_s=tuple(float(plans[share] @ tests.cost) for share in shares),
+        usual_time_s=tuple(usual_s),
+        design={figure: tuple(design[:, row].tolist()) for row, figure in enumerate(figures)},
+        usual={figure: tuple(by_usual[:, row].tolist()) for row, figure in enumerate(figures)},
+    )
+
+
+def least_time(
+    targets: Allocation, plans: Mapping[float, Array], plan: Callable[[float], Array | None], lowest: float | None
+) -> float | None:
+    """Least time (s), to 2 % of all, of a plan with no target above 1; None without one.
+
+    `plans`: share of the time to counts; `plan`: makes one of a share, None where that has no room for a test;
+    `lowest`: share below those of `plans`, by default half of the least that is good.
+    """
+    good = [share for share, counts in plans.items() if targets.variances(counts).max() <= 1.0]
+    if not good:
+        return None
+    high, found = min(good), plans[min(good)]
+    low = max((share for share in plans if share < high), default=0.5 * high if lowest is None else lowest)
+    while high - low > 0.02:
+        middle = (low + high) / 2
+        if (counts := plan(middle)) is None:
+            break
+        if targets.variances(counts).max() <= 1.0:
+            high, found = middle, counts
+        else:
+            low = middle
+    return float(found @ targets.cost)
 
 
 def target_matrices(slopes: Sequence[Array]) -> Array:

@@ -10,11 +10,11 @@ from functools import cached_property
 import numpy as np
 
 from tank2sim.analysis.influence.figures import InfluenceFigure
-from tank2sim.apps.design.allocation import Allocation, InformationBlock, target_matrices
-from tank2sim.apps.design.captive_information import GaugeErrors, PlannedCampaign
+from tank2sim.apps.design.allocation import Allocation, InformationBlock, certainty, least_time, target_matrices
+from tank2sim.apps.design.captive_information import PlannedCampaign
 from tank2sim.apps.design.captive_runs import PlannedRun, RunGroup, TankRuns, time_of
 from tank2sim.apps.design.figure_slopes import FigureSlopes, figure_slopes, hydrodynamic_derivatives, range_of_figures
-from tank2sim.apps.design.study import Certainty, PlannedCoefficient
+from tank2sim.apps.design.study import Certainty, GaugeStudy, PlannedCoefficient
 from tank2sim.apps.design.tank_form import TankFile, refuse_contradictions
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
@@ -51,7 +51,6 @@ class PlannedTest:
     ----------
     runs : tuple of PlannedRun
         A run, or one to either side.
-    repeats : int
     check : bool
         It is there to show whether the polynomial holds.
     """
@@ -67,10 +66,6 @@ class CaptiveDesign:
 
     Parameters
     ----------
-    card : ManoeuvringCard
-    tank_runs : TankRuns
-    planned : PlannedCampaign
-    slopes : FigureSlopes
     hours : float
         In the tank at most.
     tests : tuple of PlannedTest
@@ -176,9 +171,6 @@ class CaptiveDesigner:
     ----------
     card : ManoeuvringCard
         Polynomial; its values are the prior mean, its errors the spread of ships for which the plan is to be good.
-    tank : TankFile
-    figures : sequence of InfluenceFigure
-    settings : CaptiveDesignSettings
 
     Raises
     ------
@@ -259,18 +251,18 @@ class CaptiveDesigner:
                 )
                 remedy = f"give noise or zero of at least {_LEAST_ERROR:g} of the range"
                 raise InputError(self.settings.source, "gauges", problem, remedy)
-            gauges[force] = GaugeErrors(noise=max(noise, 1e-9 * span), zero=zero, largest=span if stated else math.inf)
+            gauges[force] = GaugeStudy(noise=max(noise, 1e-9 * span), zero=zero, range=span if stated else math.inf)
         return replace(bare, gauges=gauges)
 
     def _within_gauges(self, groups: Sequence[RunGroup]) -> tuple[RunGroup, ...]:
         gauges = self.planned.gauges
-        if all(math.isinf(gauge.largest) for gauge in gauges.values()):
+        if all(math.isinf(gauge.range) for gauge in gauges.values()):
             return tuple(groups)
         return tuple(
             group
             for group in groups
             if all(
-                value <= gauges[force].largest
+                value <= gauges[force].range
                 for run in group
                 for force, value in self.planned.largest_forces(run).items()
             )
@@ -369,33 +361,30 @@ class CaptiveDesigner:
                 plans[share], relaxed = self.plan(share * self._budget, relaxed)
             except InputError:
                 continue
-        ratios = self._targets.variances(counts)
-        count = len(self.slopes.figures)
+        figures = [figure.text for figure in self.slopes.figures]
+        usual_s = sorted({max(share * self._budget, self.usual_s) for share in plans})
+        checks = set(self.places["checks"].tolist())
         return CaptiveDesign(
             card=self.card,
             tank_runs=self.tank_runs,
             planned=self.planned,
             slopes=self.slopes,
             hours=self._budget / 3600,
-            tests=self._tests(counts),
+            tests=tuple(
+                PlannedTest(runs=self.groups[place], repeats=round(counts[place]), check=place in checks)
+                for place in np.flatnonzero(counts)
+            ),
             usual=self.usual,
             standard_errors=np.sqrt(self._at_card.variances(counts)),
             usual_standard_errors=np.sqrt(self._at_card.variances(usual)),
             gauge_shares=self._gauge_shares(counts),
             beyond_use=self.beyond_use,
-            ratios=ratios[count:],
-            curve=self._curve(plans),
+            ratios=self._targets.variances(counts)[len(figures) :],
+            curve=certainty(figures, self._at_card, plans, self.usual_counts, usual_s),
             hours_needed=self._needed(plans, relaxed),
             coefficients=self._coefficients(counts, usual),
             not_excited=self._not_excited(),
             too_strong=self.too_strong,
-        )
-
-    def _tests(self, counts: Array) -> tuple[PlannedTest, ...]:
-        checks = set(self.places["checks"].tolist())
-        return tuple(
-            PlannedTest(runs=self.groups[place], repeats=round(counts[place]), check=place in checks)
-            for place in np.flatnonzero(counts)
         )
 
     def _gauge_shares(self, counts: Array) -> dict[str, Array]:
@@ -404,39 +393,19 @@ class CaptiveDesigner:
         blocks = zip(self.information, self._at_card.blocks, strict=True)
         return {force: Allocation((block,), self._at_card.cost).variances(counts) / total for force, block in blocks}
 
-    def _curve(self, plans: Mapping[float, Array]) -> Certainty:
-        shares = sorted(plans)
-        design = np.sqrt([self._at_card.variances(plans[share]) for share in shares])
-        usual_s = sorted({max(share * self._budget, self.usual_s) for share in shares})
-        usual = np.sqrt([self._at_card.variances(self.usual_counts * each / self.usual_s) for each in usual_s])
-        cost = self._targets.cost
-        figures = list(enumerate(self.slopes.figures))
-        return Certainty(
-            time_s=tuple(float(plans[share] @ cost) for share in shares),
-            usual_time_s=tuple(usual_s),
-            design={figure.text: tuple(design[:, row].tolist()) for row, figure in figures},
-            usual={figure.text: tuple(usual[:, row].tolist()) for row, figure in figures},
-        )
-
     def _needed(self, plans: Mapping[float, Array], relaxed: Array) -> float | None:
-        """Least hours, to 2 % of all, of a plan with every figure as certain as by the usual matrix."""
-        good = [share for share, counts in plans.items() if self._targets.variances(counts).max() <= 1.0]
-        if not good:
-            return None
-        high = min(good)
-        low = max((share for share in plans if share < high), default=0.5 * high)
-        found = plans[high]
-        while high - low > 0.02:
-            middle = (low + high) / 2
+        """Least hours of a plan with every figure as certain as by the usual matrix."""
+
+        def plan(share: float) -> Array | None:
+            nonlocal relaxed
             try:
-                counts, relaxed = self.plan(middle * self._budget, relaxed)
+                counts, relaxed = self.plan(share * self._budget, relaxed)
             except InputError:
-                break
-            if self._targets.variances(counts).max() <= 1.0:
-                high, found = middle, counts
-            else:
-                low = middle
-        return float(found @ self._targets.cost) / 3600
+                return None
+            return counts
+
+        found = least_time(self._targets, plans, plan, None)
+        return None if found is None else found / 3600
 
     def _coefficients(self, counts: Array, usual: Array) -> dict[str, PlannedCoefficient]:
         """Standard errors of the coefficients, and the share of each figure's variance that each would take along."""

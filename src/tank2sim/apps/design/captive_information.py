@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.apps.design.captive_runs import PlannedRun, RunGroup
+from tank2sim.apps.design.study import GaugeStudy
 from tank2sim.arrays import Array
 from tank2sim.cards.terms import parse_term
 from tank2sim.identification.captive.equations import (
@@ -43,38 +44,11 @@ information of a plan without such runs invertible."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class GaugeErrors:
-    """Errors of a gauge, one standard deviation, N or N m.
-
-    Parameters
-    ----------
-    noise : float
-        Noise of an independent reading.
-    zero : float
-        Constant in a run.
-    largest : float
-        Its range to either side.
-    """
-
-    noise: float
-    zero: float
-    largest: float
-
-
-@dataclass(frozen=True, kw_only=True)
 class PlannedCampaign:
     """A model in a tank, with the coefficients known beforehand.
 
-    Parameters
-    ----------
-    model : ModelSection
-    speed_mps, water_density_kgpm3, gravity_mps2 : float
-    derivatives : mapping
-        Prime.
-    gauges : mapping
-        ``X``, ``Y``, ``N`` to the errors of the gauge.
-    gain_relative, rate_hz : float
-        Error of the gain from run to run; independent readings a second.
+    `derivatives`: prime; `gauges`: ``X``, ``Y``, ``N`` to the errors of the gauge; `gain_relative`, `rate_hz`: error of
+    the gain from run to run; independent readings a second.
     """
 
     model: ModelSection
@@ -82,7 +56,7 @@ class PlannedCampaign:
     water_density_kgpm3: float
     gravity_mps2: float
     derivatives: Mapping[str, float]
-    gauges: Mapping[str, GaugeErrors]
+    gauges: Mapping[str, GaugeStudy]
     gain_relative: float
     rate_hz: float
 

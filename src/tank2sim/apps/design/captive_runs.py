@@ -38,19 +38,9 @@ shows no more than the zero error of its run, and what a shorter one saves is le
 class PlannedRun:
     """One run of a plan; SI, rudder positive to starboard.
 
-    Parameters
-    ----------
-    type : str
-        As in ``[[runs]]`` of a campaign.
-    drift_rad, rudder_rad : float
-    frequency_radps : float
-        0 in a steady run.
-    velocity : float
-        Amplitude of v (m/s) in pure sway, of r (rad/s) in yaw.
-    speed_mps : float
-        U.
-    record_s, tank_s : float
-        Length of the record, and time in the tank until the next run can start.
+    `type`: as in ``[[runs]]`` of a campaign; `frequency_radps`: 0 in a steady run; `velocity`: amplitude of v (m/s) in
+    pure sway, of r (rad/s) in yaw; `speed_mps`: U; `record_s`, `tank_s`: length of the record, and time in the tank
+    until the next run can start.
     """
 
     type: RunType
@@ -99,13 +89,8 @@ RunGroup = tuple[PlannedRun, ...]
 class TankRuns:
     """Runs of a model in a tank.
 
-    Parameters
-    ----------
-    tank : TankFile
-    length_m, speed_mps : float
-        Length and speed of the model, and of the test.
-    largest : TestedRange
-        To which the tests go, before the limits of the mechanism.
+    `length_m`, `speed_mps`: length and speed of the model, and of the test; `largest`: to which the tests go, before
+    the limits of the mechanism.
     """
 
     tank: TankFile
@@ -164,10 +149,7 @@ class TankRuns:
     def frequencies(self, motion: str, count: int, ratio: float) -> list[float]:
         """Frequencies of a motion, rising, off the standing waves of the tank.
 
-        Raises
-        ------
-        InputError
-            The carriage is too short for the fewest cycles at any allowed frequency.
+        Raises InputError: the carriage is too short for the fewest cycles at any allowed frequency.
         """
         highest, lowest = self.highest_frequency(motion), self.lowest_frequency()
         if lowest > highest:

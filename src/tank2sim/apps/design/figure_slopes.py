@@ -34,19 +34,8 @@ _UNLISTED = 1e-12
 class FigureSlopes:
     """Figures and their slopes by named coefficients.
 
-    Parameters
-    ----------
-    figures : tuple of InfluenceFigure
-    values : array (m,)
-        Values of the card's ship.
-    parameters : tuple of CardParameter
-        k coefficients.
-    at_card : array (m, k)
-        Slopes of the card's ship.
-    drawn : array (draws, m, k)
-        Slopes of ships drawn from the errors, the card's first.
-    errors : JointErrors
-    notices : tuple of Notice
+    `values` (m,): values of the card's ship; `parameters`: k coefficients; `at_card` (m, k): slopes of the card's ship;
+    `drawn` (draws, m, k): slopes of ships drawn from the errors, the card's first.
     """
 
     figures: tuple[InfluenceFigure, ...]
@@ -90,18 +79,9 @@ def figure_slopes(
 ) -> FigureSlopes:
     """Slopes of figures by the derivatives of a card and by `terms` that it lacks.
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-    figures : sequence of InfluenceFigure
-    terms : sequence of str
-        Derivatives that may become known though the card has none.
-    draws : int
-        Ships drawn from the card's errors; a derivative without a stated one has :data:`.RELATIVE_ERROR`. Ships that do
-        not show all figures are left out.
-    seed : int
-    one_side : bool
-        Figures to the side of the given rudder, in place of the mean over both sides.
+    `terms`: derivatives that may become known though the card has none; `draws`: ships drawn from the card's errors; a
+    derivative without a stated one has :data:`.RELATIVE_ERROR`. Ships that do not show all figures are left out.
+    `one_side`: figures to the side of the given rudder, in place of the mean over both sides.
     """
     stated = {name: RELATIVE_ERROR * abs(value) for name, value in card.derivatives.items() if value}
     known = {f"derivatives.{name}" for name in stated} | {f"derivatives.{name}" for name in card.uncertainty}

@@ -10,11 +10,9 @@ from pathlib import Path
 from tank2sim.analysis.influence.figures import InfluenceFigure, parse_figure
 from tank2sim.apps.design.captive_design import CaptiveDesign, CaptiveDesigner, CaptiveDesignSettings, tank_runs
 from tank2sim.apps.design.figure_slopes import range_of_figures
-from tank2sim.apps.design.plan_files import run_rows, runs_of_campaign
-from tank2sim.apps.design.run_matrix import runs_of_matrix
+from tank2sim.apps.design.plan_files import run_rows, runs_of_campaign, runs_of_matrix
 from tank2sim.apps.design.study import (
     CampaignStudy,
-    GaugeStudy,
     PlannedFigure,
     PlannedKind,
     PlannedManoeuvre,
@@ -105,9 +103,7 @@ def _campaign_study(name: str, design: CaptiveDesign, notices: tuple[Notice, ...
             rudder_deg=math.degrees(runs.rudder_rad),
             yaw_rate_prime=runs.largest.yaw_rate_prime,
         ),
-        gauges={
-            force: GaugeStudy(gauge.noise, gauge.zero, gauge.largest) for force, gauge in design.planned.gauges.items()
-        },
+        gauges=dict(design.planned.gauges),
         figures=_planned_figures(design, variance_ratio=design.ratios),
         coefficients=design.coefficients,
         not_excited=design.not_excited,

@@ -12,16 +12,9 @@ from tank2sim.notices import Notice
 class PlannedFigure:
     """A figure, and its standard errors.
 
-    Parameters
-    ----------
-    value : float
-        Figure of the card's ship.
-    before : float, optional
-        By the errors of the card alone (of a trial).
-    design, usual : float
-        By the plan, and by the usual programme in the same time.
-    variance_ratio : float, optional
-        Variance by the plan over that by the usual programme, mean over the ships that the card may be (of a campaign).
+    `value`: figure of the card's ship; `before`: by the errors of the card alone (of a trial); `design`, `usual`: by
+    the plan, and by the usual programme in the same time; `variance_ratio`: variance by the plan over that by the usual
+    programme, mean over the ships that the card may be (of a campaign).
     """
 
     value: Number
@@ -35,16 +28,9 @@ class PlannedFigure:
 class PlannedCoefficient:
     """A coefficient, and its standard errors.
 
-    Parameters
-    ----------
-    value : float, optional
-        Prime value on the card (of a campaign).
-    before : float, optional
-        Standard error on the card (of a trial).
-    design, usual : float
-        By the plan and by the usual programme; of a campaign prime, of a trial over `before`.
-    share_of_variance : dict
-        Figure to the share of its variance that would go if this coefficient were known exactly (of a campaign).
+    `value`: prime value on the card (of a campaign); `before`: standard error on the card (of a trial); `design`,
+    `usual`: by the plan and by the usual programme; of a campaign prime, of a trial over `before`; `share_of_variance`:
+    figure to the share of its variance that would go if this coefficient were known exactly (of a campaign).
     """
 
     value: Number | None = None
@@ -128,7 +114,7 @@ class PlannedModel:
 
 @dataclass(frozen=True)
 class GaugeStudy:
-    """A gauge: standard deviations of its noise and zero, and its range; N or N m."""
+    """A gauge: standard deviations of an independent reading and of its zero in a run, and its range; N or N m."""
 
     noise: float
     zero: float

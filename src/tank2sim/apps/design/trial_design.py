@@ -14,7 +14,7 @@ import numpy as np
 
 from tank2sim.analysis.influence.figures import InfluenceFigure, parse_figure
 from tank2sim.analysis.influence.study import Study
-from tank2sim.apps.design.allocation import Allocation, InformationBlock, target_matrices
+from tank2sim.apps.design.allocation import Allocation, InformationBlock, certainty, least_time, target_matrices
 from tank2sim.apps.design.figure_slopes import FigureSlopes, figure_slopes
 from tank2sim.apps.design.study import Certainty, PlannedCoefficient
 from tank2sim.arrays import Array
@@ -52,15 +52,9 @@ _USUAL = ("turn:35", "turn:-35", "zigzag:10/10", "zigzag:20/20")
 class TrialManoeuvre:
     """A manoeuvre of a trial.
 
-    Parameters
-    ----------
-    name : str
-    manoeuvre : str
-        As ``simulate --manoeuvre`` takes it; empty for one that only its orders state.
-    duration_s, total_s : float
-        Duration of the manoeuvre, and with its approach.
-    orders : str
-        CSV of its orders by the card, for ``simulate --manoeuvre file:``.
+    `manoeuvre`: as ``simulate --manoeuvre`` takes it; empty for one that only its orders state; `duration_s`,
+    `total_s`: duration of the manoeuvre, and with its approach; `orders`: CSV of its orders by the card, for ``simulate
+    --manoeuvre file:``.
     """
 
     name: str
@@ -74,27 +68,12 @@ class TrialManoeuvre:
 class TrialDesign:
     """A designed trial.
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-    slopes : FigureSlopes
-    minutes : float
-        At most.
-    manoeuvres : tuple of (TrialManoeuvre, int)
-        With repeats.
-    usual : tuple of TrialManoeuvre
-        The usual set, once.
-    prior_errors, standard_errors, usual_standard_errors : array (m,)
-        Errors of each figure before the trial, after it, and after the usual set in the same time.
-    curve : Certainty
-    unstable : bool
-        The card's ship is unstable on a straight course: its figures are not linear in the coefficients.
-    minutes_needed : float or None
-        Least time of a plan with every figure as certain as by the usual set in `minutes`.
-    coefficients : mapping
-        Parameter to its standard error before, by the plan and by the usual set, relative to that before.
-    sensors : mapping
-        Variable to the standard deviation of a reading, SI.
+    `minutes`: at most; `manoeuvres`: with repeats; `usual`: the usual set, once; `prior_errors`,
+    `standard_errors`, `usual_standard_errors` (m,): errors of each figure before the trial, after it, and after the
+    usual set in the same time; `unstable`: the card's ship is unstable on a straight course: its figures are not linear
+    in the coefficients; `minutes_needed`: least time of a plan with every figure as certain as by the usual set in
+    `minutes`; `coefficients`: parameter to its standard error before, by the plan and by the usual set, relative to
+    that before; `sensors`: variable to the standard deviation of a reading, SI.
     """
 
     card: ManoeuvringCard
@@ -132,22 +111,10 @@ def design_of_trial(
 ) -> TrialDesign:
     """The trial that makes the worst figure most certain in a time.
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-        Its errors are the prior; a derivative without a stated one has :data:`.RELATIVE_ERROR`.
-    figures : sequence of InfluenceFigure
-    minutes : float or None
-        By default the time of the usual set.
-    sensors : mapping
-        Variable (``motion.*``) to the standard deviation of a reading a second, SI.
-    one_side : bool
-        Figures to the side of the given rudder, in place of the mean over both sides.
-
-    Raises
-    ------
-    InputError
-        The ship does not show a figure, leaves all bounds in every manoeuvre, or the time is too short.
+    `card`: its errors are the prior; a derivative without a stated one has :data:`.RELATIVE_ERROR`; `minutes`: by
+    default the time of the usual set; `sensors`: variable (``motion.*``) to the standard deviation of a reading a
+    second, SI; `one_side`: figures to the side of the given rudder, in place of the mean over both sides. Raises
+    InputError: the ship does not show a figure, leaves all bounds in every manoeuvre, or the time is too short.
     """
     slopes = figure_slopes(card, figures, (), draws=0, seed=0, one_side=one_side)
     stated = {name: RELATIVE_ERROR * abs(value) for name, value in card.derivatives.items() if value}
@@ -156,7 +123,9 @@ def design_of_trial(
     parameters = [each for each in card_parameters(known, study_model(known)) if each.name in estimated]
     errors = joint_errors(known, parameters)
     free = tuple(parameter.name for parameter in parameters)
-    ship = SailedShip(Explanation("card", card, free, errors.covariance), _seen(card, sensors), 0.0)
+    model = study_model(card)
+    seen = {name: size for name, size in sensors.items() if name in model}
+    ship = SailedShip(Explanation("card", card, free, errors.covariance), seen, 0.0)
     of, information = _candidates(card, ship)
     target = slopes.of([parameter.short for parameter in parameters], slopes.at_card) @ ship.axes
     if not np.abs(target).max(axis=1).all():
@@ -174,9 +143,12 @@ def design_of_trial(
                          "give more minutes")  # fmt: skip
     by_usual = every.variances(usual * budget / usual_s)
     targets = every.scaled(by_usual)
-    plans = {share: targets.whole(share * budget, targets.relaxed(share * budget)[0]).astype(float)
-             for share in (0.25, 0.4, 0.6, 0.8, 1.0) if share * budget >= cost.min()}  # fmt: skip
-    counts = plans[1.0]
+
+    def plan(share: float) -> Array:
+        return targets.whole(share * budget, targets.relaxed(share * budget)[0]).astype(float)
+
+    plans = {share: plan(share) for share in (0.25, 0.4, 0.6, 0.8, 1.0) if share * budget >= cost.min()}
+    counts, needed = plans[1.0], least_time(targets, plans, plan, float(cost.min()) / budget)
     return TrialDesign(
         card=card,
         slopes=slopes,
@@ -186,17 +158,14 @@ def design_of_trial(
         prior_errors=np.sqrt(every.variances(np.zeros(len(of)))),
         standard_errors=np.sqrt(every.variances(counts)),
         usual_standard_errors=np.sqrt(by_usual),
-        curve=_curve(slopes, every, plans, usual / usual_s, budget),
+        curve=certainty(
+            [each.text for each in figures], every, plans, usual, [share * budget for share in sorted(plans)]
+        ),
         unstable=bool(Study(card, [parse_figure("criterion_C")]).base[0] <= 0),
-        minutes_needed=_least(targets, budget, plans),
+        minutes_needed=None if needed is None else needed / 60,
         coefficients=_coefficients(ship.axes, block, counts, usual * budget / usual_s, free, errors.covariance),
         sensors=dict(sensors),
     )
-
-
-def _seen(card: ManoeuvringCard, sensors: Mapping[str, float]) -> dict[str, float]:
-    model = study_model(card)
-    return {name: size for name, size in sensors.items() if name in model}
 
 
 def _candidates(card: ManoeuvringCard, ship: SailedShip) -> tuple[list[TrialManoeuvre], Array]:
@@ -227,37 +196,6 @@ def _candidates(card: ManoeuvringCard, ship: SailedShip) -> tuple[list[TrialMano
         problem = "leaves all bounds in every manoeuvre of the usual set"
         raise InputError(card.source, "", problem, "check the card with tank2sim simulate")
     return found, np.stack(information)
-
-
-def _curve(
-    slopes: FigureSlopes, every: Allocation, plans: Mapping[float, Array], usual: Array, budget: float
-) -> Certainty:
-    shares = sorted(plans)
-    design = np.sqrt([every.variances(plans[share]) for share in shares])
-    by_usual = np.sqrt([every.variances(usual * share * budget) for share in shares])
-    figures = list(enumerate(slopes.figures))
-    return Certainty(
-        time_s=tuple(float(plans[share] @ every.cost) for share in shares),
-        usual_time_s=tuple(share * budget for share in shares),
-        design={figure.text: tuple(design[:, row].tolist()) for row, figure in figures},
-        usual={figure.text: tuple(by_usual[:, row].tolist()) for row, figure in figures},
-    )
-
-
-def _least(targets: Allocation, budget: float, plans: Mapping[float, Array]) -> float | None:
-    good = [share for share, counts in plans.items() if targets.variances(counts).max() <= 1.0]
-    if not good:
-        return None
-    high, found = min(good), plans[min(good)]
-    low = max((share for share in plans if share < high), default=float(targets.cost.min()) / budget)
-    while high - low > 0.02:
-        middle = (low + high) / 2
-        counts = targets.whole(middle * budget, targets.relaxed(middle * budget)[0]).astype(float)
-        if targets.variances(counts).max() <= 1.0:
-            high, found = middle, counts
-        else:
-            low = middle
-    return float(found @ targets.cost) / 60
 
 
 def _coefficients(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_panels
-from tank2sim.answer.charts.motion import columns_chart, measured_histories
+from tank2sim.answer.charts.motion import columns_chart
 from tank2sim.answer.charts.parts import LINE_SAMPLES, POINT_SAMPLES, with_unit
 from tank2sim.answer.charts.vega import ChartSpec, PlotAxis, Rule
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, table
@@ -211,7 +211,7 @@ def _filter_section(applied: FilterStudy) -> Section:
 
 def _trial_section(label: str, trial: TrialSignals) -> Section:
     charts = []
-    if chart := measured_histories(trial.histories, title=f"Measured: {label}"):
+    if chart := columns_chart({"measured": trial.histories}, title=f"Measured: {label}"):
         charts.append(Illustration(chart=chart, name=f"{label}_histories"))
     if trial.rudder_to_yaw_rate:
         charts += _steering_charts(label, trial.rudder_to_yaw_rate)

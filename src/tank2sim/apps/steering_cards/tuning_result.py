@@ -118,23 +118,13 @@ def _turn_rows(tuning: TwoPointTuning) -> list[list[Cell]]:
 
 
 def turn_table(tuning: TwoPointTuning) -> Table:
-    """Return both turns before and after.
-
-    Parameters
-    ----------
-    tuning : TwoPointTuning
-    """
+    """Return both turns before and after."""
     heads = ("rudder (deg)", "rate before (deg/min)", "rate after (deg/min)", "radius before (m)", "radius after (m)")
     return table("Turns before and after, positive to starboard", heads, _turn_rows(tuning))
 
 
 def stability_change(tuning: TwoPointTuning) -> tuple[str, ...]:
-    """Return a sentence if scaling made the ship stable or unstable on a straight course.
-
-    Parameters
-    ----------
-    tuning : TwoPointTuning
-    """
+    """Return a sentence if scaling made the ship stable or unstable on a straight course."""
     if tuning.course_stable_before == tuning.course_stable_after:
         return ()
     verdict = "stable" if tuning.course_stable_after else "unstable"
