@@ -103,7 +103,7 @@ def test_a_fit_that_drives_the_craft_on_is_not_blamed_on_the_card(craft) -> None
 
 @pytest.mark.parametrize("logged", [True, False], ids=["log", "positions alone"])
 def test_first_values_are_by_the_velocities_through_the_water_where_a_log_shows_them(logged) -> None:
-    """From rest in a current of 0.5 m/s: the log shows the time constant of 1.1 s, positions only the speed after it."""
+    """From rest in a current of 0.5 m/s: the log shows the time constant of 1.1 s, positions the speed after it."""
     otter = t2s.load("otter")
     rows = otter.simulate("straight:600", duration_s=12.0).df[::20].reset_index(drop=True)
     speed = rows["u_mps"].to_numpy()
