@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+import sys
 import threading
 from pathlib import Path
 
 import pytest
 
 from tank2sim.errors import InputError
-from tank2sim.files import read_exact_text, read_text, write_together, write_whole
+from tank2sim.files import STANDARD_OUTPUT, read_exact_text, read_text, write_together, write_whole
 
 
 def test_what_is_read_exactly_encodes_to_the_same_bytes(tmp_path: Path) -> None:
@@ -79,3 +80,10 @@ def test_a_name_that_cannot_be_written_is_reported_before_anything_is(tmp_path: 
 def test_a_name_as_long_as_the_system_allows_is_written(tmp_path: Path) -> None:
     write_whole(tmp_path / ("n" * 255), "x")
     assert (tmp_path / ("n" * 255)).read_text() == "x"
+
+
+def test_standard_output_that_is_closed_is_refused_and_nothing_is_written(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(sys, "__stdout__", None)  # as Python has it in a process without one
+    with pytest.raises(InputError, match="closed"):
+        write_together({tmp_path / "page.html": "<!doctype html>", STANDARD_OUTPUT: "{}"})
+    assert not list(tmp_path.iterdir())

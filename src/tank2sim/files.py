@@ -110,6 +110,8 @@ class _Target:
 
 def _target(given: Path) -> _Target:
     if given is STANDARD_OUTPUT:
+        if sys.__stdout__ is None:  # the process was started without one
+            raise InputError(given, "", "is standard output, which is closed", "give --json the name of a file")
         return _Target(given, given, False)
     if given.name == "-" and given.parent == Path():
         raise InputError(given, "", "is not the name of a file", "only --json writes to standard output")

@@ -100,4 +100,7 @@ def test_a_course_that_is_not_held_is_said_first(weather, word) -> None:
     assert bool(cautions) == bool(word)
     if word:
         assert word in cautions[0] and repr(result).startswith(cautions[0].line)
-    assert ("deg/s on the move" in result.headline[3]) == ("wind_mps" not in weather or weather["wind_mps"] < 100)
+    words = " ".join(result.headline)
+    kept = result.course_keeping
+    load = f"{kept['rudder_travel_degps']:.2g} deg/s, rate limit reached {kept['rate_limited_percent']:.2g} %"
+    assert (load in words) == ("rate limit" in words) == (weather.get("wind_mps", 0.0) < 100)

@@ -142,8 +142,10 @@ def test_craft_are_identified_and_validated_by_frames(otter_rows) -> None:
     otter, rows = t2s.load("otter"), otter_rows
     found = t2s.identify(otter, rows[:2], holdout=rows[2])
     assert abs(found.card.thrusters[0].ahead_Ns2 / 0.01108 - 1) < 0.05
-    checked = t2s.validate(otter, rows)
-    assert "trials[2]" in str(checked.to_dict())
+    checked = t2s.validate(otter, rows).to_dict()
+    assert "trials[2]" in str(checked)
+    shares = checked["predictions"]["determination"]  # the card is the truth
+    assert all(share > 0.999 for share in shares.values()) and checked["predictions"]["end_distance_m"] < 0.01
 
 
 def test_tows_and_yaw_records_are_frames(tmp_path) -> None:

@@ -13,9 +13,13 @@ import tank2sim as t2s
 from tank2sim.cards import CraftCard, parse_card
 from tank2sim.errors import InputError
 from tank2sim.identification.craft.card import identified_craft
+from tank2sim.identification.craft.first_values import _by_velocities
 from tank2sim.identification.craft.fit import CoefficientVerdict, CraftFit, determination
+from tank2sim.identification.craft.problem import craft_problem
 from tank2sim.identification.craft.study import _model_does_not_hold, worse_than_a_mean
 from tank2sim.notices import Level
+from tank2sim.records.craft_trials import read_craft_trial
+from tank2sim.records.csv_table import table_of_frame
 from tests.craft_trials import written
 
 
@@ -95,6 +99,24 @@ def test_a_fit_that_drives_the_craft_on_is_not_blamed_on_the_card(craft) -> None
     with pytest.raises(InputError) as refused:
         identified_craft(card, fit)
     assert refused.value.place == "derivatives.Xu" and "these trials" in refused.value.problem
+
+
+@pytest.mark.parametrize("logged", [True, False], ids=["log", "positions alone"])
+def test_first_values_are_by_the_velocities_through_the_water_where_a_log_shows_them(logged) -> None:
+    """From rest in a current of 0.5 m/s: the log shows the time constant of 1.1 s, positions the speed after it."""
+    otter = t2s.load("otter")
+    rows = otter.simulate("straight:600", duration_s=12.0).df[::20].reset_index(drop=True)
+    speed = rows["u_mps"].to_numpy()
+    rows["x_m"] += 0.5 * rows["t_s"]
+    trial = read_craft_trial(
+        table_of_frame(rows if logged else rows.drop(columns="u_mps"), "run"), otter.card.thrusters
+    )
+    (run,) = craft_problem(otter.card, [trial]).runs
+    derived = _by_velocities(run)
+    assert derived.seen[0] == "motion.u"
+    truth = np.interp(run.times, rows["t_s"], speed) + (0.0 if logged else 0.5)
+    late = run.times > (0.0 if logged else 5.0)
+    np.testing.assert_allclose(derived.measured[late, 0], truth[late], atol=0.01)
 
 
 @pytest.mark.parametrize(("rows", "place"), [("1.5", "order_port"), ("", "n_port_rpm")])

@@ -1,7 +1,7 @@
 """The audit: each fault put into a made-up record is found, a clean one raises no alarm; then real records."""
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -567,7 +567,7 @@ def test_no_pattern_of_empty_cells_and_times_breaks_the_audit():
         slow = replace(record, time_s=times * rng.choice([1.0, 1e-6, 1e6]), signals=signals)
         right, findings = audit_and_repair(slow)
         assert len(right.time_s) <= count
-        json.dumps([entry for one in findings for entry in one.as_json()])
+        json.dumps([asdict(entry) for one in findings for entry in one.entries])
 
 
 @pytest.mark.parametrize("manoeuvre", ["turn:35", "turn:-20"])

@@ -233,7 +233,7 @@ def test_thirteen_trials_take_little_of_the_page() -> None:
     gap = made_up.missing()
     trials = tuple(made_up.passed(f"trial_{place}", 5.0, 1.0, held_out=place > 6) for place in range(13))
     charts = charts_of(replace(gap, passed=trials))
-    assert sum(len(json.dumps(chart)) for chart in charts.values()) < 2e6
+    assert sum(len(json.dumps(chart_specification(chart))) for chart in charts.values()) < 2e6
 
 
 def test_what_was_found_but_not_measured_does_not_break_the_page() -> None:
@@ -278,7 +278,7 @@ def test_a_fault_of_kinematics_shows_the_missing_velocity_and_no_force() -> None
     assert {"signal", "when_signal"} <= set(drawn) and not {"force", "when_force"} & set(drawn)
     means = [row["f"] for row in rows_of(drawn["signal"]) if row.get("trials") == 2]
     assert np.mean(means) == pytest.approx(0.5, abs=0.02)
-    assert "missing velocity to east (m/s)" in json.dumps(drawn["when_signal"])
+    assert "missing velocity to east (m/s)" in json.dumps(chart_specification(drawn["when_signal"]))
     (where,) = (section for section in result_of(gap).sections if section.heading == "Where the gap is")
     assert "No force is missing" in where.text and "the motion over the ground" in where.text
     forced = replace(gap.effects[0], name="rudder_bias", parameters={}, standard_errors={})

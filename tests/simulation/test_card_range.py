@@ -104,9 +104,14 @@ def invoked(*arguments):
     ids=lambda arguments: arguments[0],
 )
 def test_a_command_whose_figures_leave_the_card_says_so_before_it_shows_any(arguments) -> None:
-    head, _, _ = invoked(*arguments).partition("┏")
-    marks = [line for line in head.splitlines() if "EXTRAPOLATED" in line]
-    assert marks and head.splitlines()[: len(marks)] == marks and all("card 0 U/L" in line for line in marks)
+    """Cautions come first; a mark below a table names a row of it that has no verdict."""
+    lines = invoked(*arguments).splitlines()
+    marks = [line for line in lines if "EXTRAPOLATED" in line and "card 0 U/L" in line]
+    first = [line for line in marks if line.startswith("CHECK: ")]
+    assert first and lines[: len(first)] == first
+    unjudged = [line for line in lines if line.rstrip(" -").endswith("beyond the card")]
+    for mark in (mark for mark in marks if mark not in first):
+        assert any(row.startswith(mark.partition(";")[0].partition(":")[0][:8]) for row in unjudged)
 
 
 def test_json_names_the_figures_outside_the_card(tmp_path) -> None:

@@ -151,11 +151,14 @@ def _alike(errors: Sequence[Array]) -> Array:
 
 
 def _by_velocities(run: SampledRun) -> SampledRun:
-    """The run with velocities over the ground in place of positions."""
+    """The run with velocities in place of positions: through the water as measured, else over the ground."""
     track = {name: run.column(SENSED_BY.get(name, name)) for name in ("motion.x", "motion.y", "motion.psi")}
     columns = {name: straight_over_gaps(run.times, column) for name, column in track.items()}
     derived = velocities_of(columns, run.step_s)
     gyro = run.column("gyro.rate")
     derived["motion.r"] = np.where(np.isfinite(gyro), gyro, derived["motion.r"])
     derived["motion.psi"] = columns["motion.psi"]
+    for name in ("motion.u", "motion.v"):
+        through_water = run.column(name)
+        derived[name] = np.where(np.isfinite(through_water), through_water, derived[name])
     return replace(run, measured=np.column_stack([derived[name] for name in _SEEN]), seen=_SEEN)

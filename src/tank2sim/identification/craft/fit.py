@@ -308,6 +308,8 @@ def _point(problem: Problem, values: Array, levels: Levels) -> tuple[SearchTask,
     Raises InputError: The filter loses the motion of a trial; the message names trial, time and axis.
     """
     task = task_of(problem, drifting=True)
+    # A signal that is constant in these runs has no noise of its own, and a filter that takes it as exact breaks down.
+    task = replace(task, first=task.first.at(np.maximum(task.first.vector, levels.vector)))
     try:
         point = task.first_point(values, levels)
     except FilterFault as error:
