@@ -107,7 +107,7 @@ def turning(card: SteeringCard, report: PaperNumbers) -> None:
             speed = turn.radius_m * turn.yaw_rate_radps
             report(f"{RUDDERS[place]:2} deg, radius times yaw rate, m/s", 7.7, speed, 0.01)
     report.heading("Fig. 1, curve 3 with its printed coefficients: yaw rate, deg/min, beside the trials'")
-    at_15, at_35 = (turn.in_degrees().yaw_rate_degpmin for turn in turns_of(card, "curve-3", (15, 35)).turns)
+    at_15, at_35 = (turn.in_degrees().yaw_rate_degpmin for turn in turns_of(card, "curve-3", (15, 35)))
     report("15 deg", 47.0, at_15, None, "the printed coefficients give 38")
     report("35 deg", 61.0, at_35, 0.6)
     drop = "the trials' 424 m at 20 deg and 61 deg/min at 35 deg need a loss of speed, which the models lack"
