@@ -120,6 +120,8 @@ def test_the_number_of_effects_is_the_one_written() -> None:
     sensors = sum(effect.acts_on == "sensor" for effect in EFFECTS.values())
     assert 45 < len(EFFECTS) - sensors < 55
     assert f"{sensors} more are errors of sensors" in (MANUAL / "features.md").read_text(encoding="utf-8")
+    for page in ("README.md", "CHANGELOG.md"):
+        assert re.search(r"some fifty (physical )?effects", (ROOT / page).read_text(encoding="utf-8")), page
 
 
 @pytest.mark.slow
