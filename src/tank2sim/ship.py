@@ -28,7 +28,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards import read_card
 from tank2sim.dynamics.vessel import Vessel
 from tank2sim.errors import InputError, close_name
-from tank2sim.files import write_together
+from tank2sim.files import FMU, refuse_other_ending, write_together
 from tank2sim.units import to_si
 
 if TYPE_CHECKING:
@@ -284,9 +284,11 @@ class Ship(Vessel):
         Raises
         ------
         InputError
-            No compiler is found, or the file cannot be written.
+            No compiler is found, or the file cannot be written, or its name ends as another kind of file's.
         """
         from tank2sim.api.fmu import make_fmu_file
+
+        refuse_other_ending(Path(path), FMU)
 
         made = make_fmu_file(self, Path(path), fmi=fmi, platforms=platforms, sources=sources, osp=osp, lean=lean)
         write_together(made.files, inputs=[Path(self.card.source)])

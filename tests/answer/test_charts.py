@@ -8,7 +8,7 @@ from PIL import Image
 from tank2sim.answer.charts.motion import TrackData, track_chart
 from tank2sim.answer.charts.parts import series_look
 from tank2sim.answer.charts.picture import VEGALITE_VERSION, altair_chart, chart_png, chart_specification
-from tank2sim.answer.charts.theme import DARK_TONE, LIGHT_PALETTE, LIGHT_TONE
+from tank2sim.answer.charts.theme import DARK_TONE, LIGHT_PALETTE, LIGHT_TONE, Tone, vega_config
 from tests.answer.example import every_chart
 
 
@@ -90,3 +90,8 @@ def test_words_and_limits_stand_out_from_the_paper(tone):
     for colour in (tone.ink, tone.muted, tone.limit):
         lighter, darker = sorted((luminance(colour), luminance(tone.paper)), reverse=True)
         assert (lighter + 0.05) / (darker + 0.05) >= 4.5
+
+
+@pytest.mark.parametrize("tone", [LIGHT_TONE, DARK_TONE], ids=["light", "dark"])
+def test_an_interval_without_a_series_has_the_ink_of_its_paper(tone: Tone) -> None:
+    assert vega_config(tone)["rule"]["color"] == tone.ink != tone.paper

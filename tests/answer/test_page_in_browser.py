@@ -7,8 +7,9 @@ from html import escape, unescape
 import altair as alt
 import pytest
 
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart
 from tank2sim.answer.charts.motion import TrackData, track_chart
-from tank2sim.answer.charts.vega import STACKS
+from tank2sim.answer.charts.vega import STACKS, PlotAxis
 from tank2sim.answer.page import Page, render_page
 from tank2sim.answer.parts import Illustration, Section
 from tests.answer.opened_page import CHROMIUM, opened
@@ -172,3 +173,27 @@ def test_halves_and_panels_are_side_by_side_only_where_there_is_room_and_folded_
     assert wide["halves"][0] == wide["halves"][1] and narrow["halves"][0] < narrow["halves"][1]
     for side_by_side, stacked in zip(wide["panels"], narrow["panels"], strict=True):
         assert len(set(side_by_side)) == 1 and stacked[0] < stacked[-1]
+
+
+PLOTS = """<script>
+const plots = [...document.querySelectorAll("iframe")].map((frame) => frame.contentDocument);
+const widths = () => {
+  if (plots.some((page) => page?.documentElement?.dataset.charts !== "drawn")) return setTimeout(widths, 100);
+  document.body.dataset.seen = JSON.stringify(plots.map((page) =>
+    page.querySelector(".role-frame .background").getBoundingClientRect().width));
+};
+setTimeout(widths, 300);
+</script>"""
+
+
+@pytest.mark.slow
+def test_a_legend_as_wide_as_the_window_does_not_squeeze_the_plot(tmp_path):
+    times = [0.0, 1.0, 2.0]
+    lines = [PlotSeries(label=name, x=times, y=times) for name in ("fit", "0.4 rad/s", "0.6 rad/s")]
+    chart = curve_chart(Plot(series=lines, up=PlotAxis(title="Yv")), PlotAxis(title="v'"), described="three lines")
+    inner = escape(render_page(Page(title="x", sections=[Section(heading="x", charts=[Illustration(chart=chart)])])))
+    frames = "".join(
+        f'<iframe width="{width}" height="800" srcdoc="{inner}"></iframe>' for width in range(340, 430, 10)
+    )
+    seen, _ = opened(f"<body>{frames}{PLOTS}</body>", tmp_path)
+    assert min(json.loads(unescape(re.search(r'data-seen="(.*?)"', seen)[1]))) > 120

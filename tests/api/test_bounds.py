@@ -256,3 +256,9 @@ def test_the_command_line_calls_an_argument_by_its_option(arguments: str, option
     done = tank2sim(*arguments.split(), cwd=tmp_path)
     assert option in done.stderr and not list(tmp_path.iterdir())
     refused(done)
+
+
+@pytest.mark.parametrize("text", ["15,5", "15kn", "fast"])
+def test_the_command_line_says_how_a_number_is_written(text: str, tmp_path: Path) -> None:
+    words = f"guess --length 320 --beam 58 --draught 20 --block 0.8 --speed {text}".split()
+    refused(tank2sim(*words, cwd=tmp_path), "--speed", f"{text!r} is not a number", "point for decimals")

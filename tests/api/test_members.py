@@ -101,3 +101,9 @@ def test_the_json_has_the_bands_alone(turned, tmp_path) -> None:
     assert "drawn" not in json.loads(path.read_text())["ensemble"]
     with pytest.raises(t2s.InputError, match="compute the result again"):
         _ = read_result(json.loads(path.read_text()), str(path)).members
+
+
+@pytest.mark.parametrize("members", [3, 20])
+def test_a_band_of_a_few_ships_is_doubted(members: int) -> None:
+    found = t2s.load("mariner").turn(20, members=members)
+    assert any(f"a band of {members} ships" in notice for notice in found.cautions) == (members == 3)

@@ -114,12 +114,15 @@ def test_results_refuse_the_ending_of_another_kind(tmp_path: Path) -> None:
         lambda: run.to_csv(tmp_path / "x.json"),
         lambda: run.plot(tmp_path / "x.html"),
         lambda: run.plot(tmp_path / "x.jpg"),
+        lambda: ship.to_fmu(tmp_path / "x.zip"),
         lambda: ship.save(tmp_path / "x.json"),
         lambda: ship.pilot_card().to_html(tmp_path / "x.pdf"),
         lambda: t2s.convert(ship, "mss").save(tmp_path / "x.py"),
     ):
         with pytest.raises(t2s.InputError, match="ends in"):
             write()
+    with pytest.raises(t2s.InputError, match=r"\.png or \.svg or \.pdf"):
+        run.plot(tmp_path / "x.jpg")
     assert not list(tmp_path.iterdir())
 
 

@@ -83,4 +83,4 @@ def test_reduce_writes_the_covariance_and_simulate_draws_from_it(data, tmp_path)
 
 def test_a_seed_without_an_ensemble_and_a_word_for_its_size_are_refused(tmp_path) -> None:
     refused(tank2sim("stability", "mariner", "--seed", "3", cwd=tmp_path), "--seed", "without members")
-    refused(tank2sim("stability", "mariner", "--members", "abc", cwd=tmp_path), "--members", "abc", "integer")
+    refused(tank2sim("stability", "mariner", "--members", "abc", cwd=tmp_path), "--members", "abc", "whole number")

@@ -12,6 +12,7 @@ import yaml
 
 import tank2sim as t2s
 from tank2sim.apps.programs.forms import FORMS
+from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.fmu.hosts import Host
 from tests.conftest import ROOT
 from tests.marks import first_fast
@@ -113,6 +114,14 @@ def test_the_image_and_the_container_take_a_python_that_is_supported() -> None:
 def test_the_map_for_language_models_names_pages_that_are_there() -> None:
     links = re.findall(r"\]\(([\w/]+)\.html\)", (MANUAL / "llms.txt").read_text(encoding="utf-8"))
     assert len(links) > 10 and [one for one in links if not (MANUAL / f"{one}.md").is_file()] == []
+
+
+def test_the_number_of_effects_is_the_one_written() -> None:
+    sensors = sum(effect.acts_on == "sensor" for effect in EFFECTS.values())
+    assert 45 < len(EFFECTS) - sensors < 55
+    assert f"{sensors} more are errors of sensors" in (MANUAL / "features.md").read_text(encoding="utf-8")
+    for page in ("README.md", "CHANGELOG.md"):
+        assert re.search(r"some fifty (physical )?effects", (ROOT / page).read_text(encoding="utf-8")), page
 
 
 @pytest.mark.slow

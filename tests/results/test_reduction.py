@@ -79,3 +79,10 @@ def test_a_result_read_from_its_json_has_the_same_page(kind: str, request: pytes
     again = type(result).read(result.to_dict(), "r.json")
     assert again.to_dict() == result.to_dict() and again.page() == result.page()
     assert t2s.make_report(result.to_dict()).page() == result.page()
+
+
+def test_measured_derivatives_below_their_standard_errors_are_counted(polynomial: ReductionResult) -> None:
+    table = polynomial.derivatives
+    measured = table[table["origin"] == "measured"]
+    lost = int((measured["value"].abs() < measured["standard_error"]).sum())
+    assert lost > 1 and f"{lost} of them are smaller than the standard error" in polynomial.headline[0]

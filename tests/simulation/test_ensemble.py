@@ -111,7 +111,7 @@ def test_what_is_drawn_beyond_a_bound_is_drawn_again_as_a_whole_and_reported() -
     found = ensemble(Linear(), held, 200, batch=7)
     assert found.redrawn.members == first > 40 and found.redrawn.beyond == {"a": first}
     assert f"{first} of 200 members" in found.notices[0] and f"(a {first})" in found.notices[0]
-    assert not found.unusable and ensemble(Linear(), DRAWS, 5).notices == []
+    assert not found.unusable and ensemble(Linear(), DRAWS, 10).notices == []
 
 
 def test_members_drawn_together_are_those_drawn_by_themselves_to_the_bit() -> None:

@@ -80,7 +80,7 @@
     const scale = picture.width.baseVal.value / width;
     const boxes = [...holder.querySelectorAll(".role-legend")].map((legend) => legend.getBoundingClientRect());
     const right = Math.max(...boxes.map((box) => box.right));
-    return (right - left) * scale <= room;
+    return (right - left) * scale + light.padding <= room;
   }
 
   function withStackedLegends(config, columns) {
@@ -149,8 +149,10 @@
         continue;
       }
       const growth = before && before.width > width ? (before.width - width) / (before.factor - factor) : width / factor;
+      // A second step is short: where a legend holds the width, the growth says nothing of the plot.
+      const least = before ? 0.5 : 0.05;
       before = { factor, width };
-      factor = Math.max(factor - (width - 0.99 * room) / growth, 0.05 * factor);
+      factor = Math.max(factor - (width - 0.99 * room) / growth, least * factor);
     }
     choose(place, kept);
     figures[place].querySelector(".tools").hidden = false;

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, get_arg
 
 from tank2sim.answer.charts.vega import ChartSpec
 from tank2sim.answer.parts import KeyFigure, Section, Table, notices_section
-from tank2sim.files import json_text, schema_name, write_together
+from tank2sim.files import PICTURE, json_text, refuse_other_ending, schema_name, write_together
 from tank2sim.notices import Level, Notice, foremost
 
 if TYPE_CHECKING:
@@ -172,13 +172,14 @@ class Result(ABC, Generic[_S]):
         Raises
         ------
         InputError
-            The file cannot be written.
+            The file cannot be written, or its name ends as no picture's.
         LookupError
             The chart does not exist.
         """
         from tank2sim.answer.charts.picture import altair_chart
 
         if path is not None:
+            refuse_other_ending(Path(path), PICTURE)
             write_together({Path(path): self.picture(name, ending=Path(path).suffix)})
         return altair_chart(self._chart_of_name(name))
 

@@ -273,14 +273,36 @@ def _type(kind: Any, several: Any) -> Any:
     return str if str in parts else next((part for part in parts if part in (int, float)), str)
 
 
+class _Number(click.FloatRange):
+    """A number between bounds; the message about any other text says how it is written."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        try:
+            float(value)
+        except ValueError:
+            self.fail(f"{value!r} is not a number; write it without a unit, and with a point for decimals", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+class _WholeNumber(click.IntRange):
+    """A whole number between bounds; the message about any other text says so."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        try:
+            int(value)
+        except ValueError:
+            self.fail(f"{value!r} is not a whole number", param, ctx)
+        return super().convert(value, param, ctx)
+
+
 def _number(limits: arguments.ArgumentBounds) -> Any:
     if limits == arguments.ArgumentBounds():
         return float
     if limits.whole:
-        return click.IntRange(
+        return _WholeNumber(
             None if limits.low is None else int(limits.low), None if limits.high is None else int(limits.high)
         )
-    return click.FloatRange(limits.low, limits.high, min_open=limits.above)
+    return _Number(limits.low, limits.high, min_open=limits.above)
 
 
 def _option(names: Sequence[str], *, name: str = "", **settings: Any) -> click.Option:

@@ -40,7 +40,7 @@ from tank2sim.answer.parts import (
 from tank2sim.answer.result import Result
 from tank2sim.arrays import Columns
 from tank2sim.errors import InputError
-from tank2sim.files import write_together
+from tank2sim.files import FMU, refuse_other_ending, write_together
 from tank2sim.simulation.trial_file import trial_columns
 
 if TYPE_CHECKING:
@@ -157,6 +157,7 @@ class ResultWithController(Result[_S]):
         InputError
             As :meth:`make_fmu`; or the file cannot be written.
         """
+        refuse_other_ending(Path(path), FMU)
         found = self.make_fmu(path, fmi=fmi, verify=verify)
         origin = self.piloted.ship.origin if self.piloted else ""
         write_together(found.files, inputs=[Path(origin)])

@@ -38,6 +38,9 @@ _LEFT_OUT = ("collinear", "not determined")
 _FEWEST_RUNS = 3
 """Least number of runs of a type whose range gives a scale for the error of their prediction."""
 
+_POOR_PREDICTION = 20.0
+"""Error of predicted runs, % of their range, above which it is marked. Project choice."""
+
 _AGAINST_MOTION = "Points: measured, bars: their 95 % intervals. Lines: the fit; shaded: its 95 % band."
 _CERTAINTY = "A derivative whose standard error is as large as its value (red) shows its order of magnitude only."
 
@@ -119,6 +122,8 @@ class ReductionResult(Result[ReductionStudy]):
     def headline(self) -> tuple[str, ...]:
         """Number of derivatives, errors of predicted runs, and the size of the card."""
         text = f"{self._measured} of {len(self.study.derivatives)} derivatives are measured"
+        if lost := self._lost:
+            text += f"; {lost} of them {'is' if lost == 1 else 'are'} smaller than the standard error"
         if worst := self._worst_predictions():
             errors = ", ".join(f"{_FORCES[force]} within {percent:.2g} %" for force, (percent, _) in worst.items())
             text += f". Each run is predicted from all the others, as a share of the range: {errors}"
@@ -127,6 +132,12 @@ class ReductionResult(Result[ReductionStudy]):
     @property
     def _measured(self) -> int:
         return sum(found.origin == "measured" for found in self.study.derivatives.values())
+
+    @property
+    def _lost(self) -> int:
+        """Measured derivatives that are smaller than their standard errors."""
+        rows = (found for found in self.study.derivatives.values() if found.origin == "measured")
+        return sum(abs(found.value) < found.standard_error for found in rows if found.standard_error is not None)
 
     def _size(self) -> list[str]:
         """The size of the card, if the campaign states a ship and the card is of the model."""
@@ -154,6 +165,7 @@ class ReductionResult(Result[ReductionStudy]):
                     label=f"{_FORCES[force].capitalize()} predicted within",
                     value=float(f"{percent:.2g}"),
                     unit="%",
+                    verdict=Verdict.CAUTION if percent > _POOR_PREDICTION else Verdict.NONE,
                     note=f"of its range, in {kind}, the worst type of run",
                 )
                 for force, (percent, kind) in self._worst_predictions().items()

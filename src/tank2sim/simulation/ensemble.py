@@ -41,6 +41,9 @@ at its bound every other draw is within, with ten such parameters one in a thous
 
 NOT_WITHIN = f"not one of {DRAWS} draws is within the bounds of all parameters"
 
+SCARCE = 10
+"""Members below which a band is doubted: one of 90 % then ends between the two outermost (project choice)."""
+
 TAIL = 0.05
 """Fraction of the members beyond either end of a 90 % band: with as many lost, the band is of other ships."""
 
@@ -303,8 +306,10 @@ class Ensemble:
 
     @property
     def notices(self) -> list[Notice]:
-        """Notices on members that were drawn again, or that are unusable."""
-        return [*self.redrawn.in_words(self.members), *self.of_unusable]
+        """Notices on members that are few, that were drawn again, or that are unusable."""
+        few = f"a band of {self.members} ships is as wide as these few happen to lie; take 200 members or more"
+        doubt = [Notice(few, Level.CAUTION)] if self.members < SCARCE else []
+        return [*doubt, *self.redrawn.in_words(self.members), *self.of_unusable]
 
     @property
     def of_unusable(self) -> list[Notice]:

@@ -11,6 +11,7 @@ import pytest
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.prepare_trials import at_size_of, measured
+from tank2sim.records.reading import read_trial_file
 from tank2sim.records.trials import Trial, froude_scaled
 
 
@@ -149,3 +150,13 @@ def test_the_same_fault_of_several_trials_is_reported_once(tmp_path: Path, card:
     assert all(any("a current of" in notice for notice in notices) for notices in each)
     (together,) = [notice for notice in measured(paths, card).notices if "a current of" in notice]
     assert "trial_0" in together and "trial_1" in together
+
+
+def test_columns_that_are_left_out_are_named_with_their_files(card: ManoeuvringCard, tmp_path: Path) -> None:
+    time = np.arange(0.0, 100.0, 0.5)
+    for name, speed in (("one", 7.7), ("two", 7.2)):
+        rows = [f"{t},{5 * np.sin(t / 20):.4f},{speed},{0.05 * speed * np.sin(t / 20 - 0.3):.4f},1" for t in time]
+        (tmp_path / f"{name}.csv").write_text("\n".join(["t_s,delta_deg,u_mps,r_degps,rudder", *rows]) + "\n")
+    given = [read_trial_file(tmp_path / f"{name}.csv") for name in ("one", "two")]
+    (notice,) = [notice for notice in measured(given, card).notices if "left out" in notice]
+    assert notice.startswith("one.csv, two.csv: ") and notice.endswith(": rudder")

@@ -107,6 +107,7 @@ def vega_config(tone: Tone) -> Config:
         | {"layout": {"top": {"anchor": "start", "direction": "horizontal", "margin": 30}}},
         "line": {"strokeWidth": 1.8, "strokeCap": "butt", "strokeJoin": "round"},
         "point": {"size": 32, "strokeWidth": 1.4, "filled": False, "opacity": 1},
+        "rule": {"color": tone.ink},
         "range": {"category": list(tone.palette)},
         "style": _styles(tone),
     }

@@ -74,13 +74,16 @@ class GuessResult(Result[GuessStudy]):
         study, given, settled = self.study, self._given, self._settled
         if not given:
             return (f"{study.ship}: no figures were given, so the dimensions alone define the intervals.",)
-        words = f"the given figures ({given}) settle {', '.join(settled) or 'no number of the card'}"
+        which = f"{len(settled) or 'none'} of {len(study.parameters)} numbers of the card"
+        which += f" ({', '.join(settled)})" if settled else ""
+        words = f"{given} {'figure was' if given == 1 else 'figures were'} given, which "
+        words += f"{'settles' if given == 1 else 'settle'} {which}"
         others = [figure for figure in study.figures.values() if figure.given is None]
         narrower = [1 - _width(figure) for figure in others if figure.by_dimensions.p95 > figure.by_dimensions.p5]
         if not narrower:
             return (f"{study.ship}: {words}.",)
         share = 100 * float(np.mean(narrower))
-        return (f"{study.ship}: {words}. The intervals of the other figures are {share:.0f} % narrower on average.",)
+        return (f"{study.ship}: {words}. The intervals of figures not given are {share:.0f} % narrower on average.",)
 
     @property
     def _given(self) -> int:

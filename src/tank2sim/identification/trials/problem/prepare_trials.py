@@ -67,8 +67,11 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unu
     trials: list[Trial] = []
     notices: list[Notice] = []
     audited: dict[str, list[Finding]] = {}
+    remarks: dict[str, list[Notice]] = {}
     for item in given:
-        trial, findings = audit_and_repair(item if isinstance(item, Trial) else read_trial_file(item))
+        read = item if isinstance(item, Trial) else read_trial_file(item)
+        remarks[read.path.name] = list(read.notices)
+        trial, findings = audit_and_repair(read)
         path = trial.path
         if wrong := next((finding for finding in findings if finding.open), None):  # not the quantity of its name
             place = f"column{'s' * (len(wrong.columns) > 1)} {wrong.column}"
@@ -96,7 +99,7 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unu
         odd = trials[by_angle.index(False)]
         remedy = "give trials that all have delta_deg, or all only delta_order_deg"
         raise InputError(odd.path, "header", "has no delta_deg, but other trials have", remedy)
-    notices = [*alike, *_of_audit(audited), *dict.fromkeys(notices)]
+    notices = [*alike, *_of_audit(audited), *_of_reading(remarks), *dict.fromkeys(notices)]
     doubts = tuple(
         RecordDoubt(Path(name).stem, finding.column, finding.likely_truth)
         for name, findings in audited.items()
@@ -109,6 +112,15 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unu
 def _taken_so(finding: Finding) -> bool:
     """Whether the trial was repaired as a finding says."""
     return finding.safe and finding.repair is not None
+
+
+def _of_reading(remarks: Mapping[str, Sequence[Notice]]) -> list[Notice]:
+    """Notices of the readers by file names, each once with all its files."""
+    files: dict[Notice, list[str]] = {}
+    for name, notices in remarks.items():
+        for notice in notices:
+            files.setdefault(notice, []).append(name)
+    return [notice.of(", ".join(names)) for notice, names in files.items()]
 
 
 def _of_audit(audited: Mapping[str, Sequence[Finding]]) -> list[Notice]:
