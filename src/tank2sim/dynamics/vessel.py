@@ -91,7 +91,7 @@ class Vessel:
     def replace(self, values: Mapping[str, object]) -> Self:
         """The ship with other values on its card, by dotted key: ``{"derivatives.Yv": -0.012}``.
 
-        Values are in the scaling and signs of the card's file, not in those of :attr:`derivatives`.
+        Values are in the scaling and signs of the card's file; :attr:`derivatives` has others.
 
         Raises
         ------

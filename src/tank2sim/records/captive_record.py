@@ -115,7 +115,7 @@ def read_captive_run(
         r_radps=_yaw_rate(table, sheet, psi, time),
         speed_mps=speed,
         delta_rad=rudder,
-        **{column: test.sense * _filled(table, column) for column in FORCE_COLUMNS.values()},
+        **{column: test.sense * table.filled_column(column, _GIVE_VALUES) for column in FORCE_COLUMNS.values()},
         y_m=y,
         psi_rad=psi,
         propeller_radps=revolutions,
@@ -141,16 +141,11 @@ def _yaw_rate(table: CsvTable, sheet: RunSheet, psi: Array | None, time: Array) 
     return np.asarray(np.gradient(np.unwrap(psi), time))
 
 
-def _filled(table: CsvTable, name: str) -> Array:
-    values = table.column(name)
-    empty = np.flatnonzero(np.isnan(values))
-    if empty.size:
-        raise InputError(table.path, table.place(int(empty[0]), name), "is empty", "give each row its value")
-    return values
+_GIVE_VALUES = "give each row its value"
 
 
 def _optional(table: CsvTable, name: str) -> Array | None:
-    return _filled(table, name) if name in table.columns else None
+    return table.filled_column(name, _GIVE_VALUES) if name in table.columns else None
 
 
 def _sway_velocity(table: CsvTable, sheet: RunSheet, motion: tuple[Array, Array | None, Array]) -> Array:

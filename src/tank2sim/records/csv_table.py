@@ -124,6 +124,33 @@ class CsvTable:
             raise InputError(self.path, self.place(row, name), problem, "sort the rows, and give each value once")
         return values
 
+    def filled_column(self, name: str, remedy: str) -> Array:
+        """Values of a column without empty cells, (rows,).
+
+        Raises
+        ------
+        InputError
+            The column does not exist, or a cell is empty: the message ends with `remedy`.
+        """
+        values = self.column(name)
+        empty = np.flatnonzero(np.isnan(values))
+        if empty.size:
+            raise InputError(self.path, self.place(int(empty[0]), name), "is empty", remedy)
+        return values
+
+    def positive_comment(self, key: str) -> float | None:
+        """The number in the comment line ``# key: number``; None without such a line.
+
+        Raises
+        ------
+        InputError
+            As :meth:`comment_number`, or it is not positive.
+        """
+        value = self.comment_number(key)
+        if value is not None and value <= 0:
+            raise InputError(self.path, f"comment {key}", f"is {value:g}", "a positive number was expected")
+        return value
+
     def comment_number(self, key: str) -> float | None:
         """The finite number in the comment line ``# key: number``; None without such a line.
 

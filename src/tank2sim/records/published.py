@@ -47,13 +47,13 @@ _LABORATORIES = {
     "HSVA": _Laboratory(
         columns=tuple("t_s x_m y_m psi_deg u_mps v_mps r_degps heel delta_deg n_rps thrust_N torque_Nm".split()),
         omission="column 8 (probably heel), thrust and torque are not part of the trial format and left out",
-        values="values are those of the model",
+        values="values are for the model",
         KVLCC2_length_m=7.0,
     ),
     "MARIN": _Laboratory(
         columns=tuple("t_s x_m y_m phi_deg psi_deg u_mps v_mps p_degps r_degps delta_deg n_rpm".split()),
         omission="the rate of roll is not a part of the trial format and left out",
-        values="values are those of the ship, scaled from a model",
+        values="values are for the ship, scaled from a model",
         KVLCC2_length_m=320.0,
     ),
 }

@@ -140,7 +140,7 @@ def stability_section(found: StabilityBands, criteria: Sequence[ImoCriterion]) -
 
 
 def chance_sentences(found: StabilityBands) -> list[str]:
-    """Return sentences on the probability of stability, and on that of meeting all criteria together."""
+    """Return sentences on the probabilities of stability and of meeting all criteria together."""
     sentences = []
     if found.probability_stable is not None and found.probability_stable_interval_95:
         interval = _interval(found.probability_stable_interval_95)

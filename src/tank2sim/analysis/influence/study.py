@@ -264,7 +264,7 @@ class EquilibriumFigures:
 
 
 def turning_states(model: Model) -> tuple[str, ...]:
-    """States that are constant in a steady turn: those of the hull, and those of the steering gear."""
+    """States that are constant in a steady turn: hull and steering gear."""
     return tuple(dict.fromkeys((*hull_states(model), *(state.name for state in model.states if state.steady))))
 
 

@@ -228,7 +228,7 @@ def _refuse_unlike(cards: Sequence[SteeredCard]) -> SteeredBy:
 
 
 def labels_of(cards: Sequence[SteeredCard]) -> tuple[str, ...]:
-    """Label of each card: its file's stem, or that of its folder for a bundled one, with a number for duplicates."""
+    """Label of each card: stem of its file, or name of its folder for a bundled one, with a number for duplicates."""
     stems = []
     for card in cards:
         path = Path(card.source)

@@ -118,7 +118,7 @@ def default_error(name: str, value: float) -> float:
 def parse_figures(manoeuvre: str, text: str) -> list[GivenFigure]:
     """Figures of an option: ``advance_m=970 tactical_diameter_m=980+-30``, the standard error after ``+-``.
 
-    InputError if a name is not that of a figure of the manoeuvre or is given twice, or a number is not positive.
+    InputError if the manoeuvre has no figure of a name, a name is given twice, or a number is not positive.
     """
     names, found = FIGURES[manoeuvre], {}
     for part in text.split():

@@ -411,7 +411,7 @@ def _find_unnamed_speed(search: ChannelSearch, stream: LogStream) -> None:
 
 
 def _closer_than_water(search: ChannelSearch, time: Array, speed: Array) -> bool:
-    """Whether a speed (m/s) follows that of the positions more closely than the one through the water does."""
+    """Whether a speed (m/s) follows the speed by the positions more closely than the one through the water does."""
     water = search.best("u_water")
     if water is None:
         return True

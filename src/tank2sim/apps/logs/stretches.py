@@ -164,7 +164,7 @@ class _Signals:
         return abs(piece.level) > self.threshold
 
     def same_power(self, first: _Piece, second: _Piece, steps: float = 1.0) -> bool:
-        """Whether the propulsion of the second of two pieces is that of the first; also if it is not known."""
+        """Whether two pieces have the same propulsion; also if it is not known."""
         return not abs(second.propulsion - first.propulsion) > steps * PROPULSION_STEP * self.full
 
 

@@ -216,7 +216,9 @@ def _clock_findings(names: list[str], found: ChannelSet, streams: list[LogStream
         shift = _shift(rates[names[0]], rates[name]) if names[0] in rates and name in rates else None
         if shift is not None and abs(shift) > _CLOCKS_AGREE_S:
             side = "ahead of" if shift > 0 else "behind"
-            text = f"the clock of {name} is {abs(shift):.3g} s {side} that of {names[0]} by the rate of turn: give "
+            text = (
+                f"the clock of {name} is {abs(shift):.3g} s {side} the clock of {names[0]} by the rate of turn: give "
+            )
             findings.append(fault(f"{text}its channels delay_s = {shift:.3g}", shift_s=shift))
     return findings
 

@@ -289,7 +289,7 @@ cosim run OspSystemStructure.xml --duration 600
 (N, to starboard); north, east (m) and heading (rad, not wrapped) `q[1]`, `q[2]`, `q[3]`. All start at zero, steps are
 of 0.04 s. Way-points are inputs of the Reference Generator (`x_wp`, `x_tp`, ...), as in the case's scenarios.
 
-`tank2sim check hull.fmu --for osp` looks at its description and groups. Its variables are those of the case and not of
+`tank2sim check hull.fmu --for osp` looks at its description and groups. It has the variables of the case and not of
 the card: the two cannot be compared."""
 
 
@@ -382,7 +382,7 @@ def gunnerus_model(card: SteeredCard) -> Model:
 
 
 def gunnerus_groups(described: Interface) -> tuple[Group, ...]:
-    """The groups of the case: six variables each, and of the outputs those of the plane, too."""
+    """The groups of the case: six variables each, and the outputs of the plane alone as well."""
 
     def group(variable: str, name: str, kinds: tuple[str, str], places: tuple[int, ...]) -> Group:
         parts = {"linear": [one for one in places if one < 4], "angular": [one for one in places if one > 3]}

@@ -65,7 +65,7 @@ class TrialState:
     length_m : float
     largest_rudder_rad : float
     draughts_recorded : bool
-        False where the draughts of the trial are not known: they are then taken to be those of the card.
+        False where nobody recorded the draughts: the card's are then taken.
     wind_speed_mps, wind_from_rad : float or None
         By the records, else by the notes.
     """
@@ -78,6 +78,11 @@ class TrialState:
     draughts_recorded: bool
     wind_speed_mps: float | None
     wind_from_rad: float | None
+
+    @property
+    def draughts_at_ends_m(self) -> tuple[float, float]:
+        """Draughts forward and aft."""
+        return self.draught_m - self.trim_m / 2, self.draught_m + self.trim_m / 2
 
     @property
     def at_full_load(self) -> bool:

@@ -116,8 +116,7 @@ def _remarks(study: TrialOffice) -> list[Row]:
     """What the form has no row for: current, wind, correction, and uncertainty."""
     rows, state = [], study.state
     if state.draughts_recorded:
-        half_trim = state.trim_m / 2
-        fore, aft = (format_number(state.draught_m + part, 4) for part in (-half_trim, half_trim))
+        fore, aft = (format_number(draught, 4) for draught in state.draughts_at_ends_m)
         rows.append(Row("Draughts of the trial", (f"{fore} m forward, {aft} m aft",)))
     if study.conditions_not_met:
         rows.append(Row("Conditions not met", (study.conditions_not_met,)))

@@ -210,7 +210,7 @@ class TrialOfficeResult(Result[TrialOffice]):
             text="The wind is taken off by the model: times its figure in calm water over that in the wind. At full "
             "load R = T F/B (MSC/Circ.1053): measured T, and simulated F at full load and B as tried, of the same "
             "member of the ensemble, so that errors of both cancel. Where the model as tried agrees with the trial, "
-            "its own figures F at full load may be used instead (option 2): those of the card full-load.toml.",
+            "its own figures F at full load may be used instead (option 2): simulate full-load.toml.",
             tables=[
                 table("Figures as run and at full load", heads, rows),
                 table("Corrections, step by step", steps, by_step, on_screen=False),
@@ -278,12 +278,11 @@ class TrialOfficeResult(Result[TrialOffice]):
         state, known = self.study.state, self._agreements
         checked = f"estimated; {sum(known)} of {len(known)} agree with the trial" if known else "estimated"
         full = checked if self.study.tested_at_full_load else "estimated"
-        half_trim = state.trim_m / 2
         agrees = bool(known) and sum(known) >= MODEL_AGREES * len(known)
         holds = (LOADING.name,) if agrees and self.study.loading_validity >= LOADING_HOLDS else ()
         return (
             DataBasis(state.full_load_draught_m, state.full_load_draught_m, full),
-            DataBasis(state.draught_m - half_trim, state.draught_m + half_trim, checked, holds),
+            DataBasis(*state.draughts_at_ends_m, checked, holds),
         )
 
     @property

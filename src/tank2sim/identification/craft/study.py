@@ -298,7 +298,7 @@ def _fit_notices(fit: CraftFit, driven_by: str, *, too_short: bool) -> Iterator[
     """Notices of thrust curves, held-out trials, orders, and of a model that does not hold."""
     thrust = [name for name in fit.undetermined if name.endswith((".ahead", ".astern"))]
     if thrust:
-        yield caution(f"the trials do not determine {', '.join(thrust)}: it is that of the card")
+        yield caution(f"the trials do not determine {', '.join(thrust)}: the card's value is kept")
     if too_short:
         least = PREDICTION_LEAD_S + SHORTEST_PREDICTION_S
         yield Notice(f"no held-out trial is longer than {least:g} s: none is predicted")
@@ -351,7 +351,7 @@ def worse_than_a_mean(r_squared: Mapping[str, float]) -> list[Notice]:
 def _dead_band_notices(card: SteeredCard, responses: Mapping[str, OrderResponse], driven_by: str) -> Iterator[Notice]:
     if not responses:
         words = "orders, and need revolutions" if driven_by == "orders" else "revolutions, and need orders"
-        yield Notice(f"dead bands are those of the card: the trials have {words} next to them")
+        yield Notice(f"dead bands are taken from the card: the trials have {words} next to them")
     for thruster in card.thrusters:
         response = responses.get(thruster.name)
         if response is None or response.dead_band is not None:

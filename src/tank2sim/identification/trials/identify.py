@@ -265,7 +265,7 @@ def _choose_structure(
     weights = {name: weight / sum(kept.values()) for name, weight in kept.items()}
     falling = sorted(weights, key=weights.__getitem__)[::-1]
     shares = ", ".join(f"{name} {100 * weights[name]:.0f} %" for name in falling)
-    words = "intervals are of all, the card is that of the first"
+    words = "intervals cover all methods, the card is from the first"
     notice = Notice(f"average over structures by their predictions: {shares}; {words}")
     return max(weights, key=weights.__getitem__), found, weights, (notice,)
 

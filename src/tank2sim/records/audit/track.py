@@ -290,7 +290,7 @@ def _offset(trial: Trial, found: WeakFit) -> Finding:
     return noted_in(trial, ["psi_rad"], what, truth, evidence, turned)
 
 
-_NO_UNIT = "the factor is that of no unit: velocities, positions or the clock are not what their names say"
+_NO_UNIT = "no unit has this factor: velocities, positions or the clock are not what their names say"
 FOOT_M = 0.3048
 _UNITS = {KNOT_MPS: "knots", 1 / 3.6: "km/h", FOOT_M: "ft/s"}
 """Factor between speed over ground and speed as given, to the unit of the velocities that it indicates."""

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
+from printed_tows import FORCE_N, FORCE_PRODUCTS, INNER_PRODUCTS
 
 from tank2sim.apps.rigs.tow.equation_error import (
     covariance,
@@ -22,18 +23,7 @@ from tank2sim.identification.conditioning import scaled_condition
 
 TERMS = ("B1", "B2", "B3")
 TIMES_S = np.arange(0, 51, 5.0)
-FORCE_N = 11.63
 PAPER_SPEED = Polynomial([-0.00493, 0.0043, -0.000017])  # (2.1); the inner products settle the sign of the first
-# as printed in the paper
-PRINTED_B = np.array(
-    [
-        [0.0006072, 0.0000264, 0.0001971, 0.0015685],
-        [0.0000264, 0.0000041, 0.0000276, 0.0001867],
-        [0.0001971, 0.0000276, 0.0001867, 0.0012860],
-        [0.0015685, 0.0001867, 0.0012860, 0.0090830],
-    ]
-)
-PRINTED_B0 = np.array([2.00615, 0.10564, 0.77341, 5.99223])
 
 
 @pytest.fixture
@@ -47,14 +37,14 @@ def table_1():
 
 
 def test_inner_products_are_those_printed(paper):
-    np.testing.assert_allclose(paper.inner_products, PRINTED_B, atol=2e-7, rtol=0)
+    np.testing.assert_allclose(paper.inner_products, INNER_PRODUCTS, atol=2e-7, rtol=0)
     # half a unit of the last digit, and 1.1e-5 by which all are low (T = 11.6299 N)
-    np.testing.assert_allclose(paper.force_products, PRINTED_B0, rtol=1.2e-5, atol=5e-6)
+    np.testing.assert_allclose(paper.force_products, FORCE_PRODUCTS, rtol=1.2e-5, atol=5e-6)
 
 
 def test_the_printed_sign_of_the_polynomial_gives_other_inner_products():
     wrong = discretise(Polynomial([0.00493, 0.0043, -0.000017]), TIMES_S, TERMS, FORCE_N)
-    assert np.max(wrong.inner_products / PRINTED_B) == pytest.approx(1.7, abs=0.05)
+    assert np.max(wrong.inner_products / INNER_PRODUCTS) == pytest.approx(1.7, abs=0.05)
 
 
 def test_simpson_has_ten_intervals_of_five_seconds():

@@ -101,7 +101,7 @@ def steady_glide(
     """The steady glide on a path (rad, + up), with a roll (rad, + starboard side down) and a net buoyancy m0 (kg, +
     light).
 
-    By default m0 is that of the card, light to climb and heavy to dive. 0 gives speed 0.
+    By default m0 is the card's, light to climb and heavy to dive. 0 gives speed 0.
 
     Raises
     ------

@@ -124,8 +124,8 @@ def read_tows(path: Path | str | CsvTable) -> Tows:
     if np.count_nonzero(read) < FEWEST_TIMES:
         problem = f"has readings at {np.count_nonzero(read)} times only"
         raise InputError(table.path, "", problem, f"give readings at {FEWEST_TIMES} times or more")
-    force, mass = _positive(table, "force_N"), _positive(table, "mass_kg")
-    body = {key: value for key in BODY_KEYS if (value := _positive(table, key)) is not None}
+    force, mass = table.positive_comment("force_N"), table.positive_comment("mass_kg")
+    body = {key: value for key in BODY_KEYS if (value := table.positive_comment(key)) is not None}
     return Tows(table.path, names, time[read], speed[read], force, mass, body)
 
 
@@ -135,13 +135,6 @@ def _check_name(table: CsvTable, name: str) -> None:
         problem = "is not a speed in m/s" if other else "is not a speed of a tow"
         remedy = f"{'convert it to m/s and' if other else 'delete it, or'} call it speed_1_mps, speed_2_mps, ..."
         raise InputError(table.path, f"column {name}", problem, remedy)
-
-
-def _positive(table: CsvTable, key: str) -> float | None:
-    value = table.comment_number(key)
-    if value is not None and value <= 0:
-        raise InputError(table.path, f"comment {key}", f"is {value:g}", "a positive number was expected")
-    return value
 
 
 def as_force(force: float | Polynomial) -> Polynomial:

@@ -345,7 +345,7 @@ def fit_energy(balance: Balance, record: YawRecord, programmed: Balance | None =
 def estimate_from(terms: tuple[str, ...], values: Array, covariance: Array, ideal: Interval) -> YawMethodEstimate:
     """An estimate from coefficients of terms, the first of them the inertia, and their covariance.
 
-    The dissipation is that of the `ideal` interval of the programme.
+    The dissipation is taken over the `ideal` interval of the programme.
     """
     names = [f"{term}_{ENERGY_TERMS[term][1]}" for term in terms]
     errors = np.sqrt(np.diag(covariance)).tolist()

@@ -226,7 +226,7 @@ def _identified(
 
 
 def _energy_estimates(fits: Fits, ideal: Interval) -> dict[str, YawMethodEstimate]:
-    """Estimates by the energy, with measured speeds and with those of the programme."""
+    """Estimates by the energy, with measured speeds and with the programme's."""
     fit, reference = fits
     plain, programmed = (estimate_from(each.balance.terms, each.coefficients, each.covariance, ideal) for each in fits)
     return {
@@ -239,7 +239,7 @@ def _energy_estimates(fits: Fits, ideal: Interval) -> dict[str, YawMethodEstimat
 
 
 def _added(found: YawMethodEstimate, body: _BodyInertia, constant_error: float) -> YawMethodEstimate:
-    """An estimate with lambda661 and its standard error: those of the total, of J_zz and of k_t together.
+    """An estimate with lambda661 and its standard error, by the errors of the total, J_zz and k_t together.
 
     The last is proportional to the total, or to the difference where J_zz was found in air with the same k_t.
     """

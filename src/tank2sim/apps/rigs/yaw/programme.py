@@ -192,7 +192,7 @@ def full_turns(programme: YawProgramme) -> YawProgramme:
 class Similarity:
     """A ship's turning motion at model size, by the Froude number over the beam and the Strouhal number of turning.
 
-    Lengths and beams of ship and model are those of the waterline.
+    Lengths and beams of ship and model are at the waterline.
     """
 
     ship_length_m: float

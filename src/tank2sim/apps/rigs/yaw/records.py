@@ -90,7 +90,10 @@ def read_yaw_record(path: Path | str | CsvTable) -> YawRecord:
     table = read_table(path).si()
     table.refuse_misspelt_keys((*_COMMENTS, *_PLAIN))
     time = table.increasing("t_s")
-    angle, current = _complete(table, "phi_rad"), _complete(table, "current_A")
+    angle, current = (
+        table.filled_column("phi_rad", "delete the row"),
+        table.filled_column("current_A", "delete the row"),
+    )
     medium = table.comments.get("medium", "water").strip().lower()
     if medium not in get_args(Medium):
         raise InputError(table.path, "comment medium", f"is {medium!r}", "write '# medium: air' or '# medium: water'")
@@ -101,7 +104,7 @@ def read_yaw_record(path: Path | str | CsvTable) -> YawRecord:
     turns = int(np.count_nonzero(np.abs(np.diff(angle)) > math.pi))
     if turns:
         notes.append(f"the angle jumps by a whole turn {turns} times and is put together again.")
-    constants = {key: value for key in _PLAIN if (value := _positive(table, key)) is not None}
+    constants = {key: value for key in _PLAIN if (value := table.positive_comment(key)) is not None}
     return YawRecord(
         path=table.path,
         time_s=time,
@@ -148,21 +151,6 @@ def yaw_record_text(record: YawRecord) -> str:
     return "\n".join([*head, "t_s,phi_rad,current_A", *body]) + "\n"
 
 
-def _complete(table: CsvTable, name: str) -> Array:
-    values = table.column(name)
-    empty = np.flatnonzero(np.isnan(values))
-    if empty.size:
-        raise InputError(table.path, table.place(int(empty[0]), name), "is empty", "delete the row")
-    return values
-
-
-def _positive(table: CsvTable, key: str) -> float | None:
-    value = table.comment_number(key)
-    if value is not None and value <= 0:
-        raise InputError(table.path, f"comment {key}", f"is {value:g}", "a positive number was expected")
-    return value
-
-
 def _programme(table: CsvTable, time: Array) -> tuple[YawProgramme, list[str]]:
     """The programme, and what the file does not state of it."""
     kinds = (*PROGRAMME_KINDS, "full_turn")
@@ -172,7 +160,7 @@ def _programme(table: CsvTable, time: Array) -> tuple[YawProgramme, list[str]]:
         raise InputError(table.path, "comment programme", problem, remedy)
     stated = {
         "max_rate_radps": _rate(table),
-        "rise_s": _positive(table, "rise_s"),
+        "rise_s": table.positive_comment("rise_s"),
         "settle_s": table.comment_number("settle_s"),
         "start_s": table.comment_number("start_s"),
     }

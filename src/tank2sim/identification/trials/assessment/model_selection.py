@@ -246,7 +246,7 @@ criterion takes for noise, shifts it by up to 0.2; on trials of a ship that has 
 choice: between the two)."""
 
 HARD_RUDDER = math.radians(35.0)
-"""Rudder of the turns that two structures are compared by: that of the turning test of IMO resolution MSC.137(76)."""
+"""Rudder of the turns that two structures are compared by: as in the turning test of IMO resolution MSC.137(76)."""
 
 NEARLY_HARD = 0.9
 """Share of that rudder from which a trial shows what a hard turn does (project choice)."""

@@ -115,7 +115,7 @@ def gauss_markov(form: WeakForm, windows: WeakWindows) -> tuple[Array, float]:
 
 
 def disturbed(model: Model) -> Model:
-    """The model with random forces; their parameters, 0 by default, are those of :func:`draw_disturbances`."""
+    """The model with random forces; :func:`draw_disturbances` names their parameters, 0 by default."""
     clock = State(
         name="disturbance.clock",
         unit="s",
