@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card
-from tank2sim.gap.inference.hypothesis import CLOCK
+from tank2sim.gap.inference.hypothesis import CLOCK, Hypothesis
 from tank2sim.gap.inference.likelihood import Likelihood
 from tank2sim.gap.inference.prior import LARGEST_SHARE, likelihood_from_card
 from tank2sim.identification.trials.problem.prepare_trials import Measured
@@ -20,14 +20,19 @@ STATED = {"Nr": 0.1, "Yd": 0.5}
 
 
 def posed(
-    *, by_angle: bool = True, gear: str = "time_constant_s = 0.5" + GEAR, stated: bool = False, duration: float = 60
+    *,
+    by_angle: bool = True,
+    gear: str = "time_constant_s = 0.5" + GEAR,
+    stated: bool = False,
+    duration: float = 60,
+    step: float = STEP,
 ) -> Likelihood:
     text = made_up_ship.CARD.replace("time_constant_s = 0.5", gear)
     if stated:
         text += "\n[uncertainty]\n" + "\n".join(f"{name} = {abs(TRUTH[name]) * s}" for name, s in STATED.items())
     card = parse_card(text, "made_up.toml")
     assert isinstance(card, ManoeuvringCard)
-    trial = made_up_ship.trial(made_up_ship.zigzag(20), duration=duration, step=STEP)
+    trial = made_up_ship.trial(made_up_ship.zigzag(20), duration=duration, step=step)
     if not by_angle:
         trial.signals["delta_order_rad"] = trial.signals.pop("delta_rad")
     return likelihood_from_card(card, Measured((trial,), "angle" if by_angle else "order", ()))
@@ -123,6 +128,19 @@ def test_the_rudder_s_clock_is_known_to_half_a_sample(by_angle: bool) -> None:
     # and its column is one of those that are integrated out
     place = individual(likelihood)[CLOCK]
     assert np.abs(likelihood.coefficient_columns[..., place]).max() > 0
+
+
+@pytest.mark.parametrize("by_angle", [True, False])
+@pytest.mark.parametrize("step", [0.5, 2.0])
+def test_an_error_of_the_clock_does_what_a_late_rudder_does(by_angle: bool, step: float) -> None:
+    likelihood = posed(by_angle=by_angle, step=step, duration=120)
+    late = Hypothesis(likelihood.none.card, likelihood.none.driven_by, ("rudder_time_offset",))
+    delay_s = 0.2 * step
+    driving, _ = likelihood.added(late, np.array([delay_s]))
+    by_clock = likelihood.coefficient_columns[..., individual(likelihood)[CLOCK]] * delay_s / (0.5 * step)
+    np.testing.assert_allclose(by_clock, driving, atol=0.05 * np.abs(driving).max())
+    # which therefore takes its place
+    assert not likelihood.of_coefficients(late, np.array([delay_s]))[..., individual(likelihood)[CLOCK]].any()
 
 
 def test_how_well_the_hull_is_known_says_nothing_of_gear_and_clock() -> None:

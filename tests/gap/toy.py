@@ -54,6 +54,7 @@ class Toy:
     card: SimpleNamespace = field(default_factory=lambda: SimpleNamespace(steering_gear=None, effects=()))
     model = SimpleNamespace(input_names=("rudder.command",))
     each = recorded = ()
+    moves_clock = False
 
     @property
     def moved_together(self):

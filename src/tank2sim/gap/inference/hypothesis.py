@@ -168,7 +168,8 @@ class Hypothesis:
         given = [EFFECTS[name].model_names()[key] for name in self._given for key in EFFECTS[name].measured_as]
         names = dict.fromkeys([*(estimate.variable for estimate in self.estimated), *given])
         chosen = ca.vcat([self.model.symbol(name) for name in names]) if names else ca.SX(0, 1)
-        states = bool(self._delays(np.ones(len(self.estimated)))) or ca.depends_on(self._of(self.unmeasured), chosen)
+        delays = any(EFFECTS[name].delays for name in self.effects)
+        states = delays or ca.depends_on(self._of(self.unmeasured), chosen)
         rates = states or ca.depends_on(self._known_rates, chosen)
         return states, rates, states or ca.depends_on(self._shown(SENSED), chosen)
 
@@ -248,8 +249,8 @@ class Hypothesis:
             found[name] = np.asarray(theta)[places].reshape(-1, 2)
         return found
 
-    def inputs(self, motion: MeasuredBatch, theta: Array) -> Array:
-        """Inputs of this model at every fine step (R, n - 1, nu)."""
+    def inputs(self, motion: MeasuredBatch, theta: Array, late_s: float = 0.0) -> Array:
+        """Inputs of this model at every fine step (R, n - 1, nu), the rudder's order later by `late_s`."""
         known = motion.inputs
         names = self.model.input_names
         runs, steps, count = known.shape
@@ -266,22 +267,22 @@ class Hypothesis:
             for variable in map(EFFECTS[effect].model_names().get, EFFECTS[effect].measured_as):
                 assert variable is not None
                 inputs[:, :, names.index(variable)] = motion.recorded[variable]
-        for name, delay in self._delays(theta).items():
-            if not self._states_behind(name):
+        for name, delay in self._delays(theta, late_s).items():
+            if delay and not self._states_behind(name):
                 place = names.index(name)
                 steps = np.full(runs, delay / motion.step_s)
                 inputs[:, :, place] = _late(inputs[:, :, place], steps)
         return inputs
 
-    def _delays(self, theta: Array) -> dict[str, float]:
+    def _delays(self, theta: Array, late_s: float = 0.0) -> dict[str, float]:
         """Name of each input whose record is not synchronous with the motion, to the delay of the ship, s."""
         keys = [(estimate.effect, estimate.parameter.name) for estimate in self.estimated]
         values = dict(zip(keys, map(float, theta), strict=True))
-        return {
-            name: values[effect, parameter]
-            for effect in self.effects
-            for name, parameter in EFFECTS[effect].delays.items()
-        }
+        found = {"rudder.command": late_s}
+        for effect in self.effects:
+            for name, parameter in EFFECTS[effect].delays.items():
+                found[name] = found.get(name, 0.0) + values[effect, parameter]
+        return found
 
     def _states_behind(self, name: str) -> tuple[int, ...]:
         """Indices of the states through which alone an input acts on the ship: these are delayed."""
@@ -294,8 +295,11 @@ class Hypothesis:
     # -- states, rates and readings
     # ---------------------------------------------------------------------------------------
 
-    def unmeasured_states(self, motion: MeasuredBatch, theta: Array, p: Array | None = None) -> Array:
-        """States that were not measured, at the fine instants (R, n, no); `p` are other parameters of the model."""
+    def unmeasured_states(
+        self, motion: MeasuredBatch, theta: Array, p: Array | None = None, late_s: float = 0.0
+    ) -> Array:
+        """States that were not measured, at the fine instants (R, n, no); `p` are other parameters of the model, and
+        `late_s` is a delay of the rudder's order."""
         if not self.unmeasured:
             return np.zeros((*motion.states.shape[:2], 0))
         inputs, p = self.inputs(motion, theta), self.parameters(theta) if p is None else p
@@ -306,8 +310,7 @@ class Hypothesis:
         unmeasured = np.array(
             [chain.run(starts[run], x[run, :-1], x[run, 1:], inputs[run], p) for run in range(len(x))]
         )
-        delays = {"rudder.command": 0.0} | self._delays(theta)
-        for name, delay in delays.items():
+        for name, delay in self._delays(theta, late_s).items():
             shown_late_s = ROWS_TO_SHOW_AN_ORDER * motion.unsure_s * (name == "rudder.command")
             delay_of_run = delay - shown_late_s
             if delay_of_run.any():
@@ -366,15 +369,17 @@ class Hypothesis:
                 rates = _rowwise(self._rates, *self._along(motion, theta, unmeasured), moved)
                 columns[..., names.index(name)] = (rates - base) / (moved[place] - p[place])
         if CLOCK in names:
-            late = self.unmeasured_states(motion, theta), self.inputs(motion, theta)
-            behind = self._states_behind("rudder.command")
-            for rows, places in zip(late, (behind, () if behind else (self._command,)), strict=True):
-                for place in places:
-                    rows[..., place] = _late(rows[..., place], np.ones(len(rows)))
+            late_s = SMALL_SHARE * motion.step_s
+            late = self.unmeasured_states(motion, theta, late_s=late_s), self.inputs(motion, theta, late_s)
             middles = motion.over_blocks(0.5 * (late[0][:, 1:] + late[0][:, :-1]))
             rates = _rowwise(self._rates, along[0], middles, motion.over_blocks(late[1]), p)
-            columns[..., names.index(CLOCK)] = (rates - base) / motion.step_s
+            columns[..., names.index(CLOCK)] = (rates - base) / late_s
         return columns
+
+    @property
+    def moves_clock(self) -> bool:
+        """Whether an effect delays the rudder's record, as an error of its clock does."""
+        return any("rudder.command" in EFFECTS[name].delays for name in self.effects)
 
     @property
     def _command(self) -> int:

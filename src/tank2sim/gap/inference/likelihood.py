@@ -155,7 +155,10 @@ class Likelihood:
         if not names:
             return np.zeros((*self._lack.shape, 0))
         slopes_by_name = hypothesis.coefficient_slopes(self.motion, theta, names)
-        columns = slopes_by_name @ self.coefficients.mixing
+        mixing = self.coefficients.mixing
+        if hypothesis.moves_clock:  # its delay takes the place of the record's
+            mixing = np.where(np.array(names)[:, None] == CLOCK, 0.0, mixing)
+        columns = slopes_by_name @ mixing
         if self._moves.shape[-1]:
             late = slopes_by_name[..., [names.index(CLOCK)]] * self._moves[:, :, None, :]
             columns = np.concatenate([columns, late], axis=-1)
