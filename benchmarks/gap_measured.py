@@ -33,12 +33,12 @@ from identify_esso_osaka import FIXED, spans
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.diagnosis.residuals import estimates, surroundings_by_trial
+from tank2sim.gap.improve_card import Found, add_effects_to_card, in_short
 from tank2sim.gap.inference.prior import likelihood_from_card
-from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults
 from tank2sim.gap.outcome.export import joined
-from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card, in_short
-from tank2sim.gap.outcome.surroundings import with_surroundings
+from tank2sim.gap.proof.correct_sensors import correct_sensor_faults
 from tank2sim.gap.proof.replay import replay_trials
+from tank2sim.gap.proof.surroundings import with_surroundings
 from tank2sim.gap.result import Gap, Passed
 from tank2sim.gap.search.explanations import search
 from tank2sim.gap.workflow import GapOptions, run_gap_workflow

@@ -29,7 +29,7 @@ from tank2sim.apps.trial_office.study import study_trials
 from tank2sim.cards import ManoeuvringCard
 from tank2sim.cards.reading import revised
 from tank2sim.dynamics import build
-from tank2sim.gap.outcome.improve_card import add_effects_to_card
+from tank2sim.gap.improve_card import add_effects_to_card
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.card_range import single_figures
 from tank2sim.simulation.integrator import Integrator

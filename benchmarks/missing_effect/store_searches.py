@@ -25,9 +25,10 @@ from pathlib import Path
 
 import tank2sim as t2s
 from tank2sim.arguments import MOST_EFFECTS
+from tank2sim.gap.diagnosis.strangeness import find_strangeness
 from tank2sim.gap.inference.prior import candidate_explanations, likelihood_from_card
+from tank2sim.gap.search.decision import decide, is_significant
 from tank2sim.gap.search.explanations import Search, search
-from tank2sim.gap.search.model_choice import decide, find_strangeness, is_significant
 from tank2sim.gap.workflow import nonlinear_card
 from tank2sim.identification.trials.problem.prepare_trials import measured
 from tank2sim.identification.trials.problem.problem_from_card import above_low_speed, polynomial_over_trials

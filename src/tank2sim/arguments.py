@@ -102,7 +102,7 @@ MOST_EFFECTS = 4
 Effects = Annotated[int, ArgumentBounds(1, MOST_EFFECTS, whole=True)]
 FalseDiscovery = Annotated[float, ArgumentBounds(0.01, 0.5)]
 """Probability with which an effect that is named alone may be wrong: from the one that even the surest name has
-(:data:`tank2sim.gap.search.model_choice.SUREST`) to a guess."""
+(:data:`tank2sim.gap.search.decision.SUREST`) to a guess."""
 Count = Annotated[int, ArgumentBounds(1, whole=True)]
 ENSEMBLE = ArgumentBounds(0, 10_000_000, whole=True)
 """Ships of an ensemble. Project choice: a day of computing."""

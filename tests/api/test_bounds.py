@@ -27,7 +27,7 @@ from tank2sim.arguments import (
 )
 from tank2sim.cli import COMMANDS
 from tank2sim.cli import tank2sim as group
-from tank2sim.gap.search.model_choice import LIKELY, SUREST
+from tank2sim.gap.search.decision import LIKELY, SUREST
 from tests.cli.command_line import refused, tank2sim
 
 SHIP = t2s.load("mariner")

@@ -14,7 +14,7 @@ import pytest
 
 import tank2sim as t2s
 from tank2sim.bundled import bundled
-from tank2sim.gap.outcome.correct_sensors import corrected_text
+from tank2sim.gap.proof.correct_sensors import corrected_text
 from tank2sim.records.csv_table import read_table, table_of_frame
 from tests.apps.logs.made_logs import frame as logged
 from tests.yaw_truth import Truth, record, written

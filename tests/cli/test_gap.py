@@ -16,7 +16,7 @@ from tank2sim import find_gap, make_report
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
-from tank2sim.gap.outcome.improve_card import add_effects_to_card, card_with_effects_text
+from tank2sim.gap.improve_card import add_effects_to_card, card_with_effects_text
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, Gap, Named
 from tank2sim.identification.trials.problem.prepare_trials import fitted_as
 from tank2sim.simulation.manoeuvres import parse_manoeuvre

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults, corrected_text
+from tank2sim.gap.proof.correct_sensors import correct_sensor_faults, corrected_text
 from tank2sim.records.audit import repair_trial
 from tank2sim.records.reading import read_trial_file
 from tank2sim.records.trials import Trial, froude_scaled

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card
-from tank2sim.gap.proof.cross_check import black_box, closes_gap, trial_consistency, worse_trials
+from tank2sim.gap.diagnosis.strangeness import trial_consistency
+from tank2sim.gap.proof.cross_check import black_box, closes_gap, worse_trials
 from tank2sim.gap.result import Passed
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tests.gap.replay_noise import NOISE

@@ -15,7 +15,7 @@ from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics import Model, build
 from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.gap.outcome.improve_card import _rounded, add_effects_to_card, card_with_effects_text
+from tank2sim.gap.improve_card import _rounded, add_effects_to_card, card_with_effects_text
 from tank2sim.units import to_si
 from tests.dynamics.effects.ships import TYPICAL, card_with, mariner_text
 from tests.marks import first_fast

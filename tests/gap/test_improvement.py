@@ -102,15 +102,6 @@ def proof(*moved: float) -> Proof:
     return Proof((), NamedEffects(), CARD, CARD, [passed(1.0, 1.0)], coefficients)
 
 
-@pytest.mark.parametrize(
-    ("moved", "other", "farther"), [(6.0, 3.0, True), (6.0, 7.0, False), (3.0, 1.0, False), (-6.0, 0.0, True)]
-)
-def test_a_coefficient_is_farther_off_beyond_several_errors_and_those_of_the_other(moved, other, farther) -> None:
-    sizes = [coefficient.moved for coefficient in proof(moved).coefficients]
-    assert proof(moved, 0.5).farthest == max(*sizes, proof(0.5).farthest) and proof().farthest == 0.0
-    assert proof(moved).is_farther_off(proof(other)) == farther
-
-
 def test_only_faults_of_sensors_are_taken_from_what_was_measured() -> None:
     named = [("rudder_lag", {}, {}), ("gyro_bias", {"rate_radps": 0.01}, {}), ("wind", {}, {})]
     assert [name for name, *_ in sensor_faults(named)] == ["gyro_bias"]

@@ -12,7 +12,7 @@ from gap_truth import HULLS, Made, Setting, make, sampled, write
 from gap_truth.disturbances import WHITE, noise_scale
 
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
-from tank2sim.gap.outcome.improve_card import add_effects_to_card
+from tank2sim.gap.improve_card import add_effects_to_card
 from tank2sim.gap.proof.open_loop import Replayer, input_record
 from tank2sim.gap.proof.replay import replay_trials
 from tank2sim.identification.trials.problem.prepare_trials import measured

@@ -13,7 +13,6 @@ from scipy.optimize import minimize_scalar
 from tank2sim.gap.inference import form_error, kalman_kernels
 from tank2sim.gap.inference import likelihood as module
 from tank2sim.gap.inference.fit import NARROWER, Belief, ExplanationFit
-from tank2sim.gap.inference.form_error import Forms
 from tank2sim.gap.inference.likelihood import COUNTED, LEAST_GAIN, WIDTHS, Likelihood
 from tests.gap.dense import Dense
 from tests.gap.toy import WHITE, Toy, toy_motion, toy_trials
@@ -130,21 +129,6 @@ def test_a_force_with_a_direction_may_differ_with_the_heading() -> None:
         price = np.log(of.count / COUNTED)
         whole = dense_cost(of, toy, fit.theta, about=fit.theta) + price + believed(of)
         assert fit.score == pytest.approx(whole, rel=1e-9)
-
-
-@pytest.mark.parametrize("effect", ["hull_fouling", "current"])
-def test_the_form_of_an_effect_that_was_found_earlier_is_integrated_out(effect: str) -> None:
-    card = SimpleNamespace(steering_gear=None, effects=[SimpleNamespace(name=effect)])
-    known, of_given = Toy(known=0.8, card=card), judge(toy_motion((0.8,)))
-    of = Likelihood(of_given.motion, known, of_given.coefficients, of_given.belief, without=Toy())
-    added = of_given.added(Toy((None,)), np.array([0.8]))[0]  # by the effect, on the card without it
-    forms = Forms(of.motion, 0).columns(added, directed=effect == "current")
-    whole = dense_cost(of, known, NOTHING, forms=forms) + believed(of)
-    fit = fitted(of, known)
-    assert fit.score == pytest.approx(whole, rel=1e-9)
-    assert len(fit.change) == 2 + forms.shape[-1]
-    without_forms = Likelihood(of_given.motion, known, of_given.coefficients, of_given.belief)
-    assert fitted(without_forms, known).score == pytest.approx(dense_cost(of, known, NOTHING) + believed(of), rel=1e-9)
 
 
 @pytest.mark.parametrize("largest", [0.0, 0.05])

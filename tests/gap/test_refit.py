@@ -12,9 +12,9 @@ from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.cards.reading import changed_text
 from tank2sim.dynamics import build
+from tank2sim.gap.improve_card import add_effects_to_card, card_with_effects_text
 from tank2sim.gap.inference.fit import CoefficientEstimates
-from tank2sim.gap.outcome.improve_card import add_effects_to_card, card_with_effects_text
-from tank2sim.gap.outcome.refit import effects_like, refit_coefficients
+from tank2sim.gap.proof.refit import effects_like, refit_coefficients
 from tank2sim.gap.result import Refitted
 from tank2sim.identification.trials.problem.prepare_trials import Measured, with_fitted_trials
 from tank2sim.results.gap import improved_files

@@ -16,14 +16,14 @@ from identify_esso_osaka import spans
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.diagnosis.residuals import surroundings_by_trial
+from tank2sim.gap.improve_card import add_effects_to_card, at_rest
 from tank2sim.gap.inference.batch import batch_trials
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.hypothesis import Hypothesis, TrialSurroundings
 from tank2sim.gap.inference.prior import likelihood_from_card
-from tank2sim.gap.outcome.improve_card import add_effects_to_card, at_rest
-from tank2sim.gap.outcome.surroundings import fit_surroundings, with_surroundings
 from tank2sim.gap.proof.judge_surroundings import fit_common_surroundings, probabilities_by_simulation
 from tank2sim.gap.proof.replay import replay_by_card
+from tank2sim.gap.proof.surroundings import fit_surroundings, with_surroundings
 from tank2sim.gap.result import MISSING, Gap, Surroundings
 from tank2sim.gap.search.explanations import search
 from tank2sim.gap.workflow import GapOptions, run_gap_workflow

@@ -18,8 +18,8 @@ from tank2sim.gap.inference.likelihood import Likelihood
 from tank2sim.gap.inference.prior import likelihood_from_card
 from tank2sim.gap.inference.wave_band import WaveBand
 from tank2sim.gap.result import NO_EFFECT_MISSING
+from tank2sim.gap.search.decision import decide
 from tank2sim.gap.search.explanations import search
-from tank2sim.gap.search.model_choice import decide
 from tank2sim.identification.trials.problem.prepare_trials import measured
 from tests.gap.dense import Dense, pushed, rocked
 from tests.gap.random_filter import RUNS, columns, problem

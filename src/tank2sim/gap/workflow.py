@@ -15,7 +15,6 @@ from tank2sim.arguments import MOST_EFFECTS
 from tank2sim.cards.card import Card, ManoeuvringCard
 from tank2sim.cards.examination import doubts
 from tank2sim.cards.form import EffectEntry
-from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.executors import executing, processes_to_begin
 from tank2sim.gap.diagnosis.misfit_location import equation_of, figures, places
@@ -25,17 +24,16 @@ from tank2sim.gap.diagnosis.residuals import (
     estimates,
     force_lacking,
 )
+from tank2sim.gap.improve_card import Found, at_rest
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.fit_all import StageReport
 from tank2sim.gap.inference.prior import candidate_explanations, likelihood_from_card
-from tank2sim.gap.outcome.combine import combine_passes, without_effect
-from tank2sim.gap.outcome.improve_card import Found, at_rest
 from tank2sim.gap.outcome.next_test import Explanation, next_test
 from tank2sim.gap.outcome.notices import gap_notices, of_tried_effects
 from tank2sim.gap.proof.card_fitness import improvement_objections
-from tank2sim.gap.proof.cross_check import MUCH, REMAINS, BlackBox, black_box, closes_gap
-from tank2sim.gap.proof.improvement import BETTER, Proof, Prover, corrected, sensor_faults
-from tank2sim.gap.proof.judge import CLEARLY, Judge, Judged
+from tank2sim.gap.proof.cross_check import BlackBox, black_box
+from tank2sim.gap.proof.improvement import Proof, Prover, corrected, sensor_faults
+from tank2sim.gap.proof.judge import Judged, judge
 from tank2sim.gap.proof.judge_surroundings import judge_surroundings
 from tank2sim.gap.proof.replay import TrialReplays
 from tank2sim.gap.result import (
@@ -49,16 +47,10 @@ from tank2sim.gap.result import (
     NextTest,
     Passed,
     Rival,
-    misfit_of,
 )
+from tank2sim.gap.search.decision import LIKELY, PRICE, Decision, decide
 from tank2sim.gap.search.detection_limit import could_hide
 from tank2sim.gap.search.explanations import Search, search
-from tank2sim.gap.search.model_choice import (
-    EVIDENCE_NEEDED,
-    LIKELY,
-    Decision,
-    decide,
-)
 from tank2sim.identification.trials.assessment.other_ship import evidence_of_other_ship, not_of_ship
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import (
@@ -72,9 +64,6 @@ from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 
 RIVALS = 12
 """Explanations that are reported."""
-
-EXPLAINED = 0.2
-"""Coefficients explain a gap that they reduce to less than this share, or to noise (project choice)."""
 
 
 @dataclass(frozen=True)
@@ -159,36 +148,25 @@ def run_gap_workflow(
         fitted, held = _without_heel(fitted), _without_heel(held)
     # Small matrices: threads of the linear algebra library would wait for each other.
     with threadpool_limits(limits=1, user_api="blas"), _processes(options, executor) as pool:
-        run = _Run(options, progress, pool, lowest)
+        names = _names(card, fitted, options)
         try:
-            first = _search_once(card, (fitted, held), run)
+            found = search(likelihood_from_card(card, fitted), progress, pool, names, most=options.max_effects)
         except FloatingPointError as error:
             problem = f"gives no finite forces along the motion of the trials ({error})"
             remedy = "check the units of its numbers and of the trials' columns"
             raise InputError(card.source, "", problem, remedy) from None
-        gap, trials, without = first.gap, first.trials, first.gap.base
-        while _seeks_more(gap, options):
-            named = tuple(effect.name for effect in gap.effects)
-            known = dict.fromkeys([*named, *(name for names in gap.alternatives for name in names)])
-            most = options.max_effects - len(named)
-            wanted = None if options.effects is None else tuple(name for name in options.effects if name not in known)
-            if wanted == () or gap.improved is card:
-                break
-            simpler = [name for effect in known for name in EFFECTS[effect].includes]
-            excluded = (*options.without, *known, *simpler)
-            more = replace(options, effects=wanted, without=excluded, max_effects=most)
-            try:
-                further = _search_once(gap.improved, trials, replace(run, options=more), without)
-            except FloatingPointError:
-                break
-            if not _adds(gap, further.gap, 1 - options.false_discovery):
-                break
-            both = combine_passes(gap, further.gap)
-            smaller = _smaller(card, (fitted, held), (gap, both), run)
-            gap, trials = smaller or (both, further.trials)
-        if gap is first.gap:
-            gap = _with_refined_coefficients(first, progress)
-        tried = of_tried_effects(_names(card, fitted, options), candidate_explanations(card, fitted.driven_by))
+        decision = decide(found, options.false_discovery)
+        progress("proving")
+        noise = {name: sigma for name, (sigma, _) in _noise(found, decision.best, fitted).items()}
+        prover = Prover(card, (fitted, held), found.likelihood, TrialReplays(noise, pool), lowest)
+        judged = judge_surroundings(prover, found, judge(prover, found, decision), names)
+        if judged.decision.verdict in (MISSING, AMBIGUOUS, COEFFICIENTS):
+            progress("refining the coefficients")
+            judged = replace(judged, proof=prover.refine(judged.proof))
+        opened = replace(judged, proof=prover.open_holdout(judged.proof))  # the verdict is fixed
+        progress("where and how much")
+        gap = _assemble_gap(prover, found, opened)
+        tried = of_tried_effects(names, candidate_explanations(card, fitted.driven_by))
         progress("trying the improved card")
         return replace(
             gap,
@@ -207,114 +185,6 @@ def _without_heel(group: Measured) -> Measured:
     )
     notice = "heel is computed and not compared: only what it changes of the motion in the plane is seen"
     return replace(group, trials=trials, notices=(*group.notices, Notice(notice)))
-
-
-@dataclass(frozen=True)
-class _Run:
-    """What all searches of a run share; speed down to which cards hold in trials held out, m/s."""
-
-    options: GapOptions
-    progress: StageReport
-    pool: Executor | None
-    lowest_mps: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Searched:
-    """One search: what was judged without trials held out, and the result with them."""
-
-    prover: Prover
-    found: Search
-    judged: Judged
-    gap: Gap
-    trials: tuple[Measured, Measured]
-
-
-def _search_once(
-    card: ManoeuvringCard, trials: tuple[Measured, Measured], run: _Run, without: ManoeuvringCard | None = None
-) -> _Searched:
-    """One search, decision and proof, and the trials in the surroundings found; `without` lacks earlier effects."""
-    options, progress = run.options, run.progress
-    names = _names(card, trials[0], options)
-    found = search(likelihood_from_card(card, trials[0], without), progress, run.pool, names, most=options.max_effects)
-    decision = decide(found, options.false_discovery)
-    progress("proving")
-    replays = TrialReplays(
-        {name: sigma for name, (sigma, _) in _noise(found, decision.best, trials[0]).items()}, run.pool
-    )
-    prover = Prover(card, trials, found.likelihood, replays, run.lowest_mps)
-    judged = Judge(prover, options.false_discovery).judge(found, decision)
-    judged = judge_surroundings(prover, found, judged, names)
-    judged = replace(judged, decision=_with_verdict_of_coefficients(judged.decision, judged.proof))
-    opened = replace(judged, proof=prover.open_holdout(judged.proof))  # the verdict is fixed
-    progress("where and how much")
-    return _Searched(prover, found, judged, _assemble_gap(prover, found, opened), opened.proof.trials)
-
-
-def _with_refined_coefficients(searched: _Searched, progress: StageReport) -> Gap:
-    """The result of a search with coefficients refined by simulations of the fitted trials, once all is named."""
-    prover, judged = searched.prover, searched.judged
-    if judged.decision.verdict not in (MISSING, AMBIGUOUS, COEFFICIENTS):
-        return searched.gap
-    progress("refining the coefficients")
-    proof = prover.refine(judged.proof)
-    if proof is judged.proof:
-        return searched.gap
-    return _assemble_gap(prover, searched.found, replace(judged, proof=prover.open_holdout(proof)))
-
-
-def _seeks_more(gap: Gap, options: GapOptions) -> bool:
-    """Whether effects of the ship were named, also one of several alike, and the fitted trials are still missed."""
-    if gap.verdict not in (MISSING, AMBIGUOUS) or not all(gap.alternatives):
-        return False
-    if not 0 < len(gap.effects) < options.max_effects:
-        return False
-    if any(EFFECTS[effect.name].acts_on == "sensor" for effect in gap.effects):
-        return False  # the trials would have to be corrected first
-    return misfit_of(gap.passed, "after", held_out=False) > REMAINS
-
-
-def _adds(gap: Gap, further: Gap, likely: float) -> bool:
-    """Whether a search on the improved card named effects of the ship, each with a probability of `likely` at least.
-
-    With them the misfit beyond the noise must be clearly smaller (:data:`.judge.CLEARLY`): what the formulas of the
-    effects named before leave is not small next to the noise, and some effect always follows it a little.
-    """
-    if further.verdict != MISSING or any(EFFECTS[effect.name].acts_on == "sensor" for effect in further.effects):
-        return False
-    before, after = (max(misfit_of(found.passed, "after", held_out=False) ** 2 - 1, 0.0) for found in (gap, further))
-    return min(effect.confidence for effect in further.effects) >= likely and after < CLEARLY**2 * before
-
-
-def _smaller(
-    card: ManoeuvringCard,
-    trials: tuple[Measured, Measured],
-    passes: tuple[Gap, Gap],
-    run: _Run,
-) -> tuple[Gap, tuple[Measured, Measured]] | None:
-    """The result without an effect of the first search that those of the second make superfluous; None without one.
-
-    The first search seeks one or two effects where more may be missing, and can name one in place of another. The
-    others, fitted together to the card as given, must then follow the fitted trials as closely as all.
-
-    Parameters
-    ----------
-    card, trials
-        As given.
-    passes : tuple of Gap
-        Results of the first search, and of both together.
-    """
-    first, both = passes
-    reached = misfit_of(both.passed, "after", held_out=False)
-    for dropped in first.effects:
-        others = tuple(effect.name for effect in both.effects if effect.name != dropped.name)
-        alone = replace(run, options=replace(run.options, effects=others), progress=lambda text: None)
-        searched = _search_once(card, trials, alone)
-        again = searched.gap
-        same = again.verdict == MISSING and {effect.name for effect in again.effects} == set(others)
-        if same and misfit_of(again.passed, "after", held_out=False) <= (1 + BETTER) * reached:
-            return without_effect(again, both, dropped.name), searched.trials
-    return None
 
 
 def _names(card: ManoeuvringCard, fitted: Measured, options: GapOptions) -> tuple[str, ...]:
@@ -343,12 +213,10 @@ def _processes(options: GapOptions, executor: Executor | None) -> Iterator[Execu
 def _assemble_gap(prover: Prover, found: Search, judged: Judged) -> Gap:
     """The results that follow from the decision."""
     card, (fitted, held), replays = prover.card, prover.trials, prover.replays
-    without = found.likelihood.without
-    given = card if without is None else without.card  # before an earlier search
     decision, proof = judged.decision, judged.proof
     estimated = proof.named.estimated
     box = _begin_black_box(card, proof, replays)
-    hidden = could_hide(found, decision.best, EVIDENCE_NEEDED)
+    hidden = could_hide(found, decision.best, PRICE)
     sensors = sensor_faults(estimated)
     force = force_lacking(found.likelihood, found.none)
     every = (*fitted.trials, *held.trials)
@@ -380,20 +248,9 @@ def _assemble_gap(prover: Prover, found: Search, judged: Judged) -> Gap:
         could_hide=hidden,
         agreement=agreement,
         next_test=_next(card, found, decision, replays.noise),
-        notices=gap_notices(given, judged, agreement, prover.trials, waves),
+        notices=gap_notices(card, judged, agreement, prover.trials, waves),
         doubts=fitted.doubts,
     )
-
-
-def _with_verdict_of_coefficients(decision: Decision, proof: Proof) -> Decision:
-    """The decision; where no effect is missing, whether the card's coefficients explain the gap, or nothing does."""
-    if decision.verdict != NO_EFFECT_MISSING:
-        return decision
-    before, after = (misfit_of(proof.results, version) for version in ("before", "after"))
-    closes = proof.coefficients and before > MUCH and closes_gap(proof.results)
-    if closes and after <= max(MUCH, EXPLAINED * before):
-        return replace(decision, verdict=COEFFICIENTS)
-    return replace(decision, verdict=OUTSIDE_LIBRARY) if after > MUCH else decision
 
 
 def _begin_black_box(card: ManoeuvringCard, proof: Proof, replays: TrialReplays) -> Callable[[], BlackBox] | None:

@@ -20,12 +20,12 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
 from tank2sim.files import folder_made
 from tank2sim.gap.diagnosis.error_intervals import EARTH_BOUND
-from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults, corrected_text
+from tank2sim.gap.improve_card import Found, card_with_effects_text
 from tank2sim.gap.outcome.export import NEXT_TEST_FILE, gap_study, joined, replaces
 from tank2sim.gap.outcome.files import CORRECTED, GAP, IMPROVED, REPORT, SURROUNDED, GapFiles, put
-from tank2sim.gap.outcome.improve_card import Found, card_with_effects_text
 from tank2sim.gap.outcome.study import EffectFound, GapStudy
-from tank2sim.gap.outcome.surroundings import with_surroundings
+from tank2sim.gap.proof.correct_sensors import correct_sensor_faults, corrected_text
+from tank2sim.gap.proof.surroundings import with_surroundings
 from tank2sim.gap.result import AMBIGUOUS, COEFFICIENTS, MISSING, NO_EFFECT_MISSING, Gap
 from tank2sim.identification.trials.problem.prepare_trials import Measured, with_fitted_trials
 from tank2sim.notices import Notice, foremost

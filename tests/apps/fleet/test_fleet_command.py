@@ -20,7 +20,7 @@ import pytest
 
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
-from tank2sim.gap.outcome.improve_card import add_effects_to_card
+from tank2sim.gap.improve_card import add_effects_to_card
 from tank2sim.gap.result import Gap, Named
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate

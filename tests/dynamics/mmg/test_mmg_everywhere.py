@@ -19,7 +19,7 @@ from tank2sim.cards.form import EffectEntry
 from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
-from tank2sim.gap.outcome.improve_card import add_effects_to_card
+from tank2sim.gap.improve_card import add_effects_to_card
 from tank2sim.identification.trials.problem.problem_from_card import free_parameters
 
 TEXT = bundled_cards()["kvlcc2-l7-mmg"].read_text(encoding="utf-8")

@@ -20,7 +20,7 @@ from tank2sim.dynamics.effects.particulars import model_particular
 from tank2sim.dynamics.effects.surroundings import WIND
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card
+from tank2sim.gap.improve_card import Found, add_effects_to_card
 from tank2sim.notices import Notice
 from tank2sim.simulation.card_range import Numbers, single_figures
 from tank2sim.simulation.integrator import Integrator

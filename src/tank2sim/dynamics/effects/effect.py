@@ -196,8 +196,8 @@ class Effect:
         there.
     states_behind : mapping
         State of its own that nothing but an order drives to the input of that order (``rudder.command``).
-    mistaken_for : str
-        What it looks like in trials, ``force`` or ``actuator``, where that is not what it acts on.
+    behind_indicator : bool
+        True if an effect of an actuator acts between the measured angle of the rudder and the rudder itself.
     measured_as : mapping
         Parameter to the signal of a trial that measures it (``wind_speed_mps``).
     in_mmg : bool
@@ -236,7 +236,7 @@ class Effect:
     reads_derivatives: bool = False
     in_place_of: Mapping[str, str] = field(default_factory=dict)
     states_behind: Mapping[str, str] = field(default_factory=dict)
-    mistaken_for: str = ""
+    behind_indicator: bool = False
     measured_as: Mapping[str, str] = field(default_factory=dict)
     terminal: str = ""
     of_craft: bool = False
@@ -249,14 +249,9 @@ class Effect:
     resonant: bool = False
 
     @property
-    def looks_like(self) -> str:
-        """What it looks like in trials: the first word of what it acts on, unless it is mistaken for something else."""
-        return self.mistaken_for or self.acts_on.partition(" ")[0]
-
-    @property
     def inside_gear(self) -> bool:
         """True if all of it is between the rudder order and a measured angle of the rudder."""
-        return self.acts_on == self.looks_like == "actuator"
+        return self.acts_on == "actuator" and not self.behind_indicator
 
     @property
     def surroundings(self) -> bool:

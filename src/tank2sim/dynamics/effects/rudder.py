@@ -45,7 +45,7 @@ RUDDER_BIAS = Effect(
         ),
     ),
     equations=_biased,
-    mistaken_for="force",  # of a ship that is not alike to both sides
+    behind_indicator=True,
 )
 
 

@@ -213,7 +213,6 @@ RUDDER_TIME_OFFSET = Effect(
         ),
     ),
     delays={"rudder.command": "delay_s"},
-    mistaken_for="actuator",  # a gear that lags
 )
 
 

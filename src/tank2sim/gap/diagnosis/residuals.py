@@ -11,11 +11,11 @@ from tank2sim.arrays import Array
 from tank2sim.dynamics.effects.forces import with_forces
 from tank2sim.dynamics.model import Parameter
 from tank2sim.gap.diagnosis.misfit_location import effect_passages, missing_force_by_state
+from tank2sim.gap.improve_card import Found
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.hypothesis import Hypothesis
 from tank2sim.gap.inference.kalman_filter import FORCE_STATES
 from tank2sim.gap.inference.likelihood import Likelihood
-from tank2sim.gap.outcome.improve_card import Found
 from tank2sim.gap.result import Acting, MissingForce, Surroundings
 
 

@@ -92,7 +92,6 @@ class _LikelihoodParts:
     coefficients: NuisanceParameters
     belief: Belief
     scale: Array
-    without: ManoeuvringCard | None
 
 
 class Fitting:
@@ -121,8 +120,7 @@ class Fitting:
         self.likelihood, self.hypotheses, self.progress, self.executor = likelihood, hypotheses, progress, executor
         self.found: dict[tuple[str, ...], ExplanationFit] = dict(found or {})
         none = likelihood.none
-        without = None if likelihood.without is None else likelihood.without.card
-        parts = likelihood.motion, likelihood.coefficients, likelihood.belief, likelihood.scale, without
+        parts = likelihood.motion, likelihood.coefficients, likelihood.belief, likelihood.scale
         self._parts = _LikelihoodParts(uuid4().hex, none.card, none.driven_by, *parts)
 
     def fit(self, proposals: Sequence[Proposal]) -> None:
@@ -205,8 +203,7 @@ def _fit_in_worker(sent: _LikelihoodParts, proposal: Proposal) -> ExplanationFit
             hypotheses = next((cache for _, cache in _LIKELIHOODS.values() if _same_trials(cache, ship, sent)), None)
             none = hypotheses.none if hypotheses else Hypothesis(*ship)
             _LIKELIHOODS.clear()
-            without = None if sent.without is None else Hypothesis(sent.without, sent.driven_by)
-            likelihood = Likelihood(sent.motion, none, sent.coefficients, sent.belief, sent.scale, without)
+            likelihood = Likelihood(sent.motion, none, sent.coefficients, sent.belief, sent.scale)
             _LIKELIHOODS[sent.token] = likelihood, hypotheses or HypothesisCache(none, sent.motion)
         likelihood_and_hypotheses = _LIKELIHOODS[sent.token]
     found = _fit(*likelihood_and_hypotheses, proposal)

@@ -29,7 +29,7 @@ from tank2sim.gap.inference.fit import (
     NuisanceParameters,
 )
 from tank2sim.gap.inference.form_error import Forms
-from tank2sim.gap.inference.hypothesis import CLOCK, Hypothesis, directed
+from tank2sim.gap.inference.hypothesis import CLOCK, Hypothesis
 from tank2sim.gap.inference.kalman_filter import FORCE_STATES, Linear, Observer, linear_filter, observer, slopes
 from tank2sim.gap.inference.wave_band import WaveBand
 
@@ -92,8 +92,6 @@ class Likelihood:
     scale : array, optional
         Of each logarithm of the noise and of the width, in which the search for the noise takes its steps
         (:meth:`noise_scale`); by default 1.
-    without : Hypothesis, optional
-        The card without the effects that an earlier search found, whose forms may differ as well.
     """
 
     def __init__(
@@ -103,10 +101,8 @@ class Likelihood:
         coefficients: NuisanceParameters,
         belief: Belief,
         scale: Array | None = None,
-        without: Hypothesis | None = None,
     ):
         self.motion, self.none, self.coefficients, self.belief = motion, none, coefficients, belief
-        self.without = without
         self.scale = np.ones(len(belief.logs)) if scale is None else scale
         self._residuals: dict[tuple[tuple[str, ...], tuple[str, ...], bytes], tuple[Array, Array]] = {}
         nothing = np.zeros(0)
@@ -118,7 +114,6 @@ class Likelihood:
         self._shown = motion.measured - none.readings(motion, nothing, self._unmeasured)
         self._forms: Forms | None = Forms(motion, none.model.input_names.index("rudder.command"))
         self._widest = WIDTHS[1]
-        self._forms_of_found = np.zeros((*self._lack.shape, 0)) if without is None else self._found_earlier(without)
         self.known = ~np.isnan(motion.measured) & motion.inside[..., None]
         self.count = int(self.known.sum())
         unsure = motion.unsure_s > SHORTEST_UNSURE * motion.block_s
@@ -128,15 +123,6 @@ class Likelihood:
         self.wide = WIDE_PRIOR * motion.errors if belief.wide is None else belief.wide
         self.base = self.linear(none, nothing)
         self.coefficient_columns = self.of_coefficients(none, nothing)
-
-    def _found_earlier(self, without: Hypothesis) -> Array:
-        """Driving of each form error of the effects on the card that `without` lacks (R, T - 1, 6, nf)."""
-        assert self._forms is not None
-        known = replace(self.motion, inputs=self.motion.inputs[..., : len(without.model.input_names)])
-        added = self.motion.block_s * (self._block_rates - without.rates(known, np.zeros(0))) * self._inside
-        before = {entry.name for entry in without.card.effects}
-        found = [entry.name for entry in self.none.card.effects if entry.name not in before]
-        return self._forms.columns(added, directed=directed(found))
 
     def linear(self, hypothesis: Hypothesis, theta: Array) -> Linear:
         """The linearised motion of an explanation, with the slopes of the same model as its forces.
@@ -211,7 +197,7 @@ class Likelihood:
                 change = moved[place] - theta[place]
                 driven[rows, ..., 1 + place] = ((moved_residual[0] - driving) / change)[rows]
                 seen[rows, ..., 1 + place] = ((moved_residual[1] - shown) / change)[rows]
-        forms = [] if self._forms is None else [self._forms_of_found]
+        forms = []
         if len(theta) and self._forms is not None:
             forms.append(self._forms.columns(driving - self._lack, directed=hypothesis.directed))
         pairs = np.concatenate([driven, of_coefficients, *forms], axis=-1)
@@ -249,7 +235,7 @@ class Likelihood:
         added *= self._inside / motion.block_s
         between = hypothesis.rates_between(motion, theta) - np.diff(motion.states, axis=1) / motion.step_s
         moved = motion.shift(slow, seen.linear.transition, between, added)
-        return Likelihood(moved, self.none, self.coefficients, self.belief, self.scale, self.without)
+        return Likelihood(moved, self.none, self.coefficients, self.belief, self.scale)
 
     def by_formula(self, fit: ExplanationFit) -> ExplanationFit:
         """An explanation at its best without form errors, as a simulation uses its formulas.

@@ -53,17 +53,13 @@ BELIEVED = {"white": 0.5, "slow": 1.5, "slow_s": 0.7, "force": 2.5, "force_s": 0
 plausible noise."""
 
 
-def likelihood_from_card(
-    card: ManoeuvringCard, measured: Measured, without: ManoeuvringCard | None = None
-) -> Likelihood:
+def likelihood_from_card(card: ManoeuvringCard, measured: Measured) -> Likelihood:
     """The likelihood of trials for a card.
 
     Parameters
     ----------
     card : ManoeuvringCard
     measured : Measured
-    without : ManoeuvringCard, optional
-        The card without the last of its effects: those that an earlier search found in these trials.
 
     Raises
     ------
@@ -84,8 +80,7 @@ def likelihood_from_card(
     wide = BEGINNING * np.array([speed, speed, speed / length, 1.0, 3 * length, 3 * length])
     known_before = replace(belief(motion, ship_time), wide=np.maximum(wide, WIDE_PRIOR * motion.errors))
     nuisance = NuisanceParameters(tuple(known), mixing, count + len(shared))
-    before = None if without is None else Hypothesis(without, measured.driven_by)
-    return Likelihood(motion, none, nuisance, known_before, without=before)
+    return Likelihood(motion, none, nuisance, known_before)
 
 
 def _group(name: str) -> str:

@@ -8,12 +8,12 @@ import numpy as np
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.gap.diagnosis.strangeness import Strange, trial_consistency
 from tank2sim.gap.inference.wave_band import WaveBand
-from tank2sim.gap.outcome.refit import effects_like
-from tank2sim.gap.proof.cross_check import MUCH, trial_consistency, worse_trials
+from tank2sim.gap.proof.cross_check import MUCH, worse_trials
 from tank2sim.gap.proof.judge import Judged
+from tank2sim.gap.proof.refit import effects_like
 from tank2sim.gap.result import AMBIGUOUS, MISSING, OUTSIDE_LIBRARY, misfit_of
-from tank2sim.gap.search.model_choice import Strange
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.structures import structure_that_adds
 from tank2sim.notices import Notice
@@ -53,12 +53,13 @@ def gap_notices(
     notices += [Notice(_of_waves(waves))] if waves else []
     notices += [Notice(judged.by_simulation)] if judged.by_simulation else []
     notices += [Notice(_in_words(strange)) for strange in decision.strange]
-    notices += [
-        Notice(
-            f"{names}: fits best from instant to instant, but simulations with it are no closer than without: not named"
+    if withheld:
+        notices.append(
+            Notice(
+                f"{withheld}: fits best from instant to instant, but simulations with it are no closer than without: "
+                "not named"
+            )
         )
-        for names in withheld
-    ]
     if fitted_to_held:
         notices.append(
             Notice(

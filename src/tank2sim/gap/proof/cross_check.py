@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
@@ -300,62 +299,3 @@ def _what_remains(before: float, after: float, group: str, begin: str) -> str:
         f"{begin} {much} (misfit {after:.3g} in noise units, before {before:.3g}): something more is missing, or its "
         "form differs"
     )
-
-
-OUTLYING = 3.0
-"""A trial is named as an outlier if it is this many standard errors from the mean of all others (project choice)."""
-
-
-@dataclass(frozen=True)
-class TrialConsistency:
-    """Agreement of the estimates of single trials.
-
-    Parameters
-    ----------
-    mean, standard_error : float
-        Weighted by the inverse squares of the standard errors.
-    q, p : float
-        Cochran's Q, and the probability of one as large if all trials have the same true value.
-    outliers : tuple of str
-        Trials that are :data:`OUTLYING` standard errors or more from all the others, the farthest first.
-    """
-
-    mean: float
-    standard_error: float
-    q: float
-    p: float
-    outliers: tuple[str, ...]
-
-
-def trial_consistency(trials: Mapping[str, tuple[float, float]]) -> TrialConsistency:
-    """Cochran's Q of estimates from single trials.
-
-    Cochran (1954), The combination of estimates from different experiments, Biometrics 10: Q = sum w (value - mean)^2
-    with w = 1/standard error^2 is chi-square distributed with one degree of freedom less than there are trials.
-
-    Parameters
-    ----------
-    trials : mapping
-        Name of a trial to (value, standard error); the error is positive. One without a finite error is left out.
-
-    Raises
-    ------
-    ValueError
-        No trial has a finite standard error.
-    """
-    kept = {name: pair for name, pair in trials.items() if np.isfinite(pair).all()}
-    if not kept:
-        raise ValueError("no trial determines the value")
-    values, errors = np.array(list(kept.values())).T
-    weights = errors**-2.0
-    mean = float(weights @ values / weights.sum())
-    q = float(weights @ (values - mean) ** 2)
-    p = float(chi2.sf(q, len(kept) - 1)) if len(kept) > 1 else 1.0
-    away = {}
-    if len(kept) > 1:
-        remaining_weights = weights.sum() - weights
-        remaining_mean = (weights @ values - weights * values) / remaining_weights
-        z = np.abs(values - remaining_mean) / np.sqrt(1 / weights + 1 / remaining_weights)
-        away = dict(zip(kept, map(float, z), strict=True))
-    outliers = sorted((name for name, z in away.items() if z >= OUTLYING), key=lambda name: -away[name])
-    return TrialConsistency(mean, float(weights.sum() ** -0.5), q, p, tuple(outliers))

@@ -12,15 +12,15 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.reading import revised
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.diagnosis.residuals import estimates, surroundings_by_trial
+from tank2sim.gap.improve_card import Found, add_effects_to_card
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.likelihood import Likelihood
-from tank2sim.gap.outcome.correct_sensors import correct_sensor_faults
-from tank2sim.gap.outcome.improve_card import Found, add_effects_to_card
-from tank2sim.gap.outcome.refit import FAR, refit_coefficients
-from tank2sim.gap.outcome.surrounded_trial import ByTrial
-from tank2sim.gap.outcome.surroundings import fit_surroundings, with_surroundings
+from tank2sim.gap.proof.correct_sensors import correct_sensor_faults
 from tank2sim.gap.proof.refinement import CoefficientPrior, refined_coefficients
+from tank2sim.gap.proof.refit import refit_coefficients
 from tank2sim.gap.proof.replay import TrialReplays
+from tank2sim.gap.proof.surrounded_trial import ByTrial
+from tank2sim.gap.proof.surroundings import fit_surroundings, with_surroundings
 from tank2sim.gap.result import Passed, Refitted, misfit_of
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import with_polynomial_down_to
@@ -76,15 +76,6 @@ class Proof:
     def misfit(self) -> float:
         """Misfit of the fitted trials with the improved card, noise units."""
         return misfit_of(self.results, "after", held_out=False)
-
-    @property
-    def farthest(self) -> float:
-        """Largest change of a coefficient, in standard errors of the given card."""
-        return max((coefficient.moved for coefficient in self.coefficients), default=0.0)
-
-    def is_farther_off(self, other: Proof) -> bool:
-        """Whether a coefficient is far off (:data:`.refit.FAR`), and farther than with another proof's effects."""
-        return self.farthest > max(FAR, other.farthest)
 
 
 @dataclass(frozen=True, eq=False)

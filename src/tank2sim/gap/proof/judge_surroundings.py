@@ -16,15 +16,15 @@ from scipy.special import softmax
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.gap.improve_card import add_effects_to_card, at_rest
 from tank2sim.gap.inference.fit import ExplanationFit
-from tank2sim.gap.outcome.improve_card import add_effects_to_card, at_rest
-from tank2sim.gap.outcome.surrounded_trial import STEP_SHARE, SurroundedTrial, typical_speed
 from tank2sim.gap.proof.cross_check import MUCH, closes_gap
 from tank2sim.gap.proof.improvement import NamedEffects, Proof, Prover
-from tank2sim.gap.proof.judge import CLEARLY, DECISIVE, Judged
+from tank2sim.gap.proof.judge import CLEARLY, Judged
+from tank2sim.gap.proof.surrounded_trial import STEP_SHARE, SurroundedTrial, typical_speed
 from tank2sim.gap.result import AMBIGUOUS, MISSING, Surroundings, misfit_of
+from tank2sim.gap.search.decision import LIKELY, TEMPER
 from tank2sim.gap.search.explanations import Search
-from tank2sim.gap.search.model_choice import LIKELY, TEMPER
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 
 PREDICTS = 0.5
@@ -76,8 +76,8 @@ def judge_surroundings(prover: Prover, search: Search, judged: Judged, names: Se
     Where the trials are still missed by far (:data:`.cross_check.MUCH`), each wind or current that was not recorded is
     fitted to the free-running simulations. It is named if less than :data:`.judge.CLEARLY` of the misfit of the
     decision is left, and if the first half of the trials predicts the second (:data:`PREDICTS`). Not in place of
-    effects that are far ahead of none in score (:data:`.judge.DECISIVE`) and close most of the gap
-    (:data:`REMAINS_OF_MOST`): two numbers to a trial follow what their formulas leave.
+    effects that close most of the gap (:data:`REMAINS_OF_MOST`): two numbers to a trial follow what their formulas
+    leave.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def judge_surroundings(prover: Prover, search: Search, judged: Judged, names: Se
     reached = misfit_of(judged.proof.results, "after")
     if reached <= MUCH or any(EFFECTS[name].surroundings for name, *_ in judged.proof.named.estimated):
         return judged
-    if _closes_most(search, judged):
+    if _closes_most(judged):
         return judged
     simulated = _simulated(prover, search, names)
     tried = {name: found for name, found in simulated.items() if found.misfit < CLEARLY * reached}
@@ -120,16 +120,15 @@ def judge_surroundings(prover: Prover, search: Search, judged: Judged, names: Se
     return Judged(decision, found.proof, judged.withheld, by_simulation)
 
 
-def _closes_most(search: Search, judged: Judged) -> bool:
-    """Whether effects of the ship were named that are far ahead in score, and close most of the gap."""
+def _closes_most(judged: Judged) -> bool:
+    """Whether effects of the ship were named that close most of the gap."""
     effects = judged.decision.best.hypothesis.effects
     if judged.decision.verdict not in (MISSING, AMBIGUOUS) or any(
         EFFECTS[name].acts_on == "sensor" for name in effects
     ):
         return False
     results = judged.proof.results
-    most = misfit_of(results, "after") < REMAINS_OF_MOST * misfit_of(results, "before")
-    return most and search.none.score - judged.decision.best.score >= DECISIVE
+    return misfit_of(results, "after") < REMAINS_OF_MOST * misfit_of(results, "before")
 
 
 def _simulated(prover: Prover, search: Search, names: Sequence[str]) -> dict[str, _Simulated]:

@@ -12,8 +12,8 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model, Quantity, State
-from tank2sim.gap.outcome.surrounded_trial import STEP_SHARE, ByTrial, SurroundedTrial, with_columns
 from tank2sim.gap.proof.open_loop import Replayer, difference_slopes
+from tank2sim.gap.proof.surrounded_trial import STEP_SHARE, ByTrial, SurroundedTrial, with_columns
 from tank2sim.gap.result import Surroundings
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 

@@ -14,7 +14,7 @@ from tank2sim.arrays import Array
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.effects.sensors import correct_reading as without_fault
 from tank2sim.files import BYTE_ORDER_MARK, read_exact_text
-from tank2sim.gap.outcome.improve_card import Found, in_short
+from tank2sim.gap.improve_card import Found, in_short
 from tank2sim.notices import Notice, caution
 from tank2sim.records.audit import repair_trial
 from tank2sim.records.csv_table import read_table, text_with_commas
