@@ -24,16 +24,29 @@ from tank2sim.dynamics.effects.particulars import ESTIMABLE, estimate_notice, es
 from tank2sim.dynamics.model import Model, Quantity
 from tank2sim.escaping import one_line
 from tank2sim.files import BYTE_ORDER_MARK
-from tank2sim.gap.outcome.export import estimate_in_file, in_file_units
 from tank2sim.identification.trials.problem.problem_from_card import rounded
 from tank2sim.units import from_si, in_words, to_si
 
 Found = tuple[str, Mapping[str, float], Mapping[str, float]]
 """Name of an effect, its parameters by name, and the standard errors of those that were estimated; SI."""
 
+_IN_FILE = {"rad": "deg", "radps": "degps"}
+
 _DIGITS = 10
 """Significant digits of numbers without a standard error: a particular that is estimated must give the force that was
 fitted."""
+
+
+def in_file_units(name: str, value: float) -> tuple[str, float]:
+    """Name and value of an effect's parameter in the units of a card, from SI: degrees in place of radians."""
+    stem, _, suffix = name.rpartition("_")
+    key = f"{stem}_{_IN_FILE[suffix]}" if stem and suffix in _IN_FILE else name
+    return key, from_si(key, value)
+
+
+def estimate_in_file(name: str, value: float) -> tuple[str, float]:
+    """As :func:`in_file_units`, a direction from 0 to 360 deg."""
+    return in_file_units(name, value % (2 * math.pi) if name == "direction_rad" else value)
 
 
 def add_effects_to_card(card: ManoeuvringCard, found: Sequence[Found]) -> ManoeuvringCard:

@@ -12,6 +12,7 @@ import numpy as np
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.diagnosis.error_intervals import acting, contradiction, missing_force_intervals
+from tank2sim.gap.improve_card import estimate_in_file, in_file_units
 from tank2sim.gap.inference.wave_band import WaveBand
 from tank2sim.gap.outcome.lacking import lacking_study
 from tank2sim.gap.outcome.study import (
@@ -36,7 +37,7 @@ from tank2sim.notices import Notice, caution
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.thinning import Indices, drawn_columns, thin_points
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
-from tank2sim.units import from_si, in_words, to_si
+from tank2sim.units import in_words, to_si
 
 NEXT_TEST_FILE = "next_test.csv"
 """File next to ``gap.json`` with the orders of the next test."""
@@ -49,8 +50,6 @@ _MOST_PASSAGES = 24
 
 _REPLAY_SAMPLES = 140
 """Samples of a trial in the JSON, without extremes: as many as its line in a small panel has."""
-
-_IN_FILE = {"rad": "deg", "radps": "degps"}
 
 MANY_HIDDEN = 0.25
 """Share of the effects that would not show at their usual size, from which "no missing effect" says little (project
@@ -136,18 +135,6 @@ def signal_display_name(variable: str) -> SignalName:
     """The signal of a trial that measures a variable of the model: ``motion.psi`` is ``psi_deg`` in a file."""
     signals = {name: signal for signal, name in OBSERVED_SIGNALS.items()}
     return SignalName(signals.get(variable, variable.removeprefix("motion.")))
-
-
-def in_file_units(name: str, value: float) -> tuple[str, float]:
-    """Name and value of an effect's parameter in the units of a card, from SI: degrees in place of radians."""
-    stem, _, suffix = name.rpartition("_")
-    key = f"{stem}_{_IN_FILE[suffix]}" if stem and suffix in _IN_FILE else name
-    return key, from_si(key, value)
-
-
-def estimate_in_file(name: str, value: float) -> tuple[str, float]:
-    """As :func:`in_file_units`, a direction from 0 to 360 deg."""
-    return in_file_units(name, value % (2 * math.pi) if name == "direction_rad" else value)
 
 
 class EffectParameterName(NamedTuple):
