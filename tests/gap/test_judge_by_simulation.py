@@ -102,6 +102,16 @@ def test_where_nothing_is_named_the_coefficients_explain_the_gap_or_nothing_does
     assert judge(Prover(before, lambda effects: after, refits=refits), FOUND, odd).decision.verdict == OUTSIDE_LIBRARY
 
 
+@pytest.mark.parametrize(("moved", "alternatives"), [(4.0, (("linear_yaw_damping",),)), (2.0, ())])
+def test_an_effect_that_is_the_error_of_one_coefficient_is_said_next_to_it(moved: float, alternatives) -> None:
+    prover = Prover(10.0, lambda effects: 1.0)
+    prover.coefficients = (Refitted("Nr", moved, 0.1, 0.0, 1.0), Refitted("Yv", 0.5, 0.1, 0.0, 1.0))
+    judged = judge(prover, FOUND, decision(NO_EFFECT_MISSING, NONE))
+    assert judged.decision.verdict == COEFFICIENTS and judged.alternatives == alternatives
+    outside = replace(judged, decision=replace(judged.decision, verdict=OUTSIDE_LIBRARY))
+    assert outside.alternatives == ()
+
+
 @pytest.mark.parametrize(("after", "sought"), [(12.0, True), (2.0, False)])
 def test_no_wind_of_each_trial_takes_the_place_of_what_closes_most_of_the_gap(
     monkeypatch, after: float, sought: bool

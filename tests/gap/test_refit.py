@@ -39,7 +39,7 @@ def test_an_effect_that_is_the_change_of_a_coefficient_is_named_next_to_it() -> 
     def refitted(name: str, moved: float) -> Refitted:
         return Refitted(name, -1.0 - 0.02 * moved, 0.01, -1.0, 0.02)
 
-    coefficients = [refitted("Xvr", 7.5), refitted("Yv", 6.0), refitted("Nv", -9.0), refitted("Yvrr", 3.0)]
+    coefficients = [refitted("Xvr", 7.5), refitted("Yv", 6.0), refitted("Nv", -9.0), refitted("Yvrr", 2.9)]
     found = effects_like([*coefficients, refitted("Yd", 20.0)], {"turning_drag"})
     assert {name: one.name for name, one in found.items()} == {"linear_sway_damping": "Nv"}
     assert list(effects_like(coefficients, ())) == ["turning_drag", "linear_sway_damping"]

@@ -234,7 +234,7 @@ def _assemble_gap(prover: Prover, found: Search, judged: Judged) -> Gap:
         ),
         coefficients=proof.coefficients,
         effect_alone=proof.effect_alone,
-        alternatives=tuple(fit.hypothesis.effects for fit in decision.alike) if estimated else (),
+        alternatives=judged.alternatives,
         rivals=_rivals(found, decision),
         where=places(results),
         equation=equation_of([name for name, *_ in estimated], proof.improved, force, results),

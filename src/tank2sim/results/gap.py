@@ -269,7 +269,7 @@ class GapResult(Result[GapStudy]):
             *self._objections,
             f"{study.ship}: {found_in_words(study)}",
             *probabilities_in_words(study)[:1],
-            *([others_in_words(study)] if study.alternatives and study.verdict != AMBIGUOUS else []),
+            *([others_in_words(study)] if study.alternatives and study.verdict == MISSING else []),
             *([f"Next test: {test.manoeuvre}. {capital(test.why)}"] if test else []),
         )
 

@@ -101,7 +101,7 @@ def _probability(study: GapStudy, name: str) -> float:
 
 
 def _together(names: Sequence[str]) -> str:
-    return " with ".join(map(effect_in_words, names)) or "nothing"
+    return " with ".join(map(effect_in_words, names)) or "no effect, with other coefficients of the card"
 
 
 def as_percent(probability: float) -> str:
@@ -133,13 +133,15 @@ def found_in_words(study: GapStudy) -> str:
         first = [f"The improved card has {_together(named[0])}."] if named and len(candidates) > 1 else []
         return " ".join([sentence, *first, *_refitted(study)])
     if verdict == COEFFICIENTS:
-        return " ".join(["The coefficients of the card explain the gap: no effect is missing.", *_refitted(study)])
+        explained = f"The coefficients of the card explain the gap: {_no_effect(study)}."
+        return " ".join([explained, *_refitted(study)])
     if verdict == NO_EFFECT_MISSING:
         if after is None:
             return "No missing effect shows in these data."
         remainder = "" if after <= GOOD else ", which is more than noise, but no effect explains the rest"
         follows = f"the card as given follows the fitting trials to {noises(after)}{remainder}"
-        return f"No missing effect shows in these data: {follows}."
+        doubt = "" if not study.alternatives else f" With other coefficients {_no_effect(study)}."
+        return f"No missing effect shows in these data: {follows}.{doubt}"
     acting = study.acting[0].trial if study.acting else ""
     doubts = [one for one in study.record_doubts if trial_name(acting) == one.trial]
     if doubts:
@@ -150,6 +152,13 @@ def found_in_words(study: GapStudy) -> str:
         )
     sentence = "Something is missing that no tried effect explains: the remaining misfit has a pattern, but no name."
     return " ".join([sentence, *([f"The cause acts most in {place_of_cause(study)}."] if study.acting else [])])
+
+
+def _no_effect(study: GapStudy) -> str:
+    """That no effect is missing, or one that the trials cannot distinguish from a coefficient that is far off."""
+    names = " or ".join(_together(effects_of(text)) for text in study.alternatives)
+    unless = f", unless it is {names}, which these trials cannot distinguish from an error of the card"
+    return f"no effect is missing{unless if names else ''}"
 
 
 EQUATION_WORDS = {
@@ -209,7 +218,7 @@ def _with_values(effect: EffectFound) -> str:
 def verdict_context(study: GapStudy) -> list[str]:
     """Probabilities, other explanations and place, a paragraph each."""
     sentences = probabilities_in_words(study)
-    if study.alternatives and study.verdict != AMBIGUOUS:
+    if study.alternatives and study.verdict == MISSING:
         sentences.append(others_in_words(study))
     elif study.effects and study.verdict == MISSING:
         company = "it" if len(study.effects) == 1 else "each of them"

@@ -14,12 +14,9 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
 from tank2sim.gap.inference.fit import CoefficientEstimates
 from tank2sim.gap.result import Refitted
+from tank2sim.gap.search.decision import STANDARD_ERRORS
 from tank2sim.identification.trials.problem.estimation_problem import Estimate
 from tank2sim.identification.trials.problem.problem_from_card import card_with_estimate, free_parameters
-
-FAR = 5.0
-"""Standard errors of the given card from which a refitted coefficient has moved far (project choice: of thirty, chance
-moves one by two)."""
 
 FEW_TERMS = 2
 """Derivatives at most, apart from their changes by speed, that an effect changes which is named next to a refitted
@@ -27,7 +24,7 @@ coefficient: more, and it is a change of the whole ship or rudder (project choic
 
 
 def effects_like(coefficients: Sequence[Refitted], named: Collection[str]) -> dict[str, Refitted]:
-    """Effects that change a refitted coefficient which has moved by :data:`FAR`, and that coefficient.
+    """Effects that change a refitted coefficient which has moved by :data:`.decision.STANDARD_ERRORS`, and that coefficient.
 
     Trials alone do not distinguish such an effect from a coefficient that is off.
 
@@ -40,7 +37,7 @@ def effects_like(coefficients: Sequence[Refitted], named: Collection[str]) -> di
     found = {}
     for name, effect in EFFECTS.items():
         terms = [term for term in effect.changes if known_term(term).u == 0]
-        moved = [entry for entry in coefficients if entry.name in terms and entry.moved > FAR]
+        moved = [entry for entry in coefficients if entry.name in terms and entry.moved > STANDARD_ERRORS]
         if moved and name not in named and len(terms) <= FEW_TERMS:
             found[name] = max(moved, key=lambda coefficient: coefficient.moved)
     return found
