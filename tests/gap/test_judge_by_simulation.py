@@ -107,9 +107,9 @@ def test_an_effect_that_is_the_error_of_one_coefficient_is_said_next_to_it(moved
     prover = Prover(10.0, lambda effects: 1.0)
     prover.coefficients = (Refitted("Nr", moved, 0.1, 0.0, 1.0), Refitted("Yv", 0.5, 0.1, 0.0, 1.0))
     judged = judge(prover, FOUND, decision(NO_EFFECT_MISSING, NONE))
-    assert judged.decision.verdict == COEFFICIENTS and judged.alternatives == alternatives
+    assert judged.decision.verdict == COEFFICIENTS and judged.alternatives(CARD) == alternatives
     outside = replace(judged, decision=replace(judged.decision, verdict=OUTSIDE_LIBRARY))
-    assert outside.alternatives == ()
+    assert outside.alternatives(CARD) == ()
 
 
 @pytest.mark.parametrize(("after", "sought"), [(12.0, True), (2.0, False)])

@@ -6,12 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from tank2sim.api.gap_search import identified_from
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.cards.reading import changed_text
 from tank2sim.dynamics import build
+from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.improve_card import add_effects_to_card, card_with_effects_text
 from tank2sim.gap.inference.fit import CoefficientEstimates
 from tank2sim.gap.proof.refit import effects_like, refit_coefficients
@@ -35,14 +37,36 @@ ESTIMATES = CoefficientEstimates(
 """Rudder positive to starboard."""
 
 
-def test_an_effect_that_is_the_change_of_a_coefficient_is_named_next_to_it() -> None:
-    def refitted(name: str, moved: float) -> Refitted:
-        return Refitted(name, -1.0 - 0.02 * moved, 0.01, -1.0, 0.02)
+def moved(changes: dict[str, float]) -> list[Refitted]:
+    """Coefficients of the Mariner, each changed by a share of its value, where a card states 2 %; others by nothing."""
+    card = read_card("mariner").manoeuvring()
+    return [
+        Refitted(name, value * (1 + changes.get(name, 0.0)), 0.1 * abs(value), value, 0.02 * abs(value))
+        for name, value in card.derivatives.items()
+        if value
+    ]
 
-    coefficients = [refitted("Xvr", 7.5), refitted("Yv", 6.0), refitted("Nv", -9.0), refitted("Yvrr", 2.9)]
-    found = effects_like([*coefficients, refitted("Yd", 20.0)], {"turning_drag"})
-    assert {name: one.name for name, one in found.items()} == {"linear_sway_damping": "Nv"}
-    assert list(effects_like(coefficients, ())) == ["turning_drag", "linear_sway_damping"]
+
+@pytest.mark.parametrize(
+    ("changes", "effects"),
+    [
+        ({"Nr": 0.1}, {"linear_yaw_damping"}),
+        ({"Nr": 0.1, "Yr": -0.05, "Yv": 0.02, "Nvrr": -0.02}, {"linear_yaw_damping"}),
+        ({"Nr": 0.05}, set()),  # less than three standard errors
+        ({"Nr": 0.1, "Yr": 0.1}, set()),  # more damping of yaw is a smaller Yr: the mass is not part of it
+        ({"Xvr": 0.3}, {"turning_drag"}),
+        ({"Nr": 0.1, "Yv": 0.3, "Xu": 0.3}, set()),  # a small part of all that moved
+        (dict.fromkeys(("Yd", "Nd", "Yddd", "Nddd", "Yvvd", "Nvvd", "Yvdd", "Nvdd"), 0.15), {"rudder_effectiveness"}),
+        ({"Yd": 0.15, "Nd": -0.15}, set()),  # no rudder is larger in Y and smaller in N
+    ],
+)
+def test_an_effect_that_changes_the_coefficients_as_they_moved_is_said_next_to_them(changes, effects) -> None:
+    card = read_card("mariner").manoeuvring()
+    found = effects_like(card, moved(changes))
+    assert found.keys() == effects
+    for name, coefficient in found.items():
+        assert coefficient.name in EFFECTS[name].changes and coefficient.name in changes
+    assert effects_like(card, moved(changes), effects) == {}
 
 
 def test_the_covariance_of_refitted_coefficients_is_written_with_the_sign_of_the_file(

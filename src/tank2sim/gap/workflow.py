@@ -234,7 +234,7 @@ def _assemble_gap(prover: Prover, found: Search, judged: Judged) -> Gap:
         ),
         coefficients=proof.coefficients,
         effect_alone=proof.effect_alone,
-        alternatives=judged.alternatives,
+        alternatives=judged.alternatives(card),
         rivals=_rivals(found, decision),
         where=places(results),
         equation=equation_of([name for name, *_ in estimated], proof.improved, force, results),

@@ -90,7 +90,7 @@ def gap_notices(
             f"{name}: these trials cannot distinguish it from an error of {coefficient.name}, now "
             f"{coefficient.moved:.2g} standard errors off"
         )
-        for name, coefficient in effects_like(proof.coefficients, named).items()
+        for name, coefficient in effects_like(card, proof.coefficients, named).items()
     ]
     if decision.verdict in (MISSING, AMBIGUOUS):
         notices += [

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.gap.proof.cross_check import MUCH, closes_gap
 from tank2sim.gap.proof.improvement import Proof, Prover
 from tank2sim.gap.proof.refit import effects_like
@@ -48,14 +49,13 @@ class Judged:
     withheld: str = ""
     by_simulation: str = ""
 
-    @property
-    def alternatives(self) -> tuple[tuple[str, ...], ...]:
+    def alternatives(self, card: ManoeuvringCard) -> tuple[tuple[str, ...], ...]:
         """Sets that the trials do not distinguish from what is named, or from the coefficients that explain the gap."""
         if self.proof.named.estimated:
             return tuple(fit.hypothesis.effects for fit in self.decision.alike)
         if self.decision.verdict == OUTSIDE_LIBRARY:
             return ()
-        return tuple((name,) for name in effects_like(self.proof.coefficients, ()))
+        return tuple((name,) for name in effects_like(card, self.proof.coefficients))
 
 
 def judge(prover: Prover, search: Search, decision: Decision) -> Judged:

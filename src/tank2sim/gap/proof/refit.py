@@ -2,45 +2,79 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from tank2sim.analysis.ensemble.draws import by_file_name
+from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.terms import known_term
+from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
+from tank2sim.gap.improve_card import changed_derivatives
 from tank2sim.gap.inference.fit import CoefficientEstimates
 from tank2sim.gap.result import Refitted
 from tank2sim.gap.search.decision import STANDARD_ERRORS
 from tank2sim.identification.trials.problem.estimation_problem import Estimate
 from tank2sim.identification.trials.problem.problem_from_card import card_with_estimate, free_parameters
 
-FEW_TERMS = 2
-"""Derivatives at most, apart from their changes by speed, that an effect changes which is named next to a refitted
-coefficient: more, and it is a change of the whole ship or rudder (project choice)."""
+EXPLAINS = 0.5
+"""Share of what the coefficients moved, in squares of their standard errors, that an effect named next to them explains
+(project choice: more than half)."""
 
 
-def effects_like(coefficients: Sequence[Refitted], named: Collection[str]) -> dict[str, Refitted]:
-    """Effects that change a refitted coefficient which has moved by :data:`.decision.STANDARD_ERRORS`, and that coefficient.
+def effects_like(
+    card: ManoeuvringCard, coefficients: Sequence[Refitted], named: Collection[str] = ()
+) -> dict[str, Refitted]:
+    """Effects that change the coefficients as they moved, and the coefficient of theirs that moved most.
 
-    Trials alone do not distinguish such an effect from a coefficient that is off.
+    It moved by more than :data:`.decision.STANDARD_ERRORS`, and the effect explains :data:`EXPLAINS` of what all moved,
+    by least squares in units of the standard errors, apart from the changes by speed. Trials alone do not distinguish
+    such an effect from coefficients that are off.
 
     Parameters
     ----------
+    card : ManoeuvringCard
+        As given.
     coefficients : sequence of Refitted
     named : collection of str
         Effects that are named already.
     """
+    steady = [entry for entry in coefficients if entry.name in ALL_TERMS and known_term(entry.name).u == 0]
+    errors = {entry.name: entry.standard_error_before for entry in steady}
+    moved = np.array([(entry.value - entry.before) / entry.standard_error_before for entry in steady])
     found = {}
     for name, effect in EFFECTS.items():
-        terms = [term for term in effect.changes if known_term(term).u == 0]
-        moved = [entry for entry in coefficients if entry.name in terms and entry.moved > STANDARD_ERRORS]
-        if moved and name not in named and len(terms) <= FEW_TERMS:
-            found[name] = max(moved, key=lambda coefficient: coefficient.moved)
+        changed = [entry for entry in steady if entry.name in effect.changes_on(card)]
+        most = max(changed, key=lambda entry: entry.moved, default=None)
+        if name in named or most is None or most.moved <= STANDARD_ERRORS or not effect.tried(card):
+            continue
+        by_effect = _changes(card, name, errors)
+        explained = by_effect @ np.linalg.lstsq(by_effect, moved, rcond=None)[0]
+        if explained @ explained > EXPLAINS * (moved @ moved):
+            found[name] = most
     return found
+
+
+def _changes(card: ManoeuvringCard, name: str, errors: Mapping[str, float]) -> Array:
+    """Changes of coefficients, in errors, by each amplitude of an effect of typical size (coefficients, amplitudes)."""
+    parameters = EFFECTS[name].parameters
+    typical = {each.name: (each.typical_values(card) or (each.value({}, card),))[0] for each in parameters}
+    absent = {each.name: each.absent for each in parameters if each.absent is not None}
+    columns = []
+    for amplitude in absent:
+        values = {**typical, **absent, amplitude: typical[amplitude]}
+        after = {term: value for term, value, *_ in changed_derivatives(card, name, values, {})}
+        columns.append(
+            [
+                (after.get(term, card.derivatives.get(term, 0.0)) - card.derivatives.get(term, 0.0)) / error
+                for term, error in errors.items()
+            ]
+        )
+    return np.array(columns, dtype=float).reshape(len(columns), len(errors)).T
 
 
 def refit_coefficients(
