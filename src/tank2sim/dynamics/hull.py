@@ -187,9 +187,9 @@ def rudder_quantities(forces: Forces) -> tuple[Quantity, Quantity, Quantity]:
     """``rudder.X``, ``rudder.Y``, ``rudder.N`` of the `forces` by the rudder alone: N, N and N m."""
     X, Y, N = forces
     return (
-        Quantity(name="rudder.X", unit="N", description="Surge force by the rudder, positive forward", value=X),
-        Quantity(name="rudder.Y", unit="N", description="Sway force by the rudder, positive to starboard", value=Y),
-        Quantity(name="rudder.N", unit="N.m", description="Yaw moment by the rudder, positive to starboard", value=N),
+        Quantity("rudder.X", "N", "Surge force by the rudder, positive forward", X),
+        Quantity("rudder.Y", "N", "Sway force by the rudder, positive to starboard", Y),
+        Quantity("rudder.N", "N.m", "Yaw moment by the rudder, positive to starboard", N),
     )
 
 
@@ -255,25 +255,25 @@ def force_quantities(
     f1, f2, f3 = forces
     return (
         Quantity(
-            name="force.X",
-            unit="N",
-            description=f"Surge force except for that of acceleration, {equations}, positive forward",
+            "force.X",
+            "N",
+            f"Surge force except for that of acceleration, {equations}, positive forward",
+            f1,
             nominal=nominal[0],
-            value=f1,
         ),
         Quantity(
-            name="force.Y",
-            unit="N",
-            description=f"Sway force except for that of acceleration, {equations}, positive to starboard",
+            "force.Y",
+            "N",
+            f"Sway force except for that of acceleration, {equations}, positive to starboard",
+            f2,
             nominal=nominal[0],
-            value=f2,
         ),
         Quantity(
-            name="force.N",
-            unit="N.m",
-            description=f"Yaw moment about midships without that of acceleration, {equations}, positive to starboard",
+            "force.N",
+            "N.m",
+            f"Yaw moment about midships without that of acceleration, {equations}, positive to starboard",
+            f3,
             nominal=nominal[1],
-            value=f3,
         ),
     )
 
@@ -296,10 +296,7 @@ def inertia_quantities(matrix: Inertia) -> tuple[Quantity, ...]:
         ("inertia.yaw_sway", "kg.m", "Yaw moment by sway acceleration, m x_G - Nvdot", matrix.yaw_sway),
         ("inertia.yaw", "kg.m2", "Yaw inertia with added inertia, J_z - Nrdot", matrix.yaw),
     )
-    return tuple(
-        Quantity(name=name, unit=unit, description=description, value=value)
-        for name, unit, description, value in described
-    )
+    return tuple(Quantity(name, unit, description, value) for name, unit, description, value in described)
 
 
 def acceleration_quantities(motion: Forces) -> tuple[Quantity, ...]:
@@ -310,7 +307,7 @@ def acceleration_quantities(motion: Forces) -> tuple[Quantity, ...]:
         ("motion.rdot", "rad/s2", "Yaw acceleration, positive to starboard", "deg/s2", 1e-3),
     )
     return tuple(
-        Quantity(name=name, unit=unit, description=description, display_unit=shown, nominal=nominal, value=value)
+        Quantity(name, unit, description, value, display_unit=shown, nominal=nominal)
         for (name, unit, description, shown, nominal), value in zip(described, motion, strict=True)
     )
 
@@ -324,18 +321,11 @@ def inside_range(excess: ca.SX, margin: ca.SX | float) -> ca.SX:
 def speed_and_drift(s: Mapping[str, ca.SX], speed: ca.SX, nominal: float) -> tuple[Quantity, Quantity]:
     """``motion.speed`` (m/s) and ``motion.beta`` (rad), with `speed` by :func:`.regular_speed`, typically `nominal`."""
     return (
+        Quantity("motion.speed", "m/s", "Speed U through the water", speed, display_unit="knots", nominal=nominal),
         Quantity(
-            name="motion.speed",
-            unit="m/s",
-            description="Speed U through the water",
-            display_unit="knots",
-            nominal=nominal,
-            value=speed,
-        ),
-        Quantity(
-            name="motion.beta",
-            unit="rad",
-            description="Drift angle -asin(v/U), positive when the water comes from port",
+            "motion.beta",
+            "rad",
+            "Drift angle -asin(v/U), positive when the water comes from port",
             display_unit="deg",
             nominal=0.1,
             # asin(v/U) without its division by zero at rest
@@ -376,24 +366,24 @@ def _water_speed_quantities(hull: Hull) -> tuple[Quantity, ...]:
         )
     )
     low = Quantity(
-        name="low_speed.share",
-        unit="1",
-        description="Share of the forces at low speed: 0 from low_speed.bound upwards, 1 at rest and astern",
+        "low_speed.share",
+        "1",
+        "Share of the forces at low speed: 0 from low_speed.bound upwards, 1 at rest and astern",
+        hull.low_share,
         minimum=0.0,
         maximum=1.0,
-        value=hull.low_share,
     )
     validity = Quantity(
-        name="validity",
-        unit="1",
-        description=(
+        "validity",
+        "1",
+        (
             "1 in the range of speed, drift angle, yaw rate and rudder angle in which the card holds; below that "
             "speed falling to 0 at low speed and astern, and never above the share of the card's polynomial in the "
             "forces; falling to 0 beyond the others"
         ),
+        math.prod((factor.symbol for factor in factors), start=ca.SX(1)),
         minimum=0.0,
         maximum=1.0,
-        value=math.prod((factor.symbol for factor in factors), start=ca.SX(1)),
     )
     return speed, drift, low, *factors, validity
 
@@ -401,10 +391,10 @@ def _water_speed_quantities(hull: Hull) -> tuple[Quantity, ...]:
 def validity_factor(name: str, cause: str, value: ca.SX) -> Quantity:
     """Factor ``validity_by.<name>`` of ``validity``: 1 where the model holds for that `cause`, falling to 0 beyond."""
     return Quantity(
-        name=f"{VALIDITY_FACTOR}{name}",
-        unit="1",
-        description=f"Factor of validity by {cause}: 1 where the model holds, falling to 0 beyond",
+        f"{VALIDITY_FACTOR}{name}",
+        "1",
+        f"Factor of validity by {cause}: 1 where the model holds, falling to 0 beyond",
+        value,
         minimum=0.0,
         maximum=1.0,
-        value=value,
     )

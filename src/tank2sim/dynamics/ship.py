@@ -83,11 +83,6 @@ def ship_model(card: ManoeuvringCard) -> Model:
     empty = Model(
         name=card.ship.name,
         description=_description(card),
-        states=(),
-        inputs=(),
-        parameters=(),
-        quantities=(),
-        outputs=(),
         step_s=_step(card),
         notices=(*notices, *gear_notices, *_without_yaw(card), *_one_sided(card)),
     )
@@ -217,9 +212,9 @@ def _ship_parameters(card: ManoeuvringCard) -> tuple[Parameter, ...]:
         # Above zero: a ship without length, speed, mass or water has no equations.
         minimum = None if name == "ship.x_G" else 1e-6
         return Parameter(
-            name=name,
-            unit=unit,
-            description=description,
+            name,
+            unit,
+            description,
             start=start,
             tunable=False,
             nominal=nominal,
@@ -229,9 +224,9 @@ def _ship_parameters(card: ManoeuvringCard) -> tuple[Parameter, ...]:
 
     def largest(name: str, unit: str, description: str, start: float) -> Parameter:
         return Parameter(
-            name=name,
-            unit=unit,
-            description=description,
+            name,
+            unit,
+            description,
             display_unit="deg" if unit == "rad" else None,
             start=start,
             minimum=0.0,
@@ -272,12 +267,6 @@ def _derivative_parameters(card: ManoeuvringCard, names: list[str]) -> tuple[Par
         return f"Coefficient of {' '.join(powers) or '1'} in {term.force}, prime system, rudder + to starboard"
 
     return tuple(
-        Parameter(
-            name=f"derivatives.{name}",
-            unit="1",
-            description=described(name),
-            nominal=1e-3,
-            start=card.derivatives.get(name, 0.0),
-        )
+        Parameter(f"derivatives.{name}", "1", described(name), nominal=1e-3, start=card.derivatives.get(name, 0.0))
         for name in names
     )

@@ -37,11 +37,11 @@ def force_shares(before: Model, after: Model, name: str) -> tuple[Quantity, ...]
             continue
         shares.append(
             Quantity(
-                name=f"{name}.{letter}",
-                unit=unit,
-                description=f"{description} by {name}, positive {_SIDES[letter]}",
+                f"{name}.{letter}",
+                unit,
+                f"{description} by {name}, positive {_SIDES[letter]}",
+                new.value - old.value,
                 nominal=old.nominal,
-                value=new.value - old.value,
             )
         )
     return tuple(shares)
@@ -80,12 +80,12 @@ def _displays(model: Model) -> Iterator[Quantity]:
         north, east = north + model.symbol("wind.north"), east + model.symbol("wind.east")
     forward, starboard = relative_air(model, north, east)
     yield Quantity(
-        name="wind.relative_speed",
-        unit="m/s",
-        description="Speed of the wind relative to the ship",
+        "wind.relative_speed",
+        "m/s",
+        "Speed of the wind relative to the ship",
+        ca.sqrt(forward**2 + starboard**2 + _STILL_MPS**2),
         display_unit="knots",
         nominal=10.0,
-        value=ca.sqrt(forward**2 + starboard**2 + _STILL_MPS**2),
     )
     from_bow = ca.atan2(-starboard, -forward + _STILL_MPS * (forward**2 + starboard**2 < _STILL_MPS**2))
     description = "Direction from which the relative wind comes, clockwise from the bow, 0 to 360 deg"
@@ -99,13 +99,13 @@ _STILL_MPS = 1e-8
 def _bearing(name: str, description: str, angle: ca.SX) -> Quantity:
     turn = 2 * math.pi
     return Quantity(
-        name=name,
-        unit="rad",
-        description=description,
+        name,
+        "rad",
+        description,
+        angle - turn * ca.floor(angle / turn),
         display_unit="deg",
         minimum=0.0,
         maximum=2 * math.pi,
-        value=angle - turn * ca.floor(angle / turn),
     )
 
 
@@ -136,7 +136,7 @@ def with_external_forces(model: Model) -> Model:
     )
     usual = (force, force, force * float(length) / 4, float(length) / 4, float(length) / 20)
     inputs = [
-        Input(name=name, unit=unit, description=description, nominal=nominal)
+        Input(name, unit, description, nominal=nominal)
         for name, (unit, description), nominal in zip(EXTERNAL_INPUTS, described, usual, strict=True)
     ]
     X, Y, N, x, y = (variable.symbol for variable in inputs)
@@ -148,7 +148,7 @@ def with_external_forces(model: Model) -> Model:
         ("m", "Point of the external force below the origin"),
     )
     rolling = [
-        Input(name=name, unit=unit, description=description, nominal=nominal)
+        Input(name, unit, description, nominal=nominal)
         for name, (unit, description), nominal in zip(
             EXTERNAL_INPUTS_OF_ROLL, of_roll, (force * float(length) / 20, float(length) / 20), strict=True
         )

@@ -105,11 +105,6 @@ def craft_model(card: SteeredCard) -> Model:
     empty = Model(
         name=card.ship.name,
         description=f"{card.ship.name}: small craft in surge, sway and yaw with thrusters {described}",
-        states=(),
-        inputs=(),
-        parameters=(),
-        quantities=(),
-        outputs=(),
         step_s=_craft_step(card),
     )
     shown = [f"thrusters.{thruster.name}.{what}" for thruster in card.thrusters for what in ("speed", "thrust")]
@@ -159,9 +154,9 @@ def _craft_particulars(card: SteeredCard) -> tuple[Parameter, ...]:
     may_vanish = ("ship.x_G", "ship.slowest")
     return tuple(
         Parameter(
-            name=name,
-            unit=unit,
-            description=description,
+            name,
+            unit,
+            description,
             start=start,
             tunable=False,
             nominal=abs(start) or 1.0,
@@ -203,9 +198,9 @@ def _craft_derivatives(card: SteeredCard) -> tuple[Parameter, ...]:
 
     return tuple(
         Parameter(
-            name=f"derivatives.{name}",
-            unit=craft_unit(name),
-            description=described(name),
+            f"derivatives.{name}",
+            craft_unit(name),
+            described(name),
             nominal=abs(card.derivatives.get(name, 0.0)) or 1.0,
             start=card.derivatives.get(name, 0.0),
         )
@@ -323,9 +318,9 @@ def _thruster(thruster: ThrusterSection, start: float, s: Mapping[str, ca.SX]) -
 
     def constant(name: str, unit: str, description: str, value: float, shown: str | None = None) -> Parameter:
         return Parameter(
-            name=f"{prefix}.{name}",
-            unit=unit,
-            description=f"{description} of {where}",
+            f"{prefix}.{name}",
+            unit,
+            f"{description} of {where}",
             display_unit=shown,
             nominal=abs(value) or 1.0,
             minimum=0.0,
@@ -346,9 +341,9 @@ def _thruster(thruster: ThrusterSection, start: float, s: Mapping[str, ca.SX]) -
         )
         ordered = float(ca.evalf(revolutions_of_order(ca.SX(start), thruster.max_radps, 1 / thruster.order_exponent)))
     command = Input(
-        name=f"{prefix}.command",
-        unit="rad/s",
-        description=f"Ordered revolutions of {where}, positive ahead",
+        f"{prefix}.command",
+        "rad/s",
+        f"Ordered revolutions of {where}, positive ahead",
         display_unit="rpm",
         nominal=thruster.max_radps / 2,
         minimum=thruster.lowest_radps,
@@ -359,18 +354,18 @@ def _thruster(thruster: ThrusterSection, start: float, s: Mapping[str, ca.SX]) -
     beyond = held * (ca.fabs(held) > band.symbol) if thruster.dead_band_radps else held
     largest = ca.if_else(held >= 0, thruster.max_radps, -thruster.lowest_radps)
     order = Quantity(
-        name=f"{prefix}.order",
-        unit="rad/s",
-        description=f"Revolutions that {where} goes to: its order within its limits, 0 in the dead band",
+        f"{prefix}.order",
+        "rad/s",
+        f"Revolutions that {where} goes to: its order within its limits, 0 in the dead band",
+        beyond if exponent is None else revolutions_of_order(beyond, largest, exponent.symbol),
         display_unit="rpm",
         nominal=thruster.max_radps,
-        value=beyond if exponent is None else revolutions_of_order(beyond, largest, exponent.symbol),
     )
     places = [
         Parameter(
-            name=f"{prefix}.{axis}",
-            unit="m",
-            description=f"Place of {where}, positive {way} of midships",
+            f"{prefix}.{axis}",
+            "m",
+            f"Place of {where}, positive {way} of midships",
             nominal=abs(value) or 1.0,
             start=value,
             tunable=False,
@@ -387,11 +382,11 @@ def _thruster(thruster: ThrusterSection, start: float, s: Mapping[str, ca.SX]) -
     variables += turning
     along = s["motion.u"] * ca.cos(azimuth) + s["motion.v"] * ca.sin(azimuth)
     thrust = Quantity(
-        name=f"{prefix}.thrust",
-        unit="N",
-        description=f"Thrust of {where}, positive with revolutions ahead",
+        f"{prefix}.thrust",
+        "N",
+        f"Thrust of {where}, positive with revolutions ahead",
+        thrust_of(speed[0].symbol, along, ahead.symbol, astern.symbol, loss.symbol),
         nominal=thruster.largest_thrust_N,
-        value=thrust_of(speed[0].symbol, along, ahead.symbol, astern.symbol, loss.symbol),
     )
     return [*variables, thrust], thrust.symbol, azimuth
 
@@ -408,29 +403,29 @@ def _revolutions(thruster: ThrusterSection, prefix: str, where: str, order: Quan
     if thruster.time_constant_s is None:
         return [Quantity(value=order.symbol, **described)]  # type: ignore[arg-type]
     first = Parameter(
-        name=f"initial.{thruster.name}_speed",
-        unit="rad/s",
-        description=f"Revolutions of {where} at the start, positive ahead",
+        f"initial.{thruster.name}_speed",
+        "rad/s",
+        f"Revolutions of {where} at the start, positive ahead",
         display_unit="rpm",
         nominal=thruster.max_radps,
         start=start,
         tunable=False,
     )
     lag = Parameter(
-        name=f"{prefix}.time_constant",
-        unit="s",
-        description=f"Lag of the revolutions of {where}",
+        f"{prefix}.time_constant",
+        "s",
+        f"Lag of the revolutions of {where}",
         nominal=thruster.time_constant_s,
         minimum=1e-6,
         start=thruster.time_constant_s,
     )
     state = State(derivative=f"{prefix}.rate", start=first.symbol, trim=order.value, **described)  # type: ignore[arg-type]
     rate = Quantity(
-        name=f"{prefix}.rate",
-        unit="rad/s2",
-        description=f"Rate of change of the revolutions of {where}",
+        f"{prefix}.rate",
+        "rad/s2",
+        f"Rate of change of the revolutions of {where}",
+        (order.symbol - state.symbol) / lag.symbol,
         nominal=thruster.max_radps,
-        value=(order.symbol - state.symbol) / lag.symbol,
     )
     return [state, rate, first, lag]
 
@@ -441,9 +436,9 @@ def _azimuth(thruster: ThrusterSection, prefix: str, where: str) -> tuple[list[V
     if reach is None:
         return [], ca.SX(middle)
     command = Input(
-        name=f"{prefix}.azimuth_command",
-        unit="rad",
-        description=f"Ordered direction in which {where} pushes the craft, clockwise from the bow",
+        f"{prefix}.azimuth_command",
+        "rad",
+        f"Ordered direction in which {where} pushes the craft, clockwise from the bow",
         display_unit="deg",
         nominal=min(reach, 0.5),
         minimum=middle - reach,
@@ -467,11 +462,7 @@ def _azimuth(thruster: ThrusterSection, prefix: str, where: str) -> tuple[list[V
         limit = thruster.max_azimuth_rate_radps
         rate = ca.fmax(-limit, ca.fmin(limit, rate))
     turn = Quantity(
-        name=f"{prefix}.azimuth_rate",
-        unit="rad/s",
-        description=f"Rate at which {where} turns, clockwise",
-        display_unit="deg/s",
-        value=rate,
+        f"{prefix}.azimuth_rate", "rad/s", f"Rate at which {where} turns, clockwise", rate, display_unit="deg/s"
     )
     return [command, state, turn], state.symbol
 
@@ -484,11 +475,11 @@ def _craft_speed(s: Mapping[str, ca.SX]) -> tuple[Quantity, ...]:
         s["ship.slowest"] - speed.symbol, margin
     )
     validity = Quantity(
-        name="validity",
-        unit="1",
-        description="1 in the range of speeds in which the card holds, falling to 0 beyond",
+        "validity",
+        "1",
+        "1 in the range of speeds in which the card holds, falling to 0 beyond",
+        inside,
         minimum=0.0,
         maximum=1.0,
-        value=inside,
     )
     return speed, drift, validity

@@ -38,9 +38,9 @@ def steering_gear(gear: SteeringGear | None, ship_time_s: float) -> tuple[tuple[
     lag, *limits = _parameters(gear, ship_time_s)
     by_name = {limit.name: limit.symbol for limit in limits}
     start = Parameter(
-        name="initial.rudder_angle",
-        unit="rad",
-        description="Rudder angle at the start, positive to starboard",
+        "initial.rudder_angle",
+        "rad",
+        "Rudder angle at the start, positive to starboard",
         display_unit="deg",
         nominal=0.35,
         start=0.0,
@@ -48,9 +48,9 @@ def steering_gear(gear: SteeringGear | None, ship_time_s: float) -> tuple[tuple[
     )
     order = _within(command.symbol, by_name.get("steering.max_angle"))
     rudder = State(
-        name="rudder.angle",
-        unit="rad",
-        description="Rudder angle, positive to starboard (turns the ship to starboard)",
+        "rudder.angle",
+        "rad",
+        "Rudder angle, positive to starboard (turns the ship to starboard)",
         display_unit="deg",
         nominal=0.35,
         derivative="rudder.rate",
@@ -58,7 +58,14 @@ def steering_gear(gear: SteeringGear | None, ship_time_s: float) -> tuple[tuple[
         trim=ca.if_else(failed.symbol, start.symbol, order),
     )
     error = _angle("rudder.error", "Order less rudder angle, on which the gear acts", order - rudder.symbol)
-    rate = _rate(_within(error.symbol / lag.symbol, by_name.get("steering.max_rate")) * (1 - failed.symbol))
+    rate = Quantity(
+        rudder.derivative,
+        "rad/s",
+        "Rate of the rudder, positive to starboard",
+        _within(error.symbol / lag.symbol, by_name.get("steering.max_rate")) * (1 - failed.symbol),
+        display_unit="deg/s",
+        nominal=0.05,
+    )
     seen = _angle("rudder.effective", "Rudder angle that the hull forces see, positive to starboard", rudder.symbol)
     return (command, failed, rudder, error, rate, seen, lag, *limits, start), notices
 
@@ -73,9 +80,9 @@ def assumed_lag_notice(ship_time_s: float) -> Notice:
 
 def _inputs(gear: SteeringGear) -> tuple[Input, Input]:
     command = Input(
-        name="rudder.command",
-        unit="rad",
-        description="Rudder order, positive to starboard (turns the ship to starboard)",
+        "rudder.command",
+        "rad",
+        "Rudder order, positive to starboard (turns the ship to starboard)",
         display_unit="deg",
         nominal=0.35,
         minimum=-(gear.max_angle_rad or ca.pi / 2),
@@ -83,19 +90,16 @@ def _inputs(gear: SteeringGear) -> tuple[Input, Input]:
         accepted=ca.pi / 2,  # more is an angle in degrees; up to there the gear stops at its largest angle
     )
     failed = Input(
-        name="steering.failed",
-        unit="1",
-        description="True: the steering gear has failed and the rudder stays where it is",
-        boolean=True,
+        "steering.failed", "1", "True: the steering gear has failed and the rudder stays where it is", boolean=True
     )
     return command, failed
 
 
 def _parameters(gear: SteeringGear, ship_time_s: float) -> list[Parameter]:
     lag = Parameter(
-        name="steering.time_constant",
-        unit="s",
-        description="Time constant of the steering gear",
+        "steering.time_constant",
+        "s",
+        "Time constant of the steering gear",
         minimum=1e-6,
         start=gear.time_constant_s or UNSTATED_LAG * ship_time_s,
     )
@@ -104,15 +108,7 @@ def _parameters(gear: SteeringGear, ship_time_s: float) -> list[Parameter]:
         ("steering.max_rate", "rad/s", "Largest rate of the rudder", gear.max_rate_radps, "deg/s"),
     )
     limits = (
-        Parameter(
-            name=name,
-            unit=unit,
-            description=description,
-            minimum=0.0,
-            start=value,
-            nominal=value,
-            display_unit=display_unit,
-        )
+        Parameter(name, unit, description, minimum=0.0, start=value, nominal=value, display_unit=display_unit)
         for name, unit, description, value, display_unit in described
         if value is not None
     )
@@ -120,18 +116,7 @@ def _parameters(gear: SteeringGear, ship_time_s: float) -> list[Parameter]:
 
 
 def _angle(name: str, description: str, value: ca.SX) -> Quantity:
-    return Quantity(name=name, unit="rad", description=description, display_unit="deg", nominal=0.35, value=value)
-
-
-def _rate(value: ca.SX) -> Quantity:
-    return Quantity(
-        name="rudder.rate",
-        unit="rad/s",
-        description="Rate of the rudder, positive to starboard",
-        display_unit="deg/s",
-        nominal=0.05,
-        value=value,
-    )
+    return Quantity(name, "rad", description, value, display_unit="deg", nominal=0.35)
 
 
 def _within(value: ca.SX, limit: ca.SX | None) -> ca.SX:

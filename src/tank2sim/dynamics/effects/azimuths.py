@@ -38,9 +38,9 @@ def _with_azimuths(model: Model, given: EffectSymbols, card: ManoeuvringCard) ->
     for unit in range(1, UNITS_OF_SHIP + 1):
         turning, angle = (
             State(
-                name=f"azimuth.{name}_actual_{unit}",
-                unit=order.unit,
-                description=f"{description} of azimuth {unit}",
+                f"azimuth.{name}_actual_{unit}",
+                order.unit,
+                f"{description} of azimuth {unit}",
                 display_unit=order.display_unit,
                 nominal=scale,
                 derivative=f"azimuth.{name}_rate_{unit}",
@@ -60,26 +60,22 @@ def _with_azimuths(model: Model, given: EffectSymbols, card: ManoeuvringCard) ->
         ahead, astern = ca.fmax(share, 0), ca.fmin(share, 0)
         value = given["force"] * (ahead * (ahead - met / given["no_thrust"]) - given["astern"] * astern**2)
         thrust = Quantity(
-            name=f"azimuth.thrust_{unit}",
-            unit="N",
-            description=f"Thrust of azimuth {unit} in its direction",
-            nominal=1e5,
-            value=value,
+            f"azimuth.thrust_{unit}", "N", f"Thrust of azimuth {unit} in its direction", value, nominal=1e5
         )
         wanted = (given[f"angle_{unit}"] - angle.symbol) / given["angle_time_constant"]
         rates = (
             Quantity(
-                name=turning.derivative,
-                unit="rad/s2",
-                description=f"Rate of the revolutions of azimuth {unit}",
-                value=(given[f"revolutions_{unit}"] - turning.symbol) / given["time_constant"],
+                turning.derivative,
+                "rad/s2",
+                f"Rate of the revolutions of azimuth {unit}",
+                (given[f"revolutions_{unit}"] - turning.symbol) / given["time_constant"],
             ),
             Quantity(
-                name=angle.derivative,
-                unit="rad/s",
-                description=f"Rate at which azimuth {unit} turns, clockwise",
+                angle.derivative,
+                "rad/s",
+                f"Rate at which azimuth {unit} turns, clockwise",
+                ca.fmax(-limit, ca.fmin(limit, wanted)),
                 display_unit="deg/s",
-                value=ca.fmax(-limit, ca.fmin(limit, wanted)),
             ),
         )
         model = model.extend(turning, angle, thrust, *rates, outputs=[turning.name, angle.name, thrust.name])

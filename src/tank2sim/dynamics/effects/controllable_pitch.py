@@ -11,8 +11,8 @@ import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard, MmgCard
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, refuse_given, with_steps_for
-from tank2sim.dynamics.effects.forces import scales, with_forces
-from tank2sim.dynamics.hull import inside_range, validity_factor
+from tank2sim.dynamics.effects.forces import scales, with_forces, with_validity
+from tank2sim.dynamics.hull import inside_range
 from tank2sim.dynamics.model import Model, Parameter, Quantity, State
 
 # Oosterveld and van Oossanen (1975), Further computer-analyzed data of the Wageningen B-screw series, International
@@ -214,34 +214,33 @@ def _with_pitch(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mo
     if "propeller.speed_actual" not in model:
         raise card.fault("propulsion", "is missing", "controllable_pitch needs the revolutions of the propeller")
     start = Parameter(
-        name="initial.propeller_pitch",
-        unit="1",
-        description="Pitch of the propeller over its diameter at the start",
+        "initial.propeller_pitch",
+        "1",
+        "Pitch of the propeller over its diameter at the start",
         minimum=-LARGEST_PITCH,
         maximum=LARGEST_PITCH,
         start=next(one.start for one in model.inputs if one.name == "propeller.pitch"),
         tunable=False,
     )
     pitch = State(
-        name="propeller.pitch_actual",
-        unit="1",
-        description="Pitch of the propeller over its diameter, negative: pushes astern",
+        "propeller.pitch_actual",
+        "1",
+        "Pitch of the propeller over its diameter, negative: pushes astern",
         derivative="propeller.pitch_rate",
         start=start.symbol,
         trim=given["pitch"],
     )
     limit = 2 * given["design_pitch"] / given["reversal"]
     rate = Quantity(
-        name=pitch.derivative,
-        unit="1/s",
-        description="Rate of the pitch over the diameter",
+        pitch.derivative,
+        "1/s",
+        "Rate of the pitch over the diameter",
+        ca.fmax(-limit, ca.fmin(limit, (given["pitch"] - pitch.symbol) / given["time_constant"])),
         nominal=0.1,
-        value=ca.fmax(-limit, ca.fmin(limit, (given["pitch"] - pitch.symbol) / given["time_constant"])),
     )
     inside = inside_range(LEAST_PITCH - pitch.symbol, LEAST_PITCH)
-    factor = validity_factor("pitch", "the pitch of the propeller, below that of the series", inside)
-    model = model.extend(start, pitch, rate, factor, outputs=[pitch.name, factor.name])
-    model = model.redefine("validity", lambda validity: validity * factor.symbol)
+    model = model.extend(start, pitch, rate, outputs=[pitch.name])
+    model = with_validity(model, "pitch", "the pitch of the propeller, below that of the series", inside)
     model = with_steps_for(model, "controllable_pitch.time_constant")
 
     blades = given["area_ratio"], given["blades"]
@@ -305,11 +304,11 @@ def _with_torques(model: Model, torques: Mapping[str, ca.SX]) -> Model:
     """The model with outputs ``propeller.torque`` (N m), by the suffix of each propeller, and ``propeller.power``."""
     each = [
         Quantity(
-            name=f"propeller.torque{suffix}",
-            unit="N.m",
-            description="Torque that turns the propeller, by the Wageningen B-series",
+            f"propeller.torque{suffix}",
+            "N.m",
+            "Torque that turns the propeller, by the Wageningen B-series",
+            torque,
             nominal=1e5,
-            value=torque,
         )
         for suffix, torque in torques.items()
     ]
@@ -320,9 +319,7 @@ def _with_torques(model: Model, torques: Mapping[str, ca.SX]) -> Model:
         ),
         ca.SX(0),
     )
-    delivered = Quantity(
-        name="propeller.power", unit="W", description="Power delivered to the propellers", nominal=1e6, value=power
-    )
+    delivered = Quantity("propeller.power", "W", "Power delivered to the propellers", power, nominal=1e6)
     return model.extend(*each, delivered, outputs=[*(torque.name for torque in each), delivered.name])
 
 

@@ -108,9 +108,9 @@ class EffectParameter:
         unit, description = _UNITS.get(suffix, "1"), self.description[0].upper() + self.description[1:]
         if self.input_name:
             return Input(
-                name=self.input_name,
-                unit=unit,
-                description=description,
+                self.input_name,
+                unit,
+                description,
                 display_unit=_SHOWN.get(suffix),
                 # A direction may go round and round, and a negative speed is one the other way.
                 minimum={
@@ -124,15 +124,25 @@ class EffectParameter:
                 start=value,
             )
         return Parameter(
-            name=f"{effect}.{self.stem}",
-            unit=unit,
-            description=description,
+            f"{effect}.{self.stem}",
+            unit,
+            description,
             display_unit=_SHOWN.get(suffix),
             nominal=0.1 * (self.maximum - self.lowest(card)),
             minimum=self.lowest(card),
             maximum=self.maximum,
             start=value,
         )
+
+
+def side_force(cause: str, Y: float, N: float) -> tuple[EffectParameter, ...]:
+    """Parameters ``Y_prime`` and ``N_prime`` of a side force by a `cause`, with their typical values (prime)."""
+    return tuple(
+        EffectParameter(
+            f"{axis}_prime", f"{what} {cause}, positive to starboard", -0.01, 0.01, absent=0.0, typical=(size,)
+        )
+        for axis, what, size in (("Y", "sway force", Y), ("N", "yaw moment", N))
+    )
 
 
 EffectSymbols = Mapping[str, ca.SX]
@@ -393,12 +403,7 @@ def with_readings(model: Model, shown: Mapping[str, ca.SX]) -> Model:
         description = f"What the sensor shows: {true.description[0].lower()}{true.description[1:]}"
         model = model.extend(
             Quantity(
-                name=names[name],
-                unit=true.unit,
-                description=description,
-                display_unit=true.display_unit,
-                nominal=true.nominal,
-                value=ca.SX(value),
+                names[name], true.unit, description, ca.SX(value), display_unit=true.display_unit, nominal=true.nominal
             )
         )
     return model

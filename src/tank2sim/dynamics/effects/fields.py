@@ -82,28 +82,28 @@ def _with_changing_current(model: Model, given: EffectSymbols, card: Manoeuvring
     started = {"north": math.cos(angle), "east": math.sin(angle)}
     for side in ("north", "east"):
         start = Parameter(
-            name=f"initial.current_{side}",
-            unit="m/s",
-            description=f"Velocity to {side} at the start of the water in which the ship is",
+            f"initial.current_{side}",
+            "m/s",
+            f"Velocity to {side} at the start of the water in which the ship is",
             display_unit="knots",
             start=inputs["current.speed"] * started[side] + inputs[f"current.{side}"],
             tunable=False,
         )
         target = given["speed"] * by_direction[side] + given[side]
         state = State(
-            name=f"current_field.{side}_reached",
-            unit="m/s",
-            description=f"Velocity to {side} of the water in which the ship is",
+            f"current_field.{side}_reached",
+            "m/s",
+            f"Velocity to {side} of the water in which the ship is",
             display_unit="knots",
             derivative=f"current_field.{side}_rate",
             start=start.symbol,
             trim=target,
         )
         rate = Quantity(
-            name=f"current_field.{side}_rate",
-            unit="m/s2",
-            description=f"Acceleration to {side} of the water in which the ship is",
-            value=(target - state.symbol) / given["entry_time"],
+            f"current_field.{side}_rate",
+            "m/s2",
+            f"Acceleration to {side} of the water in which the ship is",
+            (target - state.symbol) / given["entry_time"],
         )
         states, starts, rates = [*states, state], [*starts, start], [*rates, rate]
     carried = model.extend(*states, *starts, *rates)

@@ -97,9 +97,9 @@ def _with_backlash(model: Model, given: EffectSymbols, card: ManoeuvringCard) ->
     assert isinstance(rudder, State) and isinstance(rate, Quantity)
     contact = CONTACT * card.ship.length_m / card.model.speed_mps
     gear = State(
-        name="rudder_backlash.gear",
-        unit="rad",
-        description="Angle of the steering gear before its play, positive to starboard",
+        "rudder_backlash.gear",
+        "rad",
+        "Angle of the steering gear before its play, positive to starboard",
         display_unit="deg",
         nominal=0.35,
         derivative="rudder_backlash.rate",
@@ -107,12 +107,12 @@ def _with_backlash(model: Model, given: EffectSymbols, card: ManoeuvringCard) ->
         trim=rudder.trim,
     )
     turning = Quantity(
-        name="rudder_backlash.rate",
-        unit="rad/s",
-        description="Rate of the steering gear before its play, positive to starboard",
+        "rudder_backlash.rate",
+        "rad/s",
+        "Rate of the steering gear before its play, positive to starboard",
+        rate.value,
         display_unit="deg/s",
         nominal=0.05,
-        value=rate.value,
     )
     played = _beyond(gear.symbol - rudder.symbol, given["width"] / 2) / contact
     return (
@@ -177,9 +177,9 @@ def _with_telemotor_lag(model: Model, given: EffectSymbols, card: ManoeuvringCar
     """
     command = model.symbol("rudder.command")
     order = State(
-        name="telemotor_lag.order",
-        unit="rad",
-        description="Rudder order as it reaches the gear, positive to starboard",
+        "telemotor_lag.order",
+        "rad",
+        "Rudder order as it reaches the gear, positive to starboard",
         display_unit="deg",
         nominal=0.35,
         derivative="telemotor_lag.rate",
@@ -187,12 +187,12 @@ def _with_telemotor_lag(model: Model, given: EffectSymbols, card: ManoeuvringCar
         steady=True,
     )
     rate = Quantity(
-        name="telemotor_lag.rate",
-        unit="rad/s",
-        description="Rate of the rudder order that reaches the gear, positive to starboard",
+        "telemotor_lag.rate",
+        "rad/s",
+        "Rate of the rudder order that reaches the gear, positive to starboard",
+        ca.SX(0),
         display_unit="deg/s",
         nominal=0.05,
-        value=ca.SX(0),
     )
     # Its rate last: it alone still holds the command, which gives way to q everywhere else.
     lagging = (
