@@ -14,17 +14,8 @@ from tank2sim.errors import InputError
 def ship_card_of(form: ShipCard, text: str, source: str) -> ManoeuvringCard:
     """Return the card of a form, in the prime system and with the rudder positive to starboard.
 
-    Parameters
-    ----------
-    form : ShipCard
-        Sections as in the file, angles and rates in SI.
-    text, source : str
-        Text of the file and its name, for messages.
-
-    Raises
-    ------
-    InputError
-        A derivative is unknown or given twice, or a value is implausible.
+    `form`: sections as in the file, angles and rates in SI. `text`, `source`: text of the file and its name, for
+    messages. Raises InputError: a derivative is unknown or given twice, or a value is implausible.
     """
     scales = _file_scales(form, source)
     to_port = form.model.rudder_sign == "port"

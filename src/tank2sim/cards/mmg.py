@@ -35,10 +35,8 @@ def fujii(aspect_ratio: float) -> float:
 def mmg_fields(form: MmgForm, source: str) -> tuple[dict[str, Any], ShipCard]:
     """The fields that only an MMG card has, and the form without them.
 
-    Raises
-    ------
-    InputError
-        A value is given for one side alone, K_T or the slope of the rudder is given twice or not at all, or eta > 1.
+    Raises InputError: a value is given for one side alone, K_T or the slope of the rudder is given twice or not at all,
+    or eta > 1.
     """
     for section, pairs in WITH_BOTH_SIDES.items():
         for pair in pairs:
@@ -147,10 +145,7 @@ class OpenWaterFit(NamedTuple):
 def open_water_fit(J: list[float], values: list[float], source: str, curve: str = "K_T") -> OpenWaterFit:
     """Least squares of a curve, K_T or K_Q, on 1, J, J^2.
 
-    Raises
-    ------
-    InputError
-        The lists differ in length, or have fewer than three different J.
+    Raises InputError: the lists differ in length, or have fewer than three different J.
     """
     if len(J) != len(values):
         problem = f"has {len(values)} values and J {len(J)}"
@@ -184,16 +179,8 @@ def equilibrium_revolutions(
 ) -> float | None:
     """n (1/s) at which K_T rho n^2 D^4 is a resistance over rho, at an inflow u_P; None if there is none.
 
-    Parameters
-    ----------
-    resistance : float
-        T/rho of one propeller, m4/s2.
-    inflow : float
-        (1 - w_P0) u, m/s.
-    diameter : float
-        D_P, m.
-    coefficients : tuple
-        k_0, k_1, k_2.
+    `resistance`: T/rho of one propeller, m4/s2. `inflow`: (1 - w_P0) u, m/s. `diameter`: D_P, m. `coefficients`: k_0,
+    k_1, k_2.
     """
     k_0, k_1, k_2 = coefficients
     # k_0 D^4 n^2 + k_1 D^3 u_P n + k_2 D^2 u_P^2 - T/rho = 0
@@ -212,10 +199,7 @@ def equilibrium_revolutions(
 def nominal_revolutions(card: MmgCard, stated: float | None) -> float:
     """Revolutions (rad/s) of the approach: those stated, or those that hold ``model.speed_mps`` straight ahead.
 
-    Raises
-    ------
-    InputError
-        None do.
+    Raises InputError: None do.
     """
     if stated is not None:
         return stated
@@ -240,14 +224,7 @@ bounds are a project choice."""
 def refuse_other_scaling(card: MmgCard) -> None:
     """Raise InputError if Y_v is of another scaling, length or draught than the card's.
 
-    Parameters
-    ----------
-    card : MmgCard
-
-    Raises
-    ------
-    InputError
-        Y_v is not within :data:`_SLENDER_WING`.
+    Raises InputError: Y_v is not within :data:`_SLENDER_WING`.
     """
     draught, value = card.ship.draught_m, card.derivatives.get("Yv", 0.0)
     if draught is None or not value:

@@ -27,20 +27,10 @@ UNCERTAIN_OF_THRUSTER = (
 def craft_card(form: CraftForm, text: str, source: str, spelt: Mapping[str, str]) -> CraftCard:
     """The card of a form, in SI.
 
-    Parameters
-    ----------
-    form : CraftForm
-        Sections as in the file, angles and rates in SI.
-    text, source : str
-        Text of the file and its name, for messages.
-    spelt : mapping
-        Place of an angle or a rate in SI to its place in the file.
-
-    Raises
-    ------
-    InputError
-        A term is unknown, mass or place is implausible, a thruster is given twice or states what it cannot, or the
-        thrusters cannot hold the cruising speed.
+    `form`: sections as in the file, angles and rates in SI. `text`, `source`: text of the file and its name, for
+    messages. `spelt`: place of an angle or a rate in SI to its place in the file. Raises InputError: a term is unknown,
+    mass or place is implausible, a thruster is given twice or states what it cannot, or the thrusters cannot hold the
+    cruising speed.
     """
     for section, names in (("derivatives", form.derivatives), ("uncertainty", form.uncertainty)):
         for name in names:
@@ -123,10 +113,7 @@ def cruising_revolutions(card: SteeredCard) -> float:
 
     (sum k cos a) n^2 - (sum l cos^2 a) u n = -(Xu u + Xuabsu u^2), a their azimuths.
 
-    Raises
-    ------
-    InputError
-        No thruster pushes ahead, or the speed is beyond the largest revolutions.
+    Raises InputError: no thruster pushes ahead, or the speed is beyond the largest revolutions.
     """
     ahead = [thruster for thruster, holds in zip(card.thrusters, pushes_ahead(card), strict=True) if holds]
     speed = card.model.speed_mps

@@ -44,17 +44,10 @@ def motion_columns(motion: str) -> tuple[str, str]:
 class WaveTable:
     """The table by frequency and direction.
 
-    Parameters
-    ----------
-    frequencies : numpy.ndarray, (nf,)
-        Rising, rad/s.
-    directions : numpy.ndarray, (nd,)
-        0 to pi, rad, evenly spaced.
-    motions : mapping
-        Motion to complex amplitude (nf, nd) over that of the wave: the real part is in phase with the surface at
-        midships, a positive imaginary one leads it.
-    drift : mapping
-        ``X``, ``Y``, ``N`` to mean force over the square of the wave's amplitude, (nf, nd), N/m^2 and N/m.
+    `frequencies` (nf,): rising, rad/s. `directions` (nd,): 0 to pi, rad, evenly spaced. `motions`: motion to complex
+    amplitude (nf, nd) over that of the wave: the real part is in phase with the surface at midships, a positive
+    imaginary one leads it. `drift`: ``X``, ``Y``, ``N`` to mean force over the square of the wave's amplitude, (nf,
+    nd), N/m^2 and N/m.
     """
 
     frequencies: Array
@@ -66,10 +59,8 @@ class WaveTable:
 def wave_table(columns: Sequence[str], rows: Sequence[Sequence[float]]) -> WaveTable:
     """Read the table of a card.
 
-    Raises
-    ------
-    ValueError
-        A column is unknown, missing or given twice, or the rows are not a table of all frequencies and directions.
+    Raises ValueError: a column is unknown, missing or given twice, or the rows are not a table of all frequencies and
+    directions.
     """
     known = ["frequency_radps", "direction_deg", *(name for motion in WAVE_MOTIONS for name in motion_columns(motion))]
     known += DRIFT_COLUMNS.values()

@@ -28,11 +28,8 @@ def build(card: Card) -> Model:
 
     Equal cards have the same model, with all that it has worked out.
 
-    Raises
-    ------
-    InputError
-        The card names a derivative, an effect or a parameter that the model does not know, or its mass matrix is
-        singular; the message names the key.
+    Raises InputError: the card names a derivative, an effect or a parameter that the model does not know, or its mass
+    matrix is singular; the message names the key.
     """
     entries = card.effects if isinstance(card, SteeredCard) else ()
     effects = tuple(EFFECTS.get(entry.name) for entry in entries)

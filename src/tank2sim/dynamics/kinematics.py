@@ -20,7 +20,7 @@ def earth_velocity(u: ca.SX, v: ca.SX, psi: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def started(state: State, at_start: str) -> tuple[State, Parameter]:
-    """The state ``motion.<letter>``, and the parameter ``initial.<letter>`` at which it starts, described by `at_start`.
+    """The state ``motion.<letter>``, and the parameter ``initial.<letter>`` at which it starts, by `at_start`.
 
     The parameter has the value that the state starts at so far.
     """

@@ -49,10 +49,8 @@ _OUTPUTS = (
 def ship_model(card: ManoeuvringCard) -> Model:
     """The model of a ship without its effects, (3.5) or (3.8) of paper 2 as the card's ``model.kind`` says.
 
-    Raises
-    ------
-    InputError
-        The card has a derivative that the model does not know, or its mass matrix is singular (f4 = 0 in 3.6).
+    Raises InputError: the card has a derivative that the model does not know, or its mass matrix is singular (f4 = 0 in
+    3.6).
     """
     names, notices = _derivative_names(card)
     _refuse_singular_mass(card)

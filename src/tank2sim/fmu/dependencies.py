@@ -21,15 +21,9 @@ Pattern = NDArray[np.bool_]
 class Unknown:
     """A variable and those it depends on.
 
-    Parameters
-    ----------
-    reference : int
-        Value reference of the variable.
-    dependencies : tuple of int
-        Value references of what it depends on, ascending.
-    kinds : tuple of str
-        For each, FMI's dependenciesKind: ``constant`` (a constant factor), ``fixed`` and ``tunable`` (a factor that
-        only parameters determine), else ``dependent``.
+    `reference`: value reference of the variable. `dependencies`: value references of what it depends on, ascending.
+    `kinds`: for each, FMI's dependenciesKind: ``constant`` (a constant factor), ``fixed`` and ``tunable`` (a factor
+    that only parameters determine), else ``dependent``.
     """
 
     reference: int

@@ -318,21 +318,10 @@ class Effect:
     def apply(self, model: Model, values: Mapping[str, float], card: ManoeuvringCard) -> Model:
         """The model with this effect.
 
-        Parameters
-        ----------
-        model : Model
-            Model of the ship, with or without other effects.
-        values : mapping
-            SI, by the names of the parameters; those with a default may be absent.
-        card : ManoeuvringCard
-            Card of the ship, for what the effect needs to know of it.
-
-        Raises
-        ------
-        InputError
-            The card lacks something that the effect needs, or the model has one of its variables already.
-        KeyError
-            A required value is missing.
+        `model`: model of the ship, with or without other effects. `values`: SI, by the names of the parameters; those
+        with a default may be absent. `card`: card of the ship, for what the effect needs to know of it. Raises
+        InputError: the card lacks something that the effect needs, or the model has one of its variables already.
+        Raises KeyError: a required value is missing.
         """
         if self.in_mmg and card.model.kind == "mmg":
             raise card.fault("effects", f"{self.name} is part of the MMG method already", "leave it out")
@@ -356,12 +345,7 @@ class Effect:
 
 
 def card_for_effects(card: SteeredCard) -> ManoeuvringCard:
-    """The card as effects take it: an effect that fits a craft reads nothing of a card that only ships have.
-
-    Parameters
-    ----------
-    card : SteeredCard
-    """
+    """The card as effects take it: an effect that fits a craft reads nothing of a card that only ships have."""
     return cast(ManoeuvringCard, card)
 
 
@@ -383,12 +367,8 @@ def sensor_fault_of(effect: Effect) -> str:
 def with_readings(model: Model, shown: Mapping[str, ca.SX]) -> Model:
     """The model with quantities ``sensor.*`` of what its sensors show: ``sensor.psi`` for ``motion.psi``.
 
-    Parameters
-    ----------
-    model : Model
-        Where it has such a quantity already, the new fault acts on what the earlier one shows.
-    shown : mapping
-        Name of the variable measured to the expression shown, of the model's symbols.
+    `model`: where it has such a quantity already, the new fault acts on what the earlier one shows. `shown`: name of
+    the variable measured to the expression shown, of the model's symbols.
     """
     names = {name: name.replace("motion.", "sensor.") for name in shown}
     faulty = [name for name in shown if names[name] in model]

@@ -27,12 +27,7 @@ _WEATHER = {
 
 
 def in_calm(model: Model) -> Model:
-    """The ship of a model without wind, waves and current, unless its inputs are set to others.
-
-    Parameters
-    ----------
-    model : Model
-    """
+    """The ship of a model without wind, waves and current, unless its inputs are set to others."""
     still = model.with_values({name: 0.0 for name in _WEATHER if name in model.parameter_names})
     inputs = (replace(one, start=0.0) if one.name in _WEATHER else one for one in still.inputs)
     return replace(still, inputs=tuple(inputs))

@@ -125,14 +125,8 @@ def is_symmetric(card: MmgCard) -> bool:
 class Side:
     """One propeller with its rudder.
 
-    Parameters
-    ----------
-    suffix : str
-        Ending of its quantities: empty, or ``_right`` and ``_left`` if there are two.
-    mirror : float
-        1, or -1 for the left one.
-    y_P, y_R : float
-        Their places over L, positive to starboard.
+    `suffix`: ending of its quantities: empty, or ``_right`` and ``_left`` if there are two. `mirror`: 1, or -1 for the
+    left one. `y_P`, `y_R`: their places over L, positive to starboard.
     """
 
     suffix: str
@@ -153,11 +147,7 @@ def sides(card: MmgCard) -> tuple[Side, ...]:
 class MmgShip:
     """The symbols of a ship by the method.
 
-    Parameters
-    ----------
-    hull : Hull
-        Symbols of all variables, scales and speed.
-    sides : tuple of Side
+    `hull`: symbols of all variables, scales and speed.
     """
 
     hull: Hull

@@ -29,21 +29,9 @@ def steering_model(
     Its variables are named as those of every ship (``motion.beta`` is a state here, and ``motion.u``, ``motion.v``
     follow from it), so that manoeuvres, figures and steady turns work on it alike.
 
-    Parameters
-    ----------
-    name : str
-        The ship.
-    form : SteeringForm
-        The equations.
-    coefficients : mapping
-        Values by name, parameters ``coefficients.*``; those with a default may be left out.
-    length_m, speed_mps : float
-        L and v.
-
-    Raises
-    ------
-    ValueError
-        A coefficient without default is not given, or one is given that the form does not have.
+    `name`: the ship. `form`: the equations. `coefficients`: values by name, parameters ``coefficients.*``; those with a
+    default may be left out. `length_m`, `speed_mps`: l and v. Raises ValueError: a coefficient without default is not
+    given, or one is given that the form does not have.
     """
     known = {coefficient.name: coefficient.default for coefficient in form.coefficients}
     values = known | dict(coefficients)
