@@ -32,13 +32,7 @@ def craft_card(form: CraftForm, text: str, source: str, spelt: Mapping[str, str]
     mass or place is implausible, a thruster is given twice or states what it cannot, or the thrusters cannot hold the
     cruising speed.
     """
-    for section, names in (("derivatives", form.derivatives), ("uncertainty", form.uncertainty)):
-        for name in names:
-            if name not in CRAFT_TERMS:
-                close = difflib.get_close_matches(name, CRAFT_TERMS, n=1)
-                hint = f"did you mean {close[0]}? " if close else ""
-                remedy = f"{hint}a small craft has {' '.join(CRAFT_TERMS)}"
-                raise InputError(source, f"{section}.{name}", "is not a term of a small craft", remedy)
+    _check_names(form, source)
     length, body = form.ship.length_m, form.rigid_body
     scales = Scales(form.environment.water_density_kgpm3, length, form.model.speed_mps)
     prime = form.model.scaling == "prime"
@@ -74,28 +68,40 @@ def craft_card(form: CraftForm, text: str, source: str, spelt: Mapping[str, str]
     return card
 
 
+def _check_names(form: CraftForm, source: str) -> None:
+    for section, names in (("derivatives", form.derivatives), ("uncertainty", form.uncertainty)):
+        for name in names:
+            if name not in CRAFT_TERMS:
+                close = difflib.get_close_matches(name, CRAFT_TERMS, n=1)
+                hint = f"did you mean {close[0]}? " if close else ""
+                remedy = f"{hint}a small craft has {' '.join(CRAFT_TERMS)}"
+                raise InputError(source, f"{section}.{name}", "is not a term of a small craft", remedy)
+
+
 def _check_thrusters(form: CraftForm, source: str, spelt: Mapping[str, str]) -> None:
-    names = [thruster.name for thruster in form.thrusters]
+    names: list[str] = []
     for number, thruster in enumerate(form.thrusters):
         place = f"thrusters.{number}"
-        if thruster.name in names[:number]:
+        if thruster.name in names:
             raise InputError(source, f"{place}.name", f"{thruster.name} is given twice", "give each a name of its own")
-        for key in thruster.uncertainty:
-            if key not in UNCERTAIN_OF_THRUSTER:
-                remedy = f"errors are of {', '.join(UNCERTAIN_OF_THRUSTER)}"
-                raise InputError(source, f"{place}.uncertainty.{key}", "has no standard error", remedy)
+        names.append(thruster.name)
+        if key := next((key for key in thruster.uncertainty if key not in UNCERTAIN_OF_THRUSTER), ""):
+            remedy = f"errors are of {', '.join(UNCERTAIN_OF_THRUSTER)}"
+            raise InputError(source, f"{place}.uncertainty.{key}", "has no standard error", remedy)
         if thruster.dead_band_radps >= thruster.max_radps:
             spelling = spelt.get(f"{place}.dead_band_radps", f"{place}.dead_band_radps")
             raise InputError(source, spelling, "is not below the largest revolutions", "check both, and their units")
         if max(abs(thruster.x_m), abs(thruster.y_m)) > form.ship.length_m:
             problem = f"is at {thruster.x_m:g}, {thruster.y_m:g} m on a craft of {form.ship.length_m:g} m"
             raise InputError(source, f"{place}.x_m", problem, "places are m from the origin")
-        if thruster.max_azimuth_rad is not None and thruster.azimuth_time_constant_s is None:
-            remedy = "a thruster that turns needs the time constant of its turn"
-            raise InputError(source, f"{place}.azimuth_time_constant_s", "is missing", remedy)
-        if thruster.max_azimuth_rad is None and thruster.azimuth_time_constant_s is not None:
-            remedy = "give it, or leave out the time constant of a thruster that does not turn"
-            raise InputError(source, f"{place}.max_azimuth_rad", "is missing", remedy)
+        turns = (
+            ("max_azimuth_rad", "give it, or leave out the time constant of a thruster that does not turn"),
+            ("azimuth_time_constant_s", "a thruster that turns needs the time constant of its turn"),
+        )
+        missing = [turn for turn in turns if getattr(thruster, turn[0]) is None]
+        if len(missing) == 1:
+            key, remedy = missing[0]
+            raise InputError(source, f"{place}.{key}", "is missing", remedy)
 
 
 def _check_signs(card: CraftCard) -> None:
