@@ -9,9 +9,11 @@ from functools import cached_property
 
 import casadi as ca
 
+from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.scaling import Scales
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS, ACCELERATION_TERMS, LINEAR_TERMS, polynomial
+from tank2sim.dynamics.geographic import GEOGRAPHIC_OUTPUTS
 from tank2sim.dynamics.low_speed import (
     STILL_SPEED,
     Forces,
@@ -23,7 +25,7 @@ from tank2sim.dynamics.low_speed import (
     share_of_low_speed,
     share_out_of_range,
 )
-from tank2sim.dynamics.model import Quantity
+from tank2sim.dynamics.model import Parameter, Quantity
 from tank2sim.dynamics.propulsion import propeller_force
 from tank2sim.dynamics.rigid_body import Inertia, inertia, inertial_forces, rigid_body_accelerations
 
@@ -87,6 +89,42 @@ class Hull:
     def scales(self, speed: ca.SX) -> Scales:
         """Scales at a speed, as expressions."""
         return Scales(self["ship.water_density"], self["ship.length"], speed)
+
+
+MOTION_OUTPUTS = (
+    *("motion.x", "motion.y", "motion.psi", "motion.u", "motion.v", "motion.r", "motion.speed", "motion.beta"),
+    *("motion.sog", "motion.cog", *GEOGRAPHIC_OUTPUTS),
+    *("motion.udot", "motion.vdot", "motion.rdot"),
+)
+"""Outputs of every vessel that is steered."""
+
+
+def particulars(card: SteeredCard, speed: str, inertia: str) -> tuple[Parameter, ...]:
+    """``ship.length`` to ``ship.fastest`` of a ship or craft; `speed` says what u0 is, `inertia` what J_z is called."""
+    body, (slowest, fastest) = card.body_si, card.model.speed_range_mps
+    # Above zero: a ship without length, speed, mass or water has no equations. A craft may hold down to rest.
+    may_vanish = ("ship.x_G", "ship.slowest") if card.thrusters else ("ship.x_G",)
+    described = (
+        ("ship.length", "m", "Length between perpendiculars", card.ship.length_m),
+        ("ship.speed", "m/s", speed, card.model.speed_mps),
+        ("ship.mass", "kg", "Mass", body["mass"]),
+        ("ship.x_G", "m", "Centre of gravity forward of midships", body["x_G"]),
+        ("ship.yaw_inertia", "kg.m2", f"Yaw inertia {inertia} about midships", body["yaw_inertia"]),
+        ("ship.water_density", "kg/m3", "Density of the water", card.environment.water_density_kgpm3),
+        ("ship.slowest", "m/s", "Lowest speed at which the card holds", slowest),
+        ("ship.fastest", "m/s", "Highest speed at which the card holds", fastest),
+    )
+    return tuple(
+        Parameter(
+            *words,
+            start=start,
+            tunable=False,
+            nominal=abs(start) or 1.0,
+            minimum=None if words[0] in may_vanish else 1e-6,
+            display_unit="knots" if words[1] == "m/s" else None,
+        )
+        for *words, start in described
+    )
 
 
 def motion_quantities(hull: Hull, forces: tuple[Quantity, ...]) -> tuple[Quantity, ...]:
@@ -296,7 +334,7 @@ def inertia_quantities(matrix: Inertia) -> tuple[Quantity, ...]:
         ("inertia.yaw_sway", "kg.m", "Yaw moment by sway acceleration, m x_G - Nvdot", matrix.yaw_sway),
         ("inertia.yaw", "kg.m2", "Yaw inertia with added inertia, J_z - Nrdot", matrix.yaw),
     )
-    return tuple(Quantity(name, unit, description, value) for name, unit, description, value in described)
+    return tuple(Quantity(*one) for one in described)
 
 
 def acceleration_quantities(motion: Forces) -> tuple[Quantity, ...]:
@@ -339,31 +377,19 @@ def _water_speed_quantities(hull: Hull) -> tuple[Quantity, ...]:
     speed, drift = speed_and_drift(hull.symbols, hull.speed, 5.0)
     u0 = hull["ship.speed"]
     yaw_rate = hull["motion.r"] * hull["ship.length"] / speed.symbol
-    factors = tuple(
-        validity_factor(name, description, value)
-        for name, description, value in (
-            ("low_speed", "low speed and motion astern", 1 - share_out_of_range(hull.symbols)),
-            (
-                "high_speed",
-                "speed above ship.fastest",
-                inside_range(speed.symbol - hull["ship.fastest"], VALIDITY_MARGIN * u0),
-            ),
-            (
-                "drift",
-                "drift angle",
-                inside_range(ca.fabs(v) / speed.symbol - ca.sin(hull["ship.largest_drift"]), DRIFT_MARGIN),
-            ),
-            (
-                "yaw_rate",
-                "yaw rate r L/U",
-                inside_range(ca.fabs(yaw_rate) - hull["ship.largest_yaw_rate"], YAW_RATE_MARGIN),
-            ),
-            (
-                "rudder",
-                "rudder angle",
-                inside_range(ca.fabs(hull["rudder.effective"]) - hull["ship.largest_rudder"], RUDDER_MARGIN),
-            ),
-        )
+    excess = {
+        ("drift", "drift angle"): (ca.fabs(v) / speed.symbol - ca.sin(hull["ship.largest_drift"]), DRIFT_MARGIN),
+        ("yaw_rate", "yaw rate r L/U"): (ca.fabs(yaw_rate) - hull["ship.largest_yaw_rate"], YAW_RATE_MARGIN),
+        ("rudder", "rudder angle"): (
+            ca.fabs(hull["rudder.effective"]) - hull["ship.largest_rudder"],
+            RUDDER_MARGIN,
+        ),
+    }
+    fast = inside_range(speed.symbol - hull["ship.fastest"], VALIDITY_MARGIN * u0)
+    factors = (
+        validity_factor("low_speed", "low speed and motion astern", 1 - share_out_of_range(hull.symbols)),
+        validity_factor("high_speed", "speed above ship.fastest", fast),
+        *(validity_factor(*words, inside_range(*beyond)) for words, beyond in excess.items()),
     )
     low = Quantity(
         "low_speed.share",

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import casadi as ca
 
+from tank2sim.dynamics.geographic import geographic
 from tank2sim.dynamics.model import Parameter, Quantity, State, Variable
 
 _STILL_MPS = 1e-8
@@ -82,6 +83,14 @@ def yaw_rate(nominal_radps: float) -> tuple[State, Parameter]:
         steady=True,
     )
     return started(state, "Yaw rate at the start, positive to starboard")
+
+
+def motion_variables(speed_mps: float, length_m: float) -> tuple[Variable, ...]:
+    """Position, heading and velocities of a vessel that starts straight ahead, with where that is on the Earth."""
+    body = body_states(speed_mps, length_m)
+    position = planar_kinematics({state.name: state for state in body if isinstance(state, State)})
+    symbols = {variable.name: variable.symbol for variable in position}
+    return (*position, *geographic(symbols["motion.x"], symbols["motion.y"]), *body)
 
 
 def body_states(speed: float, length: float) -> tuple[Variable, ...]:

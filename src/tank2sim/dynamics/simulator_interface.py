@@ -127,34 +127,24 @@ def with_external_forces(model: Model) -> Model:
         model.parameter_values()[model.parameter_names.index(f"ship.{name}")] for name in ("length", "speed", "mass")
     )
     force = float(mass * speed**2 / length) / 100  # the order of a ship's resistance at the speed of expansion
+    length = float(length)
+    at, besides = "at external.point_x, external.point_y", "in addition to that of the force at its point"
+    outside = "Point of the external force"
     described = (
-        ("N", "External surge force at external.point_x, external.point_y, positive forward"),
-        ("N", "External sway force at external.point_x, external.point_y, positive to starboard"),
-        ("N.m", "External yaw moment, in addition to that of the force at its point, positive to starboard"),
-        ("m", "Point of the external force forward of midships"),
-        ("m", "Point of the external force to starboard of the centreline"),
+        ("external.X", "N", f"External surge force {at}, positive forward", force),
+        ("external.Y", "N", f"External sway force {at}, positive to starboard", force),
+        ("external.N", "N.m", f"External yaw moment, {besides}, positive to starboard", force * length / 4),
+        ("external.point_x", "m", f"{outside} forward of midships", length / 4),
+        ("external.point_y", "m", f"{outside} to starboard of the centreline", length / 20),
+        ("external.K", "N.m", f"External rolling moment, {besides}, positive to starboard", force * length / 20),
+        ("external.point_z", "m", f"{outside} below the origin", length / 20),
     )
-    usual = (force, force, force * float(length) / 4, float(length) / 4, float(length) / 20)
-    inputs = [
-        Input(name, unit, description, nominal=nominal)
-        for name, (unit, description), nominal in zip(EXTERNAL_INPUTS, described, usual, strict=True)
-    ]
-    X, Y, N, x, y = (variable.symbol for variable in inputs)
-    forced = with_forces(model.extend(*inputs), X=X, Y=Y, N=N + x * Y - y * X)
+    inputs = [Input(*words, nominal=nominal) for *words, nominal in described]
+    X, Y, N, x, y, K, z = (variable.symbol for variable in inputs)
+    forced = with_forces(model.extend(*inputs[:5]), X=X, Y=Y, N=N + x * Y - y * X)
     if "force.K" not in model:
         return forced
-    of_roll = (
-        ("N.m", "External rolling moment, in addition to that of the force at its point, positive to starboard"),
-        ("m", "Point of the external force below the origin"),
-    )
-    rolling = [
-        Input(name, unit, description, nominal=nominal)
-        for name, (unit, description), nominal in zip(
-            EXTERNAL_INPUTS_OF_ROLL, of_roll, (force * float(length) / 20, float(length) / 20), strict=True
-        )
-    ]
-    K, z = (variable.symbol for variable in rolling)
-    return forced.extend(*rolling).redefine("force.K", lambda moment: moment + K - z * Y)
+    return forced.extend(*inputs[5:]).redefine("force.K", lambda moment: moment + K - z * Y)
 
 
 def external_inputs(given: Mapping[str, float], *, rolls: bool = False) -> dict[str, float]:

@@ -27,16 +27,17 @@ from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.craft_terms import CRAFT_ADDED_MASSES, CRAFT_TERMS, VELOCITY_TERMS
 from tank2sim.cards.form import ThrusterSection
 from tank2sim.cards.small_craft import cruising_revolutions, pushes_ahead
-from tank2sim.dynamics.geographic import GEOGRAPHIC_OUTPUTS, geographic
 from tank2sim.dynamics.hull import (
+    MOTION_OUTPUTS,
     VALIDITY_MARGIN,
     acceleration_quantities,
     force_quantities,
     inertia_quantities,
     inside_range,
+    particulars,
     speed_and_drift,
 )
-from tank2sim.dynamics.kinematics import body_states, planar_kinematics
+from tank2sim.dynamics.kinematics import motion_variables
 from tank2sim.dynamics.low_speed import regular_speed
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State, Variable
 from tank2sim.dynamics.rigid_body import (
@@ -68,13 +69,6 @@ THRUSTER_PARAMETERS = {
 }
 """Key of ``[[thrusters]]`` to the last part of the name of the parameter that holds it."""
 
-_OUTPUTS = (
-    *("motion.x", "motion.y", "motion.psi", "motion.u", "motion.v", "motion.r", "motion.speed", "motion.beta"),
-    *("motion.sog", "motion.cog", *GEOGRAPHIC_OUTPUTS),
-    *("motion.udot", "motion.vdot", "motion.rdot"),
-    *("force.X", "force.Y", "force.N", "validity"),
-)
-
 
 def craft_model(card: SteeredCard) -> Model:
     """The model of a small craft without its effects.
@@ -88,12 +82,9 @@ def craft_model(card: SteeredCard) -> Model:
     InputError
         Mass with added mass is not positive.
     """
-    body = body_states(card.model.speed_mps, card.ship.length_m)
-    position = planar_kinematics({state.name: state for state in body if isinstance(state, State)})
-    symbols = {variable.name: variable.symbol for variable in position}
-    position = (*position, *geographic(symbols["motion.x"], symbols["motion.y"]))
-    constants = (*_craft_particulars(card), *_craft_derivatives(card))
-    s = {variable.name: variable.symbol for variable in (*position, *body, *constants)}
+    moving = motion_variables(card.model.speed_mps, card.ship.length_m)
+    constants = (*particulars(card, "Cruising speed", "I_z"), *_craft_derivatives(card))
+    s = {variable.name: variable.symbol for variable in (*moving, *constants)}
     thrusters, pushes = _thrusters(card, s)
     matrix = _craft_inertia(s)
     _refuse_mass(card)
@@ -109,9 +100,9 @@ def craft_model(card: SteeredCard) -> Model:
     )
     shown = [f"thrusters.{thruster.name}.{what}" for thruster in card.thrusters for what in ("speed", "thrust")]
     return empty.extend(
-        *(*position, *body, *constants, *thrusters),
+        *(*moving, *constants, *thrusters),
         *(*forces, *masses, *acceleration_quantities(motion), *_craft_speed(s)),
-        outputs=(*_OUTPUTS, *shown),
+        outputs=(*MOTION_OUTPUTS, "force.X", "force.Y", "force.N", "validity", *shown),
     )
 
 
@@ -137,34 +128,6 @@ def _nominal_forces(card: SteeredCard) -> tuple[float, float]:
     """Thrust (N) of all thrusters at their largest revolutions, and its moment (N m) at half the length."""
     thrust = sum(thruster.largest_thrust_N for thruster in card.thrusters)
     return thrust, thrust * card.ship.length_m / 2
-
-
-def _craft_particulars(card: SteeredCard) -> tuple[Parameter, ...]:
-    slowest, fastest = card.model.speed_range_mps
-    described = (
-        ("ship.length", "m", "Length between perpendiculars", card.ship.length_m),
-        ("ship.speed", "m/s", "Cruising speed", card.model.speed_mps),
-        ("ship.mass", "kg", "Mass", card.rigid_body.mass),
-        ("ship.x_G", "m", "Centre of gravity forward of midships", card.rigid_body.x_G),
-        ("ship.yaw_inertia", "kg.m2", "Yaw inertia I_z about midships", card.rigid_body.yaw_inertia),
-        ("ship.water_density", "kg/m3", "Density of the water", card.environment.water_density_kgpm3),
-        ("ship.slowest", "m/s", "Lowest speed at which the card holds", slowest),
-        ("ship.fastest", "m/s", "Highest speed at which the card holds", fastest),
-    )
-    may_vanish = ("ship.x_G", "ship.slowest")
-    return tuple(
-        Parameter(
-            name,
-            unit,
-            description,
-            start=start,
-            tunable=False,
-            nominal=abs(start) or 1.0,
-            minimum=None if name in may_vanish else 1e-6,
-            display_unit="knots" if unit == "m/s" else None,
-        )
-        for name, unit, description, start in described
-    )
 
 
 _ADDED_UNITS = {"Xudot": "kg", "Yvdot": "kg", "Yrdot": "kg.m", "Nvdot": "kg.m", "Nrdot": "kg.m2"}

@@ -11,9 +11,9 @@ import numpy as np
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, with_steps_for
 from tank2sim.dynamics.effects.forces import with_forces
-from tank2sim.dynamics.effects.froude_scale import DIRECTION_SIGNS, speeds, wave_speeds
+from tank2sim.dynamics.effects.froude_scale import first, speeds, time_scale_passages, wave_speeds
 from tank2sim.dynamics.effects.particulars import with_particulars
-from tank2sim.dynamics.effects.surroundings import STILL_MPS, WIND, relative_air
+from tank2sim.dynamics.effects.surroundings import STILL_MPS, WIND, bearing, relative_air
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model, Parameter, Quantity, State
 
@@ -39,14 +39,7 @@ def _horizontal(
             absent=0.0,
             typical=typical,
         ),
-        EffectParameter(
-            "direction_rad",
-            f"direction {direction}, clockwise from north",
-            -2 * math.pi,
-            2 * math.pi,
-            input_name=f"{prefix}direction",
-            typical=DIRECTION_SIGNS,
-        ),
+        bearing(direction, f"{prefix}direction"),
         *(
             EffectParameter(
                 f"{side}_mps",
@@ -129,7 +122,7 @@ CURRENT_FIELD = Effect(
             "time in which the hull comes into the water of the input, by default L/u0",
             0.1,
             600.0,
-            lambda card: card.ship.length_m / card.model.speed_mps,
+            first(time_scale_passages(1.0)),
         ),
     ),
     equations=_with_changing_current,

@@ -26,6 +26,12 @@ _WEATHER = {
 """Inputs and parameters that are zero in calm water."""
 
 
+def bearing(words: str, input_name: str | None = None) -> EffectParameter:
+    """Parameter ``direction_rad``: the direction that the `words` say, of the input `input_name` if it is one."""
+    description, turn = f"direction {words}, clockwise from north", 2 * math.pi
+    return EffectParameter("direction_rad", description, -turn, turn, input_name=input_name, typical=DIRECTION_SIGNS)
+
+
 def in_calm(model: Model) -> Model:
     """The ship of a model without wind, waves and current, unless its inputs are set to others."""
     still = model.with_values({name: 0.0 for name in _WEATHER if name in model.parameter_names})
@@ -59,14 +65,7 @@ CURRENT = Effect(
             absent=0.0,
             typical=speeds(0.05),  # 0.4 m/s at 15 knots (project choice)
         ),
-        EffectParameter(
-            "direction_rad",
-            "direction towards which the current sets, clockwise from north",
-            -2 * math.pi,
-            2 * math.pi,
-            input_name="current.direction",
-            typical=DIRECTION_SIGNS,
-        ),
+        bearing("towards which the current sets", "current.direction"),
     ),
     equations=_with_current,
     of_craft=True,
@@ -145,14 +144,7 @@ WIND = Effect(
             absent=0.0,
             typical=wave_speeds(0.25),  # 10 m/s, a fresh breeze (Beaufort 5), for a ship of 160 m (project choice)
         ),
-        EffectParameter(
-            "direction_rad",
-            "direction from which the wind comes, clockwise from north",
-            -2 * math.pi,
-            2 * math.pi,
-            input_name="wind.direction",
-            typical=DIRECTION_SIGNS,
-        ),
+        bearing("from which the wind comes", "wind.direction"),
         # Spreads: half the ranges of Fossen (2011) above; that of the centroid is a project choice.
         EffectParameter(
             "surge_coefficient",
@@ -241,13 +233,7 @@ WAVE_DRIFT = Effect(
             absent=0.0,
             typical=lengths(0.0125),  # 2 m, sea state 4, for a ship of 160 m (project choice)
         ),
-        EffectParameter(
-            "direction_rad",
-            "direction from which the waves come, clockwise from north",
-            -2 * math.pi,
-            2 * math.pi,
-            typical=DIRECTION_SIGNS,
-        ),
+        bearing("from which the waves come"),
         # Spreads: waves that are not short are reflected in part, and hulls differ (project choice).
         EffectParameter(
             "surge_coefficient", "wave drift coefficient in surge, on the beam", 0.0, 3.0, 2 / 3, spread=0.3

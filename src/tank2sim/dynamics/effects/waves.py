@@ -13,7 +13,8 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.wave_table import MIRRORED, WAVE_MOTIONS, WAVE_ROTATIONS, WaveTable, wave_table
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
 from tank2sim.dynamics.effects.forces import with_forces, with_validity
-from tank2sim.dynamics.effects.froude_scale import DIRECTION_SIGNS, lengths
+from tank2sim.dynamics.effects.froude_scale import lengths
+from tank2sim.dynamics.effects.surroundings import bearing
 from tank2sim.dynamics.hull import inside_range
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model, Quantity, State
@@ -267,14 +268,7 @@ WAVES = Effect(
             input_name="waves.period",
             typical=lambda card: (2 * math.sqrt(card.ship.length_m / card.environment.gravity_mps2),),
         ),
-        EffectParameter(
-            "direction_rad",
-            "direction from which the waves come, clockwise from north",
-            -2 * math.pi,
-            2 * math.pi,
-            input_name="waves.direction",
-            typical=DIRECTION_SIGNS,
-        ),
+        bearing("from which the waves come", "waves.direction"),
         EffectParameter(
             "peakedness", "gamma of the JONSWAP spectrum (1: Bretschneider, 3.3: a young wind sea)", 1.0, 7.0, 1.0
         ),
