@@ -99,7 +99,7 @@ MOTION_OUTPUTS = (
 """Outputs of every vessel that is steered."""
 
 
-def particulars(card: SteeredCard, speed: str, inertia: str) -> tuple[Parameter, ...]:
+def hull_particulars(card: SteeredCard, speed: str, inertia: str) -> tuple[Parameter, ...]:
     """``ship.length`` to ``ship.fastest`` of a ship or craft; `speed` says what u0 is, `inertia` what J_z is called."""
     body, (slowest, fastest) = card.body_si, card.model.speed_range_mps
     # Above zero: a ship without length, speed, mass or water has no equations. A craft may hold down to rest.

@@ -19,7 +19,7 @@ from tank2sim.dynamics.hull import (
     VALIDITY_FACTOR,
     Hull,
     motion_quantities,
-    particulars,
+    hull_particulars,
     polynomial_forces,
 )
 from tank2sim.dynamics.kinematics import motion_variables
@@ -202,7 +202,7 @@ def _ship_parameters(card: ManoeuvringCard) -> tuple[Parameter, ...]:
     model = card.model
     rudder = math.pi / 2 if model.valid_rudder_rad is None else model.valid_rudder_rad
     return (
-        *particulars(card, "Speed u0 about which forces are expanded", "J_z"),
+        *hull_particulars(card, "Speed u0 about which forces are expanded", "J_z"),
         largest("ship.largest_drift", "rad", "Largest drift angle at which the card holds", model.valid_drift_rad),
         largest(
             "ship.largest_yaw_rate", "1", "Largest yaw rate r L/U at which the card holds", model.valid_yaw_rate_prime

@@ -34,7 +34,7 @@ from tank2sim.dynamics.hull import (
     force_quantities,
     inertia_quantities,
     inside_range,
-    particulars,
+    hull_particulars,
     speed_and_drift,
 )
 from tank2sim.dynamics.kinematics import motion_variables
@@ -83,7 +83,7 @@ def craft_model(card: SteeredCard) -> Model:
         Mass with added mass is not positive.
     """
     moving = motion_variables(card.model.speed_mps, card.ship.length_m)
-    constants = (*particulars(card, "Cruising speed", "I_z"), *_craft_derivatives(card))
+    constants = (*hull_particulars(card, "Cruising speed", "I_z"), *_craft_derivatives(card))
     s = {variable.name: variable.symbol for variable in (*moving, *constants)}
     thrusters, pushes = _thrusters(card, s)
     matrix = _craft_inertia(s)
