@@ -203,6 +203,10 @@ def _of_ship(card: ManoeuvringCard) -> Iterator[str]:
     yield from _of_hull(card, hull, set(signs))
     if not (card.ship.beam_m and card.ship.draught_m) and card.rigid_body.mass > _LARGEST_PRIME_MASS:
         yield f"m' is {card.rigid_body.mass:.3g}, and ships have 0.003 to 0.04: check model.scaling"
+    yield from _of_angles(card)
+
+
+def _of_angles(card: ManoeuvringCard) -> Iterator[str]:
     for key in ("valid_rudder_rad", "valid_drift_rad"):
         value = getattr(card.model, key)
         if value is not None and 0 < value < LEAST_ANGLE_RAD:

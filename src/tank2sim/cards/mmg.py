@@ -39,11 +39,7 @@ def mmg_fields(form: MmgForm, source: str) -> tuple[dict[str, Any], ShipCard]:
     Raises InputError: a value is given for one side alone, K_T or the slope of the rudder is given twice or not at all,
     or eta > 1.
     """
-    for name, pairs in WITH_BOTH_SIDES.items():
-        for pair in pairs:
-            if len(given := _given(getattr(form, name), pair)) == 1:
-                absent = next(key for key in pair if key not in given)
-                raise InputError(source, f"{name}.{absent}", "is missing", f"{given[0]} is of one side: give both")
+    _refuse_one_side(form, source)
     propeller = _propeller(form.propeller, source)
     rudder = _rudder(form.rudder, source)
     if rudder.number != propeller.number:
@@ -53,15 +49,22 @@ def mmg_fields(form: MmgForm, source: str) -> tuple[dict[str, Any], ShipCard]:
         ratio = form.ship.propeller_diameter_m / rudder.height_m
         problem = f"is less than the propeller's diameter (eta = D_P/H_R = {ratio:.3g})"
         raise InputError(source, "rudder.height_m", problem, "check both: the race covers a share eta of the rudder")
-    errors = {
-        key: error for key, error in form.uncertainty.items() if key in (*PROPELLER_COEFFICIENTS, *RUDDER_COEFFICIENTS)
-    }
+    known = (*PROPELLER_COEFFICIENTS, *RUDDER_COEFFICIENTS)
+    errors = {key: error for key, error in form.uncertainty.items() if key in known}
     if form.propeller.J is not None and (key := next((key for key in (*_THRUST, *_TORQUE) if key in errors), "")):
         remedy = "give k_0, k_1, k_2 in place of J and K_T (q_0, q_1, q_2 of K_Q), or leave it out"
         raise InputError(source, f"uncertainty.{key}", "is of a polynomial, and [propeller] has a table", remedy)
     remaining = {key: error for key, error in form.uncertainty.items() if key not in errors}
     own = {"propeller": propeller, "rudder": rudder, "interaction_errors": errors}
     return own, form.model_copy(update={"propulsion": None, "uncertainty": remaining})
+
+
+def _refuse_one_side(form: MmgForm, source: str) -> None:
+    for name, pairs in WITH_BOTH_SIDES.items():
+        for pair in pairs:
+            if len(given := _given(getattr(form, name), pair)) == 1:
+                absent = next(key for key in pair if key not in given)
+                raise InputError(source, f"{name}.{absent}", "is missing", f"{given[0]} is of one side: give both")
 
 
 def _given(section: MmgPropeller | MmgRudder, keys: Sequence[str]) -> list[str]:
@@ -162,12 +165,12 @@ def _rudder(section: MmgRudder, source: str) -> MmgRudder:
         raise InputError(source, "rudder.gamma_R_plus", "is missing", "give gamma_R_plus and gamma_R_minus")
     elif section.l_R is None:
         raise InputError(source, "rudder.l_R", "is missing", "give l_R, the effective place of the rudder in yaw")
-    if section.f_alpha is None and section.aspect_ratio is None:
-        raise InputError(source, "rudder.f_alpha", "is missing", "give f_alpha or aspect_ratio")
+    if section.f_alpha is None:
+        if section.aspect_ratio is None:
+            raise InputError(source, "rudder.f_alpha", "is missing", "give f_alpha or aspect_ratio")
+        update["f_alpha"] = fujii(section.aspect_ratio)
     if section.number == 2 and section.y_R is None:
         raise InputError(source, "rudder.y_R", "is missing", "two rudders need their distance to midships, over L")
-    if section.f_alpha is None and section.aspect_ratio is not None:
-        update |= {"f_alpha": fujii(section.aspect_ratio)}
     return section.model_copy(update=update)
 
 

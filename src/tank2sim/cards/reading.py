@@ -110,16 +110,7 @@ def changed_text(text: str, source: str, changes: Mapping[str, object], *, comme
     document = _document(text, source)
     for key, value in changes.items():
         *sections, last = key.split(".")
-        table: Any = document
-        for section in sections:
-            if isinstance(table, list) and section.isdigit() and int(section) < len(table):
-                table = table[int(section)]
-                continue
-            if section not in table:
-                table[section] = tomlkit.table()
-            table = table[section]
-            if not isinstance(table, dict | list):
-                raise InputError(source, key, f"cannot be set: {section} is not a section", "give section.key=value")
+        table = _section_of(document, sections, source, key)
         try:
             table[last] = value.item() if isinstance(value, np.generic) else value
         except (TypeError, ValueError):
@@ -129,6 +120,21 @@ def changed_text(text: str, source: str, changes: Mapping[str, object], *, comme
             table[last].comment(one_line(comment))
     mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
     return mark + tomlkit.dumps(document)
+
+
+def _section_of(document: Any, sections: Sequence[str], source: str, key: str) -> Any:
+    """The table of a document that `sections` lead to, made where it is absent."""
+    table = document
+    for section in sections:
+        if isinstance(table, list) and section.isdigit() and int(section) < len(table):
+            table = table[int(section)]
+            continue
+        if section not in table:
+            table[section] = tomlkit.table()
+        table = table[section]
+        if not isinstance(table, dict | list):
+            raise InputError(source, key, f"cannot be set: {section} is not a section", "give section.key=value")
+    return table
 
 
 def revised(

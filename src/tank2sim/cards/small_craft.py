@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 from tank2sim.cards.card import CraftCard, SteeredCard
 from tank2sim.cards.craft_terms import CRAFT_TERMS, body_scales, craft_scale
-from tank2sim.cards.form import CraftForm
+from tank2sim.cards.form import CraftForm, ThrusterSection
 from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
 from tank2sim.units import from_si
@@ -94,14 +94,17 @@ def _check_thrusters(form: CraftForm, source: str, spelt: Mapping[str, str]) -> 
         if max(abs(thruster.x_m), abs(thruster.y_m)) > form.ship.length_m:
             problem = f"is at {thruster.x_m:g}, {thruster.y_m:g} m on a craft of {form.ship.length_m:g} m"
             raise InputError(source, f"{place}.x_m", problem, "places are m from the origin")
-        turns = (
-            ("max_azimuth_rad", "give it, or leave out the time constant of a thruster that does not turn"),
-            ("azimuth_time_constant_s", "a thruster that turns needs the time constant of its turn"),
-        )
-        missing = [turn for turn in turns if getattr(thruster, turn[0]) is None]
-        if len(missing) == 1:
-            key, remedy = missing[0]
-            raise InputError(source, f"{place}.{key}", "is missing", remedy)
+        _check_turn(thruster, place, source)
+
+
+def _check_turn(thruster: ThrusterSection, place: str, source: str) -> None:
+    turns = {
+        "max_azimuth_rad": "give it, or leave out the time constant of a thruster that does not turn",
+        "azimuth_time_constant_s": "a thruster that turns needs the time constant of its turn",
+    }
+    missing = [key for key in turns if getattr(thruster, key) is None]
+    if len(missing) == 1:
+        raise InputError(source, f"{place}.{missing[0]}", "is missing", turns[missing[0]])
 
 
 def _check_signs(card: CraftCard) -> None:

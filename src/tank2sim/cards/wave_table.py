@@ -89,9 +89,8 @@ def _check_columns(columns: Sequence[str], rows: Sequence[Sequence[float]]) -> N
             raise ValueError(f"columns has {name!r}, known are {', '.join(known)}")
         if list(columns).count(name) > 1:
             raise ValueError(f"columns has {name} twice")
-    for name in _PLACES:
-        if name not in columns:
-            raise ValueError(f"columns lacks {name}")
+    if absent := [name for name in _PLACES if name not in columns]:
+        raise ValueError(f"columns lacks {absent[0]}")
     if wrong := next((place for place, row in enumerate(rows) if len(row) != len(columns)), None):
         raise ValueError(f"row {wrong} has {len(rows[wrong])} numbers for {len(columns)} columns")
     if not rows or len(rows[0]) != len(columns):

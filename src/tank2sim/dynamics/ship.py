@@ -18,8 +18,8 @@ from tank2sim.dynamics.hull import (
     MOTION_OUTPUTS,
     VALIDITY_FACTOR,
     Hull,
-    motion_quantities,
     hull_particulars,
+    motion_quantities,
     polynomial_forces,
 )
 from tank2sim.dynamics.kinematics import motion_variables
@@ -58,12 +58,7 @@ def ship_model(card: ManoeuvringCard) -> Model:
     names, notices = _derivative_names(card)
     _refuse_singular_mass(card)
     gear, gear_notices = steering_gear(card.steering_gear, card.ship.length_m / card.model.speed_mps)
-    engine: tuple[Variable, ...] = ()
-    if isinstance(card, MmgCard):
-        assert card.propulsion is not None
-        engine = (*revolutions(card.propulsion), *mmg_parameters(card))
-    elif card.propulsion:
-        engine = propulsion(card.propulsion)
+    engine = _engine(card)
     constants = (
         *_ship_parameters(card),
         *roll_parameters(card),
@@ -92,6 +87,13 @@ def ship_model(card: ManoeuvringCard) -> Model:
     return with_roll(planar, hull, card) if card.roll else planar
 
 
+def _engine(card: ManoeuvringCard) -> tuple[Variable, ...]:
+    if isinstance(card, MmgCard):
+        assert card.propulsion is not None
+        return (*revolutions(card.propulsion), *mmg_parameters(card))
+    return propulsion(card.propulsion) if card.propulsion else ()
+
+
 def _limits_of_tests(card: ManoeuvringCard) -> list[Notice]:
     """What the tests behind a card leave open about yaw and about the sides."""
     notices = []
@@ -110,24 +112,27 @@ KINDS = {"abkowitz": "third-order (Abkowitz)", "linear": "linear", "mmg": "MMG"}
 
 def _derivative_names(card: ManoeuvringCard) -> tuple[list[str], list[Notice]]:
     """Names of the model's derivatives, and notices on those of the card that it does not use."""
-    mmg = card.model.kind == "mmg"
-    every, equations = (MMG_TERMS, "the MMG hull") if mmg else (ALL_TERMS, "(3.8)")
-    spelt = [*OPPOSITE, *(term for term in MMG_TERMS if term not in OPPOSED)] if mmg else list(ALL_TERMS)
     rolling = [name for name in card.derivatives if known_term(name).of_roll]
-    known = {*every, *rolling} - ({"Yrdot", "Nvdot"} if mmg and not card.roll else set())
-    for section, given in (("derivatives", card.derivatives), ("uncertainty", card.uncertainty)):
-        if name := next((name for name in given if name not in known), ""):
-            close = difflib.get_close_matches(name, spelt, n=1)
-            hint = f"did you mean {close[0]}? " if close else ""
-            remedy = f"{hint}{'an MMG hull' if mmg else 'the third-order model'} has {' '.join(spelt)}"
-            raise card.fault(f"{section}.{card.places.get(name, name)}", f"is not a term of {equations}", remedy)
-    if mmg:
-        return [*MMG_TERMS, *rolling], []
-    if card.model.kind == "abkowitz":
-        return [*ALL_TERMS, *rolling], []
+    mmg = card.model.kind == "mmg"
+    every = MMG_TERMS if mmg else ALL_TERMS
+    _refuse_unknown_terms(card, {*every, *rolling} - ({"Yrdot", "Nvdot"} if mmg and not card.roll else set()))
+    if card.model.kind != "linear":
+        return [*every, *rolling], []
     names = [*roll_terms(card), *LINEAR_TERMS["X"], *LINEAR_TERMS["Y"], *LINEAR_TERMS["N"], *ACCELERATION_TERMS]
     unused = [name for name in card.derivatives if name not in names]
     return names, [Notice(f"the linear model leaves out {len(unused)} derivatives of the card")] if unused else []
+
+
+def _refuse_unknown_terms(card: ManoeuvringCard, known: set[str]) -> None:
+    equations, kind, spelt = "(3.8)", "the third-order model", [*ALL_TERMS]
+    if card.model.kind == "mmg":
+        equations, kind = "the MMG hull", "an MMG hull"
+        spelt = [*OPPOSITE, *(term for term in MMG_TERMS if term not in OPPOSED)]
+    for section, given in (("derivatives", card.derivatives), ("uncertainty", card.uncertainty)):
+        if name := next((name for name in given if name not in known), ""):
+            close = difflib.get_close_matches(name, spelt, n=1)
+            remedy = f"{f'did you mean {close[0]}? ' if close else ''}{kind} has {' '.join(spelt)}"
+            raise card.fault(f"{section}.{card.places.get(name, name)}", f"is not a term of {equations}", remedy)
 
 
 def _refuse_singular_mass(card: ManoeuvringCard) -> None:

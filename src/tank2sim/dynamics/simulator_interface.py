@@ -59,15 +59,13 @@ def with_simulator_interface(model: Model) -> Model:
         return model
     model = with_external_forces(model)
     added = tuple(quantity for quantity in _displays(model) if quantity.name not in model)
-    parts = tuple(
-        quantity.name
-        for quantity in model.quantities
-        if quantity.name.rpartition(".")[2] in ("X", "Y", "N")
-        and not quantity.name.startswith("force.")
-        and quantity.unit in ("N", "N.m")
-        and quantity.name not in model.outputs
-    )
+    parts = [one.name for one in model.quantities if _is_part_of_force(one) and one.name not in model.outputs]
     return model.extend(*added, outputs=[*(quantity.name for quantity in added), *parts])
+
+
+def _is_part_of_force(quantity: Quantity) -> bool:
+    origin, _, axis = quantity.name.rpartition(".")
+    return axis in ("X", "Y", "N") and origin.partition(".")[0] != "force" and quantity.unit in ("N", "N.m")
 
 
 def _displays(model: Model) -> Iterator[Quantity]:

@@ -32,9 +32,9 @@ from tank2sim.dynamics.hull import (
     VALIDITY_MARGIN,
     acceleration_quantities,
     force_quantities,
+    hull_particulars,
     inertia_quantities,
     inside_range,
-    hull_particulars,
     speed_and_drift,
 )
 from tank2sim.dynamics.kinematics import motion_variables

@@ -47,26 +47,19 @@ def steering_gear(gear: SteeringGear | None, ship_time_s: float) -> tuple[tuple[
         tunable=False,
     )
     order = _within(command.symbol, by_name.get("steering.max_angle"))
-    rudder = State(
+    rudder = rudder_state(
         "rudder.angle",
-        "rad",
         "Rudder angle, positive to starboard (turns the ship to starboard)",
-        display_unit="deg",
-        nominal=0.35,
-        derivative="rudder.rate",
-        start=start.symbol,
+        "rudder.rate",
+        start.symbol,
         trim=ca.if_else(failed.symbol, start.symbol, order),
     )
-    error = _angle("rudder.error", "Order less rudder angle, on which the gear acts", order - rudder.symbol)
-    rate = Quantity(
-        rudder.derivative,
-        "rad/s",
-        "Rate of the rudder, positive to starboard",
-        _within(error.symbol / lag.symbol, by_name.get("steering.max_rate")) * (1 - failed.symbol),
-        display_unit="deg/s",
-        nominal=0.05,
+    error = rudder_quantity("rudder.error", "Order less rudder angle, on which the gear acts", order - rudder.symbol)
+    turning = _within(error.symbol / lag.symbol, by_name.get("steering.max_rate")) * (1 - failed.symbol)
+    rate = rudder_rate(rudder.derivative, "Rate of the rudder, positive to starboard", turning)
+    seen = rudder_quantity(
+        "rudder.effective", "Rudder angle that the hull forces see, positive to starboard", rudder.symbol
     )
-    seen = _angle("rudder.effective", "Rudder angle that the hull forces see, positive to starboard", rudder.symbol)
     return (command, failed, rudder, error, rate, seen, lag, *limits, start), notices
 
 
@@ -115,8 +108,37 @@ def _parameters(gear: SteeringGear, ship_time_s: float) -> list[Parameter]:
     return [lag, *limits]
 
 
-def _angle(name: str, description: str, value: ca.SX) -> Quantity:
+def rudder_quantity(name: str, description: str, value: ca.SX) -> Quantity:
+    """An angle of a rudder or of its gear."""
     return Quantity(name, "rad", description, value, display_unit="deg", nominal=0.35)
+
+
+def rudder_rate(name: str, description: str, value: ca.SX) -> Quantity:
+    """The rate of such an angle."""
+    return Quantity(name, "rad/s", description, value, display_unit="deg/s", nominal=0.05)
+
+
+def rudder_state(
+    name: str,
+    description: str,
+    derivative: str,
+    start: ca.SX | float,
+    *,
+    trim: ca.SX | None = None,
+    steady: bool = False,
+) -> State:
+    """Such an angle as a state; `derivative`, `start`, `trim` and `steady` as in :class:`.State`."""
+    return State(
+        name,
+        "rad",
+        description,
+        display_unit="deg",
+        nominal=0.35,
+        derivative=derivative,
+        start=start,
+        trim=trim,
+        steady=steady,
+    )
 
 
 def _within(value: ca.SX, limit: ca.SX | None) -> ca.SX:

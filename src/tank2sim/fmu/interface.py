@@ -65,6 +65,11 @@ class Block:
     begin: int
     end: int
 
+    @property
+    def references(self) -> range:
+        """Value references of its variables."""
+        return range(self.begin, self.end)
+
     def __len__(self) -> int:
         return self.end - self.begin
 
@@ -152,10 +157,15 @@ def interface(model: Model) -> Interface:
         *(_calculated(model, kink, indicators.begin + place) for place, kink in enumerate(indicated)),
     )
     _refuse(variables)
-    switch = 0
-    if TRIM_SWITCH in model.parameter_names and model.trim_step is not None and model[TRIM_SWITCH].boolean:
-        switch = parameters.begin + model.parameter_names.index(TRIM_SWITCH)
+    switch = _trim_switch(model, parameters)
     return Interface(variables, states, inputs, parameters, rates, outputs, indicators, switch)
+
+
+def _trim_switch(model: Model, parameters: Block) -> int:
+    """Value reference of the parameter that asks for a start in steady motion; 0 if there is none."""
+    if TRIM_SWITCH in model.parameter_names and model.trim_step is not None and model[TRIM_SWITCH].boolean:
+        return parameters.begin + model.parameter_names.index(TRIM_SWITCH)
+    return 0
 
 
 def other_outputs(model: Model) -> tuple[str, ...]:
