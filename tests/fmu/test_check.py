@@ -21,8 +21,8 @@ from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.simulator_interface import with_simulator_interface
 from tank2sim.errors import InputError
-from tank2sim.fmu import acceptance
-from tank2sim.fmu.check import LIMITS, compare_with_model, description_differences
+from tank2sim.fmu import acceptance, sources
+from tank2sim.fmu.check import LIMITS, CheckReport, compare_with_model, description_differences
 from tank2sim.fmu.export import write_fmu
 from tank2sim.fmu.manoeuvre import manoeuvre
 from tank2sim.fmu.passport import Replay
@@ -97,24 +97,28 @@ def test_an_error_of_a_direction_counts_by_the_size_of_its_velocity(share: float
     assert not any(errors.values())
 
 
+def report_of_tampered(
+    hull: Model, path: Path, monkeypatch: pytest.MonkeyPatch, change: Callable[[str, str], str]
+) -> CheckReport:
+    """Of an FMU whose generated C is changed by its text and name, which `export` refuses to write."""
+    generate = sources.generate_c
+    monkeypatch.setattr(sources, "generate_c", lambda functions, stem: change(generate(functions, stem), stem))
+    with pytest.raises(InputError, match="library that the C compiler made for this machine does not work"):
+        write_fmu(hull, path)
+    monkeypatch.setattr(acceptance, "replay_in_fmu", lambda *_: Replay(problem="not asked"))
+    write_fmu(hull, path)
+    return compare_with_model(path, model=hull)
+
+
 @pytest.mark.slow
 def test_a_sign_changed_in_the_generated_code_fails(
     hull: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from tank2sim.fmu import sources
-
-    def tampered(functions: list[ca.Function], stem: str) -> str:
-        code = generate(functions, stem)
+    def tampered(code: str, stem: str) -> str:
         assert "=sin(" in code or stem != "equations"  # those of the start have none
         return code.replace("=sin(", "=-sin(")
 
-    generate = sources.generate_c
-    monkeypatch.setattr(sources, "generate_c", tampered)
-    with pytest.raises(InputError, match="library that the C compiler made for this machine does not work"):
-        write_fmu(hull, tmp_path / "x.fmu")
-    monkeypatch.setattr(acceptance, "replay_in_fmu", lambda *_: Replay(problem="not asked"))
-    write_fmu(hull, tmp_path / "x.fmu")
-    report = compare_with_model(tmp_path / "x.fmu", model=hull)
+    report = report_of_tampered(hull, tmp_path / "x.fmu", monkeypatch, tampered)
     assert not report.passed
     assert report.max_error["motion.y"] > 0.1
 
@@ -135,12 +139,17 @@ def test_a_library_that_fails_is_a_failed_check(hull: Model, tmp_path: Path) -> 
     assert any("not finite" in line for line in report.differences)
 
 
+def falsified(source: Path, target: Path, old: bytes, new: bytes) -> Path:
+    """An FMU with another description."""
+    return rewritten(
+        source, target, lambda name, data: data.replace(old, new) if name == "modelDescription.xml" else data
+    )
+
+
 @pytest.mark.slow
 def test_a_description_with_a_fault_fails(fmu_file: FmuFile, hull: Model, tmp_path: Path) -> None:
-    def falsify(name: str, data: bytes) -> bytes:
-        return data.replace(b'unit="N.m"', b'unit="lbf.ft"') if name == "modelDescription.xml" else data
-
-    report = compare_with_model(rewritten(fmu_file("hull", 2), tmp_path / "x.fmu", falsify), model=hull)
+    path = falsified(fmu_file("hull", 2), tmp_path / "x.fmu", b'unit="N.m"', b'unit="lbf.ft"')
+    report = compare_with_model(path, model=hull)
     assert not report.passed
     assert any("lbf.ft" in problem for problem in report.validation)
     assert any("lbf.ft" in line for line in report.differences)
@@ -180,10 +189,8 @@ def test_whatever_is_falsified_in_a_description_is_reported(
 def test_an_fmu_with_a_falsified_description_fails(
     old: bytes, reported: str, fmu_file: FmuFile, hull: Model, tmp_path: Path
 ) -> None:
-    def falsify(name: str, data: bytes) -> bytes:
-        return data.replace(old, old.split(b"=")[0] + b'="0.7"') if name == "modelDescription.xml" else data
-
-    report = compare_with_model(rewritten(fmu_file("hull", 2), tmp_path / "x.fmu", falsify), model=hull)
+    path = falsified(fmu_file("hull", 2), tmp_path / "x.fmu", old, old.split(b"=")[0] + b'="0.7"')
+    report = compare_with_model(path, model=hull)
     assert not report.passed
     assert len(report.differences) == 1 and reported in report.differences[0]
     assert max(report.errors["CoSimulation"].values()) < 1e-9
@@ -193,10 +200,7 @@ def test_an_fmu_with_a_falsified_description_fails(
 def test_another_spelling_of_a_number_is_no_difference(
     fmu_file: FmuFile, models: dict[str, Model], tmp_path: Path
 ) -> None:
-    def respell(name: str, data: bytes) -> bytes:
-        return data.replace(b'start="0.05"', b'start="5e-2"') if name == "modelDescription.xml" else data
-
-    path = rewritten(fmu_file("body", 2), tmp_path / "x.fmu", respell)
+    path = falsified(fmu_file("body", 2), tmp_path / "x.fmu", b'start="0.05"', b'start="5e-2"')
     assert path.read_bytes() != fmu_file("body", 2).read_bytes()
     assert compare_with_model(path, model=models["body"]).passed
 
@@ -235,16 +239,8 @@ def test_a_library_that_cannot_be_used_is_a_failed_check(
 def test_a_library_that_ends_its_process_is_a_failed_check(
     end: str, reported: str, hull: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from tank2sim.fmu import sources
-
-    generate = sources.generate_c
     deadly = f"\n#include <stdlib.h>\n__attribute__((constructor)) static void end(void) {{ {end}; }}\n"
-    monkeypatch.setattr(sources, "generate_c", lambda functions, stem: generate(functions, stem) + deadly)
-    with pytest.raises(InputError, match="library that the C compiler made for this machine does not work"):
-        write_fmu(hull, tmp_path / "x.fmu")
-    monkeypatch.setattr(acceptance, "replay_in_fmu", lambda *_: Replay(problem="not asked"))
-    write_fmu(hull, tmp_path / "x.fmu")
-    report = compare_with_model(tmp_path / "x.fmu", model=hull)
+    report = report_of_tampered(hull, tmp_path / "x.fmu", monkeypatch, lambda code, _: code + deadly)
     assert not report.passed
     assert all("ended the process" in line and reported in line for line in report.differences)
     assert len(report.differences) == len(KINDS)

@@ -33,6 +33,7 @@ from tests.fmu.driving import (
     time_of,
     untyped,
 )
+from tests.fmu.saved_state import restore, saved
 from tests.marks import first_fast
 
 # ---- sizes ----
@@ -46,15 +47,20 @@ def test_a_thousand_steps_of_a_microsecond_are_one_of_a_millisecond(slave: Slave
     assert time_of(many) == pytest.approx(100.001, abs=1e-12)
 
 
+def exactly_by(hull: Model, until: float, command: float) -> list[float]:
+    """States at a time, by another integrator."""
+    u, p = hull.input_values({"rudder.command": command}), hull.parameter_values()
+    start = np.array(hull.initial(p)).ravel()
+    truth = solve_ivp(lambda _, x: np.array(hull.rhs(x, u, p)).ravel(), (0.0, until), start, rtol=1e-11, atol=1e-12)
+    return [float(value) for value in truth.y[:, -1]]
+
+
 def test_steps_of_any_sizes_follow_the_equations(hull: Model, slave: Slave) -> None:
     fmu, now = slave(rudder__command=0.05), 0.0
     for size in (1e-6, 0.3, 1e-4, 2.7, 0.05, 1e-5, 1.0):
         fmu.instance.doStep(currentCommunicationPoint=now, communicationStepSize=size)
         now += size
-    u, p = hull.input_values({"rudder.command": 0.05}), hull.parameter_values()
-    start = np.array(hull.initial(p)).ravel()
-    truth = solve_ivp(lambda _, x: np.array(hull.rhs(x, u, p)).ravel(), (0.0, now), start, rtol=1e-11, atol=1e-12)
-    assert fmu.read(STATES) == pytest.approx(truth.y[:, -1].tolist(), rel=1e-6, abs=1e-7)
+    assert fmu.read(STATES) == pytest.approx(exactly_by(hull, now, 0.05), rel=1e-6, abs=1e-7)
 
 
 def test_a_step_too_short_to_change_the_time_is_refused(status: Status, slave: Slave) -> None:
@@ -131,18 +137,17 @@ def output_derivatives(fmu: RunningFmu, names: list[str], order: int = 1) -> lis
     return [float(value) for value in call(fmu.unpacked.references(names), [order] * len(names))]
 
 
-def test_output_derivatives_are_the_rates_at_which_outputs_change(fmi: int, hull: Model, slave: Slave) -> None:
+def test_output_derivatives_are_the_rates_at_which_outputs_change(hull: Model, slave: Slave) -> None:
     fmu = slave(rudder__command=0.3)
     steps(fmu, 20)
     names = list(hull.outputs)
     width = 1e-5
-    state = fmu.instance.getFMUstate() if fmi == 2 else fmu.instance.getFMUState()
+    before = saved(fmu)
     values = []
     for _ in range(3):
         values.append(np.array(fmu.read(names)))
         fmu.instance.doStep(time_of(fmu), width)
-    (fmu.instance.setFMUstate if fmi == 2 else fmu.instance.setFMUState)(state)
-    (fmu.instance.freeFMUstate if fmi == 2 else fmu.instance.freeFMUState)(state)
+    restore(fmu, before)
     found = np.array(output_derivatives(fmu, names))
     forward = (-3 * values[0] + 4 * values[1] - values[2]) / (2 * width)
     scale = np.maximum(np.abs(values[0]), 1)
@@ -245,10 +250,7 @@ def test_an_early_return_is_honoured(asked: float, reached: float, hull: Model, 
     assert early
     assert last == pytest.approx(reached, abs=1e-12)
     assert fmu.read(["time"]) == [last]
-    u, p = hull.input_values({"rudder.command": 0.3}), hull.parameter_values()
-    start = np.array(hull.initial(p)).ravel()
-    truth = solve_ivp(lambda _, x: np.array(hull.rhs(x, u, p)).ravel(), (0.0, last), start, rtol=1e-11, atol=1e-12)
-    assert fmu.read(STATES) == pytest.approx(truth.y[:, -1].tolist(), rel=1e-9, abs=1e-9)
+    assert fmu.read(STATES) == pytest.approx(exactly_by(hull, last, 0.3), rel=1e-9, abs=1e-9)
     fmu.instance.doStep(last, 1.0 - last)
     assert fmu.read(["time"]) == pytest.approx([1.0])
 

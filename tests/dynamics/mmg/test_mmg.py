@@ -294,14 +294,3 @@ def test_outputs_of_torque_are_of_cards_with_its_curve_alone(ship: t2s.Ship) -> 
     card = changed_mmg(ship, ("k_0 = 0.2931\nk_1 = -0.2753\nk_2 = -0.1385\n", table))
     assert [card.propeller.q_0, card.propeller.q_1, card.propeller.q_2] == pytest.approx([0.0312, -0.0208, -0.0149])
     assert card.propeller.eta_R == 1.0
-
-
-@pytest.mark.parametrize(
-    ("given", "place"),
-    [("q_0 = 0.03\nq_1 = -0.02\n", "propeller.q_2"), ("eta_R = 1.0\n", "propeller.eta_R"),
-     ("K_Q = [0.03, 0.02, 0.01]\n", "propeller.J"), (f"{CURVE}K_Q = [0.03]\n", "propeller.K_Q")],
-)  # fmt: skip
-def test_an_incomplete_torque_curve_is_refused(ship: t2s.Ship, given: str, place: str) -> None:
-    with pytest.raises(t2s.InputError) as caught:
-        changed_mmg(ship, ("[propeller]\n", f"[propeller]\n{given}"))
-    assert caught.value.place == place
