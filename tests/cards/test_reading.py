@@ -104,12 +104,46 @@ def test_uncertainty_left_out_is_two_percent() -> None:
         ("x_G = 1.0", "x_G = 80.0", "rigid_body.x_G", "midships"),
         ("[derivatives]", "[wings]\na = 1\n[derivatives]", "wings", "not a key of a card"),
         ("[derivatives]", "[derivatives", "line", "TOML"),
+        ('kind = "abkowitz"', 'kind = ["abkowitz"]', "model.kind", "one of linear"),
+        ('kind = "abkowitz"', "kind = {a = 1}", "model.kind", "one of linear"),
+        ("length_m = 100.0", f"length_m = {'1' * 5000}", "", "thousands of digits"),
+        ("length_m = 100.0", f"length_m = {'1' * 400}", "ship.length_m", "was expected"),
+        ("length_m = 100.0", f"length_m = -{'1' * 400}", "ship.length_m", "was expected"),
+        ("length_m = 100.0", "length_m = 1e100", "ship.length_m", "at most 1000 "),
+        ("length_m = 100.0", "length_m = 1e-300", "ship.length_m", "at least 0.01 "),
+        ("speed_mps = 10.0", "speed_mps = 1e-300", "model.speed_mps", "at least 0.001 "),
+        ("kgpm3 = 1000.0", "kgpm3 = 1e30", "environment.water_density_kgpm3", "below 1300 "),
+        ("[derivatives]", "[steering_gear]\ntime_constant_s = 1e-9\n[derivatives]", "time_constant_s", "0.001 "),
+        (
+            "[derivatives]",
+            f"[steering_gear]\nmax_rate_degps = {'1' * 400}\n[derivatives]",
+            "steering_gear.max_rate_degps",
+            "no number is so large",
+        ),
+        ("[derivatives]", f"deep = {'[' * 5000}{']' * 5000}\n[derivatives]", "", "nested too deeply"),
+        ("[rigid_body]", "valid_speed_mps = [9.0, 3.0]\n[rigid_body]", "model.valid_speed_mps", "the lower first"),
+        ("[rigid_body]", f"valid_speed_mps = [1, {'9' * 400}]\n[rigid_body]", "model.valid_speed_mps", "100 m/s"),
+        ("Yv = -6e5", f"Yv = {'9' * 400}", "derivatives.Yv", "number"),
+        ("[rigid_body]", "low_speed_below_mps = -1\n[rigid_body]", "model.low_speed_below_mps", "at least 0 "),
+        (
+            "[derivatives]",
+            '[[fitted_trials]]\nname = "z"\nt_s = [0.0, 0.0]\n[derivatives]',
+            "fitted_trials.0",
+            "times t_s that rise",
+        ),
+        (
+            "[derivatives]",
+            '[[fitted_trials]]\nname = "z"\nt_s = [0.0, 1.0]\nsignals = {psi_rad = [1.0]}\n[derivatives]',
+            "fitted_trials.0",
+            "psi_rad has 1 value",
+        ),
     ],
 )
 def test_a_faulty_card_is_refused_with_its_place(old: str, new: str, place: str, expected: str) -> None:
     assert old in SI_CARD
     reported = refusal(SI_CARD.replace(old, new, 1))
     assert reported.startswith("ship.toml: ") and place in reported and expected in reported
+    assert len(reported) < 300 or expected == "not a term of (3.8)"  # which lists all terms
 
 
 def test_a_singular_mass_matrix_is_refused() -> None:
@@ -121,18 +155,17 @@ def test_a_singular_mass_matrix_is_refused() -> None:
     assert "f4 = 0" in reported and "rigid_body" in reported
 
 
-def test_positive_added_mass_is_refused() -> None:
-    assert "not positive" in refusal(read_card("mariner").text.replace("Yvdot = -748e-5", "Yvdot = 1748e-5"))
-
-
-def test_an_angle_given_in_both_units_is_refused() -> None:
-    text = read_card("mariner").text.replace("max_angle_deg = 40.0", "max_angle_deg = 40.0\nmax_angle_rad = 0.7")
-    assert "given twice" in refusal(text)
-
-
-def test_an_angle_out_of_bounds_is_reported_in_the_units_of_the_file() -> None:
-    reported = refusal(read_card("mariner").text.replace("max_angle_deg = 40.0", "max_angle_deg = 120.0"))
-    assert "is 120" in reported and "below 90" in reported
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("Yvdot = -748e-5", "Yvdot = 1748e-5", "not positive"),
+        ("max_angle_deg = 40.0", "max_angle_deg = 40.0\nmax_angle_rad = 0.7", "given twice"),
+        # in the units of the file
+        ("max_angle_deg = 40.0", "max_angle_deg = 120.0", "is 120; a number below 90 "),
+    ],
+)
+def test_what_the_mariner_cannot_have_is_refused(old: str, new: str, expected: str) -> None:
+    assert expected in refusal(read_card("mariner").text.replace(old, new))
 
 
 @pytest.mark.parametrize(
@@ -169,51 +202,6 @@ def test_changes_are_made_in_the_conventions_of_the_file() -> None:
 def test_the_propeller_term_of_a_dimensional_card_is_a_force() -> None:
     text = SI_CARD + "[propulsion]\nnominal_rpm = 60.0\nXnn = 1e5\n"
     assert parse_card(text, "ship.toml").propulsion.Xnn == pytest.approx(1e5 / (500.0 * 100.0**2 * 10.0**2))
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "place", "expected"),
-    [
-        ('kind = "abkowitz"', 'kind = ["abkowitz"]', "model.kind", "one of linear"),
-        ('kind = "abkowitz"', "kind = {a = 1}", "model.kind", "one of linear"),
-        ("length_m = 100.0", f"length_m = {'1' * 5000}", "", "thousands of digits"),
-        ("length_m = 100.0", f"length_m = {'1' * 400}", "ship.length_m", "was expected"),
-        ("length_m = 100.0", f"length_m = -{'1' * 400}", "ship.length_m", "was expected"),
-        ("length_m = 100.0", "length_m = 1e100", "ship.length_m", "at most 1000 "),
-        ("length_m = 100.0", "length_m = 1e-300", "ship.length_m", "at least 0.01 "),
-        ("speed_mps = 10.0", "speed_mps = 1e-300", "model.speed_mps", "at least 0.001 "),
-        ("kgpm3 = 1000.0", "kgpm3 = 1e30", "environment.water_density_kgpm3", "below 1300 "),
-        ("[derivatives]", "[steering_gear]\ntime_constant_s = 1e-9\n[derivatives]", "time_constant_s", "0.001 "),
-        (
-            "[derivatives]",
-            f"[steering_gear]\nmax_rate_degps = {'1' * 400}\n[derivatives]",
-            "steering_gear.max_rate_degps",
-            "no number is so large",
-        ),
-        ("[derivatives]", f"deep = {'[' * 5000}{']' * 5000}\n[derivatives]", "", "nested too deeply"),
-        ("[rigid_body]", "valid_speed_mps = [9.0, 3.0]\n[rigid_body]", "model.valid_speed_mps", "the lower first"),
-        ("[rigid_body]", f"valid_speed_mps = [1, {'9' * 400}]\n[rigid_body]", "model.valid_speed_mps", "100 m/s"),
-        ("Yv = -6e5", f"Yv = {'9' * 400}", "derivatives.Yv", "number"),
-        ("[rigid_body]", "low_speed_below_mps = -1\n[rigid_body]", "model.low_speed_below_mps", "at least 0 "),
-        (
-            "[derivatives]",
-            '[[fitted_trials]]\nname = "z"\nt_s = [0.0, 0.0]\n[derivatives]',
-            "fitted_trials.0",
-            "times t_s that rise",
-        ),
-        (
-            "[derivatives]",
-            '[[fitted_trials]]\nname = "z"\nt_s = [0.0, 1.0]\nsignals = {psi_rad = [1.0]}\n[derivatives]',
-            "fitted_trials.0",
-            "psi_rad has 1 value",
-        ),
-    ],
-)
-def test_what_no_ship_can_have_is_refused_in_one_short_line(old: str, new: str, place: str, expected: str) -> None:
-    assert old in SI_CARD
-    reported = refusal(SI_CARD.replace(old, new, 1))
-    assert reported.startswith("ship.toml: ") and place in reported and expected in reported
-    assert len(reported) < 300
 
 
 def test_a_name_no_file_can_have_is_refused() -> None:

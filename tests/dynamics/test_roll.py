@@ -18,12 +18,12 @@ from tank2sim.cards import parse_card
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.form import EffectEntry
 from tank2sim.dynamics import build
-from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.roll import natural_period_s, roll_fault
 from tank2sim.dynamics.simulator_interface import with_external_forces
 from tank2sim.errors import InputError
 from tank2sim.simulation.manoeuvres import Manoeuvre, Orders, Turn, Zigzag
 from tank2sim.simulation.run import simulate
+from tests.dynamics.states import rates, replaced
 
 TEXT = bundled_cards()["container"].read_text(encoding="utf-8")
 RPM = 2 * math.pi / 60
@@ -31,28 +31,20 @@ RPM = 2 * math.pi / 60
 
 def rolling_card(*pairs: tuple[str, str]) -> ManoeuvringCard:
     """The container ship's card with parts of its text replaced."""
-    text = TEXT
-    for old, new in pairs:
-        assert old in text
-        text = text.replace(old, new, 1)
-    card = parse_card(text, "rolling.toml")
+    card = parse_card(replaced(TEXT, *pairs), "rolling.toml")
     assert isinstance(card, ManoeuvringCard)
     return card
 
 
-def rates_at(model: Model, inputs: dict[str, float], **motion: float) -> dict[str, float]:
-    x = np.array(model.initial(model.parameter_values())).ravel()
-    for name, value in motion.items():
-        x[model.state_names.index("rudder.angle" if name == "delta" else f"motion.{name}")] = value
-    rates = np.array(model.rhs(x, model.input_values(inputs), model.parameter_values())).ravel()
-    return dict(zip(model.state_names, rates.tolist(), strict=True))
+def moving(**state: float) -> dict[str, float]:
+    return {"rudder.angle" if name == "delta" else f"motion.{name}": value for name, value in state.items()}
 
 
 def test_accelerations_are_those_of_the_published_program() -> None:
     """container.m of MSS at one state, to the ten digits that its check values have."""
-    motion = {"u": 8.0, "v": 0.5, "r": 0.01, "psi": 0.3, "p": 0.002, "phi": 0.05, "delta": 0.1}
-    inputs = {"rudder.command": 0.15, "propeller.speed": 75 * RPM}
-    found = rates_at(build(rolling_card()), inputs, **motion)
+    motion = moving(u=8.0, v=0.5, r=0.01, psi=0.3, p=0.002, phi=0.05, delta=0.1)
+    orders = {"rudder.command": 0.15, "propeller.speed": 75 * RPM}
+    found = rates(build(rolling_card()), motion | orders)
     expected = {
         "motion.u": 0.004913203437,
         "motion.v": -0.05946638388,
@@ -137,11 +129,10 @@ def test_a_ship_at_rest_rolls_with_its_natural_period() -> None:
 def test_a_centre_of_gravity_below_the_origin_couples_as_a_pendulum() -> None:
     """Rigid body with z_G alone, by hand: m (v' - z_G p') = Y, I_x p' - m z_G (v' + u r) = K - W GM phi."""
     model = build(rolling_card(("roll_inertia = 0.0000176", "roll_inertia = 0.0000176\nz_G = 0.01")))
-    names = model.parameter_names
-    p = dict(zip(names, model.parameter_values().tolist(), strict=True))
-    motion = {"u": 8.0, "v": 0.3, "r": 0.008, "p": 0.003, "phi": 0.04, "delta": 0.05}
-    found = rates_at(model, {"propeller.speed": 80 * RPM, "rudder.command": 0.05}, **motion)
-    plain = rates_at(build(rolling_card()), {"propeller.speed": 80 * RPM, "rudder.command": 0.05}, **motion)
+    p = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    at = moving(u=8.0, v=0.3, r=0.008, p=0.003, phi=0.04, delta=0.05)
+    at |= {"propeller.speed": 80 * RPM, "rudder.command": 0.05}
+    found, plain = rates(model, at), rates(build(rolling_card()), at)
     m, z, scale = p["ship.mass"], 0.01 * 175, 0.5 * 1025 * 175**3
     m_x, m_y, l_y, a_y = 0.000238 * scale, 0.007049 * scale, 0.0313 * 175, 0.05 * 175
     Ix, Iz = 2.1e-5 * scale * 175**2, 8.75e-4 * scale * 175**2
@@ -282,9 +273,7 @@ def test_terms_of_roll_are_found_in_trials_that_measured_heel(tmp_path: Path) ->
     ]
     free = {"Yv": 0.001, "Nr": 0.0002, "Kv": 0.0001}
     text = TEXT + "\n[uncertainty]\n" + "".join(f"{key} = {free.get(key, 0.0)}\n" for key in keys)
-    for old, new in wrong.items():
-        assert old in text
-        text = text.replace(old, new)
+    text = replaced(text, *wrong.items())
     (tmp_path / "start.toml").write_text(text, encoding="utf-8")
     generator, ship, paths = np.random.default_rng(2), t2s.load("container"), []
     noise = {"u_mps": 0.02, "v_mps": 0.02, "r_degps": 0.01, "psi_deg": 0.1, "x_m": 0.5, "y_m": 0.5, "phi_deg": 0.05}
@@ -303,26 +292,10 @@ def test_an_external_moment_heels_the_ship_as_far_as_its_stability_holds() -> No
     """At rest K = W GM phi; a force above the origin heels to its side, as its moment does."""
     model = with_external_forces(build(rolling_card()))
     moment = 0.02 * 21752550.0 * 9.81 * 0.3
-    upright = np.array(model.initial(model.parameter_values())).ravel()
-    upright[model.state_names.index("motion.u")] = 0.0
-    upright[model.state_names.index("motion.phi")] = 0.02
-    inputs = {"external.K": moment, "propeller.speed": 0.0}
-    at_rest = np.array(model.rhs(upright, model.input_values(inputs), model.parameter_values())).ravel()
-    assert at_rest[model.state_names.index("motion.p")] == pytest.approx(0.0, abs=1e-9)
-    by_force = np.array(
-        model.rhs(
-            upright,
-            model.input_values({"external.Y": moment / 5, "external.point_z": -5.0, "propeller.speed": 0.0}),
-            model.parameter_values(),
-        )
-    ).ravel()
-    pushed = np.array(
-        model.rhs(
-            upright,
-            model.input_values({"external.Y": moment / 5, "propeller.speed": 0.0, "external.K": moment}),
-            model.parameter_values(),
-        )
-    ).ravel()
+    upright = {"motion.u": 0.0, "motion.phi": 0.02, "propeller.speed": 0.0}
+    assert rates(model, upright | {"external.K": moment})["motion.p"] == pytest.approx(0.0, abs=1e-9)
+    by_force = rates(model, upright | {"external.Y": moment / 5, "external.point_z": -5.0})
+    pushed = rates(model, upright | {"external.Y": moment / 5, "external.K": moment})
     assert by_force == pytest.approx(pushed, rel=1e-12, abs=1e-15)
     with pytest.raises(InputError, match="rolls"):
         t2s.load("mariner").simulate("turn:10", external={"K": 1e6})

@@ -11,6 +11,7 @@ from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS, ACCELERATION_TERMS, ALL_TERMS
 from tests.cards.si_card import SI_CARD
+from tests.dynamics.states import rates, values
 
 L, U0, RHO = 160.93, 7.7175, 1025.0
 
@@ -60,12 +61,9 @@ def printed(c: dict[str, float], card: ManoeuvringCard, state: tuple[float, ...]
     return np.array([udot * V**2 / L, vdot * V**2 / L, rdot * V**2 / L**2])
 
 
-def accelerations(card: ManoeuvringCard, state: tuple[float, ...], **more: float) -> np.ndarray:
-    model = build(card)
-    values = {"motion.u": state[0], "motion.v": state[1], "motion.r": state[2], "rudder.angle": state[3], **more}
-    x = np.array([values.get(name, 0.0) for name in model.state_names])
-    y = np.array(model.output(x, model.input_values(), model.parameter_values())).ravel()
-    return y[[model.outputs.index(name) for name in ("motion.udot", "motion.vdot", "motion.rdot")]]
+def accelerations(card: ManoeuvringCard, state: tuple[float, ...]) -> np.ndarray:
+    at = dict(zip(("motion.u", "motion.v", "motion.r", "rudder.angle"), state, strict=True))
+    return values(build(card), ("motion.udot", "motion.vdot", "motion.rdot"), at)
 
 
 def linear(card: ManoeuvringCard) -> ManoeuvringCard:
@@ -122,16 +120,6 @@ def test_total_and_hydrodynamic_differ_by_m_times_speed_difference(mariner_card)
     np.testing.assert_allclose(found[1:], np.linalg.solve(matrix, difference), rtol=1e-8)
 
 
-def test_a_symmetric_ship_turns_alike_to_both_sides(mariner_card) -> None:
-    names = ("X0 Xu Xuu Xuuu Xvv Xrr Xdd Xvvu Xrru Xddu Xvr Xvd Xrd Xvru Xvdu Xrdu").split()
-    assert set(names) == set(ABKOWITZ_TERMS["X"])
-    even = [f + end for f in "YN" for end in ("0", "0u", "0uu")]
-    random = with_random_derivatives(mariner_card, 11)
-    card = replace(random, derivatives={**random.derivatives, **dict.fromkeys(even, 0.0)})
-    starboard, port = accelerations(card, (7.0, 0.5, 0.01, 0.2)), accelerations(card, (7.0, -0.5, -0.01, -0.2))
-    np.testing.assert_allclose(port, starboard * [1, -1, -1], rtol=1e-12)
-
-
 def test_ships_of_any_size_with_equal_primes_accelerate_alike(mariner_card) -> None:
     """Dimensional similarity: accelerations scale with U^2/L and U^2/L^2, whatever the density."""
     scale, speed, density = 1 / 40.0, 0.2, 0.97
@@ -152,19 +140,14 @@ def test_positive_rudder_turns_to_starboard(mariner_card) -> None:
 
 
 def test_the_steering_gear_keeps_its_limits_and_stays_when_it_fails(mariner) -> None:
-    rate = mariner.state_names.index("rudder.angle")
-    at = np.zeros(7)
-    at[mariner.state_names.index("motion.u")] = U0
-    p = mariner.parameter_values()
-    far = mariner.input_values({"rudder.command": np.radians(35)})
-    near = mariner.input_values({"rudder.command": np.radians(2)})
-    failed = mariner.input_values({"rudder.command": np.radians(35), "steering.failed": 1.0})
-    assert float(mariner.rhs(at, far, p)[rate]) == pytest.approx(np.radians(5.0))
-    assert float(mariner.rhs(at, near, p)[rate]) == pytest.approx(np.radians(2.0) / 1.0)
-    assert float(mariner.rhs(at, failed, p)[rate]) == 0.0
-    at[rate] = np.radians(40)
-    beyond = mariner.input_values({"rudder.command": np.radians(60)})
-    assert float(mariner.rhs(at, beyond, p)[rate]) == pytest.approx(0.0, abs=1e-15)
+    def rate(command_deg: float, angle_deg: float = 0.0, failed: float = 0.0) -> float:
+        at = {"motion.u": U0, "rudder.angle": np.radians(angle_deg), "steering.failed": failed}
+        return rates(mariner, at | {"rudder.command": np.radians(command_deg)})["rudder.angle"]
+
+    assert rate(35) == pytest.approx(np.radians(5.0))
+    assert rate(2) == pytest.approx(np.radians(2.0) / 1.0)
+    assert rate(35, failed=1.0) == 0.0
+    assert rate(60, angle_deg=40) == pytest.approx(0.0, abs=1e-15)
 
 
 def test_a_card_without_gear_says_which_lag_is_taken() -> None:
@@ -173,30 +156,22 @@ def test_a_card_without_gear_says_which_lag_is_taken() -> None:
 
 
 def test_current_carries_the_ship_and_changes_no_force(mariner_card) -> None:
-    text = (
-        mariner_card.text + '\n[[effects]]\nname = "current"\nparameters = {speed_mps = 0.5, direction_deg = 120.0}\n'
-    )
-    model = build(parse_card(text, "ship.toml"))
-    plain = build(mariner_card)
-    x = np.array([0, 0, 0.3, 7.0, -0.4, 0.008, 0.2])
-    assert model.state_names == plain.state_names
-    with_current = np.array(model.rhs(x, model.input_values(), model.parameter_values())).ravel()
-    without = np.array(plain.rhs(x, plain.input_values(), plain.parameter_values())).ravel()
-    expected = np.zeros(7)
-    expected[:2] = 0.5 * np.cos(np.radians(120)), 0.5 * np.sin(np.radians(120))
-    np.testing.assert_allclose(with_current - without, expected, atol=1e-14)
+    effect = '\n[[effects]]\nname = "current"\nparameters = {speed_mps = 0.5, direction_deg = 120.0}\n'
+    model, plain = build(parse_card(mariner_card.text + effect, "ship.toml")), build(mariner_card)
+    at = {"motion.psi": 0.3, "motion.u": 7.0, "motion.v": -0.4, "motion.r": 0.008, "rudder.angle": 0.2}
+    with_current, without = rates(model, at), rates(plain, at)
+    carried = {"motion.x": 0.5 * np.cos(np.radians(120)), "motion.y": 0.5 * np.sin(np.radians(120))}
+    assert with_current == pytest.approx({key: without[key] + carried.get(key, 0.0) for key in without}, abs=1e-14)
     assert {"current.speed", "current.direction"} <= set(model.input_names)
 
 
 def test_propulsion_balances_at_nominal_revolutions_and_pulls_above(data) -> None:
     card = parse_card((data / "data/gap_cases/case_1/ship.toml").read_text(), "ship.toml")
     model = build(card)
-    x = np.array([0, 0, 0, U0, 0, 0, 0.0])
     nominal = 84.0 * 2 * np.pi / 60
-    surge = model.state_names.index("motion.u")
 
     def udot(n: float) -> float:
-        return float(model.rhs(x, model.input_values({"propeller.speed": n}), model.parameter_values())[surge])
+        return rates(model, {"motion.u": U0, "propeller.speed": n})["motion.u"]
 
     assert udot(nominal) == pytest.approx(0.0, abs=1e-12)
     m = card.rigid_body.mass - card.derivatives["Xudot"]

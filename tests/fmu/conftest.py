@@ -24,6 +24,7 @@ from tank2sim.fmu.provenance import documents_of
 from tank2sim.fmu.running import RunningFmu, running
 from tank2sim.fmu.ssp import ship_with_autopilot
 from tank2sim.fmu.unpacking import UnpackedFmu
+from tests.fmu.driving import Instantiate, Slave, begun
 
 
 def tunable(name: str, start: float, unit: str = "1") -> Parameter:
@@ -46,16 +47,16 @@ def steered_hull(name: str = "Test hull") -> Model:
     """A hull with linear sway and yaw, quadratic surge, a rate-limited rudder that can fail, and a steady motion."""
     inputs = (
         Input(
-            name="rudder.command",
-            unit="rad",
-            description="Rudder order, + to starboard",
+            "rudder.command",
+            "rad",
+            "Rudder order, + to starboard",
             minimum=-0.6,
             maximum=0.6,
             display_unit="deg",
             nominal=0.3,
         ),
-        Input(name="propeller.speed", unit="rad/s", description="Revolutions", start=1.0, display_unit="rpm"),
-        Input(name="steering.failed", unit="1", description="True: the rudder stays where it is", boolean=True),
+        Input("propeller.speed", "rad/s", "Revolutions", start=1.0, display_unit="rpm"),
+        Input("steering.failed", "1", "True: the rudder stays where it is", boolean=True),
     )
     order, revolutions, failed = (variable.symbol for variable in inputs)
     parameters = (
@@ -123,7 +124,6 @@ def coasting_body() -> Model:
         name="Body",
         description="A body that slows down",
         states=(position, speed),
-        inputs=(),
         parameters=(drag, start),
         quantities=(quantity("motion.udot", "m/s2", -drag.symbol * speed.symbol**2),),
         outputs=("motion.x", "motion.u"),
@@ -133,13 +133,11 @@ def coasting_body() -> Model:
 
 def gain() -> Model:
     """No states at all, and no parameters: an output that follows its input."""
-    order = Input(name="command", unit="rad", description="Order")
+    order = Input("command", "rad", "Order")
     return Model(
         name="Gain",
         description="Twice the input",
-        states=(),
         inputs=(order,),
-        parameters=(),
         quantities=(quantity("answer", "rad", 2 * order.symbol),),
         outputs=("answer",),
         step_s=0.5,
@@ -230,6 +228,19 @@ def instantiate(unpacked: Callable[[str, int], UnpackedFmu]) -> Iterator[Callabl
             return stack.enter_context(running(unpacked(name, fmi), kind, **more))  # type: ignore[arg-type]
 
         yield make
+
+
+@pytest.fixture(scope="session", params=[2, 3])
+def fmi(request: pytest.FixtureRequest) -> int:
+    """Both versions of FMI: a test that takes this runs with each."""
+    version: int = request.param
+    return version
+
+
+@pytest.fixture
+def slave(fmi: int, instantiate: Instantiate) -> Slave:
+    """Make an instance of the hull for Co-Simulation that has begun with these inputs (a dot as two underscores)."""
+    return lambda **inputs: begun(instantiate("hull", fmi, "CoSimulation"), **inputs)
 
 
 @pytest.fixture

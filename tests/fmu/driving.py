@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import ctypes
+import zipfile
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 
 from tank2sim.dynamics.model import Model
 from tank2sim.fmu.running import RunningFmu
+from tank2sim.fmu.unpacking import UnpackedFmu
 from tank2sim.simulation.scheme import runge_kutta_step
 
 OK, DISCARD, ERROR = 0, 2, 3
 STATES = [f"motion.{name}" for name in ("x", "y", "psi", "u", "v", "r")] + ["rudder.angle"]
 
+FmuFile = Callable[[str, int], Path]
+ShipFmu = Callable[[int], Path]
+Unpacked = Callable[[str, int], UnpackedFmu]
 Instantiate = Callable[..., RunningFmu]
+Slave = Callable[..., RunningFmu]
 Status = Callable[..., int]
+"""Fixtures of ``conftest.py``: FMU of a small model, of the Mariner, unpacked; instances, one of the hull, statuses."""
 
 
 def begun(fmu: RunningFmu, **inputs: float) -> RunningFmu:
@@ -48,3 +56,11 @@ def by_casadi(model: Model, count: int, size: float, **inputs: float) -> list[fl
     for _ in range(count):
         x = step(x, u, p, size)
     return [float(value) for value in np.array(x).ravel()]
+
+
+def rewritten(source: Path, target: Path, change: Callable[[str, bytes], bytes]) -> Path:
+    """An FMU with other contents of its files."""
+    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w") as new:
+        for entry in old.infolist():
+            new.writestr(entry, change(entry.filename, old.read(entry)))
+    return target

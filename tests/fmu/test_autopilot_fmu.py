@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ from tank2sim.analysis.heading.designs import HeadingDesign, design_heading
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.fmu.autopilot import co_simulate_heading, loop_difference, make_autopilot_fmu
+from tests.fmu.driving import ShipFmu
 
 pytestmark = pytest.mark.slow
 
@@ -25,7 +25,7 @@ def design(mariner: Model) -> HeadingDesign:
 
 @pytest.fixture(scope="module", params=[2, pytest.param(3, marks=pytest.mark.slow)])
 def pair(
-    request: pytest.FixtureRequest, design: HeadingDesign, mariner_fmu: Callable[[int], Path], tmp_path_factory
+    request: pytest.FixtureRequest, design: HeadingDesign, mariner_fmu: ShipFmu, tmp_path_factory
 ) -> tuple[Path, Path]:
     path = tmp_path_factory.mktemp("autopilot") / "autopilot.fmu"
     path.write_bytes(make_autopilot_fmu(design.autopilot, design.source, fmi=request.param).content)

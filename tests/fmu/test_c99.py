@@ -6,8 +6,9 @@ import hashlib
 import platform
 import re
 import shutil
+import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -25,13 +26,23 @@ from tank2sim.fmu.reference import by_scheme, reference_errors
 from tank2sim.fmu.running import replay
 from tank2sim.native.compiler import SHARED_SUFFIX
 from tests.dynamics.effects.ships import TYPICAL, card_with
+from tests.fmu.driving import ShipFmu
 from tests.fmu.plain_ships import STRICT, CompiledShip, call, macro, written
 from tests.marks import first_fast
 
 CARDS = ["mariner", *(name for name in bundled_cards() if name != "mariner")]
 MATH = {"sin", "cos", "sincos", "tan", "atan2", "exp", "fmax", "fmin", "sqrt", "tanh", "floor", "ceil", "fabs"}
 
+Done = subprocess.CompletedProcess[str]
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
+
+
+def self_tests(ship: PlainShip, folder: Path, *compiler: str) -> Iterator[tuple[bool, Done, Done]]:
+    """Of double and of float: whether it is float, and how compiler and self test ended."""
+    written(ship, folder)
+    for single in (False, True):
+        done = call(*compiler, *macro(ship, single), "ship.c", "self_test.c", "-lm", "-o", "run", folder=folder)
+        yield single, done, call("./run", folder=folder) if done.returncode == 0 else done
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +50,7 @@ def made() -> PlainShip:
     return plain_ship(t2s.load("mariner").card)
 
 
-def test_double_is_the_fmu_to_the_last_bit(made: PlainShip, mariner: Model, mariner_fmu: Callable[[int], Path]) -> None:
+def test_double_is_the_fmu_to_the_last_bit(made: PlainShip, mariner: Model, mariner_fmu: ShipFmu) -> None:
     run = manoeuvre(mariner)
     expected = replay(mariner_fmu(2), run, mariner)
     found = CompiledShip(made).drive(run)
@@ -65,12 +76,8 @@ def test_every_bundled_card_is_its_fmu_to_the_last_bit(card: str, tmp_path: Path
 @first_fast("card", CARDS)
 def test_a_strict_compiler_has_no_objection_and_the_self_test_passes(card: str, tmp_path: Path) -> None:
     ship = plain_ship(t2s.load(card).card)
-    folder = written(ship, tmp_path)
-    for single in (False, True):
-        flags = [*STRICT, "-O1", "-ffp-contract=off", *macro(ship, single)]
-        done = call("gcc", *flags, "ship.c", "self_test.c", "-lm", "-o", "run", folder=folder)
+    for single, done, ran in self_tests(ship, tmp_path, "gcc", *STRICT, "-O1", "-ffp-contract=off"):
         assert done.returncode == 0 and not done.stderr, done.stderr
-        ran = call("./run", folder=folder)
         assert ran.returncode == 0 and ran.stdout.endswith("pass\n"), ran.stdout
         assert f"{ship.instance_bytes(single=single)} bytes" in ran.stdout
 
@@ -80,11 +87,8 @@ def test_a_strict_compiler_has_no_objection_and_the_self_test_passes(card: str, 
 @pytest.mark.parametrize("effect", TYPICAL)
 def test_every_effect_compiles_and_passes_its_self_test(effect: str, tmp_path: Path) -> None:
     ship = plain_ship(card_with({effect: TYPICAL[effect]}))
-    folder = written(ship, tmp_path)
-    for single in (False, True):
-        done = call("gcc", *STRICT, *macro(ship, single), "ship.c", "self_test.c", "-lm", "-o", "run", folder=folder)
+    for _, done, ran in self_tests(ship, tmp_path, "gcc", *STRICT):
         assert done.returncode == 0, done.stderr
-        ran = call("./run", folder=folder)
         assert ran.returncode == 0, ran.stdout
 
 
@@ -124,13 +128,10 @@ def test_the_object_is_small_and_calls_the_mathematical_library_alone(made: Plai
 @pytest.mark.parametrize("card", ["mariner", "otter", "container", "esso-osaka-ship"])
 def test_sanitizers_find_nothing(card: str, tmp_path: Path) -> None:
     ship = plain_ship(t2s.load(card).card)
-    folder = written(ship, tmp_path)
-    for single in (False, True):
-        flags = ["-std=c99", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all", *macro(ship, single)]
-        done = call("gcc", *flags, "ship.c", "self_test.c", "-lm", "-o", "run", folder=folder)
+    flags = ["-std=c99", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    for _, done, ran in self_tests(ship, tmp_path, "gcc", *flags):
         if done.returncode != 0 and "asan" in done.stderr:
             pytest.skip("gcc has no sanitizers here")
-        ran = call("./run", folder=folder)
         assert ran.returncode == 0 and not ran.stderr, ran.stderr
 
 
@@ -159,12 +160,10 @@ def test_a_compiler_for_arm_has_no_objection(
 def test_the_self_test_passes_with_another_compiler_and_mathematical_library(
     clang: tuple[str, ...], made: PlainShip, tmp_path: Path
 ) -> None:
-    folder = written(made, tmp_path)
-    for single in (False, True):
-        flags = ["-target", f"{platform.machine()}-linux-musl", *STRICT, "-O2", *macro(made, single)]
-        done = call(*clang, *flags, "ship.c", "self_test.c", "-lm", "-o", "run", folder=folder)
+    flags = ["-target", f"{platform.machine()}-linux-musl", *STRICT, "-O2"]
+    for _, done, ran in self_tests(made, tmp_path, *clang, *flags):
         assert done.returncode == 0, done.stderr
-        assert call("./run", folder=folder).returncode == 0
+        assert ran.returncode == 0
 
 
 def test_single_precision_stays_near_the_model(made: PlainShip, mariner: Model) -> None:

@@ -18,27 +18,25 @@ from scipy.integrate import solve_ivp
 
 from tank2sim.cards import read_card
 from tank2sim.dynamics import build
-from tank2sim.dynamics.model import Model, Parameter
+from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.simulator_interface import with_simulator_interface
 from tank2sim.errors import InputError
-from tank2sim.fmu import acceptance
-from tank2sim.fmu.check import LIMITS, compare_with_model, description_differences
+from tank2sim.fmu import acceptance, sources
+from tank2sim.fmu.check import LIMITS, CheckReport, compare_with_model, description_differences
 from tank2sim.fmu.export import write_fmu
 from tank2sim.fmu.manoeuvre import manoeuvre
 from tank2sim.fmu.passport import Replay
 from tank2sim.fmu.reference import by_scheme, exactly, reference_errors
 from tank2sim.fmu.unpacking import embedded_card
+from tests.fmu.driving import FmuFile, ShipFmu, rewritten
 from tests.marks import first_fast
 
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 KINDS = ("ModelExchange", "CoSimulation")
 
 
 @first_fast("fmi", [2, 3])
 @first_fast("name", ["hull", "body", "gain"])
-def test_an_fmu_agrees_with_its_model(
-    name: str, fmi: int, fmu_file: Callable[[str, int], Path], models: dict[str, Model]
-) -> None:
+def test_an_fmu_agrees_with_its_model(name: str, fmi: int, fmu_file: FmuFile, models: dict[str, Model]) -> None:
     report = compare_with_model(fmu_file(name, fmi), model=models[name])
     assert report.passed
     assert (report.kinds, report.validation, report.differences) == (KINDS, (), ())
@@ -49,11 +47,8 @@ def test_an_fmu_agrees_with_its_model(
 
 @pytest.mark.essential
 @pytest.mark.slow
-@FMI
 @pytest.mark.parametrize("ship", ["mariner", "wilinski-zellman"])
-def test_a_bundled_ship_agrees_with_its_model(
-    ship: str, fmi: int, mariner_fmu: Callable[[int], Path], tmp_path: Path
-) -> None:
+def test_a_bundled_ship_agrees_with_its_model(ship: str, fmi: int, mariner_fmu: ShipFmu, tmp_path: Path) -> None:
     model, path = with_simulator_interface(build(read_card(ship))), tmp_path / "x.fmu"
     if ship == "mariner":
         path = mariner_fmu(fmi)
@@ -64,20 +59,9 @@ def test_a_bundled_ship_agrees_with_its_model(
     assert report.passed
 
 
-def with_start(model: Model, name: str, start: float) -> Model:
-    """The model with another start value of one parameter."""
-
-    def changed(parameter: Parameter) -> Parameter:
-        copy = replace(parameter, start=start) if parameter.name == name else parameter
-        copy.__dict__["symbol"] = parameter.symbol
-        return copy
-
-    return replace(model, parameters=tuple(changed(parameter) for parameter in model.parameters))
-
-
 @pytest.mark.slow
 def test_another_coefficient_is_found_and_named(hull: Model, tmp_path: Path) -> None:
-    write_fmu(with_start(hull, "derivatives.Yv", -0.1200001), tmp_path / "x.fmu")
+    write_fmu(hull.with_values({"derivatives.Yv": -0.1200001}), tmp_path / "x.fmu")
     report = compare_with_model(tmp_path / "x.fmu", model=hull)
     assert not report.passed
     assert any("derivatives.Yv is -0.1200001 in the FMU and -0.12" in line for line in report.differences)
@@ -94,9 +78,7 @@ def test_another_coefficient_is_found_and_named(hull: Model, tmp_path: Path) -> 
         ("motion.psidot", lambda value: -value),
     ],
 )
-def test_a_wrong_equation_fails(
-    quantity: str, wrong: Callable[[ca.SX], ca.SX], hull: Model, fmu_file: Callable[[str, int], Path]
-) -> None:
+def test_a_wrong_equation_fails(quantity: str, wrong: Callable[[ca.SX], ca.SX], hull: Model, fmu_file: FmuFile) -> None:
     report = compare_with_model(fmu_file("hull", 2), model=hull.redefine(quantity, wrong))
     assert not report.passed
     for kind in KINDS:
@@ -115,31 +97,33 @@ def test_an_error_of_a_direction_counts_by_the_size_of_its_velocity(share: float
     assert not any(errors.values())
 
 
+def report_of_tampered(
+    hull: Model, path: Path, monkeypatch: pytest.MonkeyPatch, change: Callable[[str, str], str]
+) -> CheckReport:
+    """Of an FMU whose generated C is changed by its text and name, which `export` refuses to write."""
+    generate = sources.generate_c
+    monkeypatch.setattr(sources, "generate_c", lambda functions, stem: change(generate(functions, stem), stem))
+    with pytest.raises(InputError, match="library that the C compiler made for this machine does not work"):
+        write_fmu(hull, path)
+    monkeypatch.setattr(acceptance, "replay_in_fmu", lambda *_: Replay(problem="not asked"))
+    write_fmu(hull, path)
+    return compare_with_model(path, model=hull)
+
+
 @pytest.mark.slow
 def test_a_sign_changed_in_the_generated_code_fails(
     hull: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from tank2sim.fmu import sources
-
-    def tampered(functions: list[ca.Function], stem: str) -> str:
-        code = generate(functions, stem)
+    def tampered(code: str, stem: str) -> str:
         assert "=sin(" in code or stem != "equations"  # those of the start have none
         return code.replace("=sin(", "=-sin(")
 
-    generate = sources.generate_c
-    monkeypatch.setattr(sources, "generate_c", tampered)
-    with pytest.raises(InputError, match="library that the C compiler made for this machine does not work"):
-        write_fmu(hull, tmp_path / "x.fmu")
-    monkeypatch.setattr(acceptance, "replay_in_fmu", lambda *_: Replay(problem="not asked"))
-    write_fmu(hull, tmp_path / "x.fmu")
-    report = compare_with_model(tmp_path / "x.fmu", model=hull)
+    report = report_of_tampered(hull, tmp_path / "x.fmu", monkeypatch, tampered)
     assert not report.passed
     assert report.max_error["motion.y"] > 0.1
 
 
-def test_an_fmu_of_another_ship_is_reported_by_its_variables(
-    models: dict[str, Model], fmu_file: Callable[[str, int], Path]
-) -> None:
+def test_an_fmu_of_another_ship_is_reported_by_its_variables(models: dict[str, Model], fmu_file: FmuFile) -> None:
     report = compare_with_model(fmu_file("body", 2), model=models["hull"])
     assert not report.passed
     assert "input rudder.command of the model is not in the FMU" in report.differences
@@ -148,36 +132,29 @@ def test_an_fmu_of_another_ship_is_reported_by_its_variables(
 
 @pytest.mark.slow
 def test_a_library_that_fails_is_a_failed_check(hull: Model, tmp_path: Path) -> None:
-    weak = with_start(hull, "derivatives.thrust", 1e308)
-    write_fmu(with_start(weak, "derivatives.drag", -1e308), tmp_path / "x.fmu")
+    weak = hull.with_values({"derivatives.thrust": 1e308, "derivatives.drag": -1e308})
+    write_fmu(weak, tmp_path / "x.fmu")
     report = compare_with_model(tmp_path / "x.fmu", model=hull)
     assert not report.passed
     assert any("not finite" in line for line in report.differences)
 
 
+def falsified(source: Path, target: Path, old: bytes, new: bytes) -> Path:
+    """An FMU with another description."""
+    return rewritten(
+        source, target, lambda name, data: data.replace(old, new) if name == "modelDescription.xml" else data
+    )
+
+
 @pytest.mark.slow
-def test_a_description_with_a_fault_fails(fmu_file: Callable[[str, int], Path], hull: Model, tmp_path: Path) -> None:
-    with zipfile.ZipFile(fmu_file("hull", 2)) as source, zipfile.ZipFile(tmp_path / "x.fmu", "w") as target:
-        for entry in source.infolist():
-            data = source.read(entry)
-            if entry.filename == "modelDescription.xml":
-                data = data.replace(b'unit="N.m"', b'unit="lbf.ft"')
-            target.writestr(entry, data)
-    report = compare_with_model(tmp_path / "x.fmu", model=hull)
+def test_a_description_with_a_fault_fails(fmu_file: FmuFile, hull: Model, tmp_path: Path) -> None:
+    path = falsified(fmu_file("hull", 2), tmp_path / "x.fmu", b'unit="N.m"', b'unit="lbf.ft"')
+    report = compare_with_model(path, model=hull)
     assert not report.passed
     assert any("lbf.ft" in problem for problem in report.validation)
     assert any("lbf.ft" in line for line in report.differences)
 
 
-def rewritten(source: Path, target: Path, change: Callable[[str, bytes], bytes]) -> Path:
-    """An FMU with other contents of its files."""
-    with zipfile.ZipFile(source) as old, zipfile.ZipFile(target, "w") as new:
-        for entry in old.infolist():
-            new.writestr(entry, change(entry.filename, old.read(entry)))
-    return target
-
-
-@FMI
 @pytest.mark.parametrize(
     ("old", "new", "reported"),
     [
@@ -195,7 +172,7 @@ def rewritten(source: Path, target: Path, change: Callable[[str, bytes], bytes])
     ],
 )
 def test_whatever_is_falsified_in_a_description_is_reported(
-    fmi: int, old: str, new: str, reported: str, fmu_file: Callable[[str, int], Path], hull: Model, tmp_path: Path
+    fmi: int, old: str, new: str, reported: str, fmu_file: FmuFile, hull: Model, tmp_path: Path
 ) -> None:
     with zipfile.ZipFile(fmu_file("hull", fmi)) as archive:
         text = archive.read("modelDescription.xml")
@@ -210,12 +187,10 @@ def test_whatever_is_falsified_in_a_description_is_reported(
     ("old", "reported"), [(b'start="-0.12"', "start is 0.7"), (b'factor="1.9438444924406046"', "knots")]
 )
 def test_an_fmu_with_a_falsified_description_fails(
-    old: bytes, reported: str, fmu_file: Callable[[str, int], Path], hull: Model, tmp_path: Path
+    old: bytes, reported: str, fmu_file: FmuFile, hull: Model, tmp_path: Path
 ) -> None:
-    def falsify(name: str, data: bytes) -> bytes:
-        return data.replace(old, old.split(b"=")[0] + b'="0.7"') if name == "modelDescription.xml" else data
-
-    report = compare_with_model(rewritten(fmu_file("hull", 2), tmp_path / "x.fmu", falsify), model=hull)
+    path = falsified(fmu_file("hull", 2), tmp_path / "x.fmu", old, old.split(b"=")[0] + b'="0.7"')
+    report = compare_with_model(path, model=hull)
     assert not report.passed
     assert len(report.differences) == 1 and reported in report.differences[0]
     assert max(report.errors["CoSimulation"].values()) < 1e-9
@@ -223,12 +198,9 @@ def test_an_fmu_with_a_falsified_description_fails(
 
 @pytest.mark.slow
 def test_another_spelling_of_a_number_is_no_difference(
-    fmu_file: Callable[[str, int], Path], models: dict[str, Model], tmp_path: Path
+    fmu_file: FmuFile, models: dict[str, Model], tmp_path: Path
 ) -> None:
-    def respell(name: str, data: bytes) -> bytes:
-        return data.replace(b'start="0.05"', b'start="5e-2"') if name == "modelDescription.xml" else data
-
-    path = rewritten(fmu_file("body", 2), tmp_path / "x.fmu", respell)
+    path = falsified(fmu_file("body", 2), tmp_path / "x.fmu", b'start="0.05"', b'start="5e-2"')
     assert path.read_bytes() != fmu_file("body", 2).read_bytes()
     assert compare_with_model(path, model=models["body"]).passed
 
@@ -250,7 +222,7 @@ def another_token(name: str, data: bytes) -> bytes:
 def test_a_library_that_cannot_be_used_is_a_failed_check(
     damage: Callable[[str, bytes], bytes],
     fmi: int,
-    fmu_file: Callable[[str, int], Path],
+    fmu_file: FmuFile,
     hull: Model,
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
@@ -267,29 +239,21 @@ def test_a_library_that_cannot_be_used_is_a_failed_check(
 def test_a_library_that_ends_its_process_is_a_failed_check(
     end: str, reported: str, hull: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from tank2sim.fmu import sources
-
-    generate = sources.generate_c
     deadly = f"\n#include <stdlib.h>\n__attribute__((constructor)) static void end(void) {{ {end}; }}\n"
-    monkeypatch.setattr(sources, "generate_c", lambda functions, stem: generate(functions, stem) + deadly)
-    with pytest.raises(InputError, match="library that the C compiler made for this machine does not work"):
-        write_fmu(hull, tmp_path / "x.fmu")
-    monkeypatch.setattr(acceptance, "replay_in_fmu", lambda *_: Replay(problem="not asked"))
-    write_fmu(hull, tmp_path / "x.fmu")
-    report = compare_with_model(tmp_path / "x.fmu", model=hull)
+    report = report_of_tampered(hull, tmp_path / "x.fmu", monkeypatch, lambda code, _: code + deadly)
     assert not report.passed
     assert all("ended the process" in line and reported in line for line in report.differences)
     assert len(report.differences) == len(KINDS)
 
 
-def test_without_a_model_the_file_alone_is_validated(fmu_file: Callable[[str, int], Path]) -> None:
+def test_without_a_model_the_file_alone_is_validated(fmu_file: FmuFile) -> None:
     report = compare_with_model(fmu_file("hull", 3))
     assert (report.passed, report.compared, report.max_error) == (True, False, {})
 
 
 @pytest.mark.slow
 def test_the_report_is_plain_data_and_nothing_is_printed(
-    fmu_file: Callable[[str, int], Path], hull: Model, capfd: pytest.CaptureFixture[str]
+    fmu_file: FmuFile, hull: Model, capfd: pytest.CaptureFixture[str]
 ) -> None:
     report = asdict(compare_with_model(fmu_file("hull", 2), model=hull))
     assert json.loads(json.dumps(report))["max_error"]["motion.x"] < 1e-6
@@ -299,9 +263,7 @@ def test_the_report_is_plain_data_and_nothing_is_printed(
 # ---- files that are not FMU ----
 
 
-def test_files_that_are_no_fmu_are_reported_in_one_line(
-    fmu_file: Callable[[str, int], Path], tmp_path: Path, hull: Model
-) -> None:
+def test_files_that_are_no_fmu_are_reported_in_one_line(fmu_file: FmuFile, tmp_path: Path, hull: Model) -> None:
     whole = fmu_file("hull", 2).read_bytes()
     damaged = bytearray(whole)
     damaged[len(whole) // 3] ^= 0xFF
@@ -330,11 +292,9 @@ def test_files_that_are_no_fmu_are_reported_in_one_line(
     ],
 )
 def test_a_description_that_cannot_be_used_is_reported(
-    old: bytes, new: bytes, problem: str, fmu_file: Callable[[str, int], Path], tmp_path: Path
+    old: bytes, new: bytes, problem: str, fmu_file: FmuFile, tmp_path: Path
 ) -> None:
-    with zipfile.ZipFile(fmu_file("hull", 2)) as source, zipfile.ZipFile(tmp_path / "x.fmu", "w") as target:
-        for entry in source.infolist():
-            target.writestr(entry, source.read(entry).replace(old, new))
+    rewritten(fmu_file("hull", 2), tmp_path / "x.fmu", lambda _, data: data.replace(old, new))
     with pytest.raises(InputError, match=problem) as caught:
         compare_with_model(tmp_path / "x.fmu")
     assert "\n" not in str(caught.value)

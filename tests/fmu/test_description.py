@@ -5,9 +5,7 @@ from __future__ import annotations
 import ctypes
 import math
 import zipfile
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,21 +16,16 @@ from lxml import etree
 from tank2sim.dynamics.model import Model
 from tank2sim.fmu.interface import interface
 from tank2sim.fmu.running import RunningFmu
-from tank2sim.fmu.unpacking import UnpackedFmu
+from tests.fmu.driving import FmuFile, Instantiate, Unpacked
 
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 NAMES = pytest.mark.parametrize("name", ["hull", "body", "gain"])
-Unpacked = Callable[[str, int], UnpackedFmu]
-Instantiate = Callable[..., RunningFmu]
 
 
-@FMI
 @NAMES
-def test_the_description_is_valid(name: str, fmi: int, fmu_file: Callable[[str, int], Path]) -> None:
+def test_the_description_is_valid(name: str, fmi: int, fmu_file: FmuFile) -> None:
     assert validate_fmu(str(fmu_file(name, fmi))) == []
 
 
-@FMI
 @NAMES
 def test_variables_are_those_of_the_model(name: str, fmi: int, unpacked: Unpacked, models: dict[str, Model]) -> None:
     model, variables = models[name], {v.name: v for v in unpacked(name, fmi).description.modelVariables}
@@ -54,7 +47,6 @@ def test_variables_are_those_of_the_model(name: str, fmi: int, unpacked: Unpacke
         assert variables[parameter.name].variability == ("tunable" if parameter.tunable else "fixed")
 
 
-@FMI
 def test_each_rate_names_its_state(fmi: int, unpacked: Unpacked, models: dict[str, Model]) -> None:
     by_rate = {v.name: v.derivative.name for v in unpacked("hull", fmi).description.modelVariables if v.derivative}
     assert by_rate == {state.derivative: state.name for state in models["hull"].states}
@@ -63,7 +55,6 @@ def test_each_rate_names_its_state(fmi: int, unpacked: Unpacked, models: dict[st
     assert body == {"der(motion.x)": "motion.x", "motion.udot": "motion.u"}
 
 
-@FMI
 @pytest.mark.parametrize(
     ("unit", "shown", "value", "expected"),
     [("rad", "deg", math.pi, 180.0), ("m/s", "knots", 1852.0, 3600.0), ("rad/s", "rpm", 2 * math.pi, 60.0)],
@@ -76,7 +67,6 @@ def test_display_units_convert_as_they_should(
     assert float(display.factor) * value + float(display.offset or 0) == pytest.approx(expected)
 
 
-@FMI
 def test_units_have_their_base_units(fmi: int, unpacked: Unpacked) -> None:
     root = etree.parse(str(unpacked("hull", fmi).folder / "modelDescription.xml")).getroot()
     bases = {unit.get("name"): dict(unit.find("BaseUnit").attrib) for unit in root.iter("Unit")}
@@ -85,7 +75,6 @@ def test_units_have_their_base_units(fmi: int, unpacked: Unpacked) -> None:
     assert bases["m/s"] == {"m": "1", "s": "-1"}
 
 
-@FMI
 def test_abilities_are_declared(fmi: int, unpacked: Unpacked) -> None:
     root = etree.parse(str(unpacked("hull", fmi).folder / "modelDescription.xml")).getroot()
     state, plural = ("FMUstate", "") if fmi == 2 else ("FMUState", "s")
@@ -119,7 +108,6 @@ def kinds_of(unknowns: Any) -> dict[tuple[str, str], str]:
     return kinds
 
 
-@FMI
 def test_dependencies_while_running_are_those_that_a_change_shows(
     fmi: int, hull: Model, instantiate: Instantiate
 ) -> None:
@@ -146,7 +134,6 @@ def test_dependencies_while_running_are_those_that_a_change_shows(
         assert changed(before, values(states, {name: value}), names) == declared(unknowns, name), name
 
 
-@FMI
 def test_dependencies_say_whether_a_factor_is_constant(fmi: int, unpacked: Unpacked) -> None:
     description = unpacked("hull", fmi).description
     kinds = kinds_of([*description.outputs, *description.derivatives])
@@ -175,7 +162,6 @@ def shown_at_the_start(fmu: RunningFmu, model: Model, trim: bool) -> set[tuple[s
 GUESSES = ("initial.u", "initial.v", "initial.r")
 
 
-@FMI
 def test_initial_dependencies_are_those_that_a_change_shows(fmi: int, hull: Model, instantiate: Instantiate) -> None:
     fmu = instantiate("hull", fmi, "ModelExchange")
     shown = shown_at_the_start(fmu, hull, False) | shown_at_the_start(fmu, hull, True)
@@ -227,8 +213,7 @@ def test_names_that_fmi_would_refuse_are_a_fault_of_the_program(hull: Model) -> 
         interface(hull.extend(bad))
 
 
-@FMI
-def test_the_file_unpacks_to_plain_names(fmi: int, fmu_file: Callable[[str, int], Path]) -> None:
+def test_the_file_unpacks_to_plain_names(fmi: int, fmu_file: FmuFile) -> None:
     with zipfile.ZipFile(fmu_file("hull", fmi)) as archive:
         names = archive.namelist()
     assert names[0] == "modelDescription.xml"

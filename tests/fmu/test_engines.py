@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fmpy.validation import validate_fmu
 
 from tank2sim.bundled import bundled_cards
 from tank2sim.dynamics import Model
@@ -25,9 +24,9 @@ from tank2sim.fmu.unpacking import UnpackedFmu, unpack
 from tank2sim.simulation.scheme import runge_kutta_step
 from tests.fmu import engines
 from tests.fmu.descriptions import whole_description
+from tests.fmu.driving import ShipFmu
 from tests.marks import first_fast
 
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 STEP, STEPS = 0.1, 1000
 AGREEMENT = 1e-12
 """Of an output's range in the run: the engines add up time in different ways, and the last bits follow."""
@@ -59,7 +58,7 @@ def zigzag() -> list[dict[str, float | bool]]:
 
 @pytest.fixture(scope="module")
 def by_fmpy(
-    mariner_fmu: Callable[[int], Path], tmp_path_factory: pytest.TempPathFactory
+    mariner_fmu: ShipFmu, tmp_path_factory: pytest.TempPathFactory
 ) -> Callable[[int], tuple[UnpackedFmu, np.ndarray]]:
     """The FMU unpacked, and its outputs (K, ny) after each step in FMPy."""
     made: dict[int, tuple[UnpackedFmu, np.ndarray]] = {}
@@ -146,7 +145,7 @@ def test_the_zigzag_of_fmpy_is_that_of_the_model(
 @pytest.mark.slow
 @pytest.mark.parametrize(("engine", "fmi"), RUNS)
 def test_other_engines_come_to_the_same_numbers_without_complaint(
-    engine: str, fmi: int, mariner_fmu: Callable[[int], Path], by_fmpy: Callable[[int], Any], tmp_path: Path
+    engine: str, fmi: int, mariner_fmu: ShipFmu, by_fmpy: Callable[[int], Any], tmp_path: Path
 ) -> None:
     require(engine.removesuffix("_exchange"))
     unpacked, expected = by_fmpy(fmi)
@@ -175,9 +174,8 @@ def described(text: str, path: Path) -> Path:
 
 
 @pytest.mark.slow
-@FMI
 def test_the_manipulation_toolbox_finds_nothing(
-    fmi: int, mariner_fmu: Callable[[int], Path], tmp_path: Path, caplog: pytest.LogCaptureFixture
+    fmi: int, mariner_fmu: ShipFmu, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     require("fmu_manipulation_toolbox")
     assert found_by_the_toolbox(mariner_fmu(fmi), caplog) == []
@@ -186,8 +184,3 @@ def test_the_manipulation_toolbox_finds_nothing(
         assert found_by_the_toolbox(described(text, tmp_path / f"{ship}.fmu"), caplog) == []
     spoilt = text.replace('causality="input"', 'causality="output"', 1)
     assert found_by_the_toolbox(described(spoilt, tmp_path / "spoilt.fmu"), caplog) != []
-
-
-@first_fast("fmi", [2, 3])
-def test_fmpy_validates_the_ship(fmi: int, mariner_fmu: Callable[[int], Path]) -> None:
-    assert validate_fmu(str(mariner_fmu(fmi))) == []

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
-from collections.abc import Callable
 from ctypes import c_double, c_size_t, c_void_p
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import fmpy
@@ -15,13 +13,11 @@ import pytest
 
 from tank2sim.arrays import Array
 from tank2sim.fmu.running import RunningFmu
-from tests.fmu.driving import ERROR, STATES, Instantiate, Status, begun, steps, untyped
+from tests.fmu.driving import ERROR, STATES, FmuFile, Instantiate, Status, begun, steps, untyped
 
 if TYPE_CHECKING:
     from tank2sim.arrays import Array
 
-FMI = pytest.mark.parametrize("fmi", [2, 3])
-FmuFile = Callable[[str, int], Path]
 RATE_LIMIT = 0.08726646259971647  # 5 deg/s
 
 
@@ -88,7 +84,6 @@ def co_simulated(fmu: RunningFmu, largest_step: float) -> list[float]:
     return fmu.read(STATES)
 
 
-@FMI
 def test_a_zigzag_with_events_agrees_better_with_co_simulation(fmi: int, instantiate: Instantiate) -> None:
     """An integration of fourth order across a kink is of second order; up to it and on from it, of fourth again."""
     truth = co_simulated(instantiate("hull", fmi, "CoSimulation"), 1e-3)
@@ -99,7 +94,6 @@ def test_a_zigzag_with_events_agrees_better_with_co_simulation(fmi: int, instant
     assert (errors[0] < 0.1 * errors[1])[:rudder].all()  # the rudder itself is at rest at the end
 
 
-@FMI
 def test_a_solver_with_root_finding_stops_at_every_event(fmi: int, fmu_file: FmuFile, instantiate: Instantiate) -> None:
     """FMPy's CVode: with its error control it needs the events less, but must not be led astray or chatter."""
     truth = co_simulated(instantiate("hull", fmi, "CoSimulation"), 1e-3)
@@ -122,7 +116,6 @@ def test_a_solver_with_root_finding_stops_at_every_event(fmi: int, fmu_file: Fmu
     assert sorted(set(np.round(between, 6))) == pytest.approx([left[0], 20 + left[1], 40 + left[2]], abs=1e-5)
 
 
-@FMI
 def test_indicators_change_sign_where_the_rudder_reaches_its_rate_limit(fmi: int, instantiate: Instantiate) -> None:
     fmu = begun(instantiate("hull", fmi, "ModelExchange"))
     fmu.update()
@@ -140,7 +133,6 @@ def test_indicators_change_sign_where_the_rudder_reaches_its_rate_limit(fmi: int
     assert signs(1.001 * RATE_LIMIT) != signs(-1.001 * RATE_LIMIT)
 
 
-@FMI
 def test_event_indicators_are_refused_where_they_are_not(fmi: int, instantiate: Instantiate, status: Status) -> None:
     model, slave = (begun(instantiate("hull", fmi, kind)) for kind in ("ModelExchange", "CoSimulation"))
     assert status(model.instance.getEventIndicators, (c_double * 3)(), 3) == ERROR
@@ -151,7 +143,6 @@ def test_event_indicators_are_refused_where_they_are_not(fmi: int, instantiate: 
     assert function(c_void_p(slave.instance.component), (c_double * 2)(), c_size_t(2)) == ERROR
 
 
-@FMI
 def test_a_model_without_kinks_has_no_indicators(fmi: int, instantiate: Instantiate) -> None:
     fmu = begun(instantiate("body", fmi, "ModelExchange"))
     assert fmu.unpacked.description.numberOfEventIndicators == 0

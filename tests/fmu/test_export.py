@@ -8,7 +8,6 @@ import re
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,19 +17,19 @@ from fmpy.validation import validate_fmu
 from lxml import etree
 
 from tank2sim.bundled import bundled
-from tank2sim.dynamics.model import Model, Parameter
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.fmu import export, sources
 from tank2sim.fmu.check import compare_with_model
 from tank2sim.fmu.export import Documents, write_fmu
 from tank2sim.fmu.interface import interface
 from tank2sim.fmu.templates import c_identifier
-from tank2sim.fmu.unpacking import UnpackedFmu, embedded_card
+from tank2sim.fmu.unpacking import embedded_card
 from tank2sim.native.compiler import require_compiler
 from tank2sim.notices import Notice
+from tests.fmu.driving import Unpacked
 from tests.marks import first_fast
 
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 OURS = ["derivatives.c", "instance.c", "simulation.c", "snapshot.c", "values.c", "variables.c"]
 
 
@@ -61,8 +60,7 @@ def test_another_process_in_another_place_writes_the_same_bytes(model: str, fmi:
     assert contents[0] == contents[1]
 
 
-@FMI
-def test_no_path_of_this_machine_is_in_the_library(fmi: int, unpacked: Callable[[str, int], UnpackedFmu]) -> None:
+def test_no_path_of_this_machine_is_in_the_library(fmi: int, unpacked: Unpacked) -> None:
     folder = unpacked("hull", fmi).folder
     (library,) = (path for path in folder.glob("binaries/*/*"))
     content = library.read_bytes()
@@ -74,21 +72,12 @@ def test_no_path_of_this_machine_is_in_the_library(fmi: int, unpacked: Callable[
 @pytest.mark.slow
 def test_the_token_tells_contents_apart(models: dict[str, Model], tmp_path: Path) -> None:
     body = models["body"]
-    heavier = replace(body, parameters=replace_start(body, "drag", 0.06))
+    heavier = body.with_values({"drag": 0.06})
     tokens = {
         write_fmu(model, tmp_path / "x.fmu", documents=documents).token
         for model, documents in ((body, None), (heavier, None), (body, Documents(card_text="name = 1")))
     }
     assert len(tokens) == 3
-
-
-def replace_start(model: Model, name: str, start: float) -> tuple[Parameter, ...]:
-    changed = []
-    for parameter in model.parameters:
-        copy = replace(parameter, start=start) if parameter.name == name else parameter
-        copy.__dict__["symbol"] = parameter.symbol
-        changed.append(copy)
-    return tuple(changed)
 
 
 @pytest.mark.slow
@@ -112,8 +101,7 @@ def test_times_are_those_of_source_date_epoch(
 
 
 @pytest.mark.slow
-@FMI
-def test_sources_compile_alone(fmi: int, unpacked: Callable[[str, int], UnpackedFmu], tmp_path: Path) -> None:
+def test_sources_compile_alone(fmi: int, unpacked: Unpacked, tmp_path: Path) -> None:
     sources = sorted(str(path) for path in (unpacked("hull", fmi).folder / "sources").glob("*.c"))
     library = tmp_path / "library.so"
     command = [*require_compiler("the test"), "-shared", "-fPIC", *sources, "-lm", "-o", str(library)]
@@ -123,9 +111,7 @@ def test_sources_compile_alone(fmi: int, unpacked: Callable[[str, int], Unpacked
 
 @first_fast("fmi", [2, 3])
 @first_fast("name", ["hull", "body", "gain"])
-def test_sources_are_c99_without_a_warning(
-    name: str, fmi: int, unpacked: Callable[[str, int], UnpackedFmu], tmp_path: Path
-) -> None:
+def test_sources_are_c99_without_a_warning(name: str, fmi: int, unpacked: Unpacked, tmp_path: Path) -> None:
     folder = unpacked(name, fmi).folder / "sources"
     files = [*OURS, *(["fmi2.c"] if fmi == 2 else ["fmi3.c", "fmi3_unsupported.c"])]
     flags = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O2", "-fPIC"]
@@ -134,8 +120,7 @@ def test_sources_are_c99_without_a_warning(
         assert subprocess.run(command, capture_output=True, text=True, check=False).stderr == ""
 
 
-@FMI
-def test_sources_are_listed(fmi: int, unpacked: Callable[[str, int], UnpackedFmu]) -> None:
+def test_sources_are_listed(fmi: int, unpacked: Unpacked) -> None:
     folder = unpacked("hull", fmi).folder
     there = sorted(path.name for path in (folder / "sources").glob("*.c"))
     if fmi == 2:
@@ -150,7 +135,6 @@ def test_sources_are_listed(fmi: int, unpacked: Callable[[str, int], UnpackedFmu
 
 
 @pytest.mark.slow
-@FMI
 def test_documentation_names_source_units_and_licences(fmi: int, hull: Model, tmp_path: Path) -> None:
     documents = Documents(card_text='name = "x"', source="Towing tank A & B", validity="3 to 9 m/s")
     exported = write_fmu(hull, tmp_path / "x.fmu", fmi=fmi, documents=documents)
@@ -194,7 +178,6 @@ def test_any_name_gives_a_c_identifier(name: str) -> None:
 
 
 @pytest.mark.slow
-@FMI
 def test_names_that_resemble_markup_or_paths_do_no_harm(fmi: int, models: dict[str, Model], tmp_path: Path) -> None:
     # All of them at once: an export of each would only take longer.
     everything = " | ".join(NASTY)

@@ -22,7 +22,6 @@ from tank2sim.fmu.interface import interface
 from tank2sim.fmu.sources import c_sources
 
 HERE = Path(__file__).parent / "fuzz"
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 TOKEN = "{%s-#-token}"
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
 SANITISED = ("-g", "-O0", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
@@ -88,7 +87,6 @@ def fuzzed(program: Path, seed: int, calls: int, *before: str) -> None:
 
 
 @pytest.mark.slow
-@FMI
 @pytest.mark.skipif(not shutil.which("nm"), reason="nm lists the symbols of objects")
 def test_nothing_is_written_that_instances_share(fmi: int, hull: Model, sources: Sources, tmp_path: Path) -> None:
     """No variable outside instances and the stack: then any number of instances may run, each in its own thread."""
@@ -102,7 +100,6 @@ def test_nothing_is_written_that_instances_share(fmi: int, hull: Model, sources:
 
 
 @pytest.mark.slow
-@FMI
 def test_nothing_is_allocated_while_an_fmu_runs(fmi: int, hull: Model, sources: Sources) -> None:
     wrapped = ("-O2", f"-DFMI={fmi}", *(f"-Wl,--wrap={name}" for name in ("malloc", "calloc", "realloc")))
     counted = program(sources(hull, fmi), ("counted.c",), *wrapped)
@@ -113,21 +110,18 @@ def test_nothing_is_allocated_while_an_fmu_runs(fmi: int, hull: Model, sources: 
 
 
 @pytest.mark.slow
-@FMI
 def test_calls_at_random_do_no_harm(fmi: int, hull: Model, sources: Sources) -> None:
     fuzzed(program(sources(hull, fmi), FUZZ[fmi], *SANITISED), seed=1, calls=100_000)
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not shutil.which("valgrind"), reason="valgrind is not installed")
-@FMI
 def test_calls_at_random_leak_nothing(fmi: int, hull: Model, sources: Sources) -> None:
     plain = program(sources(hull, fmi), FUZZ[fmi], "-O0", "-g")
     fuzzed(plain, 2, 5_000, "valgrind", "-q", "--leak-check=full", "--show-leak-kinds=all", "--error-exitcode=9")
 
 
 @pytest.mark.slow
-@FMI
 @pytest.mark.parametrize("name", ["mariner", "gain", "body"])
 def test_a_million_calls_at_random_do_no_harm(fmi: int, name: str, models: dict[str, Model], sources: Sources) -> None:
     model = models[name] if name in models else build(read_card(name))

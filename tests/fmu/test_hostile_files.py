@@ -9,7 +9,6 @@ import subprocess
 import sys
 import time
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -17,14 +16,12 @@ import pytest
 from tank2sim.errors import InputError
 from tank2sim.fmu import process
 from tank2sim.fmu.unpacking import embedded_card, unpack
+from tests.fmu.driving import FmuFile
 
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 
-
-@FMI
 @pytest.mark.parametrize("identifier", ["../../outside", "..", "a/b", "/tmp/outside", "", "a.b"])
 def test_a_library_outside_the_archive_is_not_loaded(
-    identifier: str, fmi: int, fmu_file: Callable[[str, int], Path], tmp_path: Path
+    identifier: str, fmi: int, fmu_file: FmuFile, tmp_path: Path
 ) -> None:
     path = tmp_path / "x.fmu"
     with zipfile.ZipFile(fmu_file("hull", fmi)) as source, zipfile.ZipFile(path, "w") as target:
@@ -44,7 +41,7 @@ def test_a_library_outside_the_archive_is_not_loaded(
 
 
 @pytest.mark.parametrize("name", ["../outside.txt", "resources/../../outside.txt", "/outside.txt", "..\\outside.txt"])
-def test_a_path_out_of_the_archive_is_refused(name: str, fmu_file: Callable[[str, int], Path], tmp_path: Path) -> None:
+def test_a_path_out_of_the_archive_is_refused(name: str, fmu_file: FmuFile, tmp_path: Path) -> None:
     path, folder = tmp_path / "x.fmu", tmp_path / "unpacked"
     shutil.copy(fmu_file("hull", 2), path)
     with zipfile.ZipFile(path, "a") as archive:

@@ -24,6 +24,7 @@ from tank2sim.fmu.manoeuvre import InputSequence, manoeuvre
 from tank2sim.fmu.platforms import PLATFORMS, named_platforms
 from tank2sim.fmu.running import replay
 from tests.cli.command_line import tank2sim
+from tests.fmu.driving import ShipFmu
 
 DESCRIPTION = "modelDescription.xml"
 OSP_FILE = "extra/com.open-simulation-platform/OspModelDescription.xml"
@@ -133,7 +134,7 @@ def test_files_that_are_missing_or_too_many_fail_their_condition(lean: Path, tmp
     assert unmet(without, "unreal") == ["windows_library", "no_resources", "small_file"]
 
 
-def test_the_usual_fmu_has_more_than_a_game_engine_takes(mariner_fmu: Callable[[int], Path]) -> None:
+def test_the_usual_fmu_has_more_than_a_game_engine_takes(mariner_fmu: ShipFmu) -> None:
     assert {"few_variables", "real_inputs"} <= set(unmet(mariner_fmu(2), "unreal"))
     assert not {"names_without_case", "model_name", "file_name", "default_experiment"} & set(
         unmet(mariner_fmu(2), "unreal")
@@ -166,7 +167,7 @@ def test_no_effect_has_names_that_differ_by_case_alone() -> None:
     assert len({name.lower() for name in names}) == len(names)
 
 
-def test_a_lean_fmu_sails_as_the_whole_one(lean: Path, mariner: Model, mariner_fmu: Callable[[int], Path]) -> None:
+def test_a_lean_fmu_sails_as_the_whole_one(lean: Path, mariner: Model, mariner_fmu: ShipFmu) -> None:
     small = lean_model(mariner)
     assert small.input_names == ("rudder.command",)
     assert small.parameter_names == ("initial.x", "initial.y", "initial.psi", "initial.u")

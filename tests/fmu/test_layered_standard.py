@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 import re
 import zipfile
-from collections.abc import Callable
-from pathlib import Path, PurePosixPath
+from pathlib import PurePosixPath
 from posixpath import normpath
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+
+from tests.fmu.driving import ShipFmu
 
 FOLDER = PurePosixPath("extra/org.fmi-standard.fmi-ls-ref")
 NAMESPACE = "{http://fmi-standard.org/fmi-ls-manifest}"
@@ -24,7 +25,7 @@ def at(source: str) -> str:
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_the_manifest_names_the_run_with_its_inputs_and_outputs(mariner_fmu: Callable[[int], Path], fmi: int) -> None:
+def test_the_manifest_names_the_run_with_its_inputs_and_outputs(mariner_fmu: ShipFmu, fmi: int) -> None:
     with zipfile.ZipFile(mariner_fmu(fmi)) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}
     manifest = ElementTree.fromstring(files[str(FOLDER / "fmi-ls-manifest.xml")])

@@ -9,7 +9,6 @@ import math
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -25,20 +24,26 @@ from scipy.optimize import fsolve
 
 from tank2sim.dynamics.model import Model
 from tank2sim.fmu.running import running
-from tank2sim.fmu.unpacking import UnpackedFmu
-from tests.fmu.driving import DISCARD, ERROR, STATES, Instantiate, Status, begun, by_casadi, steps, time_of
-
-FMI = pytest.mark.parametrize("fmi", [2, 3])
-
+from tests.fmu.driving import (
+    DISCARD,
+    ERROR,
+    STATES,
+    FmuFile,
+    Instantiate,
+    Slave,
+    Status,
+    Unpacked,
+    begun,
+    by_casadi,
+    steps,
+    time_of,
+)
 
 # ---- what the library exports ----
 
 
-@FMI
 @pytest.mark.skipif(sys.platform != "linux", reason="reads the symbols of an ELF library with nm")
-def test_library_exports_the_functions_of_the_header_and_nothing_else(
-    fmi: int, unpacked: Callable[[str, int], UnpackedFmu]
-) -> None:
+def test_library_exports_the_functions_of_the_header_and_nothing_else(fmi: int, unpacked: Unpacked) -> None:
     header = (Path(fmpy.__file__).parent / "c-code" / f"fmi{fmi}Functions.h").read_text()
     declared = set(re.findall(rf"FMI{fmi}_Export\s+\w+TYPE\s+(\w+);", header))
     (library,) = unpacked("hull", fmi).folder.glob("binaries/*/*.so")
@@ -50,10 +55,9 @@ def test_library_exports_the_functions_of_the_header_and_nothing_else(
 # ---- life ----
 
 
-@FMI
-def test_two_instances_at_once_do_not_disturb_each_other(fmi: int, hull: Model, instantiate: Instantiate) -> None:
-    one = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.2)
-    other = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=-0.3)
+def test_two_instances_at_once_do_not_disturb_each_other(hull: Model, slave: Slave) -> None:
+    one = slave(rudder__command=0.2)
+    other = slave(rudder__command=-0.3)
     for place in range(50):
         for fmu in (one, other):
             fmu.instance.doStep(currentCommunicationPoint=place * 0.1, communicationStepSize=0.1)
@@ -61,23 +65,20 @@ def test_two_instances_at_once_do_not_disturb_each_other(fmi: int, hull: Model, 
     assert other.read(STATES) == pytest.approx(by_casadi(hull, 50, 0.1, rudder__command=-0.3), rel=1e-12, abs=1e-14)
 
 
-@FMI
-def test_instances_in_threads_do_not_disturb_each_other(fmi: int, hull: Model, instantiate: Instantiate) -> None:
+def test_instances_in_threads_do_not_disturb_each_other(hull: Model, slave: Slave) -> None:
     orders = [0.02 * place for place in range(8)]
-    fleet = [begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=order) for order in orders]
+    fleet = [slave(rudder__command=order) for order in orders]
     with ThreadPoolExecutor(len(fleet)) as threads:  # calls into a library do not hold Python's lock
         found = list(threads.map(lambda fmu: steps(fmu, 50, 2.0), fleet))
-    alone = [steps(begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=order), 50, 2.0) for order in orders]
+    alone = [steps(slave(rudder__command=order), 50, 2.0) for order in orders]
     assert found == alone
 
 
-@FMI
-def test_an_instance_can_be_made_again_and_again(fmi: int, instantiate: Instantiate) -> None:
-    results = {tuple(steps(begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.1), 3)) for _ in range(50)}
+def test_an_instance_can_be_made_again_and_again(slave: Slave) -> None:
+    results = {tuple(steps(slave(rudder__command=0.1), 3)) for _ in range(50)}
     assert len(results) == 1
 
 
-@FMI
 def test_reset_brings_back_the_start_values(fmi: int, instantiate: Instantiate) -> None:
     fmu = instantiate("hull", fmi, "CoSimulation")
     fmu.write({"initial.u": 3.0, "derivatives.drag": 0.1})
@@ -89,8 +90,7 @@ def test_reset_brings_back_the_start_values(fmi: int, instantiate: Instantiate) 
     assert again != disturbed
 
 
-@FMI
-def test_an_instance_is_refused_for_another_token(fmi: int, unpacked: Callable[[str, int], UnpackedFmu]) -> None:
+def test_an_instance_is_refused_for_another_token(fmi: int, unpacked: Unpacked) -> None:
     right = unpacked("hull", fmi)
     wrong = SimpleNamespace(**{name: getattr(right.description, name) for name in ("fmiVersion", "coSimulation")})
     wrong.guid = "{00000000-1111-2222-3333-444444444444}"
@@ -101,22 +101,20 @@ def test_an_instance_is_refused_for_another_token(fmi: int, unpacked: Callable[[
 # ---- integration ----
 
 
-@FMI
 @pytest.mark.parametrize(
     ("size", "count"), [(1.0, 10), (0.7, 7), (0.30000000000000004, 3), (1.1, 11), (0.25, 3), (0.05, 1)]
 )
 def test_a_communication_step_is_divided_into_the_fewest_equal_steps(
-    fmi: int, size: float, count: int, hull: Model, instantiate: Instantiate
+    size: float, count: int, hull: Model, slave: Slave
 ) -> None:
-    found = steps(begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.3), 1, size)
+    found = steps(slave(rudder__command=0.3), 1, size)
     assert found == pytest.approx(by_casadi(hull, count, size / count, rudder__command=0.3), rel=1e-14, abs=1e-16)
     wrong = by_casadi(hull, count + 1, size / (count + 1), rudder__command=0.3)
     assert found != pytest.approx(wrong, rel=1e-14, abs=1e-16)
 
 
-@FMI
-def test_time_lands_exactly_on_communication_points(fmi: int, instantiate: Instantiate) -> None:
-    fmu = begun(instantiate("hull", fmi, "CoSimulation"))
+def test_time_lands_exactly_on_communication_points(slave: Slave) -> None:
+    fmu = slave()
     now = 0.0
     for size in (0.1, 0.37, 1.0, 0.013, 2.5):
         fmu.instance.doStep(currentCommunicationPoint=now, communicationStepSize=size)
@@ -124,7 +122,6 @@ def test_time_lands_exactly_on_communication_points(fmi: int, instantiate: Insta
         assert time_of(fmu) == now
 
 
-@FMI
 def test_the_largest_step_is_a_parameter(fmi: int, hull: Model, instantiate: Instantiate, status: Status) -> None:
     fmu = instantiate("hull", fmi, "CoSimulation")
     assert status(fmu.write, {"solver.max_step": 0.0}) == DISCARD
@@ -135,7 +132,6 @@ def test_the_largest_step_is_a_parameter(fmi: int, hull: Model, instantiate: Ins
     assert status(fmu.write, {"solver.max_step": 0.1}) == ERROR
 
 
-@FMI
 def test_initial_parameters_determine_the_states(fmi: int, instantiate: Instantiate) -> None:
     fmu = instantiate("hull", fmi, "CoSimulation")
     fmu.write({"initial.u": 5.5, "initial.psi": -1.0})
@@ -155,7 +151,6 @@ def steady_motion(model: Model, order: float) -> list[float]:
     return [float(value) for value in fsolve(residual, [7.0, 0.0, 0.0], xtol=1e-13)]
 
 
-@FMI
 def test_trim_starts_in_steady_motion_with_the_inputs_given(fmi: int, hull: Model, instantiate: Instantiate) -> None:
     fmu = instantiate("hull", fmi, "CoSimulation", logging=True)
     fmu.write({"initial.trim": 1.0, "initial.psi": 0.5})
@@ -168,7 +163,6 @@ def test_trim_starts_in_steady_motion_with_the_inputs_given(fmi: int, hull: Mode
     assert any("steady motion found" in line for line in fmu.log)
 
 
-@FMI
 def test_trim_that_finds_nothing_warns_and_starts_untrimmed(fmi: int, instantiate: Instantiate) -> None:
     fmu = instantiate("hull", fmi, "CoSimulation")
     fmu.write({"initial.trim": 1.0, "derivatives.drag": 0.0, "initial.u": 6.0})  # no speed balances the thrust
@@ -180,20 +174,16 @@ def test_trim_that_finds_nothing_warns_and_starts_untrimmed(fmi: int, instantiat
 # ---- values that are not finite ----
 
 
-@FMI
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_an_input_that_is_not_finite_is_discarded(
-    fmi: int, value: float, instantiate: Instantiate, status: Status
-) -> None:
-    fmu = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.1)
+def test_an_input_that_is_not_finite_is_discarded(value: float, status: Status, slave: Slave) -> None:
+    fmu = slave(rudder__command=0.1)
     assert status(fmu.write, {"propeller.speed": 2.0, "rudder.command": value}) == DISCARD
     assert fmu.read(["rudder.command", "propeller.speed"]) == [0.1, 1.0]
     assert len(fmu.log) == 1
     assert "rudder.command" in fmu.log[0]
 
 
-@FMI
-def test_a_simulator_that_only_asks_whether_to_go_on_ends(fmi: int, fmu_file: Callable[[str, int], Path]) -> None:
+def test_a_simulator_that_only_asks_whether_to_go_on_ends(fmi: int, fmu_file: FmuFile) -> None:
     """FMPy repeats a discarded step until the FMU says that it has ended."""
     start = {"derivatives.thrust": 1e308, "propeller.speed": 1e3}
     with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(FMICallException):
@@ -203,21 +193,19 @@ def test_a_simulator_that_only_asks_whether_to_go_on_ends(fmi: int, fmu_file: Ca
         assert result["time"][-1] < 5.0
 
 
-@FMI
 @pytest.mark.parametrize(("input_name", "beyond"), [("propeller.speed", 1e9), ("rudder.command", 35.0)])
 def test_an_input_beyond_its_bounds_is_discarded_and_changes_nothing(
-    input_name: str, beyond: float, fmi: int, instantiate: Instantiate, status: Status
+    input_name: str, beyond: float, status: Status, slave: Slave
 ) -> None:
-    fmu = begun(instantiate("hull", fmi, "CoSimulation"))
+    fmu = slave()
     before = fmu.read([input_name])
     assert status(fmu.write, {input_name: beyond}) == DISCARD
     assert fmu.read([input_name]) == before
     assert len(fmu.log) == 1 and input_name in fmu.log[0]
 
 
-@FMI
-def test_a_step_to_states_that_no_ship_has_is_discarded(fmi: int, instantiate: Instantiate, status: Status) -> None:
-    fmu = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.1)
+def test_a_step_to_states_that_no_ship_has_is_discarded(fmi: int, status: Status, slave: Slave) -> None:
+    fmu = slave(rudder__command=0.1)
     before = steps(fmu, 10)
     fmu.write({"derivatives.thrust": 1e3, "propeller.speed": 1e3})
     assert status(fmu.instance.doStep, 1.0, 0.1) == DISCARD
@@ -229,11 +217,10 @@ def test_a_step_to_states_that_no_ship_has_is_discarded(fmi: int, instantiate: I
     if fmi == 2:  # FMPy does not hand on what fmi3DoStep says of it
         assert fmu.instance.getBooleanStatus(fmpy.fmi2.fmi2Terminated)
     fmu.write({"propeller.speed": 1.0, "derivatives.thrust": 0.1})
-    undisturbed = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.1)
+    undisturbed = slave(rudder__command=0.1)
     assert steps(fmu, 5, begin=1.0) == steps(undisturbed, 15)
 
 
-@FMI
 def test_an_output_or_a_rate_that_is_not_finite_is_discarded(
     fmi: int, instantiate: Instantiate, status: Status
 ) -> None:
@@ -250,7 +237,6 @@ def test_an_output_or_a_rate_that_is_not_finite_is_discarded(
     assert all("motion.udot" in line for line in fmu.log)
 
 
-@FMI
 def test_a_start_that_is_not_finite_does_not_end_the_initialisation(
     fmi: int, instantiate: Instantiate, status: Status
 ) -> None:
@@ -266,7 +252,6 @@ def test_a_start_that_is_not_finite_does_not_end_the_initialisation(
 # ---- what may be set when ----
 
 
-@FMI
 def test_parameters_and_inputs_can_be_set_when_fmi_allows_it(
     fmi: int, instantiate: Instantiate, status: Status
 ) -> None:
@@ -283,18 +268,16 @@ def test_parameters_and_inputs_can_be_set_when_fmi_allows_it(
     assert len(fmu.log) == 5
 
 
-@FMI
-def test_tunable_parameters_act_from_the_next_step(fmi: int, instantiate: Instantiate) -> None:
-    fmu, plain = (begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.2) for _ in range(2))
+def test_tunable_parameters_act_from_the_next_step(slave: Slave) -> None:
+    fmu, plain = (slave(rudder__command=0.2) for _ in range(2))
     assert steps(fmu, 5) == steps(plain, 5)
     fmu.write({"derivatives.Nd": 0.024})
     assert fmu.read(["force.N"])[0] == pytest.approx(2 * plain.read(["force.N"])[0])
     assert steps(fmu, 5, begin=0.5)[5] > steps(plain, 5, begin=0.5)[5]
 
 
-@FMI
-def test_a_failed_gear_holds_the_rudder(fmi: int, instantiate: Instantiate) -> None:
-    fmu = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.3)
+def test_a_failed_gear_holds_the_rudder(slave: Slave) -> None:
+    fmu = slave(rudder__command=0.3)
     held = steps(fmu, 10)[6]
     fmu.write({"steering.failed": 1.0, "rudder.command": -0.3})
     assert steps(fmu, 10, begin=1.0)[6] == held

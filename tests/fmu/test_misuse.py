@@ -12,13 +12,21 @@ from typing import Any
 import fmpy
 import pytest
 
-from tank2sim.fmu.unpacking import UnpackedFmu
-from tests.fmu.driving import DISCARD, ERROR, STATES, Instantiate, Status, begun, steps, time_of, untyped
+from tests.fmu.driving import (
+    DISCARD,
+    ERROR,
+    STATES,
+    Instantiate,
+    Slave,
+    Status,
+    Unpacked,
+    begun,
+    steps,
+    time_of,
+    untyped,
+)
 
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 
-
-@FMI
 def test_calls_out_of_turn_end_in_error_with_one_line_each(fmi: int, instantiate: Instantiate, status: Status) -> None:
     fmu = instantiate("hull", fmi, "CoSimulation")
     calls: list[Callable[[], Any]] = [
@@ -46,7 +54,6 @@ def test_calls_out_of_turn_end_in_error_with_one_line_each(fmi: int, instantiate
     assert steps(begun(fmu), 1)[3] == pytest.approx(7.0, abs=0.1)
 
 
-@FMI
 def test_no_step_goes_past_the_stop_time(fmi: int, instantiate: Instantiate, status: Status) -> None:
     fmu = instantiate("hull", fmi, "CoSimulation")
     if fmi == 2:
@@ -64,8 +71,7 @@ def test_no_step_goes_past_the_stop_time(fmi: int, instantiate: Instantiate, sta
         assert status(fmu.instance.doStep, 0.0, 5.0) == 0
 
 
-@FMI
-def test_kinds_are_not_mixed_up(fmi: int, instantiate: Instantiate, status: Status) -> None:
+def test_kinds_are_not_mixed_up(fmi: int, instantiate: Instantiate) -> None:
     slave, model = instantiate("hull", fmi, "CoSimulation"), instantiate("hull", fmi, "ModelExchange")
     begun(slave)
     begun(model)
@@ -77,9 +83,8 @@ def test_kinds_are_not_mixed_up(fmi: int, instantiate: Instantiate, status: Stat
     assert (len(slave.log), len(model.log)) == (1, 1)
 
 
-@FMI
-def test_null_pointers_and_unknown_references_end_in_error(fmi: int, instantiate: Instantiate) -> None:
-    fmu = begun(instantiate("hull", fmi, "CoSimulation"))
+def test_null_pointers_and_unknown_references_end_in_error(fmi: int, slave: Slave) -> None:
+    fmu = slave()
     dll, c = untyped(fmu), ctypes.c_void_p(fmu.instance.component)
     real = "Real" if fmi == 2 else "Float64"
     one, n = (ctypes.c_uint * 1)(4), ctypes.c_size_t(1)
@@ -102,9 +107,8 @@ def test_null_pointers_and_unknown_references_end_in_error(fmi: int, instantiate
     assert all(line for line in fmu.log)
 
 
-@FMI
 def test_every_function_answers_a_missing_instance_with_error(
-    fmi: int, unpacked: Callable[[str, int], UnpackedFmu], instantiate: Instantiate
+    fmi: int, unpacked: Unpacked, instantiate: Instantiate
 ) -> None:
     header = (Path(fmpy.__file__).parent / "c-code" / f"fmi{fmi}Functions.h").read_text()
     dll = untyped(instantiate("hull", fmi, "CoSimulation"))
@@ -113,7 +117,7 @@ def test_every_function_answers_a_missing_instance_with_error(
             assert getattr(dll, name)(*[None] * 10) == ERROR, name
 
 
-def test_functions_for_what_the_model_has_none_of_say_so(instantiate: Instantiate, status: Status) -> None:
+def test_functions_for_what_the_model_has_none_of_say_so(instantiate: Instantiate) -> None:
     fmu = begun(instantiate("hull", 3, "CoSimulation"))
     c = ctypes.c_void_p(fmu.instance.component)
     names = ("GetIntervalDecimal", "GetClock", "EnterConfigurationMode", "EvaluateDiscreteStates", "EnterStepMode")
@@ -123,9 +127,8 @@ def test_functions_for_what_the_model_has_none_of_say_so(instantiate: Instantiat
     assert len(fmu.log) == len(names)
 
 
-@FMI
-def test_the_log_names_the_argument_and_the_variable(fmi: int, instantiate: Instantiate, status: Status) -> None:
-    fmu = begun(instantiate("hull", fmi, "CoSimulation"))
+def test_the_log_names_the_argument_and_the_variable(fmi: int, slave: Slave) -> None:
+    fmu = slave()
     dll, c, n = untyped(fmu), ctypes.c_void_p(fmu.instance.component), ctypes.c_size_t(1)
     real, integer, last = ("Real", "Integer", []) if fmi == 2 else ("Float64", "Int32", [n])
     one, name = (ctypes.c_uint * 1)(*fmu.unpacked.references(["motion.psi"])), "motion.psi"
@@ -138,12 +141,9 @@ def test_the_log_names_the_argument_and_the_variable(fmi: int, instantiate: Inst
     assert len(fmu.log) == 3
 
 
-@FMI
 @pytest.mark.parametrize("value", [1e300, -1e300, 1e-300, 5e-324])
-def test_huge_and_tiny_inputs_and_coefficients_do_no_harm(
-    fmi: int, value: float, instantiate: Instantiate, status: Status
-) -> None:
-    fmu = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.1)
+def test_huge_and_tiny_inputs_and_coefficients_do_no_harm(value: float, status: Status, slave: Slave) -> None:
+    fmu = slave(rudder__command=0.1)
     before = steps(fmu, 3)
     for name in ("rudder.command", "propeller.speed", "derivatives.Yv", "derivatives.drag"):
         kept = fmu.read([name])[0]
@@ -157,9 +157,8 @@ def test_huge_and_tiny_inputs_and_coefficients_do_no_harm(
         fmu.write({name: kept})
 
 
-@FMI
-def test_parameters_keep_to_their_bounds(fmi: int, instantiate: Instantiate, status: Status) -> None:
-    fmu = begun(instantiate("hull", fmi, "CoSimulation"))
+def test_parameters_keep_to_their_bounds(status: Status, slave: Slave) -> None:
+    fmu = slave()
     (described,) = [v for v in fmu.unpacked.description.modelVariables if v.name == "derivatives.Yv"]
     low, high, start = (float(text) for text in (described.min, described.max, described.start))
     for value, taken in ((low, True), (high, True), (1.001 * low, False), (1.001 * high, False)):
@@ -180,9 +179,8 @@ def test_an_instance_of_no_kind_is_refused(instantiate: Instantiate) -> None:
 # ---- log ----
 
 
-@FMI
-def test_the_log_can_be_chosen_by_category(fmi: int, instantiate: Instantiate, status: Status) -> None:
-    fmu = begun(instantiate("hull", fmi, "CoSimulation"))
+def test_the_log_can_be_chosen_by_category(status: Status, slave: Slave) -> None:
+    fmu = slave()
     fmu.instance.setDebugLogging(False, ["logStatusError"])
     assert status(fmu.instance.terminate) == 0
     assert status(fmu.instance.terminate) == ERROR
@@ -194,7 +192,6 @@ def test_the_log_can_be_chosen_by_category(fmi: int, instantiate: Instantiate, s
     assert status(fmu.instance.setDebugLogging, True, ["logNothingOfTheKind"]) == ERROR
 
 
-@FMI
 def test_a_message_is_text_whatever_it_holds(fmi: int, instantiate: Instantiate, status: Status) -> None:
     fmu = instantiate("hull", fmi, "CoSimulation")
     assert status(fmu.instance.setDebugLogging, True, ["%s%n #r1# ł"]) == ERROR

@@ -11,14 +11,13 @@ import pytest
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.fmu.running import RunningFmu
+from tests.fmu.driving import Instantiate, Status
 
 ERROR = 3
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 TRIM = pytest.mark.parametrize("trim", [False, True])
 STATE = {"motion.x": 3.0, "motion.y": 1.0, "motion.psi": 0.7, "motion.u": 6.0, "motion.v": -0.5, "motion.r": 0.02}
 INPUTS = {"rudder.command": 0.15, "propeller.speed": 1.2}
 REAL_INPUTS = ["rudder.command", "propeller.speed"]
-Instantiate = Callable[..., RunningFmu]
 
 
 def at_a_point(fmu: RunningFmu) -> RunningFmu:
@@ -83,7 +82,6 @@ def assert_close(found: Array, expected: Array) -> None:
     np.testing.assert_allclose(found / scale, expected / scale, atol=2e-7)
 
 
-@FMI
 def test_directional_derivatives_are_those_of_finite_differences(
     fmi: int, hull: Model, instantiate: Instantiate
 ) -> None:
@@ -116,7 +114,6 @@ def test_directional_derivatives_are_those_of_finite_differences(
     assert_close(found, expected)
 
 
-@FMI
 def test_a_seed_of_several_knowns_sums_their_columns(fmi: int, hull: Model, instantiate: Instantiate) -> None:
     fmu = at_a_point(instantiate("hull", fmi, "ModelExchange"))
     unknowns, knowns = unknown_names(hull), ["motion.u", "rudder.command", "derivatives.Nd", "motion.u"]
@@ -143,7 +140,6 @@ def at_a_communication_point(fmu: RunningFmu) -> RunningFmu:
     return fmu
 
 
-@FMI
 def test_derivatives_at_communication_points_are_by_inputs_and_tunable_parameters(
     fmi: int, hull: Model, instantiate: Instantiate
 ) -> None:
@@ -156,8 +152,7 @@ def test_derivatives_at_communication_points_are_by_inputs_and_tunable_parameter
         np.testing.assert_allclose(adjoint(fmu, unknowns, knowns), found, rtol=1e-12, atol=1e-12)
 
 
-@FMI
-def test_a_seed_that_is_not_finite_is_discarded(fmi: int, instantiate: Instantiate, status: Callable[..., int]) -> None:
+def test_a_seed_that_is_not_finite_is_discarded(fmi: int, instantiate: Instantiate, status: Status) -> None:
     fmu = at_a_communication_point(instantiate("hull", fmi, "CoSimulation"))
     references = fmu.unpacked.references(["motion.udot"]), fmu.unpacked.references(["propeller.speed"])
     assert status(fmu.instance.getDirectionalDerivative, *references, [np.nan]) == 2
@@ -176,7 +171,6 @@ def initialising(fmu: RunningFmu, trim: bool) -> RunningFmu:
     return fmu
 
 
-@FMI
 @TRIM
 @pytest.mark.parametrize("kind", ["ModelExchange", "CoSimulation"])
 def test_derivatives_during_initialisation_go_through_the_initial_states(
@@ -194,10 +188,7 @@ def test_derivatives_during_initialisation_go_through_the_initial_states(
         np.testing.assert_allclose(adjoint(fmu, unknowns, knowns), found, rtol=1e-12, atol=1e-12)
 
 
-@FMI
-def test_derivatives_of_what_is_no_unknown_are_refused(
-    fmi: int, instantiate: Instantiate, status: Callable[..., int]
-) -> None:
+def test_derivatives_of_what_is_no_unknown_are_refused(fmi: int, instantiate: Instantiate, status: Status) -> None:
     fmu = initialising(instantiate("hull", fmi, "ModelExchange"), False)
     for unknown, known in (
         ("rudder.command", "initial.u"),

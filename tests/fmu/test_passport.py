@@ -29,11 +29,9 @@ from tank2sim.fmu.reference import by_scheme, reference_errors
 from tank2sim.fmu.reference_run import INPUTS_FILE, OUTPUTS_FILE, ReferenceRun, read_reference, reference_run
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
+from tests.fmu.driving import FmuFile, ShipFmu, rewritten
 
 from ..cli.command_line import tank2sim
-
-FMI = pytest.mark.parametrize("fmi", [2, 3])
-Fmu = Callable[[int], Path]
 
 
 def entry(path: Path, name: str) -> str:
@@ -42,7 +40,7 @@ def entry(path: Path, name: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def reported(mariner_fmu: Fmu) -> dict[str, Any]:
+def reported(mariner_fmu: ShipFmu) -> dict[str, Any]:
     """The passport of the Mariner."""
     found: dict[str, Any] = json.loads(entry(mariner_fmu(2), PASSPORT_FILE))
     return found
@@ -136,7 +134,7 @@ def test_rows_of_rules_follow_from_the_model(mariner_card: ManoeuvringCard, mari
 
 
 def test_the_page_has_the_turn_to_scale_and_the_zigzag(
-    mariner_fmu: Fmu, mariner: Model, reported: dict[str, Any]
+    mariner_fmu: ShipFmu, mariner: Model, reported: dict[str, Any]
 ) -> None:
     page = entry(mariner_fmu(2), PASSPORT_PAGE)
     assert page.count("<svg") == 3
@@ -161,15 +159,14 @@ def test_figures_are_those_of_the_simulation(reported: dict[str, Any], mariner: 
             assert reported["figures"][key][name] == pytest.approx(value, rel=1e-9)
 
 
-@FMI
-def test_the_fmu_repeats_its_reference_run_on_the_machine_that_wrote_it(fmi: int, mariner_fmu: Fmu) -> None:
+def test_the_fmu_repeats_its_reference_run_on_the_machine_that_wrote_it(fmi: int, mariner_fmu: ShipFmu) -> None:
     replay = json.loads(entry(mariner_fmu(fmi), PASSPORT_FILE))["replay"]
     assert replay["problem"] == ""
     assert replay["run"] == "zigzag 20/20"
     assert 0 <= replay["max_error"] < 1e-9
 
 
-def test_a_library_that_answers_otherwise_is_reported(hull: Model, fmu_file: Callable[[str, int], Path]) -> None:
+def test_a_library_that_answers_otherwise_is_reported(hull: Model, fmu_file: FmuFile) -> None:
     reference, _ = reference_run(hull)
     assert reference is not None
     outputs = reference.outputs.copy()
@@ -192,7 +189,7 @@ def test_a_motion_that_leaves_all_bounds_has_no_reference(hull: Model) -> None:
 # ---- the reference result ----
 
 
-def test_the_reference_result_is_the_zigzag_of_the_model(mariner: Model, mariner_fmu: Fmu, tmp_path: Path) -> None:
+def test_the_reference_result_is_the_zigzag_of_the_model(mariner: Model, mariner_fmu: ShipFmu, tmp_path: Path) -> None:
     with zipfile.ZipFile(mariner_fmu(2)) as archive:
         archive.extractall(tmp_path)
     found = read_reference(tmp_path)
@@ -208,10 +205,7 @@ def test_the_reference_result_is_the_zigzag_of_the_model(mariner: Model, mariner
     assert max(reference_errors(mariner, by_scheme(mariner, found.run), columns).values()) < 1e-11
 
 
-@FMI
-def test_fmpy_alone_can_repeat_the_reference_result(
-    fmi: int, fmu_file: Callable[[str, int], Path], tmp_path: Path
-) -> None:
+def test_fmpy_alone_can_repeat_the_reference_result(fmi: int, fmu_file: FmuFile, tmp_path: Path) -> None:
     path = fmu_file("hull", fmi)
     for name in (INPUTS_FILE, OUTPUTS_FILE):
         (tmp_path / Path(name).name).write_text(entry(path, name))
@@ -229,13 +223,6 @@ def test_fmpy_alone_can_repeat_the_reference_result(
         np.testing.assert_allclose(near, expected[name], atol=2e-3 * np.ptp(expected[name]))
 
 
-def rewritten(path: Path, target: Path, name: str, change: Callable[[str], str]) -> Path:
-    with zipfile.ZipFile(path) as old, zipfile.ZipFile(target, "w") as new:
-        for one in old.namelist():
-            new.writestr(one, change(old.read(one).decode()).encode() if one == name else old.read(one))
-    return target
-
-
 def with_another_position(text: str) -> str:
     *rows, last = text.splitlines()
     time, _, *rest = last.split(",")
@@ -243,7 +230,7 @@ def with_another_position(text: str) -> str:
 
 
 @pytest.mark.slow
-def test_a_check_repeats_the_reference_result(mariner_fmu: Fmu, tmp_path: Path) -> None:
+def test_a_check_repeats_the_reference_result(mariner_fmu: ShipFmu, tmp_path: Path) -> None:
     ended = tank2sim("check", str(mariner_fmu(2)), "--json", "x.json", cwd=tmp_path)
     assert ended.returncode == 0, ended.stdout
     assert json.loads((tmp_path / "x.json").read_text())["reference_error"] < 1e-11
@@ -261,9 +248,12 @@ def test_a_check_repeats_the_reference_result(mariner_fmu: Fmu, tmp_path: Path) 
     ],
 )
 def test_a_reference_result_that_is_wrong_or_damaged_fails_the_check(
-    name: str, change: Callable[[str], str], words: str, fmu_file: Callable[[str, int], Path], tmp_path: Path
+    name: str, change: Callable[[str], str], words: str, fmu_file: FmuFile, tmp_path: Path
 ) -> None:
-    report = compare_with_model(rewritten(fmu_file("hull", 2), tmp_path / "x.fmu", name, change))
+    def damage(file: str, data: bytes) -> bytes:
+        return change(data.decode()).encode() if file == name else data
+
+    report = compare_with_model(rewritten(fmu_file("hull", 2), tmp_path / "x.fmu", damage))
     assert not report.passed
     assert words in " ".join(report.differences)
 

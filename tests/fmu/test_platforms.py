@@ -28,10 +28,10 @@ from tank2sim.native import cross
 from tank2sim.native.compiler import require_compiler
 from tank2sim.native.cross import CompileTarget
 from tests.cli.command_line import refused, tank2sim
+from tests.fmu.driving import ShipFmu
 
 from .driver import build, runner, zigzag
 
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 FOLDERS = {
     2: ["linux64", "aarch64-linux", "win64", "darwin64"],
     3: ["x86_64-linux", "aarch64-linux", "x86_64-windows", "x86_64-darwin", "aarch64-darwin"],
@@ -109,7 +109,7 @@ needs_compiler = pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglan
 
 
 @pytest.fixture(scope="session")
-def exported(models: dict[str, Model], session_folder: Path) -> Callable[[int], Path]:
+def exported(models: dict[str, Model], session_folder: Path) -> ShipFmu:
     """The FMU of the hull for every platform, exported once and unpacked."""
 
     def folder(fmi: int) -> Path:
@@ -144,9 +144,8 @@ def functions(fmi: int) -> set[str]:
 
 @needs_compiler
 @pytest.mark.slow
-@FMI
 def test_every_platform_is_there_and_nothing_is_compiled_twice(
-    fmi: int, exported: Callable[[int], Path], hull: Model, monkeypatch: pytest.MonkeyPatch
+    fmi: int, exported: ShipFmu, hull: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = exported(fmi)
     assert sorted(path.name for path in (folder / "binaries").iterdir()) == sorted(FOLDERS[fmi])
@@ -159,12 +158,11 @@ def test_every_platform_is_there_and_nothing_is_compiled_twice(
 
 @needs_compiler
 @pytest.mark.slow
-@FMI
 @pytest.mark.parametrize("platform", ["x86_64-linux", "aarch64-linux", "x86_64-windows"])
 def test_a_zigzag_has_the_same_digits_everywhere(
     platform: str,
     fmi: int,
-    exported: Callable[[int], Path],
+    exported: ShipFmu,
     unpacked: Callable[[str, int], object],
     tmp_path: Path,
     session_folder: Path,
@@ -196,9 +194,8 @@ def test_a_zigzag_has_the_same_digits_everywhere(
 
 @needs_compiler
 @pytest.mark.slow
-@FMI
 @pytest.mark.parametrize("platform", ["x86_64-linux", "aarch64-linux"])
-def test_linux_libraries_run_on_old_systems(platform: str, fmi: int, exported: Callable[[int], Path]) -> None:
+def test_linux_libraries_run_on_old_systems(platform: str, fmi: int, exported: ShipFmu) -> None:
     lief = pytest.importorskip("lief")
     elf = lief.ELF.parse(str(library(exported(fmi), fmi, platform)))
     assert elf.header.machine_type.name == {"x86_64-linux": "X86_64", "aarch64-linux": "AARCH64"}[platform]
@@ -214,8 +211,7 @@ def test_linux_libraries_run_on_old_systems(platform: str, fmi: int, exported: C
 
 @needs_compiler
 @pytest.mark.slow
-@FMI
-def test_the_dll_needs_nothing_but_windows(fmi: int, exported: Callable[[int], Path]) -> None:
+def test_the_dll_needs_nothing_but_windows(fmi: int, exported: ShipFmu) -> None:
     lief = pytest.importorskip("lief")
     pe = lief.PE.parse(str(library(exported(fmi), fmi, "x86_64-windows")))
     assert pe.header.machine.name == "AMD64"
@@ -226,9 +222,8 @@ def test_the_dll_needs_nothing_but_windows(fmi: int, exported: Callable[[int], P
 
 @needs_compiler
 @pytest.mark.slow
-@FMI
 @pytest.mark.parametrize("processor", ["x86_64", "aarch64"])
-def test_libraries_for_macs_are_whole(processor: str, fmi: int, exported: Callable[[int], Path]) -> None:
+def test_libraries_for_macs_are_whole(processor: str, fmi: int, exported: ShipFmu) -> None:
     lief = pytest.importorskip("lief")
     content = library(exported(fmi), fmi, f"{processor}-darwin").read_bytes()
     file = lief.MachO.parse(list(content))  # its parts live no longer than it does

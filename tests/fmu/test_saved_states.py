@@ -9,13 +9,10 @@ import sys
 import pytest
 
 from tank2sim.fmu.running import RunningFmu
-from tests.fmu.driving import ERROR, STATES, Instantiate, Status, begun, steps
+from tests.fmu.driving import ERROR, STATES, Instantiate, Slave, Status, begun, steps
 from tests.fmu.saved_state import restore, saved
 
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 
-
-@FMI
 def test_a_saved_state_goes_on_in_another_instance(fmi: int, instantiate: Instantiate) -> None:
     first = instantiate("hull", fmi, "CoSimulation")
     first.write({"derivatives.Yv": -0.15, "initial.u": 6.0})
@@ -30,7 +27,6 @@ def test_a_saved_state_goes_on_in_another_instance(fmi: int, instantiate: Instan
     assert first.read(["derivatives.Yv"]) == second.read(["derivatives.Yv"]) == [-0.15]
 
 
-@FMI
 def test_the_stop_time_is_part_of_the_state(fmi: int, instantiate: Instantiate, status: Status) -> None:
     first, second = (instantiate("hull", fmi, "CoSimulation") for _ in range(2))
     if fmi == 2:
@@ -44,7 +40,6 @@ def test_the_stop_time_is_part_of_the_state(fmi: int, instantiate: Instantiate, 
     assert status(second.instance.doStep, 0.0, 2.0) == 0
 
 
-@FMI
 def test_a_state_saved_before_initialisation_is_one_before_initialisation(fmi: int, instantiate: Instantiate) -> None:
     first = instantiate("hull", fmi, "ModelExchange")
     first.write({"initial.u": 5.0})
@@ -56,9 +51,10 @@ def test_a_state_saved_before_initialisation_is_one_before_initialisation(fmi: i
     assert begun(first).read(["motion.u", "motion.psi"]) == [5.0, 1.0]
 
 
-@FMI
-def test_bytes_that_are_no_state_of_this_fmu_are_refused(fmi: int, instantiate: Instantiate, status: Status) -> None:
-    fmu = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.3)
+def test_bytes_that_are_no_state_of_this_fmu_are_refused(
+    fmi: int, instantiate: Instantiate, status: Status, slave: Slave
+) -> None:
+    fmu = slave(rudder__command=0.3)
     before, data = steps(fmu, 5), saved(fmu)
     other_kind = saved(instantiate("hull", fmi, "ModelExchange"))
     other_model = saved(instantiate("body", fmi, "CoSimulation"))
@@ -69,9 +65,8 @@ def test_bytes_that_are_no_state_of_this_fmu_are_refused(fmi: int, instantiate: 
     assert fmu.read(STATES) == before
 
 
-@FMI
-def test_a_single_bit_that_is_wrong_is_found(fmi: int, instantiate: Instantiate, status: Status) -> None:
-    fmu = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.3)
+def test_a_single_bit_that_is_wrong_is_found(status: Status, slave: Slave) -> None:
+    fmu = slave(rudder__command=0.3)
     before, data = steps(fmu, 5), saved(fmu)
     for place in range(0, len(data), 7):
         damaged = bytearray(data)
@@ -96,9 +91,8 @@ def value_count(fmu: RunningFmu) -> int:
     return min(int(variable.valueReference) for variable in variables if variable.derivative is not None)
 
 
-@FMI
-def test_every_value_of_a_state_comes_back(fmi: int, instantiate: Instantiate) -> None:
-    fmu = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.3)
+def test_every_value_of_a_state_comes_back(slave: Slave) -> None:
+    fmu = slave(rudder__command=0.3)
     steps(fmu, 5)
     before, count = saved(fmu), value_count(fmu)
     assert sealed(before) == before
@@ -111,11 +105,8 @@ def test_every_value_of_a_state_comes_back(fmi: int, instantiate: Instantiate) -
     assert saved(fmu) == before
 
 
-@FMI
-def test_a_state_with_one_value_that_is_no_number_is_refused_whichever_it_is(
-    fmi: int, instantiate: Instantiate, status: Status
-) -> None:
-    fmu = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.3)
+def test_a_state_with_one_value_that_is_no_number_is_refused_whichever_it_is(status: Status, slave: Slave) -> None:
+    fmu = slave(rudder__command=0.3)
     steps(fmu, 5)
     data, count = saved(fmu), value_count(fmu)
     taken = []
@@ -127,10 +118,11 @@ def test_a_state_with_one_value_that_is_no_number_is_refused_whichever_it_is(
     assert saved(fmu) == data
 
 
-@FMI
-def test_a_state_of_another_model_is_named_as_such(fmi: int, instantiate: Instantiate, status: Status) -> None:
+def test_a_state_of_another_model_is_named_as_such(
+    fmi: int, instantiate: Instantiate, status: Status, slave: Slave
+) -> None:
     """Another ship with as many variables: only its token tells."""
-    fmu = begun(instantiate("hull", fmi, "CoSimulation"))
+    fmu = slave()
     data = saved(fmu)
     place = data.index(b"{")
     other = data[: place + 1] + bytes([data[place + 1] ^ 1]) + data[place + 2 :]

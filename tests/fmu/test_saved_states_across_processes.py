@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,7 +11,7 @@ import pytest
 from tank2sim.fmu.running import running
 from tank2sim.fmu.unpacking import unpack
 from tests.conftest import ROOT
-from tests.fmu.driving import Instantiate, begun, steps
+from tests.fmu.driving import FmuFile, Instantiate, begun, steps
 from tests.fmu.saved_state import restore, saved
 
 LEG = 20
@@ -35,7 +34,7 @@ def one_leg(fmu: str, folder: str, place: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_a_voyage_in_two_processes_is_that_in_one_to_the_last_bit(
-    fmi: int, fmu_file: Callable[[str, int], Path], instantiate: Instantiate, tmp_path: Path
+    fmi: int, fmu_file: FmuFile, instantiate: Instantiate, tmp_path: Path
 ) -> None:
     for leg in (0, 1):
         command = [sys.executable, "-c", _ENTRY, str(fmu_file("hull", fmi)), str(tmp_path), str(leg)]

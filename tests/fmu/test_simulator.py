@@ -21,14 +21,14 @@ from tank2sim.fmu.running import RunningFmu, running
 from tank2sim.fmu.unpacking import unpack
 from tank2sim.simulation.manoeuvres import Turn
 from tank2sim.simulation.run import simulate
+from tests.fmu.driving import ShipFmu
 
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 TUNED = {"derivatives.Nr": -0.004, "derivatives.Xu": -0.004}
 COMMAND = math.radians(20.0)
 
 
 @pytest.fixture
-def start(mariner_fmu: Callable[[int], Path], tmp_path: Path) -> Iterator[Callable[[int, str], RunningFmu]]:
+def start(mariner_fmu: ShipFmu, tmp_path: Path) -> Iterator[Callable[[int, str], RunningFmu]]:
     """Instances of the Mariner (FMI version, kind), freed after the test."""
     with ExitStack() as stack:
 
@@ -57,7 +57,6 @@ ANYWHERE = {
 }
 
 
-@FMI
 def test_a_ship_starts_anywhere_and_again(fmi: int, start: Callable[[int, str], RunningFmu]) -> None:
     fmu = start(fmi, "CoSimulation")
     shown = ["motion.x", "motion.y", "motion.psi", "motion.u", "motion.v", "motion.r", "rudder.angle"]
@@ -89,7 +88,6 @@ def continued(model: Model, x: np.ndarray, times: tuple[float, float], changed: 
     return result
 
 
-@FMI
 def test_tuned_derivatives_act_at_once_in_co_simulation(
     fmi: int, mariner: Model, start: Callable[[int, str], RunningFmu]
 ) -> None:
@@ -112,7 +110,6 @@ def test_tuned_derivatives_act_at_once_in_co_simulation(
     assert not np.allclose(expected, continued(mariner, x, (40.0, 80.0), {}), rtol=1e-3)
 
 
-@FMI
 def test_tuned_derivatives_act_at_once_in_model_exchange(
     fmi: int, mariner: Model, start: Callable[[int, str], RunningFmu]
 ) -> None:
@@ -180,7 +177,6 @@ parameters = { speed_mps = 8.0, direction_deg = 200.0 }
     assert shown["motion.speed"] == pytest.approx(0.5)
 
 
-@FMI
 def test_a_rudder_order_past_the_stops_is_held_there_and_one_in_degrees_is_refused(
     fmi: int, start: Callable[[int, str], RunningFmu]
 ) -> None:

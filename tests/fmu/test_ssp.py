@@ -7,7 +7,6 @@ import math
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -25,6 +24,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.fmu.export import ExportedFmu
 from tank2sim.fmu.ssp import ship_with_autopilot
 from tank2sim.simulation.scheme import runge_kutta_step
+from tests.fmu.driving import ShipFmu
 from tests.fmu.engines import reason_to_skip
 
 from ..cli.command_line import refused, tank2sim
@@ -151,9 +151,7 @@ def every_input(mariner: Model, made: Path) -> bytes:
 
 
 @pytest.mark.slow
-def test_every_input_may_be_a_connector(
-    mariner: Model, mariner_fmu: Callable[[int], Path], tmp_path: Path, run: np.ndarray
-) -> None:
+def test_every_input_may_be_a_connector(mariner: Model, mariner_fmu: ShipFmu, tmp_path: Path, run: np.ndarray) -> None:
     package = tmp_path / "open.ssp"
     package.write_bytes(every_input(mariner, mariner_fmu(2)))
     description = read_ssd(str(package))  # holds it against the schema of SSP 1.0

@@ -18,50 +18,61 @@ from scipy.integrate import solve_ivp
 from tank2sim.dynamics.model import Model
 from tank2sim.fmu.export import write_fmu
 from tank2sim.fmu.running import RunningFmu, running
-from tank2sim.fmu.unpacking import UnpackedFmu, unpack
+from tank2sim.fmu.unpacking import unpack
 from tests.fmu.conftest import quantity, state, tunable
-from tests.fmu.driving import ERROR, STATES, Instantiate, Status, begun, by_casadi, steps, time_of, untyped
+from tests.fmu.driving import (
+    ERROR,
+    STATES,
+    Instantiate,
+    Slave,
+    Status,
+    Unpacked,
+    begun,
+    by_casadi,
+    steps,
+    time_of,
+    untyped,
+)
+from tests.fmu.saved_state import restore, saved
 from tests.marks import first_fast
-
-FMI = pytest.mark.parametrize("fmi", [2, 3])
-
 
 # ---- sizes ----
 
 
-@FMI
-def test_a_thousand_steps_of_a_microsecond_are_one_of_a_millisecond(fmi: int, instantiate: Instantiate) -> None:
-    many, one = (begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.3) for _ in range(2))
+def test_a_thousand_steps_of_a_microsecond_are_one_of_a_millisecond(slave: Slave) -> None:
+    many, one = (slave(rudder__command=0.3) for _ in range(2))
     for fmu in (many, one):
         steps(fmu, 1000, 0.1)  # far from 0, where a microsecond is near what a time can tell
     assert steps(many, 1000, 1e-6, begin=100.0) == pytest.approx(steps(one, 1, 1e-3, begin=100.0), rel=1e-12)
     assert time_of(many) == pytest.approx(100.001, abs=1e-12)
 
 
-@FMI
-def test_steps_of_any_sizes_follow_the_equations(fmi: int, hull: Model, instantiate: Instantiate) -> None:
-    fmu, now = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.05), 0.0
+def exactly_by(hull: Model, until: float, command: float) -> list[float]:
+    """States at a time, by another integrator."""
+    u, p = hull.input_values({"rudder.command": command}), hull.parameter_values()
+    start = np.array(hull.initial(p)).ravel()
+    truth = solve_ivp(lambda _, x: np.array(hull.rhs(x, u, p)).ravel(), (0.0, until), start, rtol=1e-11, atol=1e-12)
+    return [float(value) for value in truth.y[:, -1]]
+
+
+def test_steps_of_any_sizes_follow_the_equations(hull: Model, slave: Slave) -> None:
+    fmu, now = slave(rudder__command=0.05), 0.0
     for size in (1e-6, 0.3, 1e-4, 2.7, 0.05, 1e-5, 1.0):
         fmu.instance.doStep(currentCommunicationPoint=now, communicationStepSize=size)
         now += size
-    u, p = hull.input_values({"rudder.command": 0.05}), hull.parameter_values()
-    start = np.array(hull.initial(p)).ravel()
-    truth = solve_ivp(lambda _, x: np.array(hull.rhs(x, u, p)).ravel(), (0.0, now), start, rtol=1e-11, atol=1e-12)
-    assert fmu.read(STATES) == pytest.approx(truth.y[:, -1].tolist(), rel=1e-6, abs=1e-7)
+    assert fmu.read(STATES) == pytest.approx(exactly_by(hull, now, 0.05), rel=1e-6, abs=1e-7)
 
 
-@FMI
-def test_a_step_too_short_to_change_the_time_is_refused(fmi: int, instantiate: Instantiate, status: Status) -> None:
-    fmu = begun(instantiate("hull", fmi, "CoSimulation"))
+def test_a_step_too_short_to_change_the_time_is_refused(status: Status, slave: Slave) -> None:
+    fmu = slave()
     steps(fmu, 10)
     assert status(fmu.instance.doStep, 1.0, 1e-20) == ERROR
     assert len(fmu.log) == 1
 
 
-@FMI
-def test_a_clock_that_adds_up_in_32_bits_is_accepted(fmi: int, instantiate: Instantiate) -> None:
-    fmu = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.1)
-    exact = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.1)
+def test_a_clock_that_adds_up_in_32_bits_is_accepted(slave: Slave) -> None:
+    fmu = slave(rudder__command=0.1)
+    exact = slave(rudder__command=0.1)
     now = np.float32(0.0)
     for _ in range(3000):
         fmu.instance.doStep(currentCommunicationPoint=float(now), communicationStepSize=0.1)
@@ -69,12 +80,9 @@ def test_a_clock_that_adds_up_in_32_bits_is_accepted(fmi: int, instantiate: Inst
     assert fmu.read(STATES) == pytest.approx(steps(exact, 3000), rel=1e-9)
 
 
-@FMI
 @pytest.mark.parametrize("clock", [999.9, 1000.1], ids=["repeated", "left out"])
-def test_a_step_repeated_or_left_out_is_refused_however_late(
-    fmi: int, clock: float, instantiate: Instantiate, status: Status
-) -> None:
-    fmu = begun(instantiate("hull", fmi, "CoSimulation"))
+def test_a_step_repeated_or_left_out_is_refused_however_late(clock: float, status: Status, slave: Slave) -> None:
+    fmu = slave()
     steps(fmu, 100, 10.0)
     before = fmu.read(STATES)
     assert status(fmu.instance.doStep, clock, 0.1) == ERROR
@@ -92,7 +100,6 @@ def decaying() -> Model:
         name="Decay",
         description="Exponential decay",
         states=(v,),
-        inputs=(),
         parameters=(k, m),
         quantities=(quantity("vdot", "m/s2", -((k.symbol / m.symbol) ** 2) * v.symbol),),
         outputs=("v",),
@@ -130,21 +137,17 @@ def output_derivatives(fmu: RunningFmu, names: list[str], order: int = 1) -> lis
     return [float(value) for value in call(fmu.unpacked.references(names), [order] * len(names))]
 
 
-@FMI
-def test_output_derivatives_are_the_rates_at_which_outputs_change(
-    fmi: int, hull: Model, instantiate: Instantiate
-) -> None:
-    fmu = begun(instantiate("hull", fmi, "CoSimulation"), rudder__command=0.3)
+def test_output_derivatives_are_the_rates_at_which_outputs_change(hull: Model, slave: Slave) -> None:
+    fmu = slave(rudder__command=0.3)
     steps(fmu, 20)
     names = list(hull.outputs)
     width = 1e-5
-    state = fmu.instance.getFMUstate() if fmi == 2 else fmu.instance.getFMUState()
+    before = saved(fmu)
     values = []
     for _ in range(3):
         values.append(np.array(fmu.read(names)))
         fmu.instance.doStep(time_of(fmu), width)
-    (fmu.instance.setFMUstate if fmi == 2 else fmu.instance.setFMUState)(state)
-    (fmu.instance.freeFMUstate if fmi == 2 else fmu.instance.freeFMUState)(state)
+    restore(fmu, before)
     found = np.array(output_derivatives(fmu, names))
     forward = (-3 * values[0] + 4 * values[1] - values[2]) / (2 * width)
     scale = np.maximum(np.abs(values[0]), 1)
@@ -153,11 +156,8 @@ def test_output_derivatives_are_the_rates_at_which_outputs_change(
     assert output_derivatives(fmu, ["motion.u", "motion.psi"]) == fmu.read(["motion.udot", "motion.r"])
 
 
-@FMI
-def test_output_derivatives_of_other_orders_or_of_no_output_are_refused(
-    fmi: int, instantiate: Instantiate, status: Status
-) -> None:
-    fmu = begun(instantiate("hull", fmi, "CoSimulation"))
+def test_output_derivatives_of_other_orders_or_of_no_output_are_refused(status: Status, slave: Slave) -> None:
+    fmu = slave()
     for names, order in ((["motion.u"], 2), (["motion.u"], 0), (["rudder.command"], 1), (["initial.u"], 1)):
         assert status(output_derivatives, fmu, names, order) == ERROR
         assert names[0] in fmu.log[-1]
@@ -190,7 +190,7 @@ class Watcher:
 
 
 @pytest.fixture
-def watched(unpacked: Callable[[str, int], UnpackedFmu]) -> Any:
+def watched(unpacked: Unpacked) -> Any:
     """Make an FMI 3 slave with an intermediate update; freed after the test."""
     with ExitStack() as stack:
 
@@ -250,10 +250,7 @@ def test_an_early_return_is_honoured(asked: float, reached: float, hull: Model, 
     assert early
     assert last == pytest.approx(reached, abs=1e-12)
     assert fmu.read(["time"]) == [last]
-    u, p = hull.input_values({"rudder.command": 0.3}), hull.parameter_values()
-    start = np.array(hull.initial(p)).ravel()
-    truth = solve_ivp(lambda _, x: np.array(hull.rhs(x, u, p)).ravel(), (0.0, last), start, rtol=1e-11, atol=1e-12)
-    assert fmu.read(STATES) == pytest.approx(truth.y[:, -1].tolist(), rel=1e-9, abs=1e-9)
+    assert fmu.read(STATES) == pytest.approx(exactly_by(hull, last, 0.3), rel=1e-9, abs=1e-9)
     fmu.instance.doStep(last, 1.0 - last)
     assert fmu.read(["time"]) == pytest.approx([1.0])
 

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import ctypes
 import re
 import zipfile
-from collections.abc import Callable
 from dataclasses import replace
 from datetime import datetime
 from functools import cache
 from pathlib import Path
 from unittest import mock
 
-import fmpy
 import pytest
 from fmpy.validation import validate_fmu
 from hypothesis import HealthCheck, given, settings
@@ -26,14 +23,13 @@ from tank2sim.fmu.export import description_text, write_fmu
 from tank2sim.fmu.passport import PASSPORT_PAGE, Replay
 from tank2sim.fmu.provenance import Documents, ValueOrigin
 from tank2sim.fmu.templates import c_identifier
-from tank2sim.fmu.unpacking import UnpackedFmu
 from tank2sim.notices import Notice
 from tank2sim.simulation.card_range import CardRangeReading
 from tank2sim.simulation.run import Run
 from tests.fmu.descriptions import model_of, whole_description
+from tests.fmu.driving import ShipFmu
 from tests.marks import first_fast
 
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 SHIPS = pytest.mark.parametrize("ship", [*bundled_cards(), "autopilot"])
 A_SHIP = first_fast("ship", [*bundled_cards(), "autopilot"])
 
@@ -55,7 +51,6 @@ def variables(root: etree._Element) -> list[dict[str, str]]:
 # ---- units ----
 
 
-@FMI
 @SHIPS
 def test_every_unit_is_defined(ship: str, fmi: int) -> None:
     root = description(ship, fmi)
@@ -75,7 +70,6 @@ _ARRAY = r"(\[[0-9]+(,[0-9]+)*\])?"
 _NAME = rf"{_B_NAME}{_ARRAY}(\.{_B_NAME}{_ARRAY})*"
 
 
-@FMI
 @SHIPS
 def test_names_are_structured_and_unique(ship: str, fmi: int) -> None:
     root = description(ship, fmi)
@@ -92,7 +86,6 @@ def test_names_are_structured_and_unique(ship: str, fmi: int) -> None:
 # ---- start values, causality, variability ----
 
 
-@FMI
 @SHIPS
 def test_start_values_stand_where_they_must_and_nowhere_else(ship: str, fmi: int) -> None:
     for one in variables(description(ship, fmi)):
@@ -129,7 +122,6 @@ def unknowns(root: etree._Element, fmi: int, element: str) -> list[tuple[str, li
     ]
 
 
-@FMI
 @SHIPS
 def test_unknowns_are_complete_and_depend_on_knowns_alone(ship: str, fmi: int) -> None:
     root, model = description(ship, fmi), model_of(ship)
@@ -156,7 +148,6 @@ def test_unknowns_are_complete_and_depend_on_knowns_alone(ship: str, fmi: int) -
             assert len(set(dependencies)) == len(dependencies)
 
 
-@FMI
 @A_SHIP
 def test_fmpy_finds_nothing_to_object_to(ship: str, fmi: int, tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "x.fmu", "w") as archive:
@@ -167,7 +158,6 @@ def test_fmpy_finds_nothing_to_object_to(ship: str, fmi: int, tmp_path: Path) ->
 # ---- the date ----
 
 
-@FMI
 @pytest.mark.parametrize("epoch", ["0", "1700000000", "1709164800"])
 def test_the_date_is_of_the_form_that_fmi_gives(epoch: str, fmi: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", epoch)
@@ -179,10 +169,7 @@ def test_the_date_is_of_the_form_that_fmi_gives(epoch: str, fmi: int, monkeypatc
 # ---- the file, and its library ----
 
 
-@FMI
-def test_entries_of_the_zip_are_plain_and_in_folders_of_the_standard(
-    fmi: int, mariner_fmu: Callable[[int], Path]
-) -> None:
+def test_entries_of_the_zip_are_plain_and_in_folders_of_the_standard(fmi: int, mariner_fmu: ShipFmu) -> None:
     with zipfile.ZipFile(mariner_fmu(fmi)) as archive:
         entries = archive.infolist()
         assert archive.testzip() is None
@@ -199,18 +186,6 @@ def test_entries_of_the_zip_are_plain_and_in_folders_of_the_standard(
     assert {name.partition("/")[0] for name in names} == folders | roots
 
 
-@FMI
-def test_the_library_exports_every_function_of_the_header(
-    fmi: int, unpacked: Callable[[str, int], UnpackedFmu]
-) -> None:
-    header = Path(fmpy.__file__).parent / "c-code" / f"fmi{fmi}Functions.h"
-    functions = set(re.findall(rf"fmi{fmi}FullName\((fmi{fmi}\w+)\)", header.read_text()))
-    assert len(functions) > 40
-    (path,) = unpacked("gain", fmi).folder.glob("binaries/*/*")
-    library = ctypes.CDLL(str(path))
-    assert [name for name in sorted(functions) if not hasattr(library, name)] == []
-
-
 # ---- whatever a card calls things ----
 
 TEXT = st.one_of(
@@ -222,7 +197,6 @@ TEXT = st.one_of(
 )
 
 
-@FMI
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(text=TEXT)
 def test_no_name_breaks_the_description(fmi: int, text: str, models: dict[str, Model]) -> None:
@@ -261,7 +235,6 @@ def page_of(files: dict[str, str]) -> etree._Element:
 
 
 @pytest.mark.slow
-@FMI
 def test_names_of_a_card_stay_out_of_the_c_sources_and_of_paths(
     fmi: int, models: dict[str, Model], tmp_path: Path
 ) -> None:

@@ -6,7 +6,6 @@ import io
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
 import fmpy
@@ -22,10 +21,9 @@ from tank2sim.dynamics.model import Model
 from tank2sim.fmu.export import terminals
 from tank2sim.fmu.interface import interface
 from tank2sim.units import UNITS
+from tests.fmu.driving import FmuFile, ShipFmu
 
-FMI = pytest.mark.parametrize("fmi", [2, 3])
 NAMES = pytest.mark.parametrize("name", ["hull", "body", "gain"])
-File = Callable[[str, int], Path]
 OSP = "{https://open-simulation-platform.com/OspModelDescription/1.0.1}"
 OSP_FILE = "extra/com.open-simulation-platform/OspModelDescription.xml"
 
@@ -53,7 +51,9 @@ def entry(path: Path, name: str) -> bytes:
 
 
 @NAMES
-def test_terminals_keep_to_the_schema_and_name_variables(name: str, fmu_file: File, models: dict[str, Model]) -> None:
+def test_terminals_keep_to_the_schema_and_name_variables(
+    name: str, fmu_file: FmuFile, models: dict[str, Model]
+) -> None:
     root = etree.fromstring(entry(fmu_file(name, 3), "terminalsAndIcons/terminalsAndIcons.xml"))
     folder = Path(fmpy.__file__).parent / "schema" / "fmi3"
     etree.XMLSchema(file=str(folder / "fmi3TerminalsAndIcons.xsd")).assertValid(root)
@@ -89,7 +89,7 @@ def test_every_input_and_output_with_a_group_in_its_name_is_in_one_terminal(mari
 # ---- the icon ----
 
 
-def test_each_version_has_its_icon(fmu_file: File) -> None:
+def test_each_version_has_its_icon(fmu_file: FmuFile) -> None:
     assert entry(fmu_file("gain", 2), "model.png") == bundled("fmu_templates", "icon.png").read_bytes()
     for name in ("icon.png", "icon.svg"):
         assert entry(fmu_file("gain", 3), f"terminalsAndIcons/{name}") == bundled("fmu_templates", name).read_bytes()
@@ -106,13 +106,12 @@ def test_the_icon_in_pixels_is_that_in_lines() -> None:
 # ---- variable groups ----
 
 
-@FMI
 @NAMES
-def test_groups_keep_to_the_rules_of_osp(name: str, fmi: int, fmu_file: File, models: dict[str, Model]) -> None:
+def test_groups_keep_to_the_rules_of_osp(name: str, fmi: int, fmu_file: FmuFile, models: dict[str, Model]) -> None:
     assert_rules(entry(fmu_file(name, fmi), OSP_FILE), models[name])
 
 
-def test_groups_of_a_ship_keep_to_the_rules_of_osp(mariner: Model, mariner_fmu: Callable[[int], Path]) -> None:
+def test_groups_of_a_ship_keep_to_the_rules_of_osp(mariner: Model, mariner_fmu: ShipFmu) -> None:
     root = assert_rules(entry(mariner_fmu(2), OSP_FILE), mariner)
     position = root.find(f".//{OSP}Generic[@name='ned_position']/{OSP}LinearDisplacement")
     assert [(one.get("ref"), one.get("axis")) for one in position] == [("motion.x", "x"), ("motion.y", "y")]

@@ -29,7 +29,7 @@ from tank2sim.cards.form import (
     ThrusterSection,
     WavesSection,
 )
-from tank2sim.cards.scaling import Bis, FileScales, PrimeII, Scales, file_factor
+from tank2sim.cards.scaling import FileScales, OtherPrime, Scales, file_factor
 from tank2sim.cards.terms import known_term
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
@@ -236,12 +236,12 @@ def scales_of_file(ship: ShipSection, environment: Environment, model: ShipModel
     if model.scaling == "prime_ii":
         if ship.draught_m is None:
             raise KeyError("draught_m")
-        return PrimeII(ship.length_m / ship.draught_m)
+        return OtherPrime(scale=ship.length_m / ship.draught_m)
     if model.scaling == "bis":
         if ship.displacement_kg is None:
             raise KeyError("displacement_kg")
         froude = model.speed_mps / (environment.gravity_mps2 * ship.length_m) ** 0.5
-        return Bis(froude, ship.displacement_kg / scales.mass)
+        return OtherPrime(froude=froude, ship_mass=ship.displacement_kg / scales.mass)
     return None
 
 

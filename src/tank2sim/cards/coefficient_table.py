@@ -11,7 +11,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -141,9 +141,7 @@ def _of_toml(text: str, source: str) -> CoefficientTable:
 def _of_rows(text: str, source: str) -> CoefficientTable:
     stated: dict[str, Any] = {}
     derivatives: dict[str, Any] = {}
-    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
-    for row in csv.reader(io.StringIO("\n".join(lines)), delimiter=";" if any(";" in line for line in lines) else ","):
-        cells = [cell.strip() for cell in row]
+    for cells in _cells(text):
         if len(cells) < 2:
             raise InputError(source, cells[0], "is not a row of name and value", "write: Yv, -0.0116")
         name, written = cells[0], cells[1]
@@ -158,12 +156,53 @@ def _of_rows(text: str, source: str) -> CoefficientTable:
     return _table(stated, derivatives, source, "")
 
 
+def _cells(text: str) -> Iterator[list[str]]:
+    """Rows of a text that has commas or semicolons between its cells, without comments."""
+    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
+    rows = csv.reader(io.StringIO("\n".join(lines)), delimiter=";" if ";" in "\n".join(lines) else ",")
+    return ([cell.strip() for cell in row] for row in rows)
+
+
 def _table(stated: Mapping[str, Any], printed: Mapping[str, Any], source: str, section: str) -> CoefficientTable:
     known = {**STATED_CONVENTIONS, "speed_scale": ("instantaneous", "nominal")}
     for key, choices in known.items():
         if key in stated and stated[key] not in choices:
             raise InputError(source, key, f"is {stated[key]!r}", close_name(str(stated[key]), choices))
-    conventions = {key: value for key, value in stated.items() if key in STATED_CONVENTIONS}
+    sizes = _sizes(stated, source)
+    density = sizes.pop("water_density_kgpm3", None)
+    water = Environment() if density is None else Environment(water_density_kgpm3=density)
+    assumed = _assume_sizes(sizes, water)
+    table = CoefficientTable(
+        source=source,
+        derivatives=_derivatives(printed, source, section),
+        body={key: _number(stated[key], key, source) for key in dict.fromkeys(_BODY.values()) if key in stated},
+        conventions={key: value for key, value in stated.items() if key in STATED_CONVENTIONS},
+        environment=water,
+        assumed=assumed,
+        speed_scale=stated.get("speed_scale"),
+        **sizes,
+    )
+    if not 0.2 <= table.block <= 1.0:
+        problem = f"is that of a block coefficient of {table.block:.3g}"
+        raise InputError(source, "displacement_kg", problem, "check length_m, beam_m, draught_m and displacement_kg")
+    return table
+
+
+def _assume_sizes(sizes: dict[str, Any], water: Environment) -> tuple[str, ...]:
+    """Add the sizes that are lacking, those of an ordinary ship; their keys."""
+    assumed = tuple(key for key in ("beam_m", "draught_m") if key not in sizes)
+    sizes.setdefault("beam_m", sizes["length_m"] / _LENGTH_TO_BEAM)
+    sizes.setdefault("draught_m", sizes["beam_m"] / _BEAM_TO_DRAUGHT)
+    block = sizes.pop("block_coefficient", None)
+    if "displacement_kg" not in sizes:
+        if block is None:
+            block, assumed = _BLOCK, (*assumed, "displacement_kg")
+        volume = block * sizes["length_m"] * sizes["beam_m"] * sizes["draught_m"]
+        sizes["displacement_kg"] = volume * water.water_density_kgpm3
+    return assumed
+
+
+def _sizes(stated: Mapping[str, Any], source: str) -> dict[str, Any]:
     sizes = {key: _number(stated[key], key, source) for key in _SIZES if key in stated}
     for key, value in sizes.items():
         low, high = _SIZES[key]
@@ -172,47 +211,19 @@ def _table(stated: Mapping[str, Any], printed: Mapping[str, Any], source: str, s
     for key in ("length_m", "speed_mps"):
         if key not in sizes:
             raise InputError(source, key, "is missing", "give length_m and speed_mps, and beam_m, draught_m if known")
-    assumed = tuple(key for key in ("beam_m", "draught_m") if key not in sizes)
-    sizes.setdefault("beam_m", sizes["length_m"] / _LENGTH_TO_BEAM)
-    sizes.setdefault("draught_m", sizes["beam_m"] / _BEAM_TO_DRAUGHT)
-    density = sizes.pop("water_density_kgpm3", None)
-    water = Environment() if density is None else Environment(water_density_kgpm3=density)
-    block = sizes.pop("block_coefficient", None)
-    if "displacement_kg" not in sizes:
-        if block is None:
-            block, assumed = _BLOCK, (*assumed, "displacement_kg")
-        volume = block * sizes["length_m"] * sizes["beam_m"] * sizes["draught_m"]
-        sizes["displacement_kg"] = volume * water.water_density_kgpm3
+    return sizes
+
+
+def _derivatives(printed: Mapping[str, Any], source: str, section: str) -> dict[str, float]:
     derivatives: dict[str, float] = {}
     for name, value in printed.items():
         canonical, sign = _canonical(name, source, section)
         if canonical in derivatives:
             raise InputError(source, f"{section}{name}", f"is {canonical} again", "give each number once")
         derivatives[canonical] = sign * _number(value, f"{section}{name}", source)
-    least = {"Yv", "Yr", "Nv", "Nr"}
-    if missing := sorted(least - set(derivatives)):
+    if missing := sorted({"Yv", "Yr", "Nv", "Nr"} - set(derivatives)):
         raise InputError(source, section.rstrip("."), f"lacks {', '.join(missing)}", "give at least Yv Yr Nv Nr")
-    body = {key: _number(stated[key], key, source) for key in dict.fromkeys(_BODY.values()) if key in stated}
-    table = CoefficientTable(
-        source=source,
-        derivatives=derivatives,
-        body=body,
-        conventions=conventions,
-        environment=water,
-        assumed=assumed,
-        speed_scale=stated.get("speed_scale"),
-        length_m=sizes["length_m"],
-        beam_m=sizes["beam_m"],
-        draught_m=sizes["draught_m"],
-        speed_mps=sizes["speed_mps"],
-        displacement_kg=sizes["displacement_kg"],
-        centre_of_gravity_m=sizes.get("centre_of_gravity_m"),
-        rudder_area_m2=sizes.get("rudder_area_m2"),
-    )
-    if not 0.2 <= table.block <= 1.0:
-        problem = f"is that of a block coefficient of {table.block:.3g}"
-        raise InputError(source, "displacement_kg", problem, "check length_m, beam_m, draught_m and displacement_kg")
-    return table
+    return derivatives
 
 
 def _plain(name: str) -> str:

@@ -30,14 +30,8 @@ _WHOLE_LINE = re.compile(REFERENCE_LINE.pattern + r"\n?", re.MULTILINE)
 class Covariance:
     """Covariance of numbers of a card.
 
-    Parameters
-    ----------
-    names : tuple of str
-        Their k dotted keys in the card's file.
-    matrix : array (k, k)
-        In the conventions of that file.
-    samples : array (n, k), optional
-        Samples of the numbers' joint distribution, in the same conventions; normal without any.
+    `names`: their k dotted keys in the card's file. `matrix` (k, k): in the conventions of that file. `samples` (n, k):
+    samples of the numbers' joint distribution, in the same conventions; normal without any.
     """
 
     names: tuple[str, ...]

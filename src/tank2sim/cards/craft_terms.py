@@ -84,7 +84,7 @@ def body_scales(scales: FileScales) -> dict[str, float]:
 
     Parameters
     ----------
-    scales : Scales, PrimeII or Bis
+    scales : Scales or OtherPrime
         In which the values are; :class:`Scales` give SI.
     """
     return {"mass": float(scales.mass), "yaw_inertia": float(scales.inertia), "x_G": float(scales.length)}

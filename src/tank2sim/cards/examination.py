@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator
 
 from tank2sim.cards.card import Card, ManoeuvringCard, MmgCard, SteeredBy, SteeredCard
-from tank2sim.cards.form import BodySection
+from tank2sim.cards.form import BodySection, SteeringGear
 from tank2sim.cards.plausibility import (
     EXPECTED_SIGNS,
     added_masses,
@@ -19,7 +19,6 @@ from tank2sim.cards.plausibility import (
     yaw_damping,
     yaw_force,
 )
-from tank2sim.errors import InputError
 from tank2sim.notices import Notice, caution
 
 FULLEST_BLOCK = 1.15
@@ -127,16 +126,20 @@ def refuse_impossible(card: Card) -> None:
     ship = card.ship
     if ship.water_depth_m is not None and ship.draught_m is not None and ship.water_depth_m <= ship.draught_m:
         problem = f"is {ship.water_depth_m:g} m, and the draught {ship.draught_m:g} m: the ship is aground"
-        raise InputError(card.source, "ship.water_depth_m", problem, "check both")
-    gear = card.steering_gear if isinstance(card, SteeredCard) else None
+        raise card.fault("ship.water_depth_m", problem, "check both")
+    if isinstance(card, SteeredCard) and card.steering_gear:
+        _refuse_gear(card, card.steering_gear)
+
+
+def _refuse_gear(card: SteeredCard, gear: SteeringGear) -> None:
     for key, least, unit in (("max_angle_rad", LEAST_ANGLE_RAD, "deg"), ("max_rate_radps", LEAST_RATE_RADPS, "deg/s")):
-        value = getattr(gear, key, None)
-        if isinstance(card, SteeredCard) and value is not None and value < least:
+        value = getattr(gear, key)
+        if value is not None and value < least:
             place, shown = card.in_file(f"steering_gear.{key}", value)
             problem = f"is {shown:.3g}, less than any steering gear has"
             if not place.endswith(("_rad", "_radps")):
                 problem += f"; {shown:.3g} in radians would be {math.degrees(shown):.3g} {unit}"
-            raise InputError(card.source, place, problem, f"give it in {unit} (_deg, _degps) or radians (_rad, _radps)")
+            raise card.fault(place, problem, f"give it in {unit} (_deg, _degps) or radians (_rad, _radps)")
 
 
 def doubts(card: Card) -> tuple[Notice, ...]:
@@ -168,25 +171,23 @@ def _refuse_body(card: SteeredCard) -> None:
     if block is not None and not LEAST_BLOCK < block < FULLEST_BLOCK:
         problem = f"is {mass:.4g} kg, {block:.3g} times the water that a box of length, beam and draught displaces"
         remedy = "check mass, scaling, length_m, beam_m and draught_m (all in m)"
-        raise InputError(card.source, "rigid_body.mass", problem, remedy)
+        raise card.fault("rigid_body.mass", problem, remedy)
     stated = card.ship.displacement_kg
     if card.steered_by is SteeredBy.THRUSTERS and stated is not None and not 0.5 < mass / stated < 2.0:
         problem = f"is {mass:.4g} kg, and ship.displacement_kg is {stated:.4g}"
-        raise InputError(card.source, "rigid_body.mass", problem, "give both in kg (or the mass in the card's scaling)")
+        raise card.fault("rigid_body.mass", problem, "give both in kg (or the mass in the card's scaling)")
     centre = card.body_si["x_G"] / card.ship.length_m
     if not centre**2 <= gyradius_2 <= LARGEST_GYRADIUS**2:
         problem = (
             f"gives a radius of gyration of {math.sqrt(gyradius_2):.3g} L about midships with x_G at {centre:.3g} L"
         )
         remedy = "it is about midships, in the scaling of the mass; 0.25 L is usual"
-        raise InputError(card.source, "rigid_body.yaw_inertia", problem, remedy)
+        raise card.fault("rigid_body.yaw_inertia", problem, remedy)
 
 
 def _of_ship(card: ManoeuvringCard) -> Iterator[str]:
     """What is unusual about a ship with a rudder; most serious first."""
-    ship, body = card.ship, card.rigid_body
-    hull = _hydrodynamic(card)
-    errors = card.uncertainty
+    hull, errors = _hydrodynamic(card), card.uncertainty
     signs = {caution.fact.split()[0]: caution.fact for caution in unusual_signs(hull, errors)}
     if "Nd" in signs:
         turned = [name for name in ("Yd", "Nd") if signs.pop(name, "")]
@@ -196,36 +197,44 @@ def _of_ship(card: ManoeuvringCard) -> Iterator[str]:
     if (surge := hull.get("Xu", 0.0)) > _SIGNIFICANT * errors.get("Xu", 0.0):
         yield f"Xu is {surge:+.3g}, and it is negative for every known ship: resistance grows with speed"
     yield from _proportions(card, USUAL_OF_SHIPS)
-    if hull.get("Nd", 0.0) > 0:
-        yield from _beyond("N_delta'", hull["Nd"], USUAL_OF_SHIPS, _SIGNIFICANT * errors.get("Nd", 0.0))
-    gear = card.steering_gear
-    if gear and gear.max_rate_radps and ship.length_m > _LARGE_M and gear.max_rate_radps > _FASTEST_RADPS:
-        place, shown = card.in_file("steering_gear.max_rate_radps", gear.max_rate_radps)
-        yield f"{place} is {shown:.3g}, and the gear of a ship makes 2 to 7 deg/s: check its unit"
-    deep = not (ship.water_depth_m and ship.draught_m) or ship.water_depth_m >= _DEEP_DRAUGHTS * ship.draught_m
-    slender = math.pi * (ship.draught_m / ship.length_m) ** 2 if ship.draught_m else None
-    cautions = [*yaw_force(hull, body.mass)]
-    if deep:
-        cautions += added_masses(hull, errors, body.mass, body.yaw_inertia)
-        cautions += yaw_damping(hull, errors, ship.draught_m / ship.length_m if ship.draught_m else None)
-        value = hull.get("Yv", 0.0)
-        if slender and value < 0:
-            yield from _beyond(
-                "Y_v' over -pi (d/L)^2",
-                -value / slender,
-                USUAL_OF_SHIPS,
-                _SIGNIFICANT * errors.get("Yv", 0.0) / slender,
-            )
-    if "Nd" not in signs:
-        cautions += levers({name: value for name, value in hull.items() if name not in signs}, errors, _LEVER_ROOM)
-    yield from (caution.fact for caution in cautions)
-    if not (ship.beam_m and ship.draught_m) and body.mass > _LARGEST_PRIME_MASS:
-        yield f"m' is {body.mass:.3g}, and ships have 0.003 to 0.04: check model.scaling"
+    if (turning := hull.get("Nd", 0.0)) > 0:
+        yield from _beyond("N_delta'", turning, USUAL_OF_SHIPS, _SIGNIFICANT * errors.get("Nd", 0.0))
+    yield from _of_gear(card)
+    yield from _of_hull(card, hull, set(signs))
+    if not (card.ship.beam_m and card.ship.draught_m) and card.rigid_body.mass > _LARGEST_PRIME_MASS:
+        yield f"m' is {card.rigid_body.mass:.3g}, and ships have 0.003 to 0.04: check model.scaling"
+    yield from _of_angles(card)
+
+
+def _of_angles(card: ManoeuvringCard) -> Iterator[str]:
     for key in ("valid_rudder_rad", "valid_drift_rad"):
         value = getattr(card.model, key)
         if value is not None and 0 < value < LEAST_ANGLE_RAD:
             place, shown = card.in_file(f"model.{key}", value)
             yield f"{place} is {shown:.3g}, and nearly every motion is beyond it: check its unit"
+
+
+def _of_gear(card: ManoeuvringCard) -> Iterator[str]:
+    rate = card.steering_gear.max_rate_radps if card.steering_gear else None
+    if rate and rate > _FASTEST_RADPS and card.ship.length_m > _LARGE_M:
+        place, shown = card.in_file("steering_gear.max_rate_radps", rate)
+        yield f"{place} is {shown:.3g}, and the gear of a ship makes 2 to 7 deg/s: check its unit"
+
+
+def _of_hull(card: ManoeuvringCard, hull: dict[str, float], doubted: set[str]) -> Iterator[str]:
+    """Sizes of linear terms and added masses; points of attack of the terms whose sign is not `doubted`."""
+    ship, body, errors = card.ship, card.rigid_body, card.uncertainty
+    cautions = [*yaw_force(hull, body.mass)]
+    draught = ship.draught_m / ship.length_m if ship.draught_m else None
+    if not (ship.water_depth_m and ship.draught_m) or ship.water_depth_m >= _DEEP_DRAUGHTS * ship.draught_m:
+        cautions += added_masses(hull, errors, body.mass, body.yaw_inertia)
+        cautions += yaw_damping(hull, errors, draught)
+        if draught and (value := hull.get("Yv", 0.0)) < 0:
+            slender = math.pi * draught**2
+            doubt = _SIGNIFICANT * errors.get("Yv", 0.0) / slender
+            yield from _beyond("Y_v' over -pi (d/L)^2", -value / slender, USUAL_OF_SHIPS, doubt)
+    cautions += levers({name: value for name, value in hull.items() if name not in doubted}, errors, _LEVER_ROOM)
+    yield from (caution.fact for caution in cautions)
 
 
 def _of_mmg(card: MmgCard) -> Iterator[str]:
@@ -248,15 +257,22 @@ def _of_mmg(card: MmgCard) -> Iterator[str]:
             yield from _beyond(name, value, USUAL_OF_MMG, _SIGNIFICANT * card.interaction_errors.get(name, 0.0))
     area = rudder.number * ship.rudder_area_m2
     yield from _beyond("rudder area over L d", area / (ship.length_m * ship.draught_m), USUAL_OF_SHIPS)
-    if card.propulsion is not None and propeller.k_0 is not None:
-        speed = (1 - propeller.w_P0) * card.model.speed_mps
-        advance = speed / (card.propulsion.nominal_radps / (2 * math.pi) * ship.propeller_diameter_m)
-        thrust = propeller.k_0 + (propeller.k_1 or 0.0) * advance + (propeller.k_2 or 0.0) * advance**2
-        if not 0 < advance < 2 or thrust <= 0:
-            yield (
-                f"the propeller's advance ratio is {advance:.3g} at model.speed_mps and the nominal revolutions, with "
-                f"K_T = {thrust:.3g}: check propulsion.nominal_rpm, the speed and propeller_diameter_m"
-            )
+    yield from _of_advance(card)
+
+
+def _of_advance(card: MmgCard) -> Iterator[str]:
+    """An advance ratio at the speed of the card that no propeller has."""
+    propeller = card.propeller
+    if card.propulsion is None or propeller.k_0 is None:
+        return
+    speed = (1 - propeller.w_P0) * card.model.speed_mps
+    advance = speed / (card.propulsion.nominal_radps / (2 * math.pi) * card.ship.propeller_diameter_m)
+    thrust = propeller.k_0 + (propeller.k_1 or 0.0) * advance + (propeller.k_2 or 0.0) * advance**2
+    if not 0 < advance < 2 or thrust <= 0:
+        yield (
+            f"the propeller's advance ratio is {advance:.3g} at model.speed_mps and the nominal revolutions, with "
+            f"K_T = {thrust:.3g}: check propulsion.nominal_rpm, the speed and propeller_diameter_m"
+        )
 
 
 def _of_craft(card: SteeredCard) -> Iterator[str]:
@@ -266,10 +282,10 @@ def _of_craft(card: SteeredCard) -> Iterator[str]:
     thrust = sum(thruster.largest_thrust_N for thruster in card.thrusters)
     weight = card.body_si["mass"] * card.environment.gravity_mps2
     yield from _beyond("thrust over weight", thrust / weight, USUAL_OF_CRAFT)
+    wrong = {"port": 1.0, "starboard": -1.0}
     for thruster in card.thrusters:
-        for side, sign in (("port", -1.0), ("starboard", 1.0)):
-            if side in thruster.name and thruster.y_m * sign < 0:
-                yield f"thruster {thruster.name} is at y_m = {thruster.y_m:g}: y is positive to starboard"
+        if any(side in thruster.name and thruster.y_m * sign > 0 for side, sign in wrong.items()):
+            yield f"thruster {thruster.name} is at y_m = {thruster.y_m:g}: y is positive to starboard"
 
 
 def _proportions(card: SteeredCard, usual: dict[str, tuple[float, float]]) -> Iterator[str]:

@@ -27,16 +27,8 @@ def form_fault(
 ) -> InputError:
     """The first fault that pydantic found, as one line with place and remedy.
 
-    Parameters
-    ----------
-    source : str or path
-        The file.
-    spelt : mapping
-        Dotted key in SI to the key as it is spelt in the file, where the two differ.
-    form : type
-        The form that the file should follow.
-    what : str
-        What the file is, for the message: ``a card``.
+    `source`: the file. `spelt`: dotted key in SI to the key as it is spelt in the file, where the two differ. `form`:
+    the form that the file should follow. `what`: what the file is, for the message: ``a card``.
     """
     # A key that is unknown explains one that is missing (length_ft for length_m), not the other way round.
     first: Any = min(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")

@@ -8,12 +8,13 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel
 
-from tank2sim.cards.card import Card, CraftCard, ManoeuvringCard, MmgCard
-from tank2sim.cards.form import CardSection, CraftForm, MmgForm, Propulsion, ShipCard
+from tank2sim.cards.card import OPPOSITE, Card, CraftCard, ManoeuvringCard, MmgCard, scales_of_file
+from tank2sim.cards.form import CardSection, CraftForm, EffectEntry, MmgForm, Propulsion, RigidBody, Roll, ShipCard
 from tank2sim.cards.form_faults import suggestion
-from tank2sim.cards.manoeuvring import refuse_doubled_effects, ship_card_of
 from tank2sim.cards.mmg import mmg_fields, nominal_revolutions, refuse_other_scaling
+from tank2sim.cards.scaling import LARGEST_PRIME, FileScales, file_factor
 from tank2sim.cards.small_craft import craft_card
+from tank2sim.cards.terms import known_term, parse_term
 from tank2sim.errors import InputError
 from tank2sim.plugins import Registry
 
@@ -74,7 +75,7 @@ def si_card(kind: type[_C], section: str) -> Callable[[BaseModel, str, str, Mapp
 
 
 def _ship(form: ShipCard, text: str, source: str, spelt: Mapping[str, str]) -> ManoeuvringCard:
-    return replace(ship_card_of(form, text, source), spelt=spelt)
+    return replace(_ship_card(form, text, source), spelt=spelt)
 
 
 def _mmg(form: MmgForm, text: str, source: str, spelt: Mapping[str, str]) -> MmgCard:
@@ -87,7 +88,7 @@ def _mmg(form: MmgForm, text: str, source: str, spelt: Mapping[str, str]) -> Mmg
 
 
 def _craft(form: CraftForm, text: str, source: str, spelt: Mapping[str, str]) -> CraftCard:
-    refuse_doubled_effects(form.effects, source)
+    _refuse_doubled_effects(form.effects, source)
     return craft_card(form, text, source, spelt)
 
 
@@ -104,3 +105,150 @@ CARD_KINDS: Registry[CardKind] = Registry(
     CardKind,
 )
 """Built-in kinds and those of installed packages."""
+
+
+def _ship_card(form: ShipCard, text: str, source: str) -> ManoeuvringCard:
+    """Return the card of a form, in the prime system and with the rudder positive to starboard.
+
+    `form`: sections as in the file, angles and rates in SI. `text`, `source`: text of the file and its name, for
+    messages. Raises InputError: a derivative is unknown or given twice, or a value is implausible.
+    """
+    scales = _file_scales(form, source)
+    to_port = form.model.rudder_sign == "port"
+    body = _prime_rigid_body(form.rigid_body, scales, source)
+    aliases = OPPOSITE if form.model.kind == "mmg" else {}
+    places = _canonical_names(form.derivatives, "derivatives", source, aliases)
+    stated = _canonical_names(form.uncertainty, "uncertainty", source, aliases)
+
+    def inside(name: str, key: str, value: float) -> float:
+        sign = aliases.get(key, (name, 1.0))[1]
+        return sign * value / file_factor(known_term(name), scales, rudder_to_port=to_port)
+
+    def bounded(section: str, keys: Mapping[str, str], given: Mapping[str, float]) -> dict[str, float]:
+        prime = {name: inside(name, key, given[key]) for name, key in keys.items()}
+        for name, value in prime.items():
+            if abs(value) > LARGEST_PRIME:
+                problem = f"is {value:.4g} in the prime system"
+                raise InputError(source, f"{section}.{keys[name]}", problem, f"at most {LARGEST_PRIME:g} was expected")
+        return prime
+
+    _refuse_other_mass(form, body, source)
+    _refuse_doubled_effects(form.effects, source)
+    _refuse_half_of_roll(form, [*places.items(), *stated.items()], source)
+    return ManoeuvringCard(
+        source=source,
+        text=text,
+        ship=form.ship,
+        environment=form.environment,
+        model=form.model,
+        rigid_body=body,
+        derivatives=bounded("derivatives", places, form.derivatives),
+        uncertainty={name: abs(error) for name, error in bounded("uncertainty", stated, form.uncertainty).items()},
+        places=places,
+        roll=_prime_roll(form.roll, scales, source),
+        steering_gear=form.steering_gear,
+        propulsion=_prime_propulsion(form.propulsion, scales),
+        waves=form.waves,
+        effects=tuple(form.effects),
+        fitted_trials=tuple(form.fitted_trials),
+    )
+
+
+def _file_scales(form: ShipCard, source: str) -> FileScales | None:
+    try:
+        return scales_of_file(form.ship, form.environment, form.model)
+    except KeyError as error:
+        key = error.args[0]
+        problem = f'is missing, and scaling = "{form.model.scaling}" needs it'
+        raise InputError(source, f"ship.{key}", problem, "add it") from None
+
+
+def _prime_rigid_body(body: RigidBody, scales: FileScales | None, source: str) -> RigidBody:
+    if scales is not None:
+        body = RigidBody(
+            mass=body.mass / scales.mass, yaw_inertia=body.yaw_inertia / scales.inertia, x_G=body.x_G / scales.length
+        )
+    # No ship's m' exceeds 2 (m' = 2 C_B B T / L^2, each ratio below 1), and its centre of gravity lies inside the hull.
+    if body.mass > 2.0:
+        remedy = 'a prime mass is about 0.01; is the card in SI (scaling = "dimensional")?'
+        raise InputError(source, "rigid_body.mass", f"is {body.mass:g} in the prime system", remedy)
+    if abs(body.x_G) > 0.5:
+        remedy = "x_G is measured from midships, positive forward, in lengths if scaling is prime"
+        raise InputError(source, "rigid_body.x_G", f"puts the centre of gravity {body.x_G:g} L from midships", remedy)
+    return body
+
+
+_MASS_RATIO = 2.0
+"""Ratio of a card's mass to its displacement beyond which one of them is of another scaling or size. Project choice:
+mass in prime for prime II is off by the ratio of length to draught, 10 to 25."""
+
+
+def _refuse_other_mass(form: ShipCard, body: RigidBody, source: str) -> None:
+    """Raise InputError if mass and displacement differ, where the card states both."""
+    stated = form.ship.displacement_kg
+    if stated is None:
+        return
+    mass = body.mass * 0.5 * form.environment.water_density_kgpm3 * form.ship.length_m**3
+    if not 1 / _MASS_RATIO < mass / stated < _MASS_RATIO:
+        problem = f'is {mass:.4g} kg by scaling = "{form.model.scaling}", and ship.displacement_kg is {stated:.4g}'
+        raise InputError(source, "rigid_body.mass", problem, "check scaling, length_m, draught_m and displacement_kg")
+
+
+def _prime_roll(roll: Roll | None, scales: FileScales | None, source: str) -> Roll | None:
+    if roll is None:
+        return None
+    heights = {key: getattr(roll, key) / (scales.length if scales else 1.0) for key in ("z_G", "z_R", "l_x")}
+    for key, value in heights.items():
+        if abs(value) > 0.5:
+            remedy = "heights are measured from the origin, positive downwards, in lengths if scaling is prime"
+            raise InputError(source, f"roll.{key}", f"is {value:g} L from the origin", remedy)
+    inertia = roll.roll_inertia / (scales.inertia if scales else 1.0)
+    return roll.model_copy(update={"roll_inertia": inertia, **heights})
+
+
+def _refuse_half_of_roll(form: ShipCard, places: list[tuple[str, str]], source: str) -> None:
+    """Raise InputError if terms of roll have no ``[roll]``, or ``[roll]`` has no metacentric height or damping."""
+    if form.roll is None:
+        for name, key in places:
+            if known_term(name).of_roll:
+                remedy = "give [roll] with roll_inertia, and ship.metacentric_height_m"
+                raise InputError(source, f"derivatives.{key}", "is a term of a ship that rolls", remedy)
+        return
+    height = form.ship.metacentric_height_m
+    if height is None or height <= 0:
+        problem = "is missing" if height is None else f"is {height:g} m: the ship has no stable upright position"
+        raise InputError(source, "ship.metacentric_height_m", problem, "[roll] needs it, above zero")
+    if "Kp" not in dict(places):
+        raise InputError(source, "derivatives.Kp", "is missing", "[roll] needs the damping of roll (negative)")
+
+
+def _prime_propulsion(propulsion: Propulsion | None, scales: FileScales | None) -> Propulsion | None:
+    if propulsion is None or scales is None:
+        return propulsion
+    return propulsion.model_copy(update={"Xnn": propulsion.Xnn / scales.force})
+
+
+def _canonical_names(
+    values: Mapping[str, float], section: str, source: str, aliases: Mapping[str, tuple[str, float]]
+) -> dict[str, str]:
+    """Canonical name to the key in the file; `aliases` are further keys, to the name that they mean."""
+    places: dict[str, str] = {}
+    for key in values:
+        term = parse_term(aliases.get(key, (key, 1.0))[0])
+        if term is None:
+            remedy = "a name is X, Y or N and then v, r, d, u as often as they occur (Yvvr), 0 or udot, vdot, rdot"
+            remedy += "; with [roll] also K, p, phi and pdot"
+            raise InputError(source, f"{section}.{key}", "is not a name of a derivative", remedy)
+        if term.name in places:
+            problem = f"is the same term as {places[term.name]}"
+            raise InputError(source, f"{section}.{key}", problem, f"give it once, as {term.name}")
+        places[term.name] = key
+    return places
+
+
+def _refuse_doubled_effects(effects: list[EffectEntry], source: str) -> None:
+    """Raise InputError if an effect is given twice."""
+    names = [entry.name for entry in effects]
+    for number, name in enumerate(names):
+        if name in names[:number]:
+            raise InputError(source, f"effects.{number}.name", f"{name} is given twice", "give each effect once")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from tank2sim.cards.card import (
 from tank2sim.cards.form import MmgForm, MmgPropeller, MmgRudder, ShipCard
 from tank2sim.errors import InputError
 
-_CURVES = ("k_0", "k_1", "k_2", "q_0", "q_1", "q_2")
+_THRUST, _TORQUE = ("k_0", "k_1", "k_2"), ("q_0", "q_1", "q_2")
 
 WITH_BOTH_SIDES = {
     "propeller": (("C_2_plus", "C_2_minus"),),
@@ -35,14 +36,10 @@ def fujii(aspect_ratio: float) -> float:
 def mmg_fields(form: MmgForm, source: str) -> tuple[dict[str, Any], ShipCard]:
     """The fields that only an MMG card has, and the form without them.
 
-    Raises
-    ------
-    InputError
-        A value is given for one side alone, K_T or the slope of the rudder is given twice or not at all, or eta > 1.
+    Raises InputError: a value is given for one side alone, K_T or the slope of the rudder is given twice or not at all,
+    or eta > 1.
     """
-    for section, pairs in WITH_BOTH_SIDES.items():
-        for pair in pairs:
-            _check_pair(getattr(form, section), section, pair, source)
+    _refuse_one_side(form, source)
     propeller = _propeller(form.propeller, source)
     rudder = _rudder(form.rudder, source)
     if rudder.number != propeller.number:
@@ -52,10 +49,9 @@ def mmg_fields(form: MmgForm, source: str) -> tuple[dict[str, Any], ShipCard]:
         ratio = form.ship.propeller_diameter_m / rudder.height_m
         problem = f"is less than the propeller's diameter (eta = D_P/H_R = {ratio:.3g})"
         raise InputError(source, "rudder.height_m", problem, "check both: the race covers a share eta of the rudder")
-    errors = {
-        key: error for key, error in form.uncertainty.items() if key in (*PROPELLER_COEFFICIENTS, *RUDDER_COEFFICIENTS)
-    }
-    if form.propeller.J is not None and (key := next((key for key in _CURVES if key in errors), "")):
+    known = (*PROPELLER_COEFFICIENTS, *RUDDER_COEFFICIENTS)
+    errors = {key: error for key, error in form.uncertainty.items() if key in known}
+    if form.propeller.J is not None and (key := next((key for key in (*_THRUST, *_TORQUE) if key in errors), "")):
         remedy = "give k_0, k_1, k_2 in place of J and K_T (q_0, q_1, q_2 of K_Q), or leave it out"
         raise InputError(source, f"uncertainty.{key}", "is of a polynomial, and [propeller] has a table", remedy)
     remaining = {key: error for key, error in form.uncertainty.items() if key not in errors}
@@ -63,42 +59,37 @@ def mmg_fields(form: MmgForm, source: str) -> tuple[dict[str, Any], ShipCard]:
     return own, form.model_copy(update={"propulsion": None, "uncertainty": remaining})
 
 
-def _check_pair(section: MmgPropeller | MmgRudder, name: str, pair: tuple[str, str], source: str) -> None:
-    given = [key for key in pair if getattr(section, key) is not None]
-    if len(given) == 1:
-        absent = next(key for key in pair if key not in given)
-        remedy = f"{given[0]} is of one side: give both"
-        raise InputError(source, f"{name}.{absent}", "is missing", remedy)
+def _refuse_one_side(form: MmgForm, source: str) -> None:
+    for name, pairs in WITH_BOTH_SIDES.items():
+        for pair in pairs:
+            if len(given := _given(getattr(form, name), pair)) == 1:
+                absent = next(key for key in pair if key not in given)
+                raise InputError(source, f"{name}.{absent}", "is missing", f"{given[0]} is of one side: give both")
+
+
+def _given(section: MmgPropeller | MmgRudder, keys: Sequence[str]) -> list[str]:
+    return [key for key in keys if getattr(section, key) is not None]
+
+
+def _complete(given: Sequence[str], keys: Sequence[str], source: str) -> None:
+    """Raise InputError if some but not all of the `keys` of ``[propeller]`` are given."""
+    if given and (absent := [key for key in keys if key not in given]):
+        raise InputError(source, f"propeller.{absent[0]}", "is missing", f"{given[0]} is given: give {', '.join(keys)}")
 
 
 def _propeller(section: MmgPropeller, source: str) -> MmgPropeller:
-    polynomial = [key for key in ("k_0", "k_1", "k_2") if getattr(section, key) is not None]
-    table = [key for key in ("J", "K_T") if getattr(section, key) is not None]
-    if polynomial and table:
-        raise InputError(source, f"propeller.{table[0]}", f"is given, and {polynomial[0]} too", "give one of the two")
-    for keys, given in ((("k_0", "k_1", "k_2"), polynomial), (("J", "K_T"), table)):
-        for key in keys:
-            if given and key not in given:
-                raise InputError(
-                    source, f"propeller.{key}", "is missing", f"{given[0]} is given: give {', '.join(keys)}"
-                )
-    update: dict[str, float] = {}
-    if section.J is not None and section.K_T is not None:
-        fit = open_water_fit(section.J, section.K_T, source)
-        update |= dict(zip(("k_0", "k_1", "k_2"), fit.coefficients.tolist(), strict=True))
-    elif not polynomial:
+    polynomial, table = _given(section, _THRUST), _given(section, ("J", "K_T"))
+    _refuse_both(polynomial, table, source)
+    _complete(polynomial, _THRUST, source)
+    _complete(table, ("J", "K_T"), source)
+    if not polynomial and not table:
         raise InputError(source, "propeller.k_0", "is missing", "give k_0, k_1, k_2 or points J, K_T of the curve")
-    update |= _torque(section, source)
-    by_polynomial = _one_form(section, "propeller", WAKE_BY_DRIFT, source)
-    if not by_polynomial and (section.C_1 is None) != (section.C_2_plus is None):
-        absent, there = ("C_1", "C_2_plus") if section.C_1 is None else ("C_2_plus", "C_1")
-        raise InputError(
-            source, f"propeller.{absent}", "is missing", f"{there} is given: give C_1, C_2_plus, C_2_minus"
-        )
-    if by_polynomial:
+    update = _curve(section, "K_T", _THRUST, source) | _torque(section, source)
+    if _one_form(section, "propeller", WAKE_BY_DRIFT, source):
         update |= {key: getattr(section, key) or 0.0 for key in WAKE_BY_DRIFT[1]}
-    elif section.C_1 is None:
-        update |= {"C_1": 0.0, "C_2_plus": 1.0, "C_2_minus": 1.0}
+    else:
+        _complete(_given(section, WAKE_BY_DRIFT[0]), WAKE_BY_DRIFT[0], source)
+        update |= {} if section.C_1 is not None else {"C_1": 0.0, "C_2_plus": 1.0, "C_2_minus": 1.0}
     if section.number == 2 and section.y_P is None:
         raise InputError(
             source, "propeller.y_P", "is missing", "two propellers need their distance to midships, over L"
@@ -106,31 +97,38 @@ def _propeller(section: MmgPropeller, source: str) -> MmgPropeller:
     return section.model_copy(update=update)
 
 
+def _refuse_both(polynomial: Sequence[str], table: Sequence[str], source: str) -> None:
+    if polynomial and table:
+        raise InputError(source, f"propeller.{table[0]}", f"is given, and {polynomial[0]} too", "give one of the two")
+
+
 def _torque(section: MmgPropeller, source: str) -> dict[str, float]:
     """q_0, q_1, q_2 and eta_R, as given or of a table of K_Q; empty without K_Q."""
-    given = [key for key in ("q_0", "q_1", "q_2") if getattr(section, key) is not None]
-    if section.K_Q is not None and given:
-        raise InputError(source, "propeller.K_Q", f"is given, and {given[0]} too", "give one of the two")
-    if given and (absent := [key for key in ("q_0", "q_1", "q_2") if key not in given]):
-        raise InputError(source, f"propeller.{absent[0]}", "is missing", f"{given[0]} is given: give q_0, q_1, q_2")
-    if section.K_Q is not None and section.J is None:
+    given, table = _given(section, _TORQUE), _given(section, ("K_Q",))
+    _refuse_both(given, table, source)
+    _complete(given, _TORQUE, source)
+    if table and section.J is None:
         raise InputError(source, "propeller.J", "is missing", "give the J of each K_Q")
-    if section.K_Q is None and not given:
-        if section.eta_R is not None:
-            raise InputError(source, "propeller.eta_R", "is given without K_Q", "give q_0, q_1, q_2 or leave it out")
+    if given or table:
+        return {"eta_R": 1.0 if section.eta_R is None else section.eta_R} | _curve(section, "K_Q", _TORQUE, source)
+    if section.eta_R is not None:
+        raise InputError(source, "propeller.eta_R", "is given without K_Q", "give q_0, q_1, q_2 or leave it out")
+    return {}
+
+
+def _curve(section: MmgPropeller, curve: str, keys: Sequence[str], source: str) -> dict[str, float]:
+    """Coefficients of a table; empty without one."""
+    values = getattr(section, curve)
+    if values is None or section.J is None:
         return {}
-    update = {"eta_R": 1.0 if section.eta_R is None else section.eta_R}
-    if section.K_Q is None or section.J is None:
-        return update
-    fit = open_water_fit(section.J, section.K_Q, source, "K_Q")
-    return update | dict(zip(("q_0", "q_1", "q_2"), fit.coefficients.tolist(), strict=True))
+    return dict(zip(keys, open_water_fit(section.J, values, source, curve).coefficients.tolist(), strict=True))
 
 
 def _one_form(
     section: MmgPropeller | MmgRudder, name: str, forms: tuple[tuple[str, ...], tuple[str, ...]], source: str
 ) -> bool:
     """True if a section has the second form of two, whose keys `forms` has; keys of both are refused."""
-    first, second = ([key for key in keys if getattr(section, key) is not None] for keys in forms)
+    first, second = (_given(section, keys) for keys in forms)
     if first and second:
         remedy = f"give {', '.join(forms[0])} or {', '.join(forms[1])}"
         raise InputError(source, f"{name}.{second[0]}", f"is given, and {first[0]} too", remedy)
@@ -147,10 +145,7 @@ class OpenWaterFit(NamedTuple):
 def open_water_fit(J: list[float], values: list[float], source: str, curve: str = "K_T") -> OpenWaterFit:
     """Least squares of a curve, K_T or K_Q, on 1, J, J^2.
 
-    Raises
-    ------
-    InputError
-        The lists differ in length, or have fewer than three different J.
+    Raises InputError: the lists differ in length, or have fewer than three different J.
     """
     if len(J) != len(values):
         problem = f"has {len(values)} values and J {len(J)}"
@@ -170,12 +165,12 @@ def _rudder(section: MmgRudder, source: str) -> MmgRudder:
         raise InputError(source, "rudder.gamma_R_plus", "is missing", "give gamma_R_plus and gamma_R_minus")
     elif section.l_R is None:
         raise InputError(source, "rudder.l_R", "is missing", "give l_R, the effective place of the rudder in yaw")
-    if section.f_alpha is None and section.aspect_ratio is None:
-        raise InputError(source, "rudder.f_alpha", "is missing", "give f_alpha or aspect_ratio")
+    if section.f_alpha is None:
+        if section.aspect_ratio is None:
+            raise InputError(source, "rudder.f_alpha", "is missing", "give f_alpha or aspect_ratio")
+        update["f_alpha"] = fujii(section.aspect_ratio)
     if section.number == 2 and section.y_R is None:
         raise InputError(source, "rudder.y_R", "is missing", "two rudders need their distance to midships, over L")
-    if section.f_alpha is None and section.aspect_ratio is not None:
-        update |= {"f_alpha": fujii(section.aspect_ratio)}
     return section.model_copy(update=update)
 
 
@@ -184,16 +179,8 @@ def equilibrium_revolutions(
 ) -> float | None:
     """n (1/s) at which K_T rho n^2 D^4 is a resistance over rho, at an inflow u_P; None if there is none.
 
-    Parameters
-    ----------
-    resistance : float
-        T/rho of one propeller, m4/s2.
-    inflow : float
-        (1 - w_P0) u, m/s.
-    diameter : float
-        D_P, m.
-    coefficients : tuple
-        k_0, k_1, k_2.
+    `resistance`: T/rho of one propeller, m4/s2. `inflow`: (1 - w_P0) u, m/s. `diameter`: D_P, m. `coefficients`: k_0,
+    k_1, k_2.
     """
     k_0, k_1, k_2 = coefficients
     # k_0 D^4 n^2 + k_1 D^3 u_P n + k_2 D^2 u_P^2 - T/rho = 0
@@ -212,10 +199,7 @@ def equilibrium_revolutions(
 def nominal_revolutions(card: MmgCard, stated: float | None) -> float:
     """Revolutions (rad/s) of the approach: those stated, or those that hold ``model.speed_mps`` straight ahead.
 
-    Raises
-    ------
-    InputError
-        None do.
+    Raises InputError: None do.
     """
     if stated is not None:
         return stated
@@ -240,14 +224,7 @@ bounds are a project choice."""
 def refuse_other_scaling(card: MmgCard) -> None:
     """Raise InputError if Y_v is of another scaling, length or draught than the card's.
 
-    Parameters
-    ----------
-    card : MmgCard
-
-    Raises
-    ------
-    InputError
-        Y_v is not within :data:`_SLENDER_WING`.
+    Raises InputError: Y_v is not within :data:`_SLENDER_WING`.
     """
     draught, value = card.ship.draught_m, card.derivatives.get("Yv", 0.0)
     if draught is None or not value:

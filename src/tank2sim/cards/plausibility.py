@@ -61,18 +61,9 @@ N_vdot, are not listed."""
 class Caution:
     """A warning.
 
-    Parameters
-    ----------
-    kind : str
-        Subject, such as ``"frequency parameter"``.
-    fact : str
-        One sentence, with figures and source.
-    runs : tuple of str
-        The runs concerned; empty for the whole campaign.
-    missing : str
-        The missing key that prevents the check; empty if the check was made.
-    remedy : str
-        What to check in the campaign that the numbers are from.
+    `kind`: subject, such as ``"frequency parameter"``. `fact`: one sentence, with figures and source. `runs`: the runs
+    concerned; empty for the whole campaign. `missing`: the missing key that prevents the check; empty if the check was
+    made. `remedy`: what to check in the campaign that the numbers are from.
     """
 
     kind: str

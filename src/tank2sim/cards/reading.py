@@ -14,12 +14,7 @@ from pydantic import ValidationError
 from tomlkit.exceptions import TOMLKitError
 
 from tank2sim.bundled import bundled, bundled_cards
-from tank2sim.cards.card import (
-    Card,
-    ManoeuvringCard,
-    MmgCard,
-    SteeredCard,
-)
+from tank2sim.cards.card import Card, ManoeuvringCard, MmgCard, SteeredCard
 from tank2sim.cards.craft_terms import body_scales, craft_scale
 from tank2sim.cards.examination import refuse_impossible
 from tank2sim.cards.form_faults import form_fault, short
@@ -83,7 +78,7 @@ def parse_card(text: str, source: str) -> Card:
 
 
 def _parsed(text: str, source: str) -> Card:
-    content = _content(text, source)
+    content = parsed_toml(text, source)
     form_name = str(content.get("format", ""))
     if form_name.startswith("tank2sim-") and not form_name.startswith("tank2sim-ship/"):
         raise InputError(source, "format", f"is {form_name}, not a ship card", _SHIP_CARD)
@@ -115,16 +110,7 @@ def changed_text(text: str, source: str, changes: Mapping[str, object], *, comme
     document = _document(text, source)
     for key, value in changes.items():
         *sections, last = key.split(".")
-        table: Any = document
-        for section in sections:
-            if isinstance(table, list) and section.isdigit() and int(section) < len(table):
-                table = table[int(section)]
-                continue
-            if section not in table:
-                table[section] = tomlkit.table()
-            table = table[section]
-            if not isinstance(table, dict | list):
-                raise InputError(source, key, f"cannot be set: {section} is not a section", "give section.key=value")
+        table = _section_of(document, sections, source, key)
         try:
             table[last] = value.item() if isinstance(value, np.generic) else value
         except (TypeError, ValueError):
@@ -134,6 +120,21 @@ def changed_text(text: str, source: str, changes: Mapping[str, object], *, comme
             table[last].comment(one_line(comment))
     mark = BYTE_ORDER_MARK if text.startswith(BYTE_ORDER_MARK) else ""
     return mark + tomlkit.dumps(document)
+
+
+def _section_of(document: Any, sections: Sequence[str], source: str, key: str) -> Any:
+    """The table of a document that `sections` lead to, made where it is absent."""
+    table = document
+    for section in sections:
+        if isinstance(table, list) and section.isdigit() and int(section) < len(table):
+            table = table[int(section)]
+            continue
+        if section not in table:
+            table[section] = tomlkit.table()
+        table = table[section]
+        if not isinstance(table, dict | list):
+            raise InputError(source, key, f"cannot be set: {section} is not a section", "give section.key=value")
+    return table
 
 
 def revised(
@@ -185,12 +186,8 @@ def craft_in_scaling(card: SteeredCard, scaling: str) -> SteeredCard:
     return parse_card(changed_text(card.text, card.source, changes), card.source).steered()
 
 
-def _content(text: str, source: str) -> dict[str, Any]:
-    return parsed_toml(text, source)
-
-
 def _document(text: str, source: str) -> tomlkit.TOMLDocument:
-    _content(text, source)  # unlike tomlkit, tomllib reports the place of every fault, a doubled key's too
+    parsed_toml(text, source)  # unlike tomlkit, tomllib reports the place of every fault, a doubled key's too
     with faults_of_toml(source):
         document = tomlkit.parse(text.removeprefix(BYTE_ORDER_MARK))
     return document
@@ -221,23 +218,10 @@ def faults_of_toml(source: str) -> Iterator[None]:
 
 def _angles_to_radians(content: dict[str, Any], source: str, sections: Sequence[str], spelt: dict[str, str]) -> None:
     """Convert degrees in place; `spelt` learns what a converted key is called in the file."""
-    places = [(name, content[name]) for name in sections if name in content]
-    entries = content.get("effects")
-    for number, entry in enumerate(entries if isinstance(entries, list) else []):
-        if isinstance(entry, dict):
-            places += [
-                (f"effects.{number}.{part}", entry[part]) for part in ("parameters", "uncertainty") if part in entry
-            ]
-    thrusters = content.get("thrusters")
-    for number, entry in enumerate(thrusters if isinstance(thrusters, list) else []):
-        if isinstance(entry, dict):
-            places.append((f"thrusters.{number}", entry))
-            places.append((f"thrusters.{number}.uncertainty", entry.get("uncertainty")))
-    for place, section in places:
+    for place, section in _with_angles(content, sections):
         if not isinstance(section, dict):
             continue  # the form will refuse it
-        for key in list(section):
-            value = section[key]
+        for key, value in list(section.items()):
             if isinstance(value, bool) or not isinstance(value, int | float):
                 continue
             try:
@@ -251,3 +235,14 @@ def _angles_to_radians(content: dict[str, Any], source: str, sections: Sequence[
                     raise InputError(source, f"{place}.{key}", f"is given twice, also as {other}", "give it once")
                 del section[key]
                 section[si_key] = si_value
+
+
+def _with_angles(content: dict[str, Any], sections: Sequence[str]) -> Iterator[tuple[str, Any]]:
+    """Places and tables whose keys may be in degrees: `sections`, and what is in effects and thrusters."""
+    yield from ((name, content[name]) for name in sections if name in content)
+    for name, parts in (("effects", ("parameters", "uncertainty")), ("thrusters", ("", "uncertainty"))):
+        entries = content.get(name)
+        for number, entry in enumerate(entries if isinstance(entries, list) else []):
+            place = f"{name}.{number}"
+            for part in parts if isinstance(entry, dict) else ():
+                yield (f"{place}.{part}", entry.get(part)) if part else (place, entry)

@@ -62,74 +62,17 @@ class Scales:
 
 
 @dataclass(frozen=True)
-class PrimeII:
-    """Prime system of the MMG method, in which L d takes the place of L^2: everything is L/d times as large.
+class OtherPrime:
+    """A non-dimensional system in which masses are `scale`/`ship_mass` of those of the prime system, lengths in L.
 
-    Parameters
-    ----------
-    ratio : float
-        L/d.
+    Each velocity takes one of the two powers of `froude` that a force has. Prime system II of the MMG method has L d in
+    place of L^2: `scale` is L/d. Norrbin's bis system (1971, SSPA publication 68), with times in sqrt(L/g) and masses
+    in the ship's own, finite at rest: `froude` is u0/sqrt(g L), `ship_mass` m' of the ship.
     """
 
-    ratio: float
-
-    def derivative(self, term: Term) -> float:
-        """Value of any derivative whose prime value is 1."""
-        return self.ratio
-
-    @property
-    def mass(self) -> float:
-        """Value of m' = 1."""
-        return self.ratio
-
-    @property
-    def inertia(self) -> float:
-        """Value of J_z' = 1: by rho L^4 d/2."""
-        return self.ratio
-
-    @property
-    def length(self) -> float:
-        """Value of x_G' = 1: lengths are in L in both systems."""
-        return 1.0
-
-    @property
-    def force(self) -> float:
-        """Value of X' = 1."""
-        return self.ratio
-
-
-@dataclass(frozen=True)
-class Bis:
-    """Norrbin's bis system: lengths in L, times in sqrt(L/g), masses in the ship's own; finite at rest.
-
-    Norrbin (1971), SSPA publication 68.
-
-    Parameters
-    ----------
-    froude : float
-        u0/sqrt(g L).
-    ship_mass : float
-        m' of the ship in the prime system.
-    """
-
-    froude: float
-    ship_mass: float
-
-    def derivative(self, term: Term) -> float:
-        """Value of a derivative whose prime value is 1: each velocity takes one of the two powers of Fn."""
-        if term.acceleration:
-            return 1 / self.ship_mass
-        return self.froude ** (2 - term.v - term.r - term.p - term.u) / self.ship_mass
-
-    @property
-    def mass(self) -> float:
-        """Value of m' = 1."""
-        return 1 / self.ship_mass
-
-    @property
-    def inertia(self) -> float:
-        """Value of J_z' = 1."""
-        return 1 / self.ship_mass
+    scale: float = 1.0
+    froude: float = 1.0
+    ship_mass: float = 1.0
 
     @property
     def length(self) -> float:
@@ -137,12 +80,28 @@ class Bis:
         return 1.0
 
     @property
+    def mass(self) -> float:
+        """Value of m' = 1."""
+        return self.scale / self.ship_mass
+
+    @property
+    def inertia(self) -> float:
+        """Value of J_z' = 1."""
+        return self.mass
+
+    @property
     def force(self) -> float:
         """Value of X' = 1."""
-        return self.froude**2 / self.ship_mass
+        return self.scale * self.froude**2 / self.ship_mass
+
+    def derivative(self, term: Term) -> float:
+        """Value of a derivative whose prime value is 1."""
+        if term.acceleration:
+            return self.mass
+        return self.scale * self.froude ** (2 - term.v - term.r - term.p - term.u) / self.ship_mass
 
 
-FileScales = Scales | PrimeII | Bis
+FileScales = Scales | OtherPrime
 """What the numbers of a file are in, other than the prime system."""
 
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 from tank2sim.cards.card import CraftCard, SteeredCard
 from tank2sim.cards.craft_terms import CRAFT_TERMS, body_scales, craft_scale
-from tank2sim.cards.form import CraftForm
+from tank2sim.cards.form import CraftForm, ThrusterSection
 from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
 from tank2sim.units import from_si
@@ -27,28 +27,12 @@ UNCERTAIN_OF_THRUSTER = (
 def craft_card(form: CraftForm, text: str, source: str, spelt: Mapping[str, str]) -> CraftCard:
     """The card of a form, in SI.
 
-    Parameters
-    ----------
-    form : CraftForm
-        Sections as in the file, angles and rates in SI.
-    text, source : str
-        Text of the file and its name, for messages.
-    spelt : mapping
-        Place of an angle or a rate in SI to its place in the file.
-
-    Raises
-    ------
-    InputError
-        A term is unknown, mass or place is implausible, a thruster is given twice or states what it cannot, or the
-        thrusters cannot hold the cruising speed.
+    `form`: sections as in the file, angles and rates in SI. `text`, `source`: text of the file and its name, for
+    messages. `spelt`: place of an angle or a rate in SI to its place in the file. Raises InputError: a term is unknown,
+    mass or place is implausible, a thruster is given twice or states what it cannot, or the thrusters cannot hold the
+    cruising speed.
     """
-    for section, names in (("derivatives", form.derivatives), ("uncertainty", form.uncertainty)):
-        for name in names:
-            if name not in CRAFT_TERMS:
-                close = difflib.get_close_matches(name, CRAFT_TERMS, n=1)
-                hint = f"did you mean {close[0]}? " if close else ""
-                remedy = f"{hint}a small craft has {' '.join(CRAFT_TERMS)}"
-                raise InputError(source, f"{section}.{name}", "is not a term of a small craft", remedy)
+    _check_names(form, source)
     length, body = form.ship.length_m, form.rigid_body
     scales = Scales(form.environment.water_density_kgpm3, length, form.model.speed_mps)
     prime = form.model.scaling == "prime"
@@ -84,28 +68,43 @@ def craft_card(form: CraftForm, text: str, source: str, spelt: Mapping[str, str]
     return card
 
 
+def _check_names(form: CraftForm, source: str) -> None:
+    for section, names in (("derivatives", form.derivatives), ("uncertainty", form.uncertainty)):
+        for name in names:
+            if name not in CRAFT_TERMS:
+                close = difflib.get_close_matches(name, CRAFT_TERMS, n=1)
+                hint = f"did you mean {close[0]}? " if close else ""
+                remedy = f"{hint}a small craft has {' '.join(CRAFT_TERMS)}"
+                raise InputError(source, f"{section}.{name}", "is not a term of a small craft", remedy)
+
+
 def _check_thrusters(form: CraftForm, source: str, spelt: Mapping[str, str]) -> None:
-    names = [thruster.name for thruster in form.thrusters]
+    names: list[str] = []
     for number, thruster in enumerate(form.thrusters):
         place = f"thrusters.{number}"
-        if thruster.name in names[:number]:
+        if thruster.name in names:
             raise InputError(source, f"{place}.name", f"{thruster.name} is given twice", "give each a name of its own")
-        for key in thruster.uncertainty:
-            if key not in UNCERTAIN_OF_THRUSTER:
-                remedy = f"errors are of {', '.join(UNCERTAIN_OF_THRUSTER)}"
-                raise InputError(source, f"{place}.uncertainty.{key}", "has no standard error", remedy)
+        names.append(thruster.name)
+        if key := next((key for key in thruster.uncertainty if key not in UNCERTAIN_OF_THRUSTER), ""):
+            remedy = f"errors are of {', '.join(UNCERTAIN_OF_THRUSTER)}"
+            raise InputError(source, f"{place}.uncertainty.{key}", "has no standard error", remedy)
         if thruster.dead_band_radps >= thruster.max_radps:
             spelling = spelt.get(f"{place}.dead_band_radps", f"{place}.dead_band_radps")
             raise InputError(source, spelling, "is not below the largest revolutions", "check both, and their units")
         if max(abs(thruster.x_m), abs(thruster.y_m)) > form.ship.length_m:
             problem = f"is at {thruster.x_m:g}, {thruster.y_m:g} m on a craft of {form.ship.length_m:g} m"
             raise InputError(source, f"{place}.x_m", problem, "places are m from the origin")
-        if thruster.max_azimuth_rad is not None and thruster.azimuth_time_constant_s is None:
-            remedy = "a thruster that turns needs the time constant of its turn"
-            raise InputError(source, f"{place}.azimuth_time_constant_s", "is missing", remedy)
-        if thruster.max_azimuth_rad is None and thruster.azimuth_time_constant_s is not None:
-            remedy = "give it, or leave out the time constant of a thruster that does not turn"
-            raise InputError(source, f"{place}.max_azimuth_rad", "is missing", remedy)
+        _check_turn(thruster, place, source)
+
+
+def _check_turn(thruster: ThrusterSection, place: str, source: str) -> None:
+    turns = {
+        "max_azimuth_rad": "give it, or leave out the time constant of a thruster that does not turn",
+        "azimuth_time_constant_s": "a thruster that turns needs the time constant of its turn",
+    }
+    missing = [key for key in turns if getattr(thruster, key) is None]
+    if len(missing) == 1:
+        raise InputError(source, f"{place}.{missing[0]}", "is missing", turns[missing[0]])
 
 
 def _check_signs(card: CraftCard) -> None:
@@ -123,10 +122,7 @@ def cruising_revolutions(card: SteeredCard) -> float:
 
     (sum k cos a) n^2 - (sum l cos^2 a) u n = -(Xu u + Xuabsu u^2), a their azimuths.
 
-    Raises
-    ------
-    InputError
-        No thruster pushes ahead, or the speed is beyond the largest revolutions.
+    Raises InputError: no thruster pushes ahead, or the speed is beyond the largest revolutions.
     """
     ahead = [thruster for thruster, holds in zip(card.thrusters, pushes_ahead(card), strict=True) if holds]
     speed = card.model.speed_mps

@@ -44,17 +44,10 @@ def motion_columns(motion: str) -> tuple[str, str]:
 class WaveTable:
     """The table by frequency and direction.
 
-    Parameters
-    ----------
-    frequencies : numpy.ndarray, (nf,)
-        Rising, rad/s.
-    directions : numpy.ndarray, (nd,)
-        0 to pi, rad, evenly spaced.
-    motions : mapping
-        Motion to complex amplitude (nf, nd) over that of the wave: the real part is in phase with the surface at
-        midships, a positive imaginary one leads it.
-    drift : mapping
-        ``X``, ``Y``, ``N`` to mean force over the square of the wave's amplitude, (nf, nd), N/m^2 and N/m.
+    `frequencies` (nf,): rising, rad/s. `directions` (nd,): 0 to pi, rad, evenly spaced. `motions`: motion to complex
+    amplitude (nf, nd) over that of the wave: the real part is in phase with the surface at midships, a positive
+    imaginary one leads it. `drift`: ``X``, ``Y``, ``N`` to mean force over the square of the wave's amplitude, (nf,
+    nd), N/m^2 and N/m.
     """
 
     frequencies: Array
@@ -66,27 +59,12 @@ class WaveTable:
 def wave_table(columns: Sequence[str], rows: Sequence[Sequence[float]]) -> WaveTable:
     """Read the table of a card.
 
-    Raises
-    ------
-    ValueError
-        A column is unknown, missing or given twice, or the rows are not a table of all frequencies and directions.
+    Raises ValueError: a column is unknown, missing or given twice, or the rows are not a table of all frequencies and
+    directions.
     """
-    known = ["frequency_radps", "direction_deg", *(name for motion in WAVE_MOTIONS for name in motion_columns(motion))]
-    known += DRIFT_COLUMNS.values()
-    for name in columns:
-        if name not in known:
-            raise ValueError(f"columns has {name!r}, known are {', '.join(known)}")
-        if list(columns).count(name) > 1:
-            raise ValueError(f"columns has {name} twice")
-    for name in known[:2]:
-        if name not in columns:
-            raise ValueError(f"columns lacks {name}")
-    if wrong := next((place for place, row in enumerate(rows) if len(row) != len(columns)), None):
-        raise ValueError(f"row {wrong} has {len(rows[wrong])} numbers for {len(columns)} columns")
-    if not rows or len(rows[0]) != len(columns):
-        raise ValueError(f"rows of {len(columns)} numbers were expected")
+    _check_columns(columns, rows)
     values = dict(zip(columns, np.array(rows, dtype=float).T, strict=True))
-    frequencies, directions = (np.unique(values[name]) for name in known[:2])
+    frequencies, directions = (np.unique(values[name]) for name in _PLACES)
     _check_grid(frequencies, directions, values)
     order = np.lexsort((values["direction_deg"], values["frequency_radps"]))
     grid = {name: column[order].reshape(len(frequencies), -1) for name, column in values.items()}
@@ -99,6 +77,24 @@ def wave_table(columns: Sequence[str], rows: Sequence[Sequence[float]]) -> WaveT
         if name in MIRRORED and along > MESH_ASYMMETRY * np.max(np.abs(column)):
             raise ValueError(f"{name} is not zero in head and following waves, as that of a ship alike to both sides")
     return WaveTable(frequencies, np.radians(directions), motions, drift)
+
+
+_PLACES = ("frequency_radps", "direction_deg")
+
+
+def _check_columns(columns: Sequence[str], rows: Sequence[Sequence[float]]) -> None:
+    known = [*_PLACES, *(name for motion in WAVE_MOTIONS for name in motion_columns(motion)), *DRIFT_COLUMNS.values()]
+    for name in columns:
+        if name not in known:
+            raise ValueError(f"columns has {name!r}, known are {', '.join(known)}")
+        if list(columns).count(name) > 1:
+            raise ValueError(f"columns has {name} twice")
+    if absent := [name for name in _PLACES if name not in columns]:
+        raise ValueError(f"columns lacks {absent[0]}")
+    if wrong := next((place for place, row in enumerate(rows) if len(row) != len(columns)), None):
+        raise ValueError(f"row {wrong} has {len(rows[wrong])} numbers for {len(columns)} columns")
+    if not rows or len(rows[0]) != len(columns):
+        raise ValueError(f"rows of {len(columns)} numbers were expected")
 
 
 def _check_grid(frequencies: Array, directions: Array, values: Mapping[str, Array]) -> None:

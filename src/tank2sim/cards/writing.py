@@ -17,18 +17,9 @@ from tank2sim.escaping import one_line
 class SurgeResult:
     """What a card of a body that only surges is made of.
 
-    Parameters
-    ----------
-    name, source : str
-        What it is, and where the numbers come from.
-    values, standard_errors : mapping
-        Keys of ``[surge]``, SI, to numbers.
-    top_speed_mps : float
-        Highest speed at which they were measured.
-    length_m : float, optional
-        Length, if known.
-    notes : str
-        Anything a reader should know.
+    `name`, `source`: what it is, and where the numbers come from. `values`, `standard_errors`: keys of ``[surge]``, SI,
+    to numbers. `top_speed_mps`: highest speed at which they were measured. `length_m`: length, if known. `notes`:
+    anything a reader should know.
     """
 
     name: str
@@ -68,16 +59,9 @@ def surge_card_text(result: SurgeResult) -> str:
 class YawRigResult:
     """What a card of a body on the yaw rig is made of.
 
-    Parameters
-    ----------
-    name, source, notes : str
-        What it is, where the numbers come from, and what a reader should know.
-    values, standard_errors : mapping
-        Keys of ``[yaw_rig]``, SI, to numbers.
-    programme : mapping
-        Keys of ``[programme]``.
-    water_density_kgpm3, length_m : float, optional
-        Where they are known.
+    `name`, `source`, `notes`: what it is, where the numbers come from, and what a reader should know. `values`,
+    `standard_errors`: keys of ``[yaw_rig]``, SI, to numbers. `programme`: keys of ``[programme]``.
+    `water_density_kgpm3`, `length_m`: where they are known.
     """
 
     name: str
@@ -126,24 +110,10 @@ class DerivativeEntry(NamedTuple):
 class ManoeuvringResult:
     """What a card of a manoeuvring ship is made of: prime, instantaneous, "hydrodynamic", starboard-positive.
 
-    Parameters
-    ----------
-    particulars : mapping
-        Keys of ``[ship]`` but source and notes; SI.
-    source, notes : str
-        Where the numbers come from, and what a reader should know.
-    environment : mapping
-        Keys of ``[environment]``, SI.
-    speed_mps : float
-        u0, about which the forces are expanded.
-    largest : TestedRange
-        How far the tests went.
-    rigid_body : mapping
-        ``mass``, ``yaw_inertia``, ``x_G``.
-    inertia_source : str
-        Where the yaw inertia is from.
-    derivatives : mapping
-        Canonical name to entry, in the order of the card.
+    `particulars`: keys of ``[ship]`` but source and notes; SI. `source`, `notes`: where the numbers come from, and what
+    a reader should know. `environment`: keys of ``[environment]``, SI. `speed_mps`: u0, about which the forces are
+    expanded. `largest`: how far the tests went. `rigid_body`: ``mass``, ``yaw_inertia``, ``x_G``. `inertia_source`:
+    where the yaw inertia is from. `derivatives`: canonical name to entry, in the order of the card.
     """
 
     particulars: Mapping[str, float | str]

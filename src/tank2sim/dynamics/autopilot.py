@@ -83,15 +83,7 @@ def autopilot_model(name: str, gains: HeadingGains, step_s: float) -> Model:
 
 @dataclass(frozen=True)
 class IntegralState:
-    """The integral of a controller, its limit and its anti-windup: all that is alike in every design.
-
-    Parameters
-    ----------
-    anti_windup_time_s : float
-        Tt, s.
-    largest_rudder_rad : float
-        The rudder is ordered no further either way.
-    """
+    """The integral of a controller with its anti-windup time Tt (s) and the limit of the order (rad)."""
 
     anti_windup_time_s: float
     largest_rudder_rad: float
@@ -99,25 +91,24 @@ class IntegralState:
     def variables(self, demand: ca.SX, growth: ca.SX) -> tuple[Variable, ...]:
         """Variables of order = demand + z, within the limit, and dz/dt = growth + (rudder - order, within -z and 0)/Tt.
 
-        Parameters
-        ----------
-        demand : casadi.SX
-            Rudder without the integral, rad.
-        growth : casadi.SX
-            Rate of the integral away from the limit, rad/s.
+        `demand` is the rudder without the integral, rad; `growth` the rate of z away from the limit, rad/s.
         """
         tracking, start, most = parameters = self._parameters()
-        integral = _integral(start)
+        integral = State(
+            "autopilot.integral",
+            "rad",
+            "Rudder held against steady disturbances, positive to starboard",
+            display_unit="deg",
+            nominal=0.1,
+            derivative="autopilot.integral_rate",
+            start=start.symbol,
+        )
         wanted, order = _limited(demand + integral.symbol, most)
         z = integral.symbol
         emptied = ca.fmax(-ca.fmax(z, 0), ca.fmin(-ca.fmin(z, 0), order.symbol - wanted.symbol))
+        growing = growth + emptied / tracking.symbol
         rate = Quantity(
-            name="autopilot.integral_rate",
-            unit="rad/s",
-            description="Rate of the integral",
-            display_unit="deg/s",
-            nominal=1e-3,
-            value=growth + emptied / tracking.symbol,
+            integral.derivative, "rad/s", "Rate of the integral", growing, display_unit="deg/s", nominal=1e-3
         )
         return (*parameters, integral, wanted, order, rate)
 
@@ -129,17 +120,17 @@ class IntegralState:
     def _parameters(self) -> tuple[Parameter, Parameter, Parameter]:
         return (
             Parameter(
-                name="autopilot.anti_windup_time",
-                unit="s",
-                description="Time in which the integral is emptied while the rudder is at its limit",
+                "autopilot.anti_windup_time",
+                "s",
+                "Time in which the integral is emptied while the rudder is at its limit",
                 minimum=1e-3,
                 nominal=self.anti_windup_time_s,
                 start=self.anti_windup_time_s,
             ),
             Parameter(
-                name="initial.integral",
-                unit="rad",
-                description="Rudder held against steady disturbances at the start, positive to starboard",
+                "initial.integral",
+                "rad",
+                "Rudder held against steady disturbances at the start, positive to starboard",
                 display_unit="deg",
                 start=0.0,
                 nominal=0.1,
@@ -160,16 +151,7 @@ def steered_by(
     name: str, description: str, given: Sequence[Variable], held: Sequence[Variable], step_s: float
 ) -> Model:
     """A model of a controller of its variables; outputs ``rudder.command`` and ``heading.error``."""
-    empty = Model(
-        name=name,
-        description=description,
-        states=(),
-        inputs=(),
-        parameters=(),
-        quantities=(),
-        outputs=(),
-        step_s=step_s,
-    )
+    empty = Model(name, description, step_s=step_s)
     return empty.extend(*given, *held, outputs=("rudder.command", "heading.error"))
 
 
@@ -189,7 +171,7 @@ def heading_signals() -> tuple[Input, ...]:
         ("heading.command", "rad", "Ordered heading, clockwise from north", "deg", 1.0),
     )
     return tuple(
-        Input(name=name, unit=unit, description=description, display_unit=shown, nominal=nominal)
+        Input(name, unit, description, display_unit=shown, nominal=nominal)
         for name, unit, description, shown, nominal in described
     )
 
@@ -202,7 +184,7 @@ def _parameters(gains: HeadingGains) -> tuple[Parameter, ...]:
     )
     return (
         *(
-            Parameter(name=name, unit=unit, description=description, start=start, nominal=abs(start) or 1.0)
+            Parameter(name, unit, description, start=start, nominal=abs(start) or 1.0)
             for name, unit, description, start in described
         ),
         limit("autopilot.integral_band", "Most of a heading error that Ki acts on", gains.integral_band_rad),
@@ -211,25 +193,11 @@ def _parameters(gains: HeadingGains) -> tuple[Parameter, ...]:
 
 def limit(name: str, description: str, start: float) -> Parameter:
     """A parameter that bounds an angle either way; `start` in rad."""
-    return Parameter(
-        name=name, unit="rad", description=description, display_unit="deg", minimum=0.0, nominal=start, start=start
-    )
-
-
-def _integral(start: Parameter) -> State:
-    return State(
-        name="autopilot.integral",
-        unit="rad",
-        description="Rudder held against steady disturbances, positive to starboard",
-        display_unit="deg",
-        nominal=0.1,
-        derivative="autopilot.integral_rate",
-        start=start.symbol,
-    )
+    return Parameter(name, "rad", description, display_unit="deg", minimum=0.0, nominal=start, start=start)
 
 
 def _angle(name: str, description: str, value: ca.SX) -> Quantity:
-    return Quantity(name=name, unit="rad", description=description, display_unit="deg", nominal=0.35, value=value)
+    return Quantity(name, "rad", description, value, display_unit="deg", nominal=0.35)
 
 
 def within(value: ca.SX, bound: ca.SX) -> ca.SX:
@@ -284,12 +252,22 @@ def linear_autopilot_model(name: str, description: str, law: LinearLaw, step_s: 
         raise ValueError(f"{count} states do not fit {law.rates.shape}, {law.demand.shape}, {law.growth.shape}")
     psi, r, command = inputs = heading_signals()
     error = heading_error(psi, command)
-    states = [_state_of_law(place) for place in range(1, count + 1)]
+    places = range(1, count + 1)
+    states = [
+        State(
+            f"autopilot.state_{place}",
+            "1",
+            f"State {place} of the controller",
+            derivative=f"autopilot.rate_{place}",
+            start=0.0,
+        )
+        for place in places
+    ]
     seen = ca.vcat([*(state.symbol for state in states), error.symbol, r.symbol])
     most = Parameter(
-        name="autopilot.integral_limit",
-        unit="rad/s",
-        description="The integral grows no faster than this",
+        "autopilot.integral_limit",
+        "rad/s",
+        "The integral grows no faster than this",
         display_unit="deg/s",
         minimum=0.0,
         nominal=law.growth_limit_radps,
@@ -299,8 +277,10 @@ def linear_autopilot_model(name: str, description: str, law: LinearLaw, step_s: 
         _dot(law.demand, seen), within(_dot(law.growth, seen), most.symbol)
     )
     order = next(variable for variable in held if variable.name == "rudder.command")
+    received = ca.vertcat(seen, order.symbol)
     rates = [
-        _rate_of_law(place, _dot(row, ca.vertcat(seen, order.symbol))) for place, row in enumerate(law.rates, start=1)
+        Quantity(f"autopilot.rate_{place}", "1/s", f"Rate of state {place} of the controller", _dot(row, received))
+        for place, row in zip(places, law.rates, strict=True)
     ]
     given: tuple[Variable, ...] = (*inputs, most, *states, *rates, error)
     return steered_by(name, description, given, held, step_s)
@@ -308,22 +288,3 @@ def linear_autopilot_model(name: str, description: str, law: LinearLaw, step_s: 
 
 def _dot(coefficients: Array, of: ca.SX) -> ca.SX:
     return ca.dot(ca.DM(np.asarray(coefficients)), of)
-
-
-def _state_of_law(place: int) -> State:
-    return State(
-        name=f"autopilot.state_{place}",
-        unit="1",
-        description=f"State {place} of the controller",
-        derivative=f"autopilot.rate_{place}",
-        start=0.0,
-    )
-
-
-def _rate_of_law(place: int, value: ca.SX) -> Quantity:
-    return Quantity(
-        name=f"autopilot.rate_{place}",
-        unit="1/s",
-        description=f"Rate of state {place} of the controller",
-        value=value,
-    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from tank2sim.dynamics.model import Input, Model, Quantity, Variable, same_symbol
+from tank2sim.dynamics.model import Input, Model, Quantity
 
 YAW_DISTURBANCE = "waves.yaw_acceleration"
 """Input of :func:`with_yaw_disturbance`, rad/s2."""
@@ -27,7 +27,17 @@ def closed_loop_model(ship: Model, autopilot: Model) -> Model:
     joints: list[Quantity] = []
     for receiver, sender in ((ship, autopilot), (autopilot, ship)):
         sent = {state.name: state for state in (*sender.states, *sender.quantities)}
-        joints += [_joint(variable, sent[variable.name]) for variable in receiver.inputs if variable.name in sent]
+        joints += (
+            Quantity(
+                f"joint.{one.name}",
+                one.unit,
+                f"What is received of: {one.description}",
+                sent[one.name].symbol,
+                symbol=one.symbol,
+            )
+            for one in receiver.inputs
+            if one.name in sent
+        )
     joined = {joint.name.removeprefix("joint.") for joint in joints}
     return Model(
         name=f"{ship.name} with {autopilot.name}",
@@ -41,16 +51,6 @@ def closed_loop_model(ship: Model, autopilot: Model) -> Model:
         step_s=min(ship.step_s, autopilot.step_s),
         notices=(*ship.notices, *autopilot.notices),
     )
-
-
-def _joint(receiver: Input, sender: Variable) -> Quantity:
-    joint = Quantity(
-        name=f"joint.{receiver.name}",
-        unit=receiver.unit,
-        description=f"What is received of: {receiver.description}",
-        value=sender.symbol,
-    )
-    return same_symbol(receiver, joint)
 
 
 def ship_steered_by_either(ship: Model, autopilot: Model) -> Model:
@@ -68,11 +68,11 @@ def ship_steered_by_either(ship: Model, autopilot: Model) -> Model:
     """
     order = next(quantity for quantity in autopilot.quantities if quantity.name == "rudder.command")
     words = "Rudder order of the autopilot, positive to starboard"
-    renamed = same_symbol(order, replace(order, name=AUTOPILOT_ORDER, description=words))
+    renamed = replace(order, name=AUTOPILOT_ORDER, description=words)
     others = tuple(quantity for quantity in autopilot.quantities if quantity is not order)
     outputs = (*(name for name in autopilot.outputs if name != order.name), AUTOPILOT_ORDER)
     loop = closed_loop_model(ship, replace(autopilot, quantities=(*others, renamed), outputs=outputs))
-    steers = Input(name=AUTOPILOT_STEERS, unit="1", description="True: the autopilot steers", boolean=True)
+    steers = Input(AUTOPILOT_STEERS, "1", "True: the autopilot steers", boolean=True)
     helm, on = loop.symbol("rudder.command"), steers.symbol
     integral, time = loop.symbol("autopilot.integral"), loop.symbol("autopilot.anti_windup_time")
     steered = (
@@ -90,9 +90,9 @@ def with_yaw_disturbance(ship: Model) -> Model:
     The moment is that of wave frequency, to which hull damping adds little: its coupling into sway is left out.
     """
     waves = Input(
-        name=YAW_DISTURBANCE,
-        unit="rad/s2",
-        description="Yaw acceleration by waves, positive to starboard",
+        YAW_DISTURBANCE,
+        "rad/s2",
+        "Yaw acceleration by waves, positive to starboard",
         display_unit="deg/s2",
         nominal=1e-3,
     )

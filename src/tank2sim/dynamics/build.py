@@ -11,7 +11,7 @@ from tank2sim.cards.examination import doubts
 from tank2sim.cards.form import EffectEntry
 from tank2sim.cards.kinds import CARD_KINDS
 from tank2sim.dynamics.effects import EFFECTS, Effect
-from tank2sim.dynamics.effects.effect import card_for_effects
+from tank2sim.dynamics.effects.effect import EffectParameter, card_for_effects
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.ship import ship_model
 from tank2sim.dynamics.simulator_interface import force_shares
@@ -28,11 +28,8 @@ def build(card: Card) -> Model:
 
     Equal cards have the same model, with all that it has worked out.
 
-    Raises
-    ------
-    InputError
-        The card names a derivative, an effect or a parameter that the model does not know, or its mass matrix is
-        singular; the message names the key.
+    Raises InputError: the card names a derivative, an effect or a parameter that the model does not know, or its mass
+    matrix is singular; the message names the key.
     """
     entries = card.effects if isinstance(card, SteeredCard) else ()
     effects = tuple(EFFECTS.get(entry.name) for entry in entries)
@@ -94,23 +91,24 @@ def _check_effect(card: SteeredCard, entry: EffectEntry, place: str) -> None:
     if card.steered_by is SteeredBy.THRUSTERS and not effect.fits_craft:
         fitting = ", ".join(name for name, other in EFFECTS.items() if other.fits_craft)
         raise card.fault(f"{place}.name", f"{entry.name} is not for a small craft", f"it can have {fitting}")
-    shared = card_for_effects(card)
-    known = {parameter.name: parameter for parameter in effect.parameters}
+    _check_values(card, entry, place, {parameter.name: parameter for parameter in effect.parameters})
+
+
+def _check_values(card: SteeredCard, entry: EffectEntry, place: str, known: dict[str, EffectParameter]) -> None:
     for section, given in (("parameters", entry.parameters), ("uncertainty", entry.uncertainty)):
-        for name in given:
-            if name not in known:
-                remedy = f"{entry.name} has {', '.join(known)} (angles also in deg)"
-                raise card.fault(f"{place}.{section}.{name}", f"is not a parameter of {entry.name}", remedy)
+        if name := next((name for name in given if name not in known), ""):
+            remedy = f"{entry.name} has {', '.join(known)} (angles also in deg)"
+            raise card.fault(f"{place}.{section}.{name}", f"is not a parameter of {entry.name}", remedy)
     for name, parameter in known.items():
         if name not in entry.parameters:
             if parameter.default is not None:
                 continue
             raise card.fault(f"{place}.parameters.{name}", "is missing", f"give the {parameter.description}")
-        value = entry.parameters[name]
-        if not parameter.lowest(shared) <= value <= parameter.maximum:
-            key, shown = card.in_file(f"{place}.parameters.{name}", value)
-            lowest, highest = (from_si(key, bound) for bound in (parameter.lowest(shared), parameter.maximum))
-            raise card.fault(key, f"is {shown:g}", f"{lowest:g} to {highest:g} was expected")
+        lowest, highest = parameter.lowest(card_for_effects(card)), parameter.maximum
+        if not lowest <= entry.parameters[name] <= highest:
+            key, shown = card.in_file(f"{place}.parameters.{name}", entry.parameters[name])
+            remedy = f"{from_si(key, lowest):g} to {from_si(key, highest):g} was expected"
+            raise card.fault(key, f"is {shown:g}", remedy)
 
 
 def _with_effect(model: Model, card: SteeredCard, entry: EffectEntry) -> Model:

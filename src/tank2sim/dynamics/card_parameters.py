@@ -30,22 +30,11 @@ from tank2sim.units import from_si
 class CardParameter:
     """A number of a card.
 
-    Parameters
-    ----------
-    name : str
-        Name of the model's parameter, ``derivatives.Yv``.
-    value : float
-        In the model's unit: prime or SI, rudder positive to starboard.
-    standard_error : float
-        In the same unit; 0 for an exact number.
-    assumed : bool
-        The card states no standard error: :data:`DEFAULT_RELATIVE_ERROR` of the value is taken.
-    key : str
-        Dotted key in the card's file.
-    factor : float
-        Factor from the value to the number in the file.
-    bounds : tuple
-        Bounds of the number, in the unit of `value`; None without a bound.
+    `name`: name of the model's parameter, ``derivatives.Yv``. `value`: in the model's unit: prime or SI, rudder
+    positive to starboard. `standard_error`: in the same unit; 0 for an exact number. `assumed`: the card states no
+    standard error: :data:`DEFAULT_RELATIVE_ERROR` of the value is taken. `key`: dotted key in the card's file.
+    `factor`: factor from the value to the number in the file. `bounds`: bounds of the number, in the unit of `value`;
+    None without a bound.
     """
 
     name: str
@@ -94,10 +83,7 @@ def card_parameters(card: SteeredCard, model: Model) -> tuple[CardParameter, ...
 def find_parameter(parameters: Sequence[CardParameter], name: str, argument: str) -> CardParameter:
     """The parameter of a user's name, either its full name or that in the card.
 
-    Raises
-    ------
-    InputError
-        The parameter does not exist on the card, or is exactly zero.
+    Raises InputError: the parameter does not exist on the card, or is exactly zero.
     """
     by_name = {key: parameter for parameter in parameters for key in (parameter.key, parameter.short, parameter.name)}
     if name in by_name:
@@ -217,10 +203,7 @@ def _effects(card: SteeredCard, model: Model) -> list[CardParameter]:
 def agreed_by_name(agreed: Mapping[str, float], parameters: Sequence[CardParameter]) -> dict[str, float]:
     """An agreed variation (Kc %, by names as a user writes them) by the names of parameters.
 
-    Raises
-    ------
-    InputError
-        A name is not on the card, or is repeated.
+    Raises InputError: a name is not on the card, or is repeated.
     """
     found: dict[str, float] = {}
     for name, percent in agreed.items():
@@ -235,17 +218,9 @@ def agreed_by_name(agreed: Mapping[str, float], parameters: Sequence[CardParamet
 class JointErrors:
     """Errors of parameters.
 
-    Parameters
-    ----------
-    parameters : tuple of CardParameter
-    covariance : array (k, k)
-        In the units of the parameters' values.
-    together : frozenset of str
-        Keys of the parameters in the card's covariance; all others are independent. Empty without a covariance.
-    samples : array (n, m), optional
-        Samples of the joint distribution of m parameters, in the units of their values.
-    sampled : tuple of int
-        Places of these parameters.
+    `covariance` (k, k): in the units of the parameters' values. `together`: keys of the parameters in the card's
+    covariance; all others are independent. Empty without a covariance. `samples` (n, m): samples of the joint
+    distribution of m parameters, in the units of their values. `sampled`: places of these parameters.
     """
 
     parameters: tuple[CardParameter, ...]
@@ -295,10 +270,7 @@ class JointErrors:
 def joint_errors(card: SteeredCard, parameters: Sequence[CardParameter]) -> JointErrors:
     """The errors of parameters of a card: correlated if in its covariance, else independent.
 
-    Raises
-    ------
-    InputError
-        The covariance to which the card refers has an error.
+    Raises InputError: the covariance to which the card refers has an error.
     """
     known = read_covariance(card)
     standard_errors = np.array([parameter.standard_error for parameter in parameters])

@@ -75,30 +75,33 @@ def craft_autopilot_model(card: SteeredCard, gains: CraftGains, step_s: float) -
         Step of the integration of the two integrals, s.
     """
     psi, r, command = heading_signals()
-    u = Input(name="motion.u", unit="m/s", description="Surge velocity through the water, positive ahead")
+    u = Input("motion.u", "m/s", "Surge velocity through the water, positive ahead")
     ordered = Input(
-        name="speed.command",
-        unit="m/s",
-        description="Ordered surge velocity through the water",
+        "speed.command",
+        "m/s",
+        "Ordered surge velocity through the water",
         nominal=card.model.speed_mps,
         start=card.model.speed_mps,
     )
     error = heading_error(psi, command)
-    lack = _quantity("speed.error", "m/s", "Ordered less actual surge velocity", ordered.symbol - u.symbol)
+    lack = Quantity("speed.error", "m/s", "Ordered less actual surge velocity", ordered.symbol - u.symbol)
     Kp, Kd, Ki, Ku, Ki_u, Tt = tuned = _gains(gains)
     band = limit("autopilot.integral_band", "Most of a heading error that Ki acts on", gains.integral_band_rad)
     z, y = (
-        _integral("yaw", "N.m", "Yaw moment held against steady disturbances, positive to starboard"),
-        _integral("surge", "N", "Surge force held against steady disturbances, positive ahead"),
+        State(f"autopilot.{name}_integral", unit, words, derivative=f"autopilot.{name}_rate_of_integral", start=0.0)
+        for name, unit, words in (
+            ("yaw", "N.m", "Yaw moment held against steady disturbances, positive to starboard"),
+            ("surge", "N", "Surge force held against steady disturbances, positive ahead"),
+        )
     )
-    wanted_N = _quantity(
+    wanted_N = Quantity(
         "autopilot.demanded_moment",
         "N.m",
         "Yaw moment without its limits, positive to starboard",
         Kp.symbol * error.symbol - Kd.symbol * r.symbol + z.symbol,
     )
     low, high = gains.largest_moment_Nm
-    N = _quantity(
+    N = Quantity(
         "autopilot.moment",
         "N.m",
         "Yaw moment of the thrusters, positive to starboard",
@@ -106,13 +109,13 @@ def craft_autopilot_model(card: SteeredCard, gains: CraftGains, step_s: float) -
     )
     known = {name: ca.SX(card.derivatives.get(name, 0.0)) for name in CRAFT_TERMS}
     resistance = -craft_damping(known, ordered.symbol, ca.SX(0), ca.SX(0))[0]
-    wanted_X = _quantity(
+    wanted_X = Quantity(
         "autopilot.demanded_force",
         "N",
         "Surge force without its limits, positive ahead",
         resistance + Ku.symbol * lack.symbol + y.symbol,
     )
-    X = _quantity(
+    X = Quantity(
         "autopilot.force",
         "N",
         "Surge force of the thrusters, positive ahead",
@@ -121,13 +124,13 @@ def craft_autopilot_model(card: SteeredCard, gains: CraftGains, step_s: float) -
     emptied = N.symbol - wanted_N.symbol
     emptied = ca.fmax(-ca.fmax(z.symbol, 0), ca.fmin(-ca.fmin(z.symbol, 0), emptied))
     rates = (
-        _quantity(
+        Quantity(
             "autopilot.yaw_rate_of_integral",
             "N.m/s",
             "Rate of the held yaw moment",
             Ki.symbol * within(error.symbol, band.symbol) + emptied / Tt.symbol,
         ),
-        _quantity(
+        Quantity(
             "autopilot.surge_rate_of_integral",
             "N/s",
             "Rate of the held surge force",
@@ -141,11 +144,6 @@ def craft_autopilot_model(card: SteeredCard, gains: CraftGains, step_s: float) -
     empty = Model(
         name=f"Autopilot of {card.ship.name}",
         description="Autopilot of heading and speed: PID and PI, with limits and anti-windup",
-        states=(),
-        inputs=(),
-        parameters=(),
-        quantities=(),
-        outputs=(),
         step_s=step_s,
     )
     given: tuple[Variable, ...] = (psi, r, u, command, ordered, *tuned, band, error, lack)
@@ -183,12 +181,12 @@ def _order(thruster: ThrusterSection, thrust: ca.SX, u: ca.SX) -> Quantity:
         largest = ca.if_else(n >= 0, thruster.max_radps, -thruster.lowest_radps)
         n = revolutions_of_order(n, largest, 1 / thruster.order_exponent)
     return Quantity(
-        name=f"thrusters.{thruster.name}.command",
-        unit="rad/s",
-        description=f"Ordered revolutions of thruster {thruster.name}, positive ahead",
+        f"thrusters.{thruster.name}.command",
+        "rad/s",
+        f"Ordered revolutions of thruster {thruster.name}, positive ahead",
+        ca.fmax(thruster.lowest_radps, ca.fmin(thruster.max_radps, n)),
         display_unit="rpm",
         nominal=thruster.max_radps / 2,
-        value=ca.fmax(thruster.lowest_radps, ca.fmin(thruster.max_radps, n)),
     )
 
 
@@ -202,20 +200,6 @@ def _gains(gains: CraftGains) -> tuple[Parameter, ...]:
         ("autopilot.anti_windup_time", "s", "Time in which integrals are emptied at a limit", gains.anti_windup_time_s),
     )
     return tuple(
-        Parameter(name=name, unit=unit, description=description, minimum=0.0, nominal=abs(start) or 1.0, start=start)
+        Parameter(name, unit, description, minimum=0.0, nominal=abs(start) or 1.0, start=start)
         for name, unit, description, start in described
     )
-
-
-def _integral(name: str, unit: str, description: str) -> State:
-    return State(
-        name=f"autopilot.{name}_integral",
-        unit=unit,
-        description=description,
-        derivative=f"autopilot.{name}_rate_of_integral",
-        start=0.0,
-    )
-
-
-def _quantity(name: str, unit: str, description: str, value: ca.SX) -> Quantity:
-    return Quantity(name=name, unit=unit, description=description, value=value)

@@ -43,10 +43,10 @@ def kinks(model: Model) -> tuple[Quantity, ...]:
 
 def _indicator(quantity: Quantity, place: int, difference: ca.SX) -> Quantity:
     return Quantity(
-        name=f"kinks.{quantity.name}[{place}]",
-        unit="1",
-        description=f"Event indicator: changes sign where the equation of {quantity.name} has a kink, in its SI units",
-        value=difference - EVENT_SHIFT,
+        f"kinks.{quantity.name}[{place}]",
+        "1",
+        f"Event indicator: changes sign where the equation of {quantity.name} has a kink, in its SI units",
+        difference - EVENT_SHIFT,
     )
 
 

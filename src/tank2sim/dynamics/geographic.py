@@ -46,9 +46,9 @@ def geographic(north: ca.SX, east: ca.SX) -> tuple[Variable, ...]:
     most = math.degrees(HIGHEST_LATITUDE)
     latitude, longitude = (
         Parameter(
-            name=f"origin.{name}",
-            unit="rad",
-            description=f"Geodetic {name} (WGS 84) of the origin of motion.x and motion.y, positive to {side}{limit}",
+            f"origin.{name}",
+            "rad",
+            f"Geodetic {name} (WGS 84) of the origin of motion.x and motion.y, positive to {side}{limit}",
             display_unit="deg",
             minimum=-bound,
             maximum=bound,
@@ -69,14 +69,14 @@ def geographic(north: ca.SX, east: ca.SX) -> tuple[Variable, ...]:
         longitude,
         *(
             Quantity(
-                name=f"position.{name}",
-                unit="rad",
-                description=f"Geodetic {name} (WGS 84) of the ship, positive to {sides[name]}",
+                f"position.{name}",
+                "rad",
+                f"Geodetic {name} (WGS 84) of the ship, positive to {sides[name]}",
+                value,
                 display_unit="deg",
                 nominal=NOMINAL_ANGLE,
                 minimum=-bound,
                 maximum=bound,
-                value=value,
             )
             for (name, value), bound in zip(values.items(), (math.pi / 2, math.pi), strict=True)
         ),

@@ -9,9 +9,11 @@ from functools import cached_property
 
 import casadi as ca
 
+from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.scaling import Scales
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ABKOWITZ_TERMS, ACCELERATION_TERMS, LINEAR_TERMS, polynomial
+from tank2sim.dynamics.geographic import GEOGRAPHIC_OUTPUTS
 from tank2sim.dynamics.low_speed import (
     STILL_SPEED,
     Forces,
@@ -23,7 +25,7 @@ from tank2sim.dynamics.low_speed import (
     share_of_low_speed,
     share_out_of_range,
 )
-from tank2sim.dynamics.model import Quantity
+from tank2sim.dynamics.model import Parameter, Quantity
 from tank2sim.dynamics.propulsion import propeller_force
 from tank2sim.dynamics.rigid_body import Inertia, inertia, inertial_forces, rigid_body_accelerations
 
@@ -87,6 +89,42 @@ class Hull:
     def scales(self, speed: ca.SX) -> Scales:
         """Scales at a speed, as expressions."""
         return Scales(self["ship.water_density"], self["ship.length"], speed)
+
+
+MOTION_OUTPUTS = (
+    *("motion.x", "motion.y", "motion.psi", "motion.u", "motion.v", "motion.r", "motion.speed", "motion.beta"),
+    *("motion.sog", "motion.cog", *GEOGRAPHIC_OUTPUTS),
+    *("motion.udot", "motion.vdot", "motion.rdot"),
+)
+"""Outputs of every vessel that is steered."""
+
+
+def hull_particulars(card: SteeredCard, speed: str, inertia: str) -> tuple[Parameter, ...]:
+    """``ship.length`` to ``ship.fastest`` of a ship or craft; `speed` says what u0 is, `inertia` what J_z is called."""
+    body, (slowest, fastest) = card.body_si, card.model.speed_range_mps
+    # Above zero: a ship without length, speed, mass or water has no equations. A craft may hold down to rest.
+    may_vanish = ("ship.x_G", "ship.slowest") if card.thrusters else ("ship.x_G",)
+    described = (
+        ("ship.length", "m", "Length between perpendiculars", card.ship.length_m),
+        ("ship.speed", "m/s", speed, card.model.speed_mps),
+        ("ship.mass", "kg", "Mass", body["mass"]),
+        ("ship.x_G", "m", "Centre of gravity forward of midships", body["x_G"]),
+        ("ship.yaw_inertia", "kg.m2", f"Yaw inertia {inertia} about midships", body["yaw_inertia"]),
+        ("ship.water_density", "kg/m3", "Density of the water", card.environment.water_density_kgpm3),
+        ("ship.slowest", "m/s", "Lowest speed at which the card holds", slowest),
+        ("ship.fastest", "m/s", "Highest speed at which the card holds", fastest),
+    )
+    return tuple(
+        Parameter(
+            *words,
+            start=start,
+            tunable=False,
+            nominal=abs(start) or 1.0,
+            minimum=None if words[0] in may_vanish else 1e-6,
+            display_unit="knots" if words[1] == "m/s" else None,
+        )
+        for *words, start in described
+    )
 
 
 def motion_quantities(hull: Hull, forces: tuple[Quantity, ...]) -> tuple[Quantity, ...]:
@@ -187,9 +225,9 @@ def rudder_quantities(forces: Forces) -> tuple[Quantity, Quantity, Quantity]:
     """``rudder.X``, ``rudder.Y``, ``rudder.N`` of the `forces` by the rudder alone: N, N and N m."""
     X, Y, N = forces
     return (
-        Quantity(name="rudder.X", unit="N", description="Surge force by the rudder, positive forward", value=X),
-        Quantity(name="rudder.Y", unit="N", description="Sway force by the rudder, positive to starboard", value=Y),
-        Quantity(name="rudder.N", unit="N.m", description="Yaw moment by the rudder, positive to starboard", value=N),
+        Quantity("rudder.X", "N", "Surge force by the rudder, positive forward", X),
+        Quantity("rudder.Y", "N", "Sway force by the rudder, positive to starboard", Y),
+        Quantity("rudder.N", "N.m", "Yaw moment by the rudder, positive to starboard", N),
     )
 
 
@@ -255,25 +293,25 @@ def force_quantities(
     f1, f2, f3 = forces
     return (
         Quantity(
-            name="force.X",
-            unit="N",
-            description=f"Surge force except for that of acceleration, {equations}, positive forward",
+            "force.X",
+            "N",
+            f"Surge force except for that of acceleration, {equations}, positive forward",
+            f1,
             nominal=nominal[0],
-            value=f1,
         ),
         Quantity(
-            name="force.Y",
-            unit="N",
-            description=f"Sway force except for that of acceleration, {equations}, positive to starboard",
+            "force.Y",
+            "N",
+            f"Sway force except for that of acceleration, {equations}, positive to starboard",
+            f2,
             nominal=nominal[0],
-            value=f2,
         ),
         Quantity(
-            name="force.N",
-            unit="N.m",
-            description=f"Yaw moment about midships without that of acceleration, {equations}, positive to starboard",
+            "force.N",
+            "N.m",
+            f"Yaw moment about midships without that of acceleration, {equations}, positive to starboard",
+            f3,
             nominal=nominal[1],
-            value=f3,
         ),
     )
 
@@ -296,10 +334,7 @@ def inertia_quantities(matrix: Inertia) -> tuple[Quantity, ...]:
         ("inertia.yaw_sway", "kg.m", "Yaw moment by sway acceleration, m x_G - Nvdot", matrix.yaw_sway),
         ("inertia.yaw", "kg.m2", "Yaw inertia with added inertia, J_z - Nrdot", matrix.yaw),
     )
-    return tuple(
-        Quantity(name=name, unit=unit, description=description, value=value)
-        for name, unit, description, value in described
-    )
+    return tuple(Quantity(*one) for one in described)
 
 
 def acceleration_quantities(motion: Forces) -> tuple[Quantity, ...]:
@@ -310,7 +345,7 @@ def acceleration_quantities(motion: Forces) -> tuple[Quantity, ...]:
         ("motion.rdot", "rad/s2", "Yaw acceleration, positive to starboard", "deg/s2", 1e-3),
     )
     return tuple(
-        Quantity(name=name, unit=unit, description=description, display_unit=shown, nominal=nominal, value=value)
+        Quantity(name, unit, description, value, display_unit=shown, nominal=nominal)
         for (name, unit, description, shown, nominal), value in zip(described, motion, strict=True)
     )
 
@@ -324,18 +359,11 @@ def inside_range(excess: ca.SX, margin: ca.SX | float) -> ca.SX:
 def speed_and_drift(s: Mapping[str, ca.SX], speed: ca.SX, nominal: float) -> tuple[Quantity, Quantity]:
     """``motion.speed`` (m/s) and ``motion.beta`` (rad), with `speed` by :func:`.regular_speed`, typically `nominal`."""
     return (
+        Quantity("motion.speed", "m/s", "Speed U through the water", speed, display_unit="knots", nominal=nominal),
         Quantity(
-            name="motion.speed",
-            unit="m/s",
-            description="Speed U through the water",
-            display_unit="knots",
-            nominal=nominal,
-            value=speed,
-        ),
-        Quantity(
-            name="motion.beta",
-            unit="rad",
-            description="Drift angle -asin(v/U), positive when the water comes from port",
+            "motion.beta",
+            "rad",
+            "Drift angle -asin(v/U), positive when the water comes from port",
             display_unit="deg",
             nominal=0.1,
             # asin(v/U) without its division by zero at rest
@@ -349,51 +377,39 @@ def _water_speed_quantities(hull: Hull) -> tuple[Quantity, ...]:
     speed, drift = speed_and_drift(hull.symbols, hull.speed, 5.0)
     u0 = hull["ship.speed"]
     yaw_rate = hull["motion.r"] * hull["ship.length"] / speed.symbol
-    factors = tuple(
-        validity_factor(name, description, value)
-        for name, description, value in (
-            ("low_speed", "low speed and motion astern", 1 - share_out_of_range(hull.symbols)),
-            (
-                "high_speed",
-                "speed above ship.fastest",
-                inside_range(speed.symbol - hull["ship.fastest"], VALIDITY_MARGIN * u0),
-            ),
-            (
-                "drift",
-                "drift angle",
-                inside_range(ca.fabs(v) / speed.symbol - ca.sin(hull["ship.largest_drift"]), DRIFT_MARGIN),
-            ),
-            (
-                "yaw_rate",
-                "yaw rate r L/U",
-                inside_range(ca.fabs(yaw_rate) - hull["ship.largest_yaw_rate"], YAW_RATE_MARGIN),
-            ),
-            (
-                "rudder",
-                "rudder angle",
-                inside_range(ca.fabs(hull["rudder.effective"]) - hull["ship.largest_rudder"], RUDDER_MARGIN),
-            ),
-        )
+    excess = {
+        ("drift", "drift angle"): (ca.fabs(v) / speed.symbol - ca.sin(hull["ship.largest_drift"]), DRIFT_MARGIN),
+        ("yaw_rate", "yaw rate r L/U"): (ca.fabs(yaw_rate) - hull["ship.largest_yaw_rate"], YAW_RATE_MARGIN),
+        ("rudder", "rudder angle"): (
+            ca.fabs(hull["rudder.effective"]) - hull["ship.largest_rudder"],
+            RUDDER_MARGIN,
+        ),
+    }
+    fast = inside_range(speed.symbol - hull["ship.fastest"], VALIDITY_MARGIN * u0)
+    factors = (
+        validity_factor("low_speed", "low speed and motion astern", 1 - share_out_of_range(hull.symbols)),
+        validity_factor("high_speed", "speed above ship.fastest", fast),
+        *(validity_factor(*words, inside_range(*beyond)) for words, beyond in excess.items()),
     )
     low = Quantity(
-        name="low_speed.share",
-        unit="1",
-        description="Share of the forces at low speed: 0 from low_speed.bound upwards, 1 at rest and astern",
+        "low_speed.share",
+        "1",
+        "Share of the forces at low speed: 0 from low_speed.bound upwards, 1 at rest and astern",
+        hull.low_share,
         minimum=0.0,
         maximum=1.0,
-        value=hull.low_share,
     )
     validity = Quantity(
-        name="validity",
-        unit="1",
-        description=(
+        "validity",
+        "1",
+        (
             "1 in the range of speed, drift angle, yaw rate and rudder angle in which the card holds; below that "
             "speed falling to 0 at low speed and astern, and never above the share of the card's polynomial in the "
             "forces; falling to 0 beyond the others"
         ),
+        math.prod((factor.symbol for factor in factors), start=ca.SX(1)),
         minimum=0.0,
         maximum=1.0,
-        value=math.prod((factor.symbol for factor in factors), start=ca.SX(1)),
     )
     return speed, drift, low, *factors, validity
 
@@ -401,10 +417,10 @@ def _water_speed_quantities(hull: Hull) -> tuple[Quantity, ...]:
 def validity_factor(name: str, cause: str, value: ca.SX) -> Quantity:
     """Factor ``validity_by.<name>`` of ``validity``: 1 where the model holds for that `cause`, falling to 0 beyond."""
     return Quantity(
-        name=f"{VALIDITY_FACTOR}{name}",
-        unit="1",
-        description=f"Factor of validity by {cause}: 1 where the model holds, falling to 0 beyond",
+        f"{VALIDITY_FACTOR}{name}",
+        "1",
+        f"Factor of validity by {cause}: 1 where the model holds, falling to 0 beyond",
+        value,
         minimum=0.0,
         maximum=1.0,
-        value=value,
     )

@@ -120,9 +120,9 @@ def low_speed_parameters(card: ManoeuvringCard) -> tuple[Parameter, ...]:
         estimated = "" if getattr(card.ship, key) else " (estimated: the card states none)"
         value = model_particular(card, key)
         return Parameter(
-            name=name,
-            unit="m",
-            description=f"{description}, for the forces at low speed{estimated}",
+            name,
+            "m",
+            f"{description}, for the forces at low speed{estimated}",
             nominal=value,
             minimum=1e-6,
             start=value,
@@ -130,15 +130,15 @@ def low_speed_parameters(card: ManoeuvringCard) -> tuple[Parameter, ...]:
         )
 
     def number(name: str, description: str, start: float, maximum: float = 3.0) -> Parameter:
-        return Parameter(name=name, unit="1", description=description, minimum=0.0, maximum=maximum, start=start)
+        return Parameter(name, "1", description, minimum=0.0, maximum=maximum, start=start)
 
     return (
         length("draught_m", "ship.draught", "Draught"),
         length("propeller_diameter_m", "ship.propeller_diameter", "Diameter of the propeller"),
         Parameter(
-            name="low_speed.bound",
-            unit="m/s",
-            description="Speed below which the forces at low speed replace the polynomial, within 0.05 and 0.9 u0",
+            "low_speed.bound",
+            "m/s",
+            "Speed below which the forces at low speed replace the polynomial, within 0.05 and 0.9 u0",
             display_unit="knots",
             nominal=bound or 1.0,
             minimum=0.0,

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import graphlib
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property
 from typing import TypeVar
 
@@ -27,7 +27,7 @@ from tank2sim.units import UNITS
 Kind = TypeVar("Kind", bound="Variable")
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class Variable:
     """A named scalar of a model.
 
@@ -47,21 +47,25 @@ class Variable:
         One of the unit's ``displays``.
     boolean : bool
         A truth value; its symbol holds 0 or 1.
+    symbol : casadi.SX
+        The scalar that denotes it in expressions; by default a new one. What :func:`dataclasses.replace` makes of a
+        variable has the same, so that it fits equations that use it.
     """
 
     name: str
     unit: str
     description: str
+    _: KW_ONLY
     nominal: float = 1.0
     minimum: float | None = None
     maximum: float | None = None
     display_unit: str | None = None
     boolean: bool = False
+    symbol: ca.SX = field(default=None, repr=False)  # type: ignore[assignment]
 
-    @cached_property
-    def symbol(self) -> ca.SX:
-        """The scalar CasADi symbol that denotes this variable in expressions."""
-        return ca.SX.sym(self.name)
+    def __post_init__(self) -> None:
+        if self.symbol is None:
+            object.__setattr__(self, "symbol", ca.SX.sym(self.name))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -110,12 +114,12 @@ class State(Variable):
     """
 
     derivative: str
-    start: ca.SX | float
+    start: ca.SX | float = 0.0
     steady: bool = False
     trim: ca.SX | None = None
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class Quantity(Variable):
     """A value defined by an expression of states, inputs, parameters and other quantities."""
 
@@ -160,12 +164,12 @@ class Model:
 
     name: str
     description: str
-    states: tuple[State, ...]
-    inputs: tuple[Input, ...]
-    parameters: tuple[Parameter, ...]
-    quantities: tuple[Quantity, ...]
-    outputs: tuple[str, ...]
-    step_s: float
+    states: tuple[State, ...] = ()
+    inputs: tuple[Input, ...] = ()
+    parameters: tuple[Parameter, ...] = ()
+    quantities: tuple[Quantity, ...] = ()
+    outputs: tuple[str, ...] = ()
+    step_s: float = field(kw_only=True)
     notices: tuple[Notice, ...] = ()
     source: str = ""
 
@@ -175,12 +179,12 @@ class Model:
             raise ValueError(f"doubled variable: {sorted({name for name in names if names.count(name) > 1})}")
         for variable in self.variables:
             unit = UNITS.get(variable.unit)
-            if unit is None or (variable.display_unit is not None and variable.display_unit not in unit.displays):
+            if unit is None or variable.display_unit not in (None, *unit.displays):
                 raise ValueError(f"{variable.name}: unknown unit {variable.unit} or {variable.display_unit}")
-        known = {quantity.name for quantity in self.quantities}
-        for name in (*self.outputs, *(state.derivative for state in self.states)):
-            if name not in known and name not in {state.name for state in self.states}:
-                raise ValueError(f"{name} is not a state or quantity")
+        known = {variable.name for variable in (*self.states, *self.quantities)}
+        unknown = [name for name in (*self.outputs, *(state.derivative for state in self.states)) if name not in known]
+        if unknown:
+            raise ValueError(f"{unknown[0]} is not a state or quantity")
         _ = self._sorted_quantities
 
     # -- looking things up -------------------------------------------------------------------------------------------
@@ -256,12 +260,7 @@ class Model:
 
     def with_values(self, changed: Mapping[str, float]) -> Model:
         """The model with parameters that start at the values of `changed` (by name) in place of their own."""
-        parameters = (
-            same_symbol(parameter, replace(parameter, start=changed[parameter.name]))
-            if parameter.name in changed
-            else parameter
-            for parameter in self.parameters
-        )
+        parameters = (replace(one, start=changed[one.name]) if one.name in changed else one for one in self.parameters)
         return replace(self, parameters=tuple(parameters))
 
     # -- making another model of it (what effects do) ----------------------------------------------------------------
@@ -270,13 +269,8 @@ class Model:
         """A model in which the quantity `name` has the value ``value(old expression)``."""
         if name not in {quantity.name for quantity in self.quantities}:
             raise ValueError(f"{name} is not a quantity of {self.name}")
-        changed = tuple(
-            same_symbol(quantity, replace(quantity, value=ca.SX(value(quantity.value))))
-            if quantity.name == name
-            else quantity
-            for quantity in self.quantities
-        )
-        return replace(self, quantities=changed)
+        changed = (replace(one, value=ca.SX(value(one.value))) if one.name == name else one for one in self.quantities)
+        return replace(self, quantities=tuple(changed))
 
     def substitute(self, name: str, value: ca.SX) -> Model:
         """A model in which `value` replaces the variable `name`: in quantities, starts and trims.
@@ -298,10 +292,9 @@ class Model:
         constants = [parameter for parameter in self.parameters if parameter.name in given]
         if not constants:
             return self
-        symbols = ca.vertcat(*(parameter.symbol for parameter in constants))
-        starts = ca.SX(ca.vertcat(*(parameter.start for parameter in constants)))
+        symbols, starts = ([getattr(one, key) for one in constants] for key in ("symbol", "start"))
         kept = tuple(parameter for parameter in self.parameters if parameter.name not in given)
-        return self._substituted(symbols, starts, kept)
+        return self._substituted(ca.vcat(symbols), ca.SX(ca.vcat(starts)), kept)
 
     def _substituted(self, old: ca.SX, value: ca.SX, parameters: tuple[Parameter, ...]) -> Model:
         """The model with `value` in place of the symbols `old`, and with `parameters`."""
@@ -310,20 +303,14 @@ class Model:
         def changed(expression: ca.SX | float) -> ca.SX:
             return ca.substitute(ca.SX(expression), old, value)
 
-        quantities = tuple(
-            quantity
-            if gone.isdisjoint(quantity.uses)
-            else same_symbol(quantity, replace(quantity, value=changed(quantity.value)))
-            for quantity in self.quantities
+        quantities = (
+            one if gone.isdisjoint(one.uses) else replace(one, value=changed(one.value)) for one in self.quantities
         )
-        states = tuple(
-            same_symbol(
-                state,
-                replace(state, start=changed(state.start), trim=None if state.trim is None else changed(state.trim)),
-            )
-            for state in self.states
+        states = (
+            replace(one, start=changed(one.start), trim=None if one.trim is None else changed(one.trim))
+            for one in self.states
         )
-        return replace(self, quantities=quantities, states=states, parameters=parameters)
+        return replace(self, quantities=tuple(quantities), states=tuple(states), parameters=parameters)
 
     def extend(self, *variables: Variable, outputs: Iterable[str] = (), notices: Iterable[Notice] = ()) -> Model:
         """A model with more variables (each put with its own kind), outputs and notices."""
@@ -344,22 +331,11 @@ class Model:
     def with_constant_inputs(self, names: Iterable[str]) -> Model:
         """A model in which the inputs of these names are parameters, constant at what they start at."""
         given = set(names)
-        held = [variable for variable in self.inputs if variable.name in given]
-        constants = tuple(
-            same_symbol(
-                variable,
-                Parameter(
-                    name=variable.name,
-                    unit=variable.unit,
-                    description=variable.description,
-                    nominal=variable.nominal,
-                    minimum=variable.minimum,
-                    maximum=variable.maximum,
-                    display_unit=variable.display_unit,
-                    start=variable.start,
-                ),
-            )
-            for variable in held
+        shared = ("nominal", "minimum", "maximum", "display_unit", "start", "symbol")
+        constants = (
+            Parameter(one.name, one.unit, one.description, **{key: getattr(one, key) for key in shared})
+            for one in self.inputs
+            if one.name in given
         )
         remaining = tuple(variable for variable in self.inputs if variable.name not in given)
         return replace(self, inputs=remaining, parameters=(*self.parameters, *constants))
@@ -441,19 +417,17 @@ class Model:
     @cached_property
     def _sorted_quantities(self) -> tuple[Quantity, ...]:
         by_symbol = {quantity.symbol.element_hash(): quantity for quantity in self.quantities}
-        known = {variable.symbol.element_hash() for variable in (*self.states, *self.inputs, *self.parameters)}
-        uses: dict[str, set[str]] = {}
+        known = {variable.symbol.element_hash() for variable in self.variables}
+        uses: dict[Quantity, list[Quantity]] = {}
         for quantity in self.quantities:
-            unknown = [name for key, name in quantity.uses.items() if key not in known and key not in by_symbol]
-            if unknown:
+            if unknown := [name for key, name in quantity.uses.items() if key not in known]:
                 raise ValueError(f"{quantity.name} uses {unknown}, which are not variables of the model")
-            uses[quantity.name] = {by_symbol[key].name for key in quantity.uses if key in by_symbol}
+            uses[quantity] = [by_symbol[key] for key in quantity.uses if key in by_symbol]
         try:
-            order = graphlib.TopologicalSorter(uses).static_order()
-            named = {quantity.name: quantity for quantity in self.quantities}
-            return tuple(named[name] for name in order)
+            return tuple(graphlib.TopologicalSorter(uses).static_order())
         except graphlib.CycleError as error:
-            raise ValueError(f"quantities define each other in a circle: {error.args[1]}") from None
+            circle = [quantity.name for quantity in error.args[1]]
+            raise ValueError(f"quantities define each other in a circle: {circle}") from None
 
 
 def _values(variables: tuple[Parameter, ...] | tuple[Input, ...], changed: Mapping[str, float]) -> Array:
@@ -465,6 +439,4 @@ def _values(variables: tuple[Parameter, ...] | tuple[Input, ...], changed: Mappi
 
 def same_symbol(old: Variable, new: Kind) -> Kind:
     """The variable `new` with the symbol of `old`, which the equations of a model already use."""
-    # cached_property stores in __dict__
-    new.__dict__["symbol"] = old.symbol
-    return new
+    return replace(new, symbol=old.symbol)

@@ -15,9 +15,9 @@ lies beyond it. Project choice."""
 def revolutions(section: Propulsion) -> tuple[Variable, Variable]:
     """Input ``propeller.speed`` (rad/s) and quantity ``propeller.speed_actual``."""
     order = Input(
-        name="propeller.speed",
-        unit="rad/s",
-        description="Propeller revolutions, positive ahead",
+        "propeller.speed",
+        "rad/s",
+        "Propeller revolutions, positive ahead",
         display_unit="rpm",
         nominal=section.nominal_radps,
         minimum=-LARGEST_REVOLUTIONS * section.nominal_radps,
@@ -27,12 +27,12 @@ def revolutions(section: Propulsion) -> tuple[Variable, Variable]:
     return (
         order,
         Quantity(
-            name="propeller.speed_actual",
-            unit="rad/s",
-            description="Revolutions at which the propeller turns, positive ahead",
+            "propeller.speed_actual",
+            "rad/s",
+            "Revolutions at which the propeller turns, positive ahead",
+            order.symbol,
             display_unit="rpm",
             nominal=section.nominal_radps,
-            value=order.symbol,
         ),
     )
 
@@ -42,9 +42,9 @@ def propulsion(section: Propulsion) -> tuple[Variable, ...]:
     return (
         *revolutions(section),
         Parameter(
-            name="propulsion.nominal_speed",
-            unit="rad/s",
-            description="Revolutions that hold the speed of expansion",
+            "propulsion.nominal_speed",
+            "rad/s",
+            "Revolutions that hold the speed of expansion",
             display_unit="rpm",
             nominal=section.nominal_radps,
             minimum=section.nominal_radps / LARGEST_REVOLUTIONS,
@@ -52,9 +52,9 @@ def propulsion(section: Propulsion) -> tuple[Variable, ...]:
             start=section.nominal_radps,
         ),
         Parameter(
-            name="propulsion.Xnn",
-            unit="1",
-            description="Surge force by revolutions, prime system at the speed of expansion",
+            "propulsion.Xnn",
+            "1",
+            "Surge force by revolutions, prime system at the speed of expansion",
             nominal=1e-3,
             start=section.Xnn,
         ),

@@ -30,7 +30,7 @@ from tank2sim.dynamics.abkowitz import polynomial
 from tank2sim.dynamics.effects.effect import with_steps_for_time
 from tank2sim.dynamics.effects.forces import with_forces
 from tank2sim.dynamics.hull import Hull, prime_motion
-from tank2sim.dynamics.kinematics import heel
+from tank2sim.dynamics.kinematics import heel, rate_of_heel
 from tank2sim.dynamics.model import Model, Parameter, Quantity
 
 ACCELERATIONS_WITH_ROLL = ("Ypdot", "Kvdot", "Kpdot", "Krdot", "Npdot")
@@ -42,11 +42,9 @@ def roll_terms(card: ManoeuvringCard) -> list[str]:
     terms = [name for name in card.derivatives if known_term(name).of_roll]
     if card.model.kind != "linear":
         return terms
-    return [name for name in terms if (term := known_term(name)).acceleration or _order(name) - term.u == 1]
-
-
-def _order(name: str) -> int:
-    return sum(known_term(name).powers.values())
+    return [
+        name for name in terms if (term := known_term(name)).acceleration or sum(term.powers.values()) - term.u == 1
+    ]
 
 
 def roll_fault(card: ManoeuvringCard) -> str:
@@ -87,9 +85,9 @@ def roll_parameters(card: ManoeuvringCard) -> tuple[Parameter, ...]:
     )
     return tuple(
         Parameter(
-            name=name,
-            unit=unit,
-            description=description,
+            name,
+            unit,
+            description,
             start=value,
             nominal=abs(value) or 1.0,
             minimum=minimum,
@@ -112,10 +110,18 @@ def with_roll(model: Model, hull: Hull, card: ManoeuvringCard) -> Model:
         With ``roll``.
     """
     (phi, p), starts = heel()
-    K, phidot = _moment(model, hull, card, p.symbol, phi.symbol), _rate_of_heel(p.symbol)
+    K, phidot = _moment(model, hull, card, p.symbol, phi.symbol), rate_of_heel(p.symbol)
     forces = model.symbol("force.Y"), K.symbol, model.symbol("force.N")
     vdot, pdot, rdot = _accelerations(model, hull, card, forces)
-    rolling = phi, p, *starts, K, phidot, _acceleration_of_roll(pdot)
+    acceleration = Quantity(
+        "motion.pdot",
+        "rad/s2",
+        "Acceleration of roll, positive to starboard",
+        pdot,
+        display_unit="deg/s2",
+        nominal=1e-3,
+    )
+    rolling = phi, p, *starts, K, phidot, acceleration
     model = model.extend(*rolling, outputs=("motion.phi", "motion.p", "force.K"))
     model = with_forces(model, **_forces_by_roll(hull, card, p.symbol, phi.symbol))
     model = model.redefine("motion.vdot", lambda _: vdot).redefine("motion.rdot", lambda _: rdot)
@@ -150,10 +156,9 @@ def _of_polynomial(hull: Hull, card: ManoeuvringCard, force: str, p: ca.SX, phi:
     rolling = {"p": p * hull["ship.length"] / speed, "phi": phi}
     motion = {"v": v, "r": r, "d": hull["rudder.effective"], "u": du, **rolling}
     total = ca.SX(0)
-    for kept, share in (([name for name in names if name != "Kp"], 1 - hull.low_share), (["Kp"], ca.SX(1))):
-        chosen = [name for name in names if name in kept]
-        coefficients = {name: hull.coefficient(name) for name in chosen}
-        total += share * polynomial(chosen, coefficients, **motion)
+    for kept, share in ((True, 1 - hull.low_share), (False, ca.SX(1))):
+        chosen = [name for name in names if (name != "Kp") == kept]
+        total += share * polynomial(chosen, {name: hull.coefficient(name) for name in chosen}, **motion)
     scales = hull.scales(speed)
     arm = scales.length if force in "KN" else 1
     force_or_moment: ca.SX = scales.force * arm * total
@@ -176,11 +181,11 @@ def _moment(model: Model, hull: Hull, card: ManoeuvringCard, p: ca.SX, phi: ca.S
         - hull["ship.weight"] * hull["ship.metacentric_height"] * phi
     )
     return Quantity(
-        name="force.K",
-        unit="N.m",
-        description="Rolling moment about the origin except for that of acceleration, positive to starboard",
+        "force.K",
+        "N.m",
+        "Rolling moment about the origin except for that of acceleration, positive to starboard",
+        value,
         nominal=1e6,
-        value=value,
     )
 
 
@@ -205,25 +210,3 @@ def _accelerations(
     )
     v, p, r = ca.vertsplit(ca.inv(matrix) @ ca.vertcat(*forces))
     return v, p, r
-
-
-def _rate_of_heel(p: ca.SX) -> Quantity:
-    return Quantity(
-        name="motion.phidot",
-        unit="rad/s",
-        description="Rate of change of heel",
-        display_unit="deg/s",
-        nominal=0.01,
-        value=p,
-    )
-
-
-def _acceleration_of_roll(value: ca.SX) -> Quantity:
-    return Quantity(
-        name="motion.pdot",
-        unit="rad/s2",
-        description="Acceleration of roll, positive to starboard",
-        display_unit="deg/s2",
-        nominal=1e-3,
-        value=value,
-    )

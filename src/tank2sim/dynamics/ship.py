@@ -14,13 +14,19 @@ from tank2sim.cards.card import OPPOSITE, ManoeuvringCard, MmgCard
 from tank2sim.cards.scaling import Scales
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
-from tank2sim.dynamics.geographic import GEOGRAPHIC_OUTPUTS, geographic
-from tank2sim.dynamics.hull import VALIDITY_FACTOR, Hull, motion_quantities, polynomial_forces
-from tank2sim.dynamics.kinematics import body_states, planar_kinematics
+from tank2sim.dynamics.hull import (
+    MOTION_OUTPUTS,
+    VALIDITY_FACTOR,
+    Hull,
+    hull_particulars,
+    motion_quantities,
+    polynomial_forces,
+)
+from tank2sim.dynamics.kinematics import motion_variables
 from tank2sim.dynamics.low_speed import low_speed_parameters
 from tank2sim.dynamics.mmg.hull import MMG_TERMS
 from tank2sim.dynamics.mmg.ship import MmgShip, mmg_forces, mmg_parameters, sides
-from tank2sim.dynamics.model import Model, Parameter, State, Variable
+from tank2sim.dynamics.model import Model, Parameter, Variable
 from tank2sim.dynamics.propulsion import propulsion, revolutions
 from tank2sim.dynamics.rigid_body import Inertia, inertia
 from tank2sim.dynamics.roll import roll_fault, roll_parameters, roll_terms, with_roll
@@ -38,10 +44,7 @@ _STEPS_PER_LENGTH = 200
 """Integration steps while the ship covers its own length (benchmarks/accuracy.py prints what halving them changes)."""
 
 _OUTPUTS = (
-    *("motion.x", "motion.y", "motion.psi", "motion.u", "motion.v", "motion.r", "motion.speed", "motion.beta"),
-    *("motion.sog", "motion.cog", *GEOGRAPHIC_OUTPUTS),
-    *("motion.udot", "motion.vdot", "motion.rdot", "rudder.angle"),
-    *("force.X", "force.Y", "force.N", "validity"),
+    *(*MOTION_OUTPUTS, "rudder.angle", "force.X", "force.Y", "force.N", "validity"),
     *(f"{VALIDITY_FACTOR}{cause}" for cause in ("low_speed", "high_speed", "drift", "yaw_rate", "rudder")),
 )
 
@@ -49,47 +52,33 @@ _OUTPUTS = (
 def ship_model(card: ManoeuvringCard) -> Model:
     """The model of a ship without its effects, (3.5) or (3.8) of paper 2 as the card's ``model.kind`` says.
 
-    Raises
-    ------
-    InputError
-        The card has a derivative that the model does not know, or its mass matrix is singular (f4 = 0 in 3.6).
+    Raises InputError: the card has a derivative that the model does not know, or its mass matrix is singular (f4 = 0 in
+    3.6).
     """
     names, notices = _derivative_names(card)
     _refuse_singular_mass(card)
-    body = body_states(card.model.speed_mps, card.ship.length_m)
     gear, gear_notices = steering_gear(card.steering_gear, card.ship.length_m / card.model.speed_mps)
-    engine: tuple[Variable, ...] = ()
-    if isinstance(card, MmgCard):
-        assert card.propulsion is not None
-        engine = (*revolutions(card.propulsion), *mmg_parameters(card))
-    elif card.propulsion:
-        engine = propulsion(card.propulsion)
+    engine = _engine(card)
     constants = (
         *_ship_parameters(card),
         *roll_parameters(card),
         *low_speed_parameters(card),
         *_derivative_parameters(card, names),
     )
-    position = planar_kinematics({state.name: state for state in body if isinstance(state, State)})
-    symbols = {variable.name: variable.symbol for variable in position}
-    position = (*position, *geographic(symbols["motion.x"], symbols["motion.y"]))
-    given = (*position, *body, *gear, *engine, *constants)
+    motion = motion_variables(card.model.speed_mps, card.ship.length_m)
+    given = (*motion, *gear, *engine, *constants)
     hull = Hull(
         linear=card.model.kind == "linear",
         nominal_scale=card.model.speed_scale == "nominal",
         inertial_terms=card.model.yaw_rate_terms == "hydrodynamic",
         symbols={variable.name: variable.symbol for variable in given},
     )
+    motions = "surge, sway, roll and yaw" if card.roll else "surge, sway and yaw"
     empty = Model(
         name=card.ship.name,
-        description=_description(card),
-        states=(),
-        inputs=(),
-        parameters=(),
-        quantities=(),
-        outputs=(),
+        description=f"{card.ship.name}: {KINDS[card.model.kind]} manoeuvring model in {motions} with steering gear",
         step_s=_step(card),
-        notices=(*notices, *gear_notices, *_without_yaw(card), *_one_sided(card)),
+        notices=(*notices, *gear_notices, *_limits_of_tests(card)),
     )
     forces = mmg_forces(MmgShip(hull, sides(card))) if isinstance(card, MmgCard) else polynomial_forces(hull)
     loads = [quantity.name for quantity in forces if quantity.name.startswith(("propeller.torque", "propeller.power"))]
@@ -98,59 +87,52 @@ def ship_model(card: ManoeuvringCard) -> Model:
     return with_roll(planar, hull, card) if card.roll else planar
 
 
-def _without_yaw(card: ManoeuvringCard) -> list[Notice]:
-    if card.model.valid_yaw_rate_prime > 0:
-        return []
-    return [
-        Notice(
-            "no test behind the card had a yaw rate (valid_yaw_rate_prime = 0): its derivatives by r are estimates, "
-            "and so are course stability and every turn"
-        )
-    ]
+def _engine(card: ManoeuvringCard) -> tuple[Variable, ...]:
+    if isinstance(card, MmgCard):
+        assert card.propulsion is not None
+        return (*revolutions(card.propulsion), *mmg_parameters(card))
+    return propulsion(card.propulsion) if card.propulsion else ()
 
 
-def _one_sided(card: ManoeuvringCard) -> list[Notice]:
-    if not isinstance(card, MmgCard) or card.rudder.gamma_R_plus == card.rudder.gamma_R_minus:
-        return []
-    return [
-        Notice(
-            "gamma_R changes with the side of the flow: what is linearised about straight motion (stability, small "
-            "rudder) has gamma_R_minus"
-        )
-    ]
+def _limits_of_tests(card: ManoeuvringCard) -> list[Notice]:
+    """What the tests behind a card leave open about yaw and about the sides."""
+    notices = []
+    if not card.model.valid_yaw_rate_prime > 0:
+        text = "no test behind the card had a yaw rate (valid_yaw_rate_prime = 0): its derivatives by r are estimates, "
+        notices.append(Notice(f"{text}and so are course stability and every turn"))
+    if isinstance(card, MmgCard) and card.rudder.gamma_R_plus != card.rudder.gamma_R_minus:
+        text = "gamma_R changes with the side of the flow: what is linearised about straight motion (stability, small "
+        notices.append(Notice(f"{text}rudder) has gamma_R_minus"))
+    return notices
 
 
 KINDS = {"abkowitz": "third-order (Abkowitz)", "linear": "linear", "mmg": "MMG"}
 """Kind of model to what it is called."""
 
 
-def _description(card: ManoeuvringCard) -> str:
-    motions = "surge, sway, roll and yaw" if card.roll else "surge, sway and yaw"
-    return f"{card.ship.name}: {KINDS[card.model.kind]} manoeuvring model in {motions} with steering gear"
-
-
 def _derivative_names(card: ManoeuvringCard) -> tuple[list[str], list[Notice]]:
     """Names of the model's derivatives, and notices on those of the card that it does not use."""
-    mmg = card.model.kind == "mmg"
-    every, equations = (MMG_TERMS, "the MMG hull") if mmg else (ALL_TERMS, "(3.8)")
-    spelt = [*OPPOSITE, *(term for term in MMG_TERMS if term not in OPPOSED)] if mmg else list(ALL_TERMS)
     rolling = [name for name in card.derivatives if known_term(name).of_roll]
-    for section, given in (("derivatives", card.derivatives), ("uncertainty", card.uncertainty)):
-        for name in given:
-            of_roll_alone = mmg and not card.roll and name in ("Yrdot", "Nvdot")
-            if (name not in every and name not in rolling) or of_roll_alone:
-                key = card.places.get(name, name)
-                close = difflib.get_close_matches(name, spelt, n=1)
-                hint = f"did you mean {close[0]}? " if close else ""
-                remedy = f"{hint}{'an MMG hull' if mmg else 'the third-order model'} has {' '.join(spelt)}"
-                raise card.fault(f"{section}.{key}", f"is not a term of {equations}", remedy)
-    if mmg:
-        return [*MMG_TERMS, *rolling], []
-    if card.model.kind == "abkowitz":
-        return [*ALL_TERMS, *rolling], []
+    mmg = card.model.kind == "mmg"
+    every = MMG_TERMS if mmg else ALL_TERMS
+    _refuse_unknown_terms(card, {*every, *rolling} - ({"Yrdot", "Nvdot"} if mmg and not card.roll else set()))
+    if card.model.kind != "linear":
+        return [*every, *rolling], []
     names = [*roll_terms(card), *LINEAR_TERMS["X"], *LINEAR_TERMS["Y"], *LINEAR_TERMS["N"], *ACCELERATION_TERMS]
     unused = [name for name in card.derivatives if name not in names]
     return names, [Notice(f"the linear model leaves out {len(unused)} derivatives of the card")] if unused else []
+
+
+def _refuse_unknown_terms(card: ManoeuvringCard, known: set[str]) -> None:
+    equations, kind, spelt = "(3.8)", "the third-order model", [*ALL_TERMS]
+    if card.model.kind == "mmg":
+        equations, kind = "the MMG hull", "an MMG hull"
+        spelt = [*OPPOSITE, *(term for term in MMG_TERMS if term not in OPPOSED)]
+    for section, given in (("derivatives", card.derivatives), ("uncertainty", card.uncertainty)):
+        if name := next((name for name in given if name not in known), ""):
+            close = difflib.get_close_matches(name, spelt, n=1)
+            remedy = f"{f'did you mean {close[0]}? ' if close else ''}{kind} has {' '.join(spelt)}"
+            raise card.fault(f"{section}.{card.places.get(name, name)}", f"is not a term of {equations}", remedy)
 
 
 def _refuse_singular_mass(card: ManoeuvringCard) -> None:
@@ -210,28 +192,11 @@ def _step(card: ManoeuvringCard) -> float:
 
 
 def _ship_parameters(card: ManoeuvringCard) -> tuple[Parameter, ...]:
-    scales, (slowest, fastest) = card.scales, card.model.speed_range_mps
-
-    def particular(name: str, unit: str, description: str, start: float, **more: str) -> Parameter:
-        nominal = abs(start) or 1.0
-        # Above zero: a ship without length, speed, mass or water has no equations.
-        minimum = None if name == "ship.x_G" else 1e-6
-        return Parameter(
-            name=name,
-            unit=unit,
-            description=description,
-            start=start,
-            tunable=False,
-            nominal=nominal,
-            minimum=minimum,
-            display_unit=more.get("display_unit"),
-        )
-
     def largest(name: str, unit: str, description: str, start: float) -> Parameter:
         return Parameter(
-            name=name,
-            unit=unit,
-            description=description,
+            name,
+            unit,
+            description,
             display_unit="deg" if unit == "rad" else None,
             start=start,
             minimum=0.0,
@@ -239,17 +204,10 @@ def _ship_parameters(card: ManoeuvringCard) -> tuple[Parameter, ...]:
             tunable=False,
         )
 
-    body, model = card.rigid_body, card.model
+    model = card.model
     rudder = math.pi / 2 if model.valid_rudder_rad is None else model.valid_rudder_rad
     return (
-        particular("ship.length", "m", "Length between perpendiculars", scales.length),
-        particular("ship.speed", "m/s", "Speed u0 about which forces are expanded", scales.speed, display_unit="knots"),
-        particular("ship.mass", "kg", "Mass", body.mass * scales.mass),
-        particular("ship.x_G", "m", "Centre of gravity forward of midships", body.x_G * scales.length),
-        particular("ship.yaw_inertia", "kg.m2", "Yaw inertia J_z about midships", body.yaw_inertia * scales.inertia),
-        particular("ship.water_density", "kg/m3", "Density of the water", scales.density),
-        particular("ship.slowest", "m/s", "Lowest speed at which the card holds", slowest, display_unit="knots"),
-        particular("ship.fastest", "m/s", "Highest speed at which the card holds", fastest, display_unit="knots"),
+        *hull_particulars(card, "Speed u0 about which forces are expanded", "J_z"),
         largest("ship.largest_drift", "rad", "Largest drift angle at which the card holds", model.valid_drift_rad),
         largest(
             "ship.largest_yaw_rate", "1", "Largest yaw rate r L/U at which the card holds", model.valid_yaw_rate_prime
@@ -272,12 +230,6 @@ def _derivative_parameters(card: ManoeuvringCard, names: list[str]) -> tuple[Par
         return f"Coefficient of {' '.join(powers) or '1'} in {term.force}, prime system, rudder + to starboard"
 
     return tuple(
-        Parameter(
-            name=f"derivatives.{name}",
-            unit="1",
-            description=described(name),
-            nominal=1e-3,
-            start=card.derivatives.get(name, 0.0),
-        )
+        Parameter(f"derivatives.{name}", "1", described(name), nominal=1e-3, start=card.derivatives.get(name, 0.0))
         for name in names
     )

@@ -37,11 +37,11 @@ def force_shares(before: Model, after: Model, name: str) -> tuple[Quantity, ...]
             continue
         shares.append(
             Quantity(
-                name=f"{name}.{letter}",
-                unit=unit,
-                description=f"{description} by {name}, positive {_SIDES[letter]}",
+                f"{name}.{letter}",
+                unit,
+                f"{description} by {name}, positive {_SIDES[letter]}",
+                new.value - old.value,
                 nominal=old.nominal,
-                value=new.value - old.value,
             )
         )
     return tuple(shares)
@@ -59,15 +59,13 @@ def with_simulator_interface(model: Model) -> Model:
         return model
     model = with_external_forces(model)
     added = tuple(quantity for quantity in _displays(model) if quantity.name not in model)
-    parts = tuple(
-        quantity.name
-        for quantity in model.quantities
-        if quantity.name.rpartition(".")[2] in ("X", "Y", "N")
-        and not quantity.name.startswith("force.")
-        and quantity.unit in ("N", "N.m")
-        and quantity.name not in model.outputs
-    )
+    parts = [one.name for one in model.quantities if _is_part_of_force(one) and one.name not in model.outputs]
     return model.extend(*added, outputs=[*(quantity.name for quantity in added), *parts])
+
+
+def _is_part_of_force(quantity: Quantity) -> bool:
+    origin, _, axis = quantity.name.rpartition(".")
+    return axis in ("X", "Y", "N") and origin.partition(".")[0] != "force" and quantity.unit in ("N", "N.m")
 
 
 def _displays(model: Model) -> Iterator[Quantity]:
@@ -80,12 +78,12 @@ def _displays(model: Model) -> Iterator[Quantity]:
         north, east = north + model.symbol("wind.north"), east + model.symbol("wind.east")
     forward, starboard = relative_air(model, north, east)
     yield Quantity(
-        name="wind.relative_speed",
-        unit="m/s",
-        description="Speed of the wind relative to the ship",
+        "wind.relative_speed",
+        "m/s",
+        "Speed of the wind relative to the ship",
+        ca.sqrt(forward**2 + starboard**2 + _STILL_MPS**2),
         display_unit="knots",
         nominal=10.0,
-        value=ca.sqrt(forward**2 + starboard**2 + _STILL_MPS**2),
     )
     from_bow = ca.atan2(-starboard, -forward + _STILL_MPS * (forward**2 + starboard**2 < _STILL_MPS**2))
     description = "Direction from which the relative wind comes, clockwise from the bow, 0 to 360 deg"
@@ -99,13 +97,13 @@ _STILL_MPS = 1e-8
 def _bearing(name: str, description: str, angle: ca.SX) -> Quantity:
     turn = 2 * math.pi
     return Quantity(
-        name=name,
-        unit="rad",
-        description=description,
+        name,
+        "rad",
+        description,
+        angle - turn * ca.floor(angle / turn),
         display_unit="deg",
         minimum=0.0,
         maximum=2 * math.pi,
-        value=angle - turn * ca.floor(angle / turn),
     )
 
 
@@ -127,34 +125,24 @@ def with_external_forces(model: Model) -> Model:
         model.parameter_values()[model.parameter_names.index(f"ship.{name}")] for name in ("length", "speed", "mass")
     )
     force = float(mass * speed**2 / length) / 100  # the order of a ship's resistance at the speed of expansion
+    length = float(length)
+    at, besides = "at external.point_x, external.point_y", "in addition to that of the force at its point"
+    outside = "Point of the external force"
     described = (
-        ("N", "External surge force at external.point_x, external.point_y, positive forward"),
-        ("N", "External sway force at external.point_x, external.point_y, positive to starboard"),
-        ("N.m", "External yaw moment, in addition to that of the force at its point, positive to starboard"),
-        ("m", "Point of the external force forward of midships"),
-        ("m", "Point of the external force to starboard of the centreline"),
+        ("external.X", "N", f"External surge force {at}, positive forward", force),
+        ("external.Y", "N", f"External sway force {at}, positive to starboard", force),
+        ("external.N", "N.m", f"External yaw moment, {besides}, positive to starboard", force * length / 4),
+        ("external.point_x", "m", f"{outside} forward of midships", length / 4),
+        ("external.point_y", "m", f"{outside} to starboard of the centreline", length / 20),
+        ("external.K", "N.m", f"External rolling moment, {besides}, positive to starboard", force * length / 20),
+        ("external.point_z", "m", f"{outside} below the origin", length / 20),
     )
-    usual = (force, force, force * float(length) / 4, float(length) / 4, float(length) / 20)
-    inputs = [
-        Input(name=name, unit=unit, description=description, nominal=nominal)
-        for name, (unit, description), nominal in zip(EXTERNAL_INPUTS, described, usual, strict=True)
-    ]
-    X, Y, N, x, y = (variable.symbol for variable in inputs)
-    forced = with_forces(model.extend(*inputs), X=X, Y=Y, N=N + x * Y - y * X)
+    inputs = [Input(*words, nominal=nominal) for *words, nominal in described]
+    X, Y, N, x, y, K, z = (variable.symbol for variable in inputs)
+    forced = with_forces(model.extend(*inputs[:5]), X=X, Y=Y, N=N + x * Y - y * X)
     if "force.K" not in model:
         return forced
-    of_roll = (
-        ("N.m", "External rolling moment, in addition to that of the force at its point, positive to starboard"),
-        ("m", "Point of the external force below the origin"),
-    )
-    rolling = [
-        Input(name=name, unit=unit, description=description, nominal=nominal)
-        for name, (unit, description), nominal in zip(
-            EXTERNAL_INPUTS_OF_ROLL, of_roll, (force * float(length) / 20, float(length) / 20), strict=True
-        )
-    ]
-    K, z = (variable.symbol for variable in rolling)
-    return forced.extend(*rolling).redefine("force.K", lambda moment: moment + K - z * Y)
+    return forced.extend(*inputs[5:]).redefine("force.K", lambda moment: moment + K - z * Y)
 
 
 def external_inputs(given: Mapping[str, float], *, rolls: bool = False) -> dict[str, float]:

@@ -27,16 +27,17 @@ from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.craft_terms import CRAFT_ADDED_MASSES, CRAFT_TERMS, VELOCITY_TERMS
 from tank2sim.cards.form import ThrusterSection
 from tank2sim.cards.small_craft import cruising_revolutions, pushes_ahead
-from tank2sim.dynamics.geographic import GEOGRAPHIC_OUTPUTS, geographic
 from tank2sim.dynamics.hull import (
+    MOTION_OUTPUTS,
     VALIDITY_MARGIN,
     acceleration_quantities,
     force_quantities,
+    hull_particulars,
     inertia_quantities,
     inside_range,
     speed_and_drift,
 )
-from tank2sim.dynamics.kinematics import body_states, planar_kinematics
+from tank2sim.dynamics.kinematics import motion_variables
 from tank2sim.dynamics.low_speed import regular_speed
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State, Variable
 from tank2sim.dynamics.rigid_body import (
@@ -68,13 +69,6 @@ THRUSTER_PARAMETERS = {
 }
 """Key of ``[[thrusters]]`` to the last part of the name of the parameter that holds it."""
 
-_OUTPUTS = (
-    *("motion.x", "motion.y", "motion.psi", "motion.u", "motion.v", "motion.r", "motion.speed", "motion.beta"),
-    *("motion.sog", "motion.cog", *GEOGRAPHIC_OUTPUTS),
-    *("motion.udot", "motion.vdot", "motion.rdot"),
-    *("force.X", "force.Y", "force.N", "validity"),
-)
-
 
 def craft_model(card: SteeredCard) -> Model:
     """The model of a small craft without its effects.
@@ -88,12 +82,9 @@ def craft_model(card: SteeredCard) -> Model:
     InputError
         Mass with added mass is not positive.
     """
-    body = body_states(card.model.speed_mps, card.ship.length_m)
-    position = planar_kinematics({state.name: state for state in body if isinstance(state, State)})
-    symbols = {variable.name: variable.symbol for variable in position}
-    position = (*position, *geographic(symbols["motion.x"], symbols["motion.y"]))
-    constants = (*_craft_particulars(card), *_craft_derivatives(card))
-    s = {variable.name: variable.symbol for variable in (*position, *body, *constants)}
+    moving = motion_variables(card.model.speed_mps, card.ship.length_m)
+    constants = (*hull_particulars(card, "Cruising speed", "I_z"), *_craft_derivatives(card))
+    s = {variable.name: variable.symbol for variable in (*moving, *constants)}
     thrusters, pushes = _thrusters(card, s)
     matrix = _craft_inertia(s)
     _refuse_mass(card)
@@ -105,18 +96,13 @@ def craft_model(card: SteeredCard) -> Model:
     empty = Model(
         name=card.ship.name,
         description=f"{card.ship.name}: small craft in surge, sway and yaw with thrusters {described}",
-        states=(),
-        inputs=(),
-        parameters=(),
-        quantities=(),
-        outputs=(),
         step_s=_craft_step(card),
     )
     shown = [f"thrusters.{thruster.name}.{what}" for thruster in card.thrusters for what in ("speed", "thrust")]
     return empty.extend(
-        *(*position, *body, *constants, *thrusters),
+        *(*moving, *constants, *thrusters),
         *(*forces, *masses, *acceleration_quantities(motion), *_craft_speed(s)),
-        outputs=(*_OUTPUTS, *shown),
+        outputs=(*MOTION_OUTPUTS, "force.X", "force.Y", "force.N", "validity", *shown),
     )
 
 
@@ -142,34 +128,6 @@ def _nominal_forces(card: SteeredCard) -> tuple[float, float]:
     """Thrust (N) of all thrusters at their largest revolutions, and its moment (N m) at half the length."""
     thrust = sum(thruster.largest_thrust_N for thruster in card.thrusters)
     return thrust, thrust * card.ship.length_m / 2
-
-
-def _craft_particulars(card: SteeredCard) -> tuple[Parameter, ...]:
-    slowest, fastest = card.model.speed_range_mps
-    described = (
-        ("ship.length", "m", "Length between perpendiculars", card.ship.length_m),
-        ("ship.speed", "m/s", "Cruising speed", card.model.speed_mps),
-        ("ship.mass", "kg", "Mass", card.rigid_body.mass),
-        ("ship.x_G", "m", "Centre of gravity forward of midships", card.rigid_body.x_G),
-        ("ship.yaw_inertia", "kg.m2", "Yaw inertia I_z about midships", card.rigid_body.yaw_inertia),
-        ("ship.water_density", "kg/m3", "Density of the water", card.environment.water_density_kgpm3),
-        ("ship.slowest", "m/s", "Lowest speed at which the card holds", slowest),
-        ("ship.fastest", "m/s", "Highest speed at which the card holds", fastest),
-    )
-    may_vanish = ("ship.x_G", "ship.slowest")
-    return tuple(
-        Parameter(
-            name=name,
-            unit=unit,
-            description=description,
-            start=start,
-            tunable=False,
-            nominal=abs(start) or 1.0,
-            minimum=None if name in may_vanish else 1e-6,
-            display_unit="knots" if unit == "m/s" else None,
-        )
-        for name, unit, description, start in described
-    )
 
 
 _ADDED_UNITS = {"Xudot": "kg", "Yvdot": "kg", "Yrdot": "kg.m", "Nvdot": "kg.m", "Nrdot": "kg.m2"}
@@ -203,9 +161,9 @@ def _craft_derivatives(card: SteeredCard) -> tuple[Parameter, ...]:
 
     return tuple(
         Parameter(
-            name=f"derivatives.{name}",
-            unit=craft_unit(name),
-            description=described(name),
+            f"derivatives.{name}",
+            craft_unit(name),
+            described(name),
             nominal=abs(card.derivatives.get(name, 0.0)) or 1.0,
             start=card.derivatives.get(name, 0.0),
         )
@@ -323,9 +281,9 @@ def _thruster(thruster: ThrusterSection, start: float, s: Mapping[str, ca.SX]) -
 
     def constant(name: str, unit: str, description: str, value: float, shown: str | None = None) -> Parameter:
         return Parameter(
-            name=f"{prefix}.{name}",
-            unit=unit,
-            description=f"{description} of {where}",
+            f"{prefix}.{name}",
+            unit,
+            f"{description} of {where}",
             display_unit=shown,
             nominal=abs(value) or 1.0,
             minimum=0.0,
@@ -346,9 +304,9 @@ def _thruster(thruster: ThrusterSection, start: float, s: Mapping[str, ca.SX]) -
         )
         ordered = float(ca.evalf(revolutions_of_order(ca.SX(start), thruster.max_radps, 1 / thruster.order_exponent)))
     command = Input(
-        name=f"{prefix}.command",
-        unit="rad/s",
-        description=f"Ordered revolutions of {where}, positive ahead",
+        f"{prefix}.command",
+        "rad/s",
+        f"Ordered revolutions of {where}, positive ahead",
         display_unit="rpm",
         nominal=thruster.max_radps / 2,
         minimum=thruster.lowest_radps,
@@ -359,18 +317,18 @@ def _thruster(thruster: ThrusterSection, start: float, s: Mapping[str, ca.SX]) -
     beyond = held * (ca.fabs(held) > band.symbol) if thruster.dead_band_radps else held
     largest = ca.if_else(held >= 0, thruster.max_radps, -thruster.lowest_radps)
     order = Quantity(
-        name=f"{prefix}.order",
-        unit="rad/s",
-        description=f"Revolutions that {where} goes to: its order within its limits, 0 in the dead band",
+        f"{prefix}.order",
+        "rad/s",
+        f"Revolutions that {where} goes to: its order within its limits, 0 in the dead band",
+        beyond if exponent is None else revolutions_of_order(beyond, largest, exponent.symbol),
         display_unit="rpm",
         nominal=thruster.max_radps,
-        value=beyond if exponent is None else revolutions_of_order(beyond, largest, exponent.symbol),
     )
     places = [
         Parameter(
-            name=f"{prefix}.{axis}",
-            unit="m",
-            description=f"Place of {where}, positive {way} of midships",
+            f"{prefix}.{axis}",
+            "m",
+            f"Place of {where}, positive {way} of midships",
             nominal=abs(value) or 1.0,
             start=value,
             tunable=False,
@@ -387,11 +345,11 @@ def _thruster(thruster: ThrusterSection, start: float, s: Mapping[str, ca.SX]) -
     variables += turning
     along = s["motion.u"] * ca.cos(azimuth) + s["motion.v"] * ca.sin(azimuth)
     thrust = Quantity(
-        name=f"{prefix}.thrust",
-        unit="N",
-        description=f"Thrust of {where}, positive with revolutions ahead",
+        f"{prefix}.thrust",
+        "N",
+        f"Thrust of {where}, positive with revolutions ahead",
+        thrust_of(speed[0].symbol, along, ahead.symbol, astern.symbol, loss.symbol),
         nominal=thruster.largest_thrust_N,
-        value=thrust_of(speed[0].symbol, along, ahead.symbol, astern.symbol, loss.symbol),
     )
     return [*variables, thrust], thrust.symbol, azimuth
 
@@ -408,29 +366,29 @@ def _revolutions(thruster: ThrusterSection, prefix: str, where: str, order: Quan
     if thruster.time_constant_s is None:
         return [Quantity(value=order.symbol, **described)]  # type: ignore[arg-type]
     first = Parameter(
-        name=f"initial.{thruster.name}_speed",
-        unit="rad/s",
-        description=f"Revolutions of {where} at the start, positive ahead",
+        f"initial.{thruster.name}_speed",
+        "rad/s",
+        f"Revolutions of {where} at the start, positive ahead",
         display_unit="rpm",
         nominal=thruster.max_radps,
         start=start,
         tunable=False,
     )
     lag = Parameter(
-        name=f"{prefix}.time_constant",
-        unit="s",
-        description=f"Lag of the revolutions of {where}",
+        f"{prefix}.time_constant",
+        "s",
+        f"Lag of the revolutions of {where}",
         nominal=thruster.time_constant_s,
         minimum=1e-6,
         start=thruster.time_constant_s,
     )
     state = State(derivative=f"{prefix}.rate", start=first.symbol, trim=order.value, **described)  # type: ignore[arg-type]
     rate = Quantity(
-        name=f"{prefix}.rate",
-        unit="rad/s2",
-        description=f"Rate of change of the revolutions of {where}",
+        f"{prefix}.rate",
+        "rad/s2",
+        f"Rate of change of the revolutions of {where}",
+        (order.symbol - state.symbol) / lag.symbol,
         nominal=thruster.max_radps,
-        value=(order.symbol - state.symbol) / lag.symbol,
     )
     return [state, rate, first, lag]
 
@@ -441,9 +399,9 @@ def _azimuth(thruster: ThrusterSection, prefix: str, where: str) -> tuple[list[V
     if reach is None:
         return [], ca.SX(middle)
     command = Input(
-        name=f"{prefix}.azimuth_command",
-        unit="rad",
-        description=f"Ordered direction in which {where} pushes the craft, clockwise from the bow",
+        f"{prefix}.azimuth_command",
+        "rad",
+        f"Ordered direction in which {where} pushes the craft, clockwise from the bow",
         display_unit="deg",
         nominal=min(reach, 0.5),
         minimum=middle - reach,
@@ -467,11 +425,7 @@ def _azimuth(thruster: ThrusterSection, prefix: str, where: str) -> tuple[list[V
         limit = thruster.max_azimuth_rate_radps
         rate = ca.fmax(-limit, ca.fmin(limit, rate))
     turn = Quantity(
-        name=f"{prefix}.azimuth_rate",
-        unit="rad/s",
-        description=f"Rate at which {where} turns, clockwise",
-        display_unit="deg/s",
-        value=rate,
+        f"{prefix}.azimuth_rate", "rad/s", f"Rate at which {where} turns, clockwise", rate, display_unit="deg/s"
     )
     return [command, state, turn], state.symbol
 
@@ -484,11 +438,11 @@ def _craft_speed(s: Mapping[str, ca.SX]) -> tuple[Quantity, ...]:
         s["ship.slowest"] - speed.symbol, margin
     )
     validity = Quantity(
-        name="validity",
-        unit="1",
-        description="1 in the range of speeds in which the card holds, falling to 0 beyond",
+        "validity",
+        "1",
+        "1 in the range of speeds in which the card holds, falling to 0 beyond",
+        inside,
         minimum=0.0,
         maximum=1.0,
-        value=inside,
     )
     return speed, drift, validity

@@ -38,28 +38,28 @@ def steering_gear(gear: SteeringGear | None, ship_time_s: float) -> tuple[tuple[
     lag, *limits = _parameters(gear, ship_time_s)
     by_name = {limit.name: limit.symbol for limit in limits}
     start = Parameter(
-        name="initial.rudder_angle",
-        unit="rad",
-        description="Rudder angle at the start, positive to starboard",
+        "initial.rudder_angle",
+        "rad",
+        "Rudder angle at the start, positive to starboard",
         display_unit="deg",
         nominal=0.35,
         start=0.0,
         tunable=False,
     )
     order = _within(command.symbol, by_name.get("steering.max_angle"))
-    rudder = State(
-        name="rudder.angle",
-        unit="rad",
-        description="Rudder angle, positive to starboard (turns the ship to starboard)",
-        display_unit="deg",
-        nominal=0.35,
-        derivative="rudder.rate",
-        start=start.symbol,
+    rudder = rudder_state(
+        "rudder.angle",
+        "Rudder angle, positive to starboard (turns the ship to starboard)",
+        "rudder.rate",
+        start.symbol,
         trim=ca.if_else(failed.symbol, start.symbol, order),
     )
-    error = _angle("rudder.error", "Order less rudder angle, on which the gear acts", order - rudder.symbol)
-    rate = _rate(_within(error.symbol / lag.symbol, by_name.get("steering.max_rate")) * (1 - failed.symbol))
-    seen = _angle("rudder.effective", "Rudder angle that the hull forces see, positive to starboard", rudder.symbol)
+    error = rudder_quantity("rudder.error", "Order less rudder angle, on which the gear acts", order - rudder.symbol)
+    turning = _within(error.symbol / lag.symbol, by_name.get("steering.max_rate")) * (1 - failed.symbol)
+    rate = rudder_rate(rudder.derivative, "Rate of the rudder, positive to starboard", turning)
+    seen = rudder_quantity(
+        "rudder.effective", "Rudder angle that the hull forces see, positive to starboard", rudder.symbol
+    )
     return (command, failed, rudder, error, rate, seen, lag, *limits, start), notices
 
 
@@ -73,9 +73,9 @@ def assumed_lag_notice(ship_time_s: float) -> Notice:
 
 def _inputs(gear: SteeringGear) -> tuple[Input, Input]:
     command = Input(
-        name="rudder.command",
-        unit="rad",
-        description="Rudder order, positive to starboard (turns the ship to starboard)",
+        "rudder.command",
+        "rad",
+        "Rudder order, positive to starboard (turns the ship to starboard)",
         display_unit="deg",
         nominal=0.35,
         minimum=-(gear.max_angle_rad or ca.pi / 2),
@@ -83,19 +83,16 @@ def _inputs(gear: SteeringGear) -> tuple[Input, Input]:
         accepted=ca.pi / 2,  # more is an angle in degrees; up to there the gear stops at its largest angle
     )
     failed = Input(
-        name="steering.failed",
-        unit="1",
-        description="True: the steering gear has failed and the rudder stays where it is",
-        boolean=True,
+        "steering.failed", "1", "True: the steering gear has failed and the rudder stays where it is", boolean=True
     )
     return command, failed
 
 
 def _parameters(gear: SteeringGear, ship_time_s: float) -> list[Parameter]:
     lag = Parameter(
-        name="steering.time_constant",
-        unit="s",
-        description="Time constant of the steering gear",
+        "steering.time_constant",
+        "s",
+        "Time constant of the steering gear",
         minimum=1e-6,
         start=gear.time_constant_s or UNSTATED_LAG * ship_time_s,
     )
@@ -104,33 +101,43 @@ def _parameters(gear: SteeringGear, ship_time_s: float) -> list[Parameter]:
         ("steering.max_rate", "rad/s", "Largest rate of the rudder", gear.max_rate_radps, "deg/s"),
     )
     limits = (
-        Parameter(
-            name=name,
-            unit=unit,
-            description=description,
-            minimum=0.0,
-            start=value,
-            nominal=value,
-            display_unit=display_unit,
-        )
+        Parameter(name, unit, description, minimum=0.0, start=value, nominal=value, display_unit=display_unit)
         for name, unit, description, value, display_unit in described
         if value is not None
     )
     return [lag, *limits]
 
 
-def _angle(name: str, description: str, value: ca.SX) -> Quantity:
-    return Quantity(name=name, unit="rad", description=description, display_unit="deg", nominal=0.35, value=value)
+def rudder_quantity(name: str, description: str, value: ca.SX) -> Quantity:
+    """An angle of a rudder or of its gear."""
+    return Quantity(name, "rad", description, value, display_unit="deg", nominal=0.35)
 
 
-def _rate(value: ca.SX) -> Quantity:
-    return Quantity(
-        name="rudder.rate",
-        unit="rad/s",
-        description="Rate of the rudder, positive to starboard",
-        display_unit="deg/s",
-        nominal=0.05,
-        value=value,
+def rudder_rate(name: str, description: str, value: ca.SX) -> Quantity:
+    """The rate of such an angle."""
+    return Quantity(name, "rad/s", description, value, display_unit="deg/s", nominal=0.05)
+
+
+def rudder_state(
+    name: str,
+    description: str,
+    derivative: str,
+    start: ca.SX | float,
+    *,
+    trim: ca.SX | None = None,
+    steady: bool = False,
+) -> State:
+    """Such an angle as a state; `derivative`, `start`, `trim` and `steady` as in :class:`.State`."""
+    return State(
+        name,
+        "rad",
+        description,
+        display_unit="deg",
+        nominal=0.35,
+        derivative=derivative,
+        start=start,
+        trim=trim,
+        steady=steady,
     )
 
 

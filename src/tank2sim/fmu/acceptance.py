@@ -34,12 +34,7 @@ _TITLES = {"zigzag_20_20": "Zigzag 20/20", "turn_35": "Turning circle, rudder 35
 class AcceptanceResult:
     """What the model itself answers to standard manoeuvres.
 
-    Parameters
-    ----------
-    reference : ReferenceRun, optional
-        None if the motion leaves all bounds.
-    manoeuvres : mapping
-        Standard manoeuvres of a ship, by name.
+    `reference`: None if the motion leaves all bounds. `manoeuvres`: standard manoeuvres of a ship, by name.
     """
 
     model: Model
@@ -53,10 +48,7 @@ class AcceptanceResult:
     def passport_files(self, documents: Documents, fmu: bytes, fmi: int) -> dict[str, str]:
         """Name in the FMU to text: the passport for machines and as a page, with what the FMU `fmu` itself answered.
 
-        Raises
-        ------
-        InputError
-            Its library does not run here, or answers with something else than the model.
+        Raises InputError: its library does not run here, or answers with something else than the model.
         """
         replay = replay_in_fmu(fmu, self.reference, self.model, fmi)
         error = replay.max_error or 0.0

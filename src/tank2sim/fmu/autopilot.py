@@ -50,13 +50,7 @@ def make_autopilot_fmu(
     and its orders are called as the signals of the ship's FMU. Other parameters and errors are those of
     :func:`tank2sim.fmu.export.make_fmu`.
 
-    Parameters
-    ----------
-    autopilot : Model
-    source : str
-        How it was found, in a sentence.
-    file : Path, optional
-        Where it goes: its modelName is the name of the file.
+    `source`: how it was found, in a sentence. `file`: where it goes: its modelName is the name of the file.
     """
     tuned = (parameter.name for parameter in autopilot.parameters if parameter.name.startswith("autopilot."))
     documents = Documents(source=source, origins={name: ValueOrigin(source) for name in tuned})
@@ -73,17 +67,9 @@ def co_simulate_heading(
     for the step; then both go on. An order is half a step old on average, so that the error falls in proportion to the
     step. Both may be of FMI 2.0 or 3.0.
 
-    Parameters
-    ----------
-    ship, autopilot : Path
-        FMUs. What the autopilot orders are its outputs called ``*.command``, what it hears its inputs ``motion.*``.
-    step_s, duration_s : float
-        Communication step, and length of the run, a whole number of steps.
-
-    Raises
-    ------
-    InputError
-        A file is not an FMU that runs here, offers no Co-Simulation, or lacks a signal of the two.
+    `ship`, `autopilot`: FMUs. What the autopilot orders are its outputs called ``*.command``, what it hears its inputs
+    ``motion.*``. `step_s`, `duration_s`: communication step, and length of the run, a whole number of steps. Raises
+    InputError: a file is not an FMU that runs here, offers no Co-Simulation, or lacks a signal of the two.
     """
     count = round(duration_s / step_s)
     time = np.asarray(step_s * np.arange(count + 1), dtype=np.float64)
@@ -136,16 +122,8 @@ def loop_difference(
 ) -> CoSimulated:
     """Hold the co-simulation of two FMUs against the closed loop simulated as one model.
 
-    Parameters
-    ----------
-    ship, autopilot : Model
-        What the FMUs are of.
-    fmus : (Path, Path)
-        FMU of the ship and FMU of the autopilot.
-    heading_rad : float
-        Change of course.
-    steps_s : sequence of float
-        Communication steps to try, whole numbers of the models' steps, two at least.
+    `ship`, `autopilot`: what the FMUs are of. `fmus`: FMU of the ship and FMU of the autopilot. `heading_rad`: change
+    of course. `steps_s`: communication steps to try, whole numbers of the models' steps, two at least.
     """
     values = {parameter.name: parameter.start for parameter in ship.parameters}
     longest = max(steps_s)

@@ -41,20 +41,11 @@ other mathematical libraries make of the last bits; float loses 6e-6 on the bund
 class PlainShip:
     """A ship in plain C99.
 
-    Parameters
-    ----------
-    prefix : str
-        With which each public name begins; macros and enumerators have it in capitals.
-    files : dict
-        Name to text of ``ship.h``, ``ship.c`` and ``self_test.c``.
-    counts : dict
-        ``states``, ``inputs``, ``outputs``, ``parameters``, ``constants`` to their number.
-    operations : dict
-        Kind of operation to how many of them an internal step has.
-    work : int
-        Local numbers of the function that has most.
-    use : str
-        How the files are compiled and called, and what they need, in Markdown.
+    `prefix`: with which each public name begins; macros and enumerators have it in capitals. `files`: name to text of
+    ``ship.h``, ``ship.c`` and ``self_test.c``. `counts`: ``states``, ``inputs``, ``outputs``, ``parameters``,
+    ``constants`` to their number. `operations`: kind of operation to how many of them an internal step has. `work`:
+    local numbers of the function that has most. `use`: how the files are compiled and called, and what they need, in
+    Markdown.
     """
 
     prefix: str
@@ -76,15 +67,8 @@ class PlainShip:
 def plain_ship(card: Card) -> PlainShip:
     """A card's equations in plain C99: as in its FMU, with the same steps, to the last bit in double precision.
 
-    Parameters
-    ----------
-    card : Card
-        Of any kind that has a model; steering gear, low speed and effects are in it.
-
-    Raises
-    ------
-    InputError
-        The card names what no model knows, or an effect of another package has what C99 cannot name or calculate.
+    `card`: of any kind that has a model; steering gear, low speed and effects are in it. Raises InputError: the card
+    names what no model knows, or an effect of another package has what C99 cannot name or calculate.
     """
     model = with_simulator_interface(build(card))
     described = interface(model)

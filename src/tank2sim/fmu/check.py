@@ -23,7 +23,7 @@ from tank2sim.fmu.interface import CLAMP_SWITCH, MAX_STEP, interface
 from tank2sim.fmu.manoeuvre import InputSequence, manoeuvre
 from tank2sim.fmu.process import Drive, drive_apart
 from tank2sim.fmu.reference import by_scheme, exactly, reference_errors, relative_errors
-from tank2sim.fmu.reference_run import read_reference
+from tank2sim.fmu.reference_run import ReferenceRun, read_reference
 from tank2sim.fmu.unpacking import FmuType, UnpackedFmu, unpack
 from tank2sim.notices import Level, Notice
 
@@ -84,26 +84,31 @@ class CheckReport:
 
     def judged(self) -> CheckReport:
         """The report with its verdict, and with a notice for each kind of failure."""
-        beyond = {
+        failures = tuple(self._failures())
+        notices = tuple(Notice(f"{self.path}: {text}", Level.STOP) for text in failures)
+        return replace(self, passed=not failures, notices=(*notices, *self.notices))
+
+    def _failures(self) -> Iterator[str]:
+        if self.validation:
+            yield f"the description is not valid: {len(self.validation)} objections"
+        if self.differences:
+            yield f"the FMU is not what its model says: {len(self.differences)} differences"
+        if beyond := self._beyond_limits():
+            yield f"errors beyond the limits: {', '.join(beyond)}"
+        if self.compared and not (self.errors or self.validation or self.differences):
+            yield "no output was compared"
+        if unmet := [one for one in self.conditions if not one.met]:
+            named = "; ".join(f"{one.condition} ({one.found})" for one in unmet)
+            yield f"{len(unmet)} of {len(self.conditions)} conditions of {self.host} are not met: {named}"
+
+    def _beyond_limits(self) -> dict[str, None]:
+        """Outputs with an error beyond its limit, or with one that is not a number."""
+        return {
             name: None
             for kind, found in self.errors.items()
             for name, error in found.items()
-            if not error <= LIMITS[kind]  # an error that is not a number fails
+            if not error <= LIMITS[kind]
         }
-        failures = []
-        if self.validation:
-            failures.append(f"the description is not valid: {len(self.validation)} objections")
-        if self.differences:
-            failures.append(f"the FMU is not what its model says: {len(self.differences)} differences")
-        if beyond:
-            failures.append(f"errors beyond the limits: {', '.join(beyond)}")
-        if self.compared and not (self.errors or failures):
-            failures.append("no output was compared")
-        if unmet := [one for one in self.conditions if not one.met]:
-            named = "; ".join(f"{one.condition} ({one.found})" for one in unmet)
-            failures.append(f"{len(unmet)} of {len(self.conditions)} conditions of {self.host} are not met: {named}")
-        notices = tuple(Notice(f"{self.path}: {text}", Level.STOP) for text in failures)
-        return replace(self, passed=not failures, notices=(*notices, *self.notices))
 
 
 def compare_with_model(path: Path, *, model: Model | None = None, host: Host | None = None) -> CheckReport:
@@ -196,6 +201,10 @@ def _repeat_reference(unpacked: UnpackedFmu) -> tuple[list[str], float | None]:
         return [f"the reference result {error.problem}"], None
     if reference is None or "CoSimulation" not in unpacked.kinds:
         return [], None
+    return _compare_reference(unpacked, reference)
+
+
+def _compare_reference(unpacked: UnpackedFmu, reference: ReferenceRun) -> tuple[list[str], float | None]:
     variables = {variable.name: variable for variable in unpacked.description.modelVariables}
     unknown = [name for name in (*reference.input_names, *reference.output_names) if name not in variables]
     if unknown:

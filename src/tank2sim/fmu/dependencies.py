@@ -21,15 +21,9 @@ Pattern = NDArray[np.bool_]
 class Unknown:
     """A variable and those it depends on.
 
-    Parameters
-    ----------
-    reference : int
-        Value reference of the variable.
-    dependencies : tuple of int
-        Value references of what it depends on, ascending.
-    kinds : tuple of str
-        For each, FMI's dependenciesKind: ``constant`` (a constant factor), ``fixed`` and ``tunable`` (a factor that
-        only parameters determine), else ``dependent``.
+    `reference`: value reference of the variable. `dependencies`: value references of what it depends on, ascending.
+    `kinds`: for each, FMI's dependenciesKind: ``constant`` (a constant factor), ``fixed`` and ``tunable`` (a factor
+    that only parameters determine), else ``dependent``.
     """
 
     reference: int
@@ -49,28 +43,22 @@ class FmuStructure:
 
 def fmu_structure(model: Model, interface: Interface) -> FmuStructure:
     """Dependencies of outputs and rates on states and inputs, and of initial values on parameters and inputs."""
-    knowns = [
-        *range(interface.states.begin, interface.states.end),
-        *range(interface.inputs.begin, interface.inputs.end),
-    ]
+    knowns = [*interface.states.references, *interface.inputs.references]
     while_running = {
         unknown.reference: unknown
         for unknown in (
             *_unknowns(model, interface, knowns, model.rates, interface.rates.begin),
             *_unknowns(model, interface, knowns, other_values(model), interface.outputs.begin),
             # An output that is a state depends on itself alone.
-            *(Unknown(place, (place,), ("constant",)) for place in range(interface.states.begin, interface.states.end)),
+            *(Unknown(place, (place,), ("constant",)) for place in interface.states.references),
         )
     }
     outputs = [variable.reference for variable in interface.with_causality("output")]
-    rates = range(interface.rates.begin, interface.rates.end)
     return FmuStructure(
         outputs=tuple(while_running[reference] for reference in outputs),
-        rates=tuple(while_running[reference] for reference in rates),
+        rates=tuple(while_running[reference] for reference in interface.rates.references),
         initial_unknowns=_initial_unknowns(model, interface),
-        indicators=tuple(
-            while_running[reference] for reference in range(interface.indicators.begin, interface.indicators.end)
-        ),
+        indicators=tuple(while_running[reference] for reference in interface.indicators.references),
     )
 
 
@@ -104,23 +92,17 @@ def _initial_unknowns(model: Model, interface: Interface) -> tuple[Unknown, ...]
     results = ca.vertcat(ca.SX(model.rates), ca.SX(other_values(model)))
     direct, through_states = _pattern(results, knowns), _pattern(results, x)
     pattern = np.vstack([states, direct | _product(through_states, states)])
-    references = [
-        *range(interface.states.begin, interface.states.end),
-        *range(interface.rates.begin, interface.outputs.end),
-    ]
-    columns = [
-        *range(interface.inputs.begin, interface.inputs.end),
-        *range(interface.parameters.begin, interface.parameters.end),
-    ]
+    references = [*interface.states.references, *range(interface.rates.begin, interface.outputs.end)]
+    columns = [*interface.inputs.references, *interface.parameters.references]
     listed = [*interface.with_causality("output"), *interface.variables[interface.rates.begin : interface.rates.end]]
     listed += interface.variables[interface.states.begin : interface.states.end]
     wanted = {variable.reference for variable in listed}
-    unknowns = []
-    for reference, row in zip(references, pattern, strict=True):
-        known = tuple(columns[place] for place in np.flatnonzero(row))
-        if reference in wanted:
-            unknowns.append(Unknown(reference, known, ("dependent",) * len(known)))
-    return tuple(unknowns)
+    found = {
+        reference: tuple(columns[place] for place in np.flatnonzero(row))
+        for reference, row in zip(references, pattern, strict=True)
+        if reference in wanted
+    }
+    return tuple(Unknown(reference, known, ("dependent",) * len(known)) for reference, known in found.items())
 
 
 def _initial_states(model: Model, interface: Interface) -> Pattern:

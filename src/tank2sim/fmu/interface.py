@@ -29,18 +29,10 @@ _STRUCTURED_NAME = re.compile(r"[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\
 class FmuVariable:
     """A variable of the FMU.
 
-    Parameters
-    ----------
-    reference : int
-        Value reference, which is also its place in the list of all variables.
-    causality, variability, initial : str
-        As FMI defines them; `initial` empty where FMI wants none.
-    start : float, optional
-        Start value in `unit`; None where it is calculated.
-    derivative_of : int, optional
-        Value reference of the state of which this is the time derivative.
-    accepted : pair of float, optional
-        Lowest and highest value that an input may be set to; None: those of minimum and maximum.
+    `reference`: value reference, which is also its place in the list of all variables. `causality`, `variability`,
+    `initial`: as FMI defines them; `initial` empty where FMI wants none. `start`: start value in `unit`; None where it
+    is calculated. `derivative_of`: value reference of the state of which this is the time derivative. `accepted`:
+    lowest and highest value that an input may be set to; None: those of minimum and maximum.
     """
 
     name: str
@@ -72,6 +64,11 @@ class Block:
     name: str
     begin: int
     end: int
+
+    @property
+    def references(self) -> range:
+        """Value references of its variables."""
+        return range(self.begin, self.end)
 
     def __len__(self) -> int:
         return self.end - self.begin
@@ -133,10 +130,8 @@ class Interface:
 def interface(model: Model) -> Interface:
     """The interface of a model.
 
-    Raises
-    ------
-    ValueError
-        A name is not a structured name of FMI or is one that the FMU gives itself, or a start value is not finite.
+    Raises ValueError: a name is not a structured name of FMI or is one that the FMU gives itself, or a start value is
+    not finite.
     """
     rate_names = _rate_names(model)
     others = [name for name in dict.fromkeys(model.outputs) if name not in model.state_names and name not in rate_names]
@@ -162,10 +157,15 @@ def interface(model: Model) -> Interface:
         *(_calculated(model, kink, indicators.begin + place) for place, kink in enumerate(indicated)),
     )
     _refuse(variables)
-    switch = 0
-    if TRIM_SWITCH in model.parameter_names and model.trim_step is not None and model[TRIM_SWITCH].boolean:
-        switch = parameters.begin + model.parameter_names.index(TRIM_SWITCH)
+    switch = _trim_switch(model, parameters)
     return Interface(variables, states, inputs, parameters, rates, outputs, indicators, switch)
+
+
+def _trim_switch(model: Model, parameters: Block) -> int:
+    """Value reference of the parameter that asks for a start in steady motion; 0 if there is none."""
+    if TRIM_SWITCH in model.parameter_names and model.trim_step is not None and model[TRIM_SWITCH].boolean:
+        return parameters.begin + model.parameter_names.index(TRIM_SWITCH)
+    return 0
 
 
 def other_outputs(model: Model) -> tuple[str, ...]:

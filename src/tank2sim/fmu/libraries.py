@@ -40,10 +40,7 @@ _PAGE_BITS = 14
 def require_compilers(platforms: Sequence[Platform] | None) -> None:
     """Make sure that libraries for `platforms` (None: this machine's) can be made here, before anything else is done.
 
-    Raises
-    ------
-    InputError
-        The compiler is missing, or this machine's platform has no name in FMI.
+    Raises InputError: the compiler is missing, or this machine's platform has no name in FMI.
     """
     if platforms is None:
         require_compiler("exporting an FMU")
@@ -59,17 +56,8 @@ def libraries(
 
     Platforms that share a folder (the two Macs in FMI 2) share one universal library there.
 
-    Parameters
-    ----------
-    sources : mapping
-        Name to text of every C file and header.
-    platforms : sequence of Platform, optional
-        None: this machine's, by its own compiler; others, and this one if it is among them, by the one for all.
-
-    Raises
-    ------
-    InputError
-        As :func:`require_compilers`.
+    `sources`: name to text of every C file and header. `platforms`: None: this machine's, by its own compiler; others,
+    and this one if it is among them, by the one for all. Raises InputError: as :func:`require_compilers`.
     """
     if platforms is None:
         library = cached_library(sources, flags=_LINK_FLAGS.get(sys.platform, ()), seldom=SELDOM)
@@ -115,10 +103,7 @@ def _patience(platform: Platform) -> str:
 def universal(libraries: Sequence[bytes]) -> bytes:
     """A universal Mach-O file of the 64-bit Mach-O `libraries`; the loader takes the one for its processor.
 
-    Raises
-    ------
-    ValueError
-        One of them is not such a library, or two are for the same processor.
+    Raises ValueError: one of them is not such a library, or two are for the same processor.
     """
     page = 1 << _PAGE_BITS
     heads = [_BEGIN.unpack_from(library) for library in libraries]

@@ -29,12 +29,7 @@ _STAGGER = 0.02
 class InputSequence:
     """Inputs at communication points.
 
-    Parameters
-    ----------
-    times : (K + 1,) array
-        Communication points from 0, s.
-    inputs : (K, nu) array
-        Inputs held from each point to the next.
+    `times` (K + 1,): communication points from 0, s. `inputs` (K, nu): inputs held from each point to the next.
     """
 
     times: Array

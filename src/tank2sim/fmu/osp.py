@@ -6,7 +6,7 @@ they are in the order of the axes, forward and starboard in body axes, north and
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from tank2sim.dynamics.model import Model
@@ -94,10 +94,18 @@ def osp_groups(interface: Interface) -> tuple[Group, ...]:
     A part that lacks one of its variables is left out. What has no kind (``wind.speed``) is in a Generic group
     with the others of its first name and causality (``wind`` for inputs, ``position_output`` for outputs).
     """
-    found = {
-        fmu_variable.name: fmu_variable
-        for fmu_variable in (*interface.with_causality("input"), *interface.with_causality("output"))
-    }
+    found = {one.name: one for causality in ("input", "output") for one in interface.with_causality(causality)}
+    groups = _motion_groups(found)
+    grouped = {variable.name for group in groups for variable in _variables(group)}
+    others: dict[str, list[tuple[FmuVariable, str]]] = {}
+    for one in found.values():
+        if one.name not in grouped:
+            name = one.name.partition(".")[0] + ("" if one.causality == "input" else "_output")
+            others.setdefault(name, []).append((one, ""))
+    return (*groups, *(Group("Generic", name, tuple(members)) for name, members in others.items()))
+
+
+def _motion_groups(found: Mapping[str, FmuVariable]) -> list[Group]:
     groups = []
     for name, parts in _MOTION.items():
         within = tuple(
@@ -107,21 +115,7 @@ def osp_groups(interface: Interface) -> tuple[Group, ...]:
         )
         if within:
             groups.append(Group("Generic", name, groups=within))
-    grouped = {variable.name for group in groups for variable in _variables(group)}
-    ungrouped: dict[str, list[FmuVariable]] = {}
-    for fmu_variable in found.values():
-        if fmu_variable.name not in grouped:
-            first = fmu_variable.name.partition(".")[0]
-            ungrouped.setdefault(first if fmu_variable.causality == "input" else f"{first}_output", []).append(
-                fmu_variable
-            )
-    return (
-        *groups,
-        *(
-            Group("Generic", name, tuple((fmu_variable, "") for fmu_variable in members))
-            for name, members in ungrouped.items()
-        ),
-    )
+    return groups
 
 
 def _variables(group: Group) -> Iterator[FmuVariable]:

@@ -44,18 +44,9 @@ class PassportCoefficient:
 class Replay:
     """What the library of the FMU answered to its own reference run, in Co-Simulation on the machine that wrote it.
 
-    Parameters
-    ----------
-    run : str
-        What was done; empty if there is no reference run.
-    platform : str
-        Folder of the library that was run; empty if it was not run.
-    max_error : float, optional
-        Largest error of an output, relative to the larger of its range in the run and its nominal value.
-    output : str
-        The output with that error.
-    problem : str
-        Why there is no error to show.
+    `run`: what was done; empty if there is no reference run. `platform`: folder of the library that was run; empty if
+    it was not run. `max_error`: largest error of an output, relative to the larger of its range in the run and its
+    nominal value. `output`: the output with that error. `problem`: why there is no error to show.
     """
 
     run: str = ""
@@ -171,13 +162,8 @@ def simulator_rules(model: Model, *, manoeuvres: bool, errors: bool) -> tuple[Ru
     Navigation, report of section C2 of the edition of 2011, then Standard for Certification 2.14; the clauses of today
     may ask for more.
 
-    Parameters
-    ----------
-    model : Model
-    manoeuvres : bool
-        The passport has figures of a turning circle and a zigzag.
-    errors : bool
-        The card states standard errors of its coefficients.
+    `manoeuvres`: the passport has figures of a turning circle and a zigzag. `errors`: the card states standard errors
+    of its coefficients.
     """
     if "rudder.command" not in model.input_names:
         return ()

@@ -71,14 +71,8 @@ def picture(
 ) -> str:
     """Lines in a frame with axes, as SVG.
 
-    Parameters
-    ----------
-    lines : sequence of PictureLine
-        Two at most; with a legend if there are two.
-    to_scale : bool
-        A unit is as long across as up.
-    least : tuple of float, optional
-        Values that the upward axis holds at least.
+    `lines`: two at most; with a legend if there are two. `to_scale`: a unit is as long across as up. `least`: values
+    that the upward axis holds at least.
 
     Examples
     --------

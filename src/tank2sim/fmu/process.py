@@ -39,14 +39,8 @@ class Drive:
 class ProcessResult:
     """What came of it.
 
-    Parameters
-    ----------
-    parameters : (np,) array, optional
-        Their values after instantiation, None if it did not come so far.
-    outputs : (K + 1, ny) array, optional
-        At the communication points, None if it did not come so far.
-    problem : str
-        What went wrong, in one line; empty if nothing.
+    `parameters` (np,): their values after instantiation, None if it did not come so far. `outputs` (K + 1, ny): at the
+    communication points, None if it did not come so far. `problem`: what went wrong, in one line; empty if nothing.
     """
 
     parameters: Array | None = None

@@ -94,16 +94,9 @@ def relative_errors(
 ) -> dict[str, float]:
     """Name to the largest error, relative to the larger of the signal's range in the run and its nominal value.
 
-    Parameters
-    ----------
-    expected, found : mapping
-        Signals (K + 1,) by name.
-    nominals : mapping
-        Their nominal values; 0 counts as 1.
-    angles : collection of str
-        Those (rad) that are calculated again at each point: they may jump by a full turn, a moment sooner or later.
-    weights : mapping, optional
-        Name to the weight of each error (K + 1,), by default 1.
+    `expected`, `found`: signals (K + 1,) by name. `nominals`: their nominal values; 0 counts as 1. `angles`: those
+    (rad) that are calculated again at each point: they may jump by a full turn, a moment sooner or later. `weights`:
+    name to the weight of each error (K + 1,), by default 1.
     """
     errors = {}
     for name, signal in expected.items():

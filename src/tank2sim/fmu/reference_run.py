@@ -46,16 +46,8 @@ _SHIP = ("rudder.command", "motion.psi", "ship.length", "ship.speed", "ship.slow
 class ReferenceRun:
     """A run, and the answer to it.
 
-    Parameters
-    ----------
-    title : str
-        What is done.
-    run : InputSequence
-        Communication points and inputs.
-    input_names, output_names : tuple of str
-        The columns of the inputs and outputs.
-    outputs : (K + 1, ny) array
-        At the communication points.
+    `title`: what is done. `run`: communication points and inputs. `input_names`, `output_names`: the columns of the
+    inputs and outputs. `outputs` (K + 1, ny): at the communication points.
     """
 
     title: str
@@ -128,10 +120,7 @@ def reference_run(model: Model) -> tuple[ReferenceRun | None, dict[str, Run]]:
 def read_reference(folder: Path) -> ReferenceRun | None:
     """The reference result in an unpacked FMU; None if it carries none.
 
-    Raises
-    ------
-    InputError
-        The files are damaged.
+    Raises InputError: the files are damaged.
     """
     inputs, outputs = folder / INPUTS_FILE, folder / OUTPUTS_FILE
     if not (inputs.is_file() and outputs.is_file()):

@@ -182,10 +182,7 @@ def _solver(fmu: RunningFmu) -> Any:
 def replay(path: Path, run: InputSequence, model: Model) -> dict[str, Array]:
     """Outputs (K + 1,) by name, at the communication points of a run, in Co-Simulation.
 
-    Raises
-    ------
-    InputError
-        The file is not an FMU for this machine.
+    Raises InputError: the file is not an FMU for this machine.
     """
     with contextlib.redirect_stdout(io.StringIO()), tempfile.TemporaryDirectory(prefix="tank2sim-") as folder:
         unpacked = unpack(Path(path), Path(folder))

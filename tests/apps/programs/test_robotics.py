@@ -16,7 +16,7 @@ from tank2sim.bundled import bundled_cards
 from tank2sim.cards import CraftCard, parse_card, read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
-from tests.dynamics.accelerations import accelerations
+from tests.dynamics.states import accelerations, motion
 
 CROSS = (
     "Yrdot = -9.0\nNvdot = -9.0\nYvabsr = -40.0\nYr = -8.0\nNv = -14.0\nNrabsv = -60.0\nNrabsu = -30.0\n"
@@ -103,7 +103,7 @@ def test_the_growth_of_each_bundled_craft_is_that_of_an_independent_calculation(
     fastest, nothing = card.model.speed_range_mps[1], {command.name: 0.0 for command in model.inputs}
 
     def rates(u: float, v: float, r: float) -> np.ndarray:
-        return accelerations(model, {"motion.u": u, "motion.v": v, "motion.r": r}, nothing)
+        return accelerations(model, motion(u, v, r) | nothing)
 
     d, body = card.derivatives, card.rigid_body
     lever = body.mass * body.x_G
@@ -156,7 +156,7 @@ def test_gazebos_own_sum_gives_the_accelerations_of_the_card(heavy: CraftCard) -
         centripetal = np.array([m * (port[1] * port[2] + x_G * port[2] ** 2), -m * u * port[2], -m * x_G * u * port[2]])
         there = np.linalg.solve(body - added, plugin_forces(given, port) + centripetal)
         stopped = {"thrusters.port.command": 0.0, "thrusters.starboard.command": 0.0}
-        here = accelerations(model, {"motion.u": u, "motion.v": v, "motion.r": r}, stopped)
+        here = accelerations(model, motion(u, v, r) | stopped)
         assert there * [1, -1, -1] == pytest.approx(here, rel=1e-8)
 
 

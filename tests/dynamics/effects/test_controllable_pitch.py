@@ -18,6 +18,7 @@ from tank2sim.dynamics.effects.controllable_pitch import (
     pitch_thrust,
     pitch_torque,
 )
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.running import Running
@@ -25,6 +26,12 @@ from tank2sim.simulation.running import Running
 from .ships import N0, RHO, U0, L, added_forces, mariner_text, ship, state, values
 
 PITCH = {"pitch": 0.8, "design_pitch": 0.8}
+MMG = bundled_cards()["kvlcc2-l7-mmg"].read_text(encoding="utf-8")
+ADDED = '\n[[effects]]\nname = "controllable_pitch"\nparameters = {pitch = 0.72, design_pitch = 0.72}\n'
+
+
+def mmg_ship(text: str = MMG + ADDED) -> Model:
+    return build(parse_card(text, "ship.toml"))
 
 
 @cache
@@ -135,9 +142,7 @@ def test_a_negative_pitch_stops_the_ship_with_the_propeller_turning_ahead() -> N
 
 
 def test_on_an_mmg_card_the_thrust_and_the_race_on_the_rudder_change() -> None:
-    text = bundled_cards()["kvlcc2-l7-mmg"].read_text(encoding="utf-8")
-    added = '\n[[effects]]\nname = "controllable_pitch"\nparameters = {pitch = 0.72, design_pitch = 0.72}\n'
-    model, bare = (build(parse_card(one, "ship.toml")) for one in (text + added, text))
+    model, bare = mmg_ship(), mmg_ship(MMG)
     u, n, D = 0.9, 10.0, 0.216
     at = {"motion.u": u, "propeller.speed": 2 * math.pi * n}
     J = 0.6 * u / (n * D)
@@ -148,14 +153,12 @@ def test_on_an_mmg_card_the_thrust_and_the_race_on_the_rudder_change() -> None:
         assert found[0] - without[0] == pytest.approx(change, rel=1e-9, abs=1e-9)
         assert np.sign(found[1] - without[1]) == np.sign(pitch - 0.72)
     with pytest.raises(InputError, match=r"advance_share: acts on nothing"):
-        build(parse_card(text + added.replace("}", ", advance_share = 0.6}"), "ship.toml"))
+        mmg_ship(MMG + ADDED.replace("}", ", advance_share = 0.6}"))
 
 
 @pytest.mark.parametrize("share", [0.01, 0.03, -0.5])
 def test_on_an_mmg_card_J_is_held_below_two_percent_of_the_revolutions(share: float) -> None:
-    text = bundled_cards()["kvlcc2-l7-mmg"].read_text(encoding="utf-8")
-    added = '\n[[effects]]\nname = "controllable_pitch"\nparameters = {pitch = 0.72, design_pitch = 0.72}\n'
-    model, bare = (build(parse_card(one, "ship.toml")) for one in (text + added, text))
+    model, bare = mmg_ship(), mmg_ship(MMG)
     nominal, D, u = 11.8516, 0.216, 0.03
     at = {"motion.u": u, "propeller.speed": 2 * math.pi * share * nominal}
     found = values(model, ["propeller.thrust"], {**at, "propeller.pitch_actual": 1.0})
@@ -192,11 +195,8 @@ def test_torque_is_least_at_zero_pitch_and_has_no_step_there_at_rest() -> None:
 
 @pytest.mark.parametrize("with_torque", [True, False])
 def test_torque_and_power_of_an_mmg_card_change_by_the_series_or_are_those_of_it(with_torque: bool) -> None:
-    text = bundled_cards()["kvlcc2-l7-mmg"].read_text(encoding="utf-8")
-    if with_torque:
-        text = text.replace("[propeller]", "[propeller]\nq_0 = 0.034\nq_1 = -0.025\nq_2 = -0.01\neta_R = 1.01", 1)
-    added = '\n[[effects]]\nname = "controllable_pitch"\nparameters = {pitch = 0.72, design_pitch = 0.72}\n'
-    model = build(parse_card(text + added, "ship.toml"))
+    curve = "[propeller]\nq_0 = 0.034\nq_1 = -0.025\nq_2 = -0.01\neta_R = 1.01" if with_torque else "[propeller]"
+    model = mmg_ship(MMG.replace("[propeller]", curve, 1) + ADDED)
     u, n, D = 0.9, 10.0, 0.216
     J = 0.6 * u / (n * D)
     unit = 1000.0 * n**2 * D**5

@@ -15,22 +15,25 @@ from tank2sim.simulation.running import Running
 
 from .ships import N0, RHO, STATES, TYPICAL, U0, L, T, added_forces, mariner_text, ship, state, values
 
+SIDE = {"Y_prime": -1e-4, "N_prime": 5e-5}
+
+
+def sideways(q: float, Y_prime: float = -1e-4, N_prime: float = 5e-5) -> object:
+    """X, Y, N of a side force."""
+    return pytest.approx([0.0, Y_prime * q, N_prime * q * L], rel=1e-6, abs=1e-5)
+
 
 @pytest.mark.parametrize("share", [1.0, 0.5, -0.7])
 def test_the_side_force_goes_with_revolutions_squared_whatever_the_ships_speed(share: float) -> None:
     q = 0.5 * RHO * L**2 * U0**2 * share * abs(share)
     for at in STATES:
-        found = added_forces(
-            "propeller_side_force", {"Y_prime": -1e-4, "N_prime": 4e-5}, {**at, "propeller.speed": share * N0}
-        )
-        np.testing.assert_allclose(found, [0.0, -1e-4 * q, 4e-5 * q * L], rtol=1e-6, atol=1e-5)
+        found = added_forces("propeller_side_force", SIDE, {**at, "propeller.speed": share * N0})
+        assert found == sideways(q)
 
 
 def test_without_propulsion_the_revolutions_are_nominal() -> None:
     text = mariner_text().split("[propulsion]")[0]
-    found = added_forces("propeller_side_force", {"Y_prime": -1e-4, "N_prime": 4e-5}, STATES[0], text)
-    q = 0.5 * RHO * L**2 * U0**2
-    np.testing.assert_allclose(found, [0.0, -1e-4 * q, 4e-5 * q * L], rtol=1e-6, atol=1e-5)
+    assert added_forces("propeller_side_force", SIDE, STATES[0], text) == sideways(0.5 * RHO * L**2 * U0**2)
 
 
 def test_a_propeller_walks_only_astern() -> None:
@@ -38,7 +41,7 @@ def test_a_propeller_walks_only_astern() -> None:
     assert not np.any(added_forces("propeller_walk", given, {**STATES[0], "propeller.speed": N0}))
     q = 0.5 * RHO * L**2 * U0**2 * 0.36
     found = added_forces("propeller_walk", given, {**STATES[0], "propeller.speed": -0.6 * N0})
-    np.testing.assert_allclose(found, [0.0, -1e-4 * q, 5e-5 * q * L], rtol=1e-6, atol=1e-5)
+    assert found == sideways(q)
 
 
 @pytest.mark.parametrize("J", [-1.2, -0.35, -0.3, -0.1, -0.06, -0.02, 0.4])
@@ -75,7 +78,7 @@ def test_side_force_by_loading(at: dict[str, float]) -> None:
     U, n = np.hypot(at["motion.u"], at["motion.v"]), 0.9
     q = 0.5 * RHO * L**2 * U**2 * (n * U0 / U - 1)
     found = added_forces("loading_side_force", TYPICAL["loading_side_force"], {**at, "propeller.speed": n * N0})
-    np.testing.assert_allclose(found, [0.0, -1e-4 * q, 5e-5 * q * L], rtol=1e-6, atol=1e-5)
+    assert found == sideways(q)
 
 
 def test_a_drooping_engine_loses_revolutions_with_speed() -> None:
@@ -195,4 +198,4 @@ def test_asymmetric_turning_goes_with_the_square_of_the_rate() -> None:
     for at in STATES:
         found = added_forces("asymmetric_turning", {"Yrr": 1e-4, "Nrr": -2e-4}, at)
         q = 0.5 * RHO * L**4 * at["motion.r"] ** 2
-        np.testing.assert_allclose(found, [0.0, 1e-4 * q, -2e-4 * q * L], rtol=1e-6, atol=1e-5)
+        assert found == sideways(q, 1e-4, -2e-4)

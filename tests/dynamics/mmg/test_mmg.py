@@ -17,6 +17,7 @@ from tank2sim.cards.card import MmgCard
 from tank2sim.dynamics import build
 from tank2sim.dynamics.mmg.equivalent import linear_equivalent, straight_inflow
 from tank2sim.dynamics.model import Model
+from tests.dynamics.states import at_start, replaced, values
 
 SIDES = {"stbd": 1, "port": -1}
 
@@ -34,11 +35,7 @@ def mmg_card(ship: t2s.Ship) -> MmgCard:
 
 def changed_mmg(ship: t2s.Ship, *pairs: tuple[str, str]) -> MmgCard:
     """The card with parts of its text replaced."""
-    text = ship.card.text
-    for old, new in pairs:
-        assert old in text
-        text = text.replace(old, new, 1)
-    card = parse_card(text, "changed.toml")
+    card = parse_card(replaced(ship.card.text, *pairs), "changed.toml")
     assert isinstance(card, MmgCard)
     return card
 
@@ -47,18 +44,11 @@ class Forces:
     """A model's quantities at given states."""
 
     def __init__(self, model: Model, *names: str):
-        values = model.expand(ca.vcat([model.symbol(name) for name in names]))
-        self.model = model
-        self.function = ca.Function("f", [model.x, model.u, model.p], [values])
+        self.model, self.names = model, names
 
     def at(self, delta: float = 0.0, n_rps: float | None = None, **motion: float) -> np.ndarray:
-        x = np.array(self.model.initial(self.model.parameter_values())).ravel()
-        for name, value in {"rudder.angle": delta, **{f"motion.{key}": v for key, v in motion.items()}}.items():
-            x[self.model.state_names.index(name)] = value
-        inputs = self.model.input_values()
-        if n_rps is not None:
-            inputs[self.model.input_names.index("propeller.speed")] = 2 * math.pi * n_rps
-        return np.array(self.function(x, inputs, self.model.parameter_values())).ravel()
+        at = {"rudder.angle": delta, **{f"motion.{key}": v for key, v in motion.items()}}
+        return values(self.model, self.names, at if n_rps is None else at | {"propeller.speed": 2 * math.pi * n_rps})
 
 
 def reference(data: Path, name: str) -> tuple[dict[str, list[float]], str]:
@@ -173,8 +163,7 @@ def test_linearisation_at_the_kink_takes_the_side_that_is_said(ship: t2s.Ship) -
     slopes = ca.Function(
         "s", [model.x, model.u, model.p], [ca.jacobian(model.expand(model.symbol("force.Y")), model.symbol("motion.v"))]
     )
-    x = model.initial(model.parameter_values())
-    slope = float(slopes(x, model.input_values(), model.parameter_values())) / (500 * 7 * 0.46 * 1.179)
+    slope = float(slopes(*at_start(model, {}))) / (500 * 7 * 0.46 * 1.179)
     assert slope == pytest.approx(-0.3403, abs=6e-5)
     assert any("gamma_R_minus" in notice for notice in model.notices)
 
@@ -191,16 +180,11 @@ def test_a_ship_alike_to_both_sides_has_mirrored_forces(ship: t2s.Ship) -> None:
 @pytest.mark.parametrize("n", [-15.0, -3.0, 0.0, 1e-9, 3.0, 15.0])
 def test_forces_and_slopes_are_finite_in_all_quadrants(ship: t2s.Ship, u: float, n: float) -> None:
     model = ship.model
-    rates = ca.vcat([model.symbol(name) for name in ("force.X", "force.Y", "force.N")])
-    value = model.expand(rates)
+    value = model.expand(ca.vcat([model.symbol(name) for name in ("force.X", "force.Y", "force.N")]))
     both = ca.Function("f", [model.x, model.u, model.p], [value, ca.jacobian(value, ca.vertcat(model.x, model.u))])
-    inputs = model.input_values()
-    inputs[model.input_names.index("propeller.speed")] = 2 * math.pi * n
     for v, r in ((0.0, 0.0), (0.4, 0.1), (-0.4, 0.3)):
-        x = np.array(model.initial(model.parameter_values())).ravel()
-        for name, start in (("motion.u", u), ("motion.v", v), ("motion.r", r), ("rudder.angle", 0.3)):
-            x[model.state_names.index(name)] = start
-        assert all(np.isfinite(np.array(part)).all() for part in both(x, inputs, model.parameter_values()))
+        at = {"motion.u": u, "motion.v": v, "motion.r": r, "rudder.angle": 0.3, "propeller.speed": 2 * math.pi * n}
+        assert all(np.isfinite(np.array(part)).all() for part in both(*at_start(model, at)))
 
 
 def test_forces_are_continuous_where_a_quadrant_begins(ship: t2s.Ship) -> None:
@@ -307,20 +291,6 @@ def test_outputs_of_torque_are_of_cards_with_its_curve_alone(ship: t2s.Ship) -> 
     assert {"propeller.torque", "propeller.power"} <= set(model.outputs)
     assert model["propeller.power"].unit == "W" and model["propeller.torque"].unit == "N.m"
     table = "J = [0.0, 0.4, 0.8]\nK_T = [0.2931, 0.16082, -0.01578]\nK_Q = [0.0312, 0.020496, 0.005024]\n"
-    text = ship.card.text
-    lines = [line for line in text.splitlines() if not line.startswith(("k_0", "k_1", "k_2"))]
-    card = parse_card("\n".join(lines).replace("[propeller]", f"[propeller]\n{table}", 1), "table.toml")
-    assert isinstance(card, MmgCard)
+    card = changed_mmg(ship, ("k_0 = 0.2931\nk_1 = -0.2753\nk_2 = -0.1385\n", table))
     assert [card.propeller.q_0, card.propeller.q_1, card.propeller.q_2] == pytest.approx([0.0312, -0.0208, -0.0149])
     assert card.propeller.eta_R == 1.0
-
-
-@pytest.mark.parametrize(
-    ("given", "place"),
-    [("q_0 = 0.03\nq_1 = -0.02\n", "propeller.q_2"), ("eta_R = 1.0\n", "propeller.eta_R"),
-     ("K_Q = [0.03, 0.02, 0.01]\n", "propeller.J"), (f"{CURVE}K_Q = [0.03]\n", "propeller.K_Q")],
-)  # fmt: skip
-def test_an_incomplete_torque_curve_is_refused(ship: t2s.Ship, given: str, place: str) -> None:
-    with pytest.raises(t2s.InputError) as caught:
-        changed_mmg(ship, ("[propeller]\n", f"[propeller]\n{given}"))
-    assert caught.value.place == place

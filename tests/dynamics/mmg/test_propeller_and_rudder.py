@@ -16,6 +16,7 @@ from tank2sim.dynamics.mmg.rudder import normal_force, rudder_inflow
 from tank2sim.dynamics.model import Model
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.running import Running
+from tests.dynamics.states import motion, replaced, values
 
 ASTERN = 0.6
 SLOW = 1e-6
@@ -26,29 +27,22 @@ def number(value: ca.SX) -> float:
 
 
 def model_of(name: str, *pairs: tuple[str, str]) -> Model:
-    text = bundled_cards()[name].read_text(encoding="utf-8")
-    for old, new in pairs:
-        assert old in text
-        text = text.replace(old, new, 1)
-    return build(parse_card(text, "changed.toml"))
+    return build(parse_card(replaced(bundled_cards()[name].read_text(encoding="utf-8"), *pairs), "changed.toml"))
 
 
-def seen(model: Model, names: list[str], n_rps: float, **motion: float) -> np.ndarray:
-    x = np.array(model.initial(model.parameter_values())).ravel()
-    for name, value in motion.items():
-        x[model.state_names.index("rudder.angle" if name == "delta" else f"motion.{name}")] = value
-    inputs = model.input_values({"propeller.speed": 2 * math.pi * n_rps})
-    expression = model.expand(ca.vcat([model.symbol(name) for name in names]))
-    return np.array(
-        ca.Function("seen", [model.x, model.u, model.p], [expression])(x, inputs, model.parameter_values())
-    )[:, 0]
+def given_of(model: Model) -> dict[str, float]:
+    return dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+
+
+def seen(model: Model, names: list[str], n_rps: float, u: float, v: float, r: float, delta: float = 0.0) -> np.ndarray:
+    return values(model, names, motion(u, v, r) | {"rudder.angle": delta, "propeller.speed": 2 * math.pi * n_rps})
 
 
 @pytest.mark.parametrize(("C_Pv", "C_Pr"), [(0.3, 0.0), (0.0, 0.3), (-0.2, 0.5)])
 def test_drift_and_yaw_to_one_side_raise_the_wake_and_to_the_other_lower_it(C_Pv: float, C_Pr: float) -> None:
     """1 - w_P = 1 - w_P0 + tau ((v' + x_P' r')^2 + C_Pv v' + C_Pr r'), Son and Nomoto (1982)."""
     model = model_of("container", ("tau = 1.09", f"tau = 1.09\nC_Pv = {C_Pv}\nC_Pr = {C_Pr}"))
-    given = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    given = given_of(model)
     u, v, r = 8.0, 0.7, -0.009
     U, L, x_P, w_P0 = math.hypot(u, v), 175.0, given["mmg.x_P"], given["mmg.w_P0"]
     for side in (1, -1):
@@ -79,7 +73,7 @@ def test_a_rudder_met_from_aft_has_its_share_of_the_force_and_pushes_the_other_w
 
 def test_the_ship_that_goes_astern_is_turned_the_other_way_by_its_rudder() -> None:
     model = model_of("kvlcc2-l7-mmg")
-    given = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    given = given_of(model)
     names = ["rudder.inflow", "rudder.normal_force", "rudder.X", "rudder.Y", "rudder.N"]
     u_R, F_N, X, Y, N = seen(model, names, 0.0, u=-0.5, v=0.0, r=0.0, delta=0.3)
     # A stopped propeller still takes k_2 J^2 of the flow: thrust of the other sign astern, 8 T/(rho pi D^2).
@@ -117,16 +111,8 @@ def test_the_flow_to_the_rudder_is_known_without_load_at_rest_and_behind_a_windm
 @pytest.mark.parametrize(("n", "u_P"), [(8.0, 1.5), (-8.0, 1.5), (8.0, -1.5), (-8.0, -1.5), (0.0, 1.5), (0.0, -1.5)])
 def test_thrust_and_torque_in_all_quadrants(n: float, u_P: float) -> None:
     """T = rho n^2 D^4 K_T(J) ahead; the stopped or reversed propeller keeps k_2 u_P abs(u_P), and no term in n u_P."""
-    p = {
-        "k_0": 0.3,
-        "k_1": -0.28,
-        "k_2": -0.14,
-        "astern": ASTERN,
-        "q_0": 0.03,
-        "q_1": -0.02,
-        "q_2": -0.015,
-        "eta_R": 0.9,
-    }
+    p = {"k_0": 0.3, "k_1": -0.28, "k_2": -0.14, "q_0": 0.03, "q_1": -0.02, "q_2": -0.015}
+    p |= {"astern": ASTERN, "eta_R": 0.9}
     D = 0.25
 
     def curve(first: float, second: float, third: float) -> float:
@@ -178,7 +164,7 @@ def test_the_wake_of_a_ship_that_turns_on_the_spot_is_that_of_the_tightest_turn(
 
 def test_cross_flow_goes_on_with_the_yaw_rate_where_the_ship_turns_on_the_spot() -> None:
     model = model_of("container")
-    given = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    given = given_of(model)
     (first,), (second,) = (seen(model, ["rudder.cross_flow"], 0.0, u=0.0, v=0.0, r=r) for r in (0.001, 0.002))
     assert second == pytest.approx(2 * first, rel=1e-6)
     assert first == pytest.approx(-0.001 * 175.0 * (given["mmg.C_Rr"] + given["mmg.C_Rrrr"]), rel=1e-6)

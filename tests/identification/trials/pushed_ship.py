@@ -68,7 +68,7 @@ def model() -> Model:
         Quantity(name=f"motion.{name}dot", unit=unit, description=name, value=rate)
         for (name, _, unit, _), rate in zip(STATES, _rates(states, rudder, parameters), strict=True)
     )
-    return Model("made-up", "a ship of no yard", states, (rudder,), (*parameters, *size), quantities, (), STEP)
+    return Model("made-up", "a ship of no yard", states, (rudder,), (*parameters, *size), quantities, (), step_s=STEP)
 
 
 def _rates(states: tuple[Variable, ...], rudder: Variable, parameters: tuple[Variable, ...]) -> tuple[ca.SX, ...]:

@@ -10,7 +10,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects.controllable_pitch import ADVANCE_SHARE
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, with_steps_for
 from tank2sim.dynamics.effects.forces import with_forces
-from tank2sim.dynamics.effects.froude_scale import rates, time_scale_passages
+from tank2sim.dynamics.effects.froude_scale import first, lengths, rates, time_scale_passages
 from tank2sim.dynamics.effects.harbour import largest_force
 from tank2sim.dynamics.effects.particulars import model_particular
 from tank2sim.dynamics.model import Input, Model, Quantity, State
@@ -38,9 +38,9 @@ def _with_azimuths(model: Model, given: EffectSymbols, card: ManoeuvringCard) ->
     for unit in range(1, UNITS_OF_SHIP + 1):
         turning, angle = (
             State(
-                name=f"azimuth.{name}_actual_{unit}",
-                unit=order.unit,
-                description=f"{description} of azimuth {unit}",
+                f"azimuth.{name}_actual_{unit}",
+                order.unit,
+                f"{description} of azimuth {unit}",
                 display_unit=order.display_unit,
                 nominal=scale,
                 derivative=f"azimuth.{name}_rate_{unit}",
@@ -60,26 +60,22 @@ def _with_azimuths(model: Model, given: EffectSymbols, card: ManoeuvringCard) ->
         ahead, astern = ca.fmax(share, 0), ca.fmin(share, 0)
         value = given["force"] * (ahead * (ahead - met / given["no_thrust"]) - given["astern"] * astern**2)
         thrust = Quantity(
-            name=f"azimuth.thrust_{unit}",
-            unit="N",
-            description=f"Thrust of azimuth {unit} in its direction",
-            nominal=1e5,
-            value=value,
+            f"azimuth.thrust_{unit}", "N", f"Thrust of azimuth {unit} in its direction", value, nominal=1e5
         )
         wanted = (given[f"angle_{unit}"] - angle.symbol) / given["angle_time_constant"]
         rates = (
             Quantity(
-                name=turning.derivative,
-                unit="rad/s2",
-                description=f"Rate of the revolutions of azimuth {unit}",
-                value=(given[f"revolutions_{unit}"] - turning.symbol) / given["time_constant"],
+                turning.derivative,
+                "rad/s2",
+                f"Rate of the revolutions of azimuth {unit}",
+                (given[f"revolutions_{unit}"] - turning.symbol) / given["time_constant"],
             ),
             Quantity(
-                name=angle.derivative,
-                unit="rad/s",
-                description=f"Rate at which azimuth {unit} turns, clockwise",
+                angle.derivative,
+                "rad/s",
+                f"Rate at which azimuth {unit} turns, clockwise",
+                ca.fmax(-limit, ca.fmin(limit, wanted)),
                 display_unit="deg/s",
-                value=ca.fmax(-limit, ca.fmin(limit, wanted)),
             ),
         )
         model = model.extend(turning, angle, thrust, *rates, outputs=[turning.name, angle.name, thrust.name])
@@ -91,10 +87,10 @@ def _with_azimuths(model: Model, given: EffectSymbols, card: ManoeuvringCard) ->
 
 
 def _unit(unit: int) -> tuple[EffectParameter, ...]:
-    first, side = unit == 1, "starboard" if unit == 1 else "port"
+    default, side = (None, "starboard") if unit == 1 else (0.0, "port")
 
     def off_the_centre_line(card: ManoeuvringCard) -> float:
-        return (AZIMUTH_SIDE if first else -AZIMUTH_SIDE) * model_particular(card, "beam_m")
+        return (AZIMUTH_SIDE if unit == 1 else -AZIMUTH_SIDE) * model_particular(card, "beam_m")
 
     return (
         EffectParameter(
@@ -102,7 +98,7 @@ def _unit(unit: int) -> tuple[EffectParameter, ...]:
             f"revolutions of azimuth {unit}, on the {side} side, positive pushes in its direction",
             -400.0,
             400.0,
-            None if first else 0.0,
+            default,
             input_name=f"azimuth.revolutions_{unit}",
             absent=0.0,
             typical=rates(200.0),  # those of a merchant ship (project choice)
@@ -112,7 +108,7 @@ def _unit(unit: int) -> tuple[EffectParameter, ...]:
             f"direction of the force of azimuth {unit}, clockwise from the bow",
             -2 * math.pi,
             2 * math.pi,
-            None if first else 0.0,
+            default,
             input_name=f"azimuth.angle_{unit}",
             typical=(math.pi / 4,),
         ),
@@ -121,7 +117,7 @@ def _unit(unit: int) -> tuple[EffectParameter, ...]:
             f"place of azimuth {unit} forward of midships",
             -250.0,
             250.0,
-            lambda card: AZIMUTH_PLACE * card.ship.length_m,
+            first(lengths(AZIMUTH_PLACE)),
         ),
         EffectParameter(
             f"starboard_{unit}_m", f"place of azimuth {unit} to starboard", -50.0, 50.0, off_the_centre_line
@@ -159,21 +155,21 @@ AZIMUTHS = Effect(
             "time constant of the revolutions, by default a quarter of L/u0",
             0.01,
             600.0,
-            lambda card: time_scale_passages(0.25)(card)[0],
+            first(time_scale_passages(0.25)),
         ),
         EffectParameter(
             "angle_time_constant_s",
             "time constant of the turn of the unit, by default a twentieth of L/u0",
             0.01,
             600.0,
-            lambda card: time_scale_passages(0.05)(card)[0],
+            first(time_scale_passages(0.05)),
         ),
         EffectParameter(
             "max_rate_radps",
             "largest rate at which a unit turns, by default 240 deg in L/u0",
             0.001,
             6.3,
-            lambda card: rates(math.radians(240.0))(card)[0],
+            first(rates(math.radians(240.0))),
         ),
     ),
     equations=_with_azimuths,

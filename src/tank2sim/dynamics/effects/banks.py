@@ -6,10 +6,10 @@ import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
-from tank2sim.dynamics.effects.forces import with_forces
+from tank2sim.dynamics.effects.forces import with_forces, with_validity
 from tank2sim.dynamics.effects.froude_scale import lengths
 from tank2sim.dynamics.effects.particulars import model_particular, with_particulars
-from tank2sim.dynamics.hull import inside_range, validity_factor
+from tank2sim.dynamics.hull import inside_range
 from tank2sim.dynamics.model import Model, Quantity
 
 # Fitted by benchmarks/bank.py to the steady tests without drift of Lataire, Vantorre and Eloot (2009), a model of an
@@ -95,18 +95,16 @@ def _with_banks(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mo
     force = 0.5 * model.symbol("ship.water_density") * length * draught * u**2 * nearness
     drawn = with_forces(model, Y=force * sway, N=-force * length * yaw)
     inside = inside_range(ca.fabs(nearness) - LARGEST_BANK, BANK_MARGIN)
-    factor = validity_factor("bank", "the distance of a bank", inside)
-    drawn = drawn.extend(factor, outputs=[factor.name])
-    drawn = drawn.redefine("validity", lambda validity: validity * factor.symbol)
+    drawn = with_validity(drawn, "bank", "the distance of a bank", inside)
     if "water.under_keel_clearance" not in model:
         return drawn
     added = SQUAT_BY_BANK * ca.fabs(nearness) + SQUAT_BY_PROPELLER * at_work
     squat = Quantity(
-        name="squat.bank",
-        unit="m",
-        description="Largest sinkage by squat near a bank: that of ICORELS, more by bank and propeller",
+        "squat.bank",
+        "m",
+        "Largest sinkage by squat near a bank: that of ICORELS, more by bank and propeller",
+        model.symbol("squat.icorels") * (1 + added),
         nominal=0.1 * model_particular(card, "draught_m"),
-        value=model.symbol("squat.icorels") * (1 + added),
     )
     drawn = drawn.extend(squat, outputs=[squat.name])
     return drawn.redefine(

@@ -2,117 +2,31 @@
 
 from __future__ import annotations
 
+import csv
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard, MmgCard
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, refuse_given, with_steps_for
-from tank2sim.dynamics.effects.forces import scales, with_forces
-from tank2sim.dynamics.hull import inside_range, validity_factor
+from tank2sim.dynamics.effects.forces import scales, with_forces, with_validity
+from tank2sim.dynamics.hull import inside_range
 from tank2sim.dynamics.model import Model, Parameter, Quantity, State
 
 # Oosterveld and van Oossanen (1975), Further computer-analyzed data of the Wageningen B-screw series, International
 # Shipbuilding Progress 22, 251-262; the numbers are alike in three public transcriptions, one of them of Bernitsas, Ray
 # and Kinley (1981), K_T, K_Q and efficiency curves for the Wageningen B-series propellers. The paper was not at hand.
-# fmt: off
-B_SERIES: Sequence[tuple[float, int, int, int, int]] = (
-    (0.00880496, 0, 0, 0, 0),
-    (-0.204554, 1, 0, 0, 0),
-    (0.166351, 0, 1, 0, 0),
-    (0.158114, 0, 2, 0, 0),
-    (-0.147581, 2, 0, 1, 0),
-    (-0.481497, 1, 1, 1, 0),
-    (0.415437, 0, 2, 1, 0),
-    (0.0144043, 0, 0, 0, 1),
-    (-0.0530054, 2, 0, 0, 1),
-    (0.0143481, 0, 1, 0, 1),
-    (0.0606826, 1, 1, 0, 1),
-    (-0.0125894, 0, 0, 1, 1),
-    (0.0109689, 1, 0, 1, 1),
-    (-0.133698, 0, 3, 0, 0),
-    (0.00638407, 0, 6, 0, 0),
-    (-0.00132718, 2, 6, 0, 0),
-    (0.168496, 3, 0, 1, 0),
-    (-0.0507214, 0, 0, 2, 0),
-    (0.0854559, 2, 0, 2, 0),
-    (-0.0504475, 3, 0, 2, 0),
-    (0.010465, 1, 6, 2, 0),
-    (-0.00648272, 2, 6, 2, 0),
-    (-0.00841728, 0, 3, 0, 1),
-    (0.0168424, 1, 3, 0, 1),
-    (-0.00102296, 3, 3, 0, 1),
-    (-0.0317791, 0, 3, 1, 1),
-    (0.018604, 1, 0, 2, 1),
-    (-0.00410798, 0, 2, 2, 1),
-    (-0.000606848, 0, 0, 0, 2),
-    (-0.0049819, 1, 0, 0, 2),
-    (0.0025983, 2, 0, 0, 2),
-    (-0.000560528, 3, 0, 0, 2),
-    (-0.00163652, 1, 2, 0, 2),
-    (-0.000328787, 1, 6, 0, 2),
-    (0.000116502, 2, 6, 0, 2),
-    (0.000690904, 0, 0, 1, 2),
-    (0.00421749, 0, 3, 1, 2),
-    (0.0000565229, 3, 6, 1, 2),
-    (-0.00146564, 0, 3, 2, 2),
+_ROWS = list(csv.DictReader(Path(__file__).with_name("b_series.csv").read_text(encoding="ascii").splitlines()))
+B_SERIES, B_SERIES_TORQUE = (
+    [(float(row["C"]), *(int(row[power]) for power in "stuv")) for row in _ROWS if row["of"] == curve]
+    for curve in ("thrust", "torque")
 )
-"""C, s, t, u, v of K_T = sum of C J^s (P/D)^t (A_E/A_0)^u Z^v, at a Reynolds number of 2e6."""
-
-B_SERIES_TORQUE: Sequence[tuple[float, int, int, int, int]] = (
-    (0.00379368, 0, 0, 0, 0),
-    (0.00886523, 2, 0, 0, 0),
-    (-0.032241, 1, 1, 0, 0),
-    (0.00344778, 0, 2, 0, 0),
-    (-0.0408811, 0, 1, 1, 0),
-    (-0.108009, 1, 1, 1, 0),
-    (-0.0885381, 2, 1, 1, 0),
-    (0.188561, 0, 2, 1, 0),
-    (-0.00370871, 1, 0, 0, 1),
-    (0.00513696, 0, 1, 0, 1),
-    (0.0209449, 1, 1, 0, 1),
-    (0.00474319, 2, 1, 0, 1),
-    (-0.00723408, 2, 0, 1, 1),
-    (0.00438388, 1, 1, 1, 1),
-    (-0.0269403, 0, 2, 1, 1),
-    (0.0558082, 3, 0, 1, 0),
-    (0.0161886, 0, 3, 1, 0),
-    (0.00318086, 1, 3, 1, 0),
-    (0.015896, 0, 0, 2, 0),
-    (0.0471729, 1, 0, 2, 0),
-    (0.0196283, 3, 0, 2, 0),
-    (-0.0502782, 0, 1, 2, 0),
-    (-0.030055, 3, 1, 2, 0),
-    (0.0417122, 2, 2, 2, 0),
-    (-0.0397722, 0, 3, 2, 0),
-    (-0.00350024, 0, 6, 2, 0),
-    (-0.0106854, 3, 0, 0, 1),
-    (0.00110903, 3, 3, 0, 1),
-    (-0.000313912, 0, 6, 0, 1),
-    (0.0035985, 3, 0, 1, 1),
-    (-0.00142121, 0, 6, 1, 1),
-    (-0.00383637, 1, 0, 2, 1),
-    (0.0126803, 0, 2, 2, 1),
-    (-0.00318278, 2, 3, 2, 1),
-    (0.00334268, 0, 6, 2, 1),
-    (-0.00183491, 1, 1, 0, 2),
-    (0.000112451, 3, 2, 0, 2),
-    (-0.0000297228, 3, 6, 0, 2),
-    (0.000269551, 1, 0, 1, 2),
-    (0.00083265, 2, 0, 1, 2),
-    (0.00155334, 0, 2, 1, 2),
-    (0.000302683, 0, 6, 1, 2),
-    (-0.0001843, 0, 0, 2, 2),
-    (-0.000425399, 0, 3, 2, 2),
-    (0.0000869243, 3, 3, 2, 2),
-    (-0.0004659, 0, 6, 2, 2),
-    (0.0000554194, 1, 6, 2, 2),
-)
-"""The same of K_Q; alike in public transcriptions except for the 40th number, which is that of most of them."""
-# fmt: on
+"""C, s, t, u, v of K_T = sum of C J^s (P/D)^t (A_E/A_0)^u Z^v, at a Reynolds number of 2e6, and the same of K_Q; alike
+in public transcriptions except for the 40th number of K_Q, which is that of most of them."""
 
 LEAST_PITCH, LARGEST_PITCH, LARGEST_J = 0.5, 1.4, 1.6
 """P/D of the series, and the J beyond which no curve of it goes."""
@@ -158,7 +72,7 @@ def b_series_torque(J: Any, pitch: Any, area: Any, blades: Any) -> Any:
     return _of_series(B_SERIES_TORQUE, J, pitch, area, blades)
 
 
-def _of_series(table: Sequence[tuple[float, int, int, int, int]], J: Any, pitch: Any, area: Any, blades: Any) -> Any:
+def _of_series(table: Sequence[tuple[float, ...]], J: Any, pitch: Any, area: Any, blades: Any) -> Any:
     total: Any = 0.0
     for coefficient, s, t, u, v in table:
         total = total + coefficient * J**s * pitch**t * area**u * blades**v
@@ -214,34 +128,33 @@ def _with_pitch(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mo
     if "propeller.speed_actual" not in model:
         raise card.fault("propulsion", "is missing", "controllable_pitch needs the revolutions of the propeller")
     start = Parameter(
-        name="initial.propeller_pitch",
-        unit="1",
-        description="Pitch of the propeller over its diameter at the start",
+        "initial.propeller_pitch",
+        "1",
+        "Pitch of the propeller over its diameter at the start",
         minimum=-LARGEST_PITCH,
         maximum=LARGEST_PITCH,
         start=next(one.start for one in model.inputs if one.name == "propeller.pitch"),
         tunable=False,
     )
     pitch = State(
-        name="propeller.pitch_actual",
-        unit="1",
-        description="Pitch of the propeller over its diameter, negative: pushes astern",
+        "propeller.pitch_actual",
+        "1",
+        "Pitch of the propeller over its diameter, negative: pushes astern",
         derivative="propeller.pitch_rate",
         start=start.symbol,
         trim=given["pitch"],
     )
     limit = 2 * given["design_pitch"] / given["reversal"]
     rate = Quantity(
-        name=pitch.derivative,
-        unit="1/s",
-        description="Rate of the pitch over the diameter",
+        pitch.derivative,
+        "1/s",
+        "Rate of the pitch over the diameter",
+        ca.fmax(-limit, ca.fmin(limit, (given["pitch"] - pitch.symbol) / given["time_constant"])),
         nominal=0.1,
-        value=ca.fmax(-limit, ca.fmin(limit, (given["pitch"] - pitch.symbol) / given["time_constant"])),
     )
     inside = inside_range(LEAST_PITCH - pitch.symbol, LEAST_PITCH)
-    factor = validity_factor("pitch", "the pitch of the propeller, below that of the series", inside)
-    model = model.extend(start, pitch, rate, factor, outputs=[pitch.name, factor.name])
-    model = model.redefine("validity", lambda validity: validity * factor.symbol)
+    model = model.extend(start, pitch, rate, outputs=[pitch.name])
+    model = with_validity(model, "pitch", "the pitch of the propeller, below that of the series", inside)
     model = with_steps_for(model, "controllable_pitch.time_constant")
 
     blades = given["area_ratio"], given["blades"]
@@ -305,11 +218,11 @@ def _with_torques(model: Model, torques: Mapping[str, ca.SX]) -> Model:
     """The model with outputs ``propeller.torque`` (N m), by the suffix of each propeller, and ``propeller.power``."""
     each = [
         Quantity(
-            name=f"propeller.torque{suffix}",
-            unit="N.m",
-            description="Torque that turns the propeller, by the Wageningen B-series",
+            f"propeller.torque{suffix}",
+            "N.m",
+            "Torque that turns the propeller, by the Wageningen B-series",
+            torque,
             nominal=1e5,
-            value=torque,
         )
         for suffix, torque in torques.items()
     ]
@@ -320,9 +233,7 @@ def _with_torques(model: Model, torques: Mapping[str, ca.SX]) -> Model:
         ),
         ca.SX(0),
     )
-    delivered = Quantity(
-        name="propeller.power", unit="W", description="Power delivered to the propellers", nominal=1e6, value=power
-    )
+    delivered = Quantity("propeller.power", "W", "Power delivered to the propellers", power, nominal=1e6)
     return model.extend(*each, delivered, outputs=[*(torque.name for torque in each), delivered.name])
 
 

@@ -9,10 +9,10 @@ import casadi as ca
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects.derivatives import at_depth, least_depth
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
-from tank2sim.dynamics.effects.forces import scales, with_forces
+from tank2sim.dynamics.effects.forces import scales, with_forces, with_validity
 from tank2sim.dynamics.effects.particulars import model_particular, with_particulars
 from tank2sim.dynamics.effects.propeller import resistance_prime
-from tank2sim.dynamics.hull import inside_range, validity_factor
+from tank2sim.dynamics.hull import inside_range
 from tank2sim.dynamics.model import Model, Quantity
 from tank2sim.units import KNOT_MPS
 
@@ -93,34 +93,27 @@ def _with_finite_depth(model: Model, given: EffectSymbols, card: ManoeuvringCard
     slowed = with_forces(model, X=-resistance * (1 / (1 - loss) ** 2 - 1))
     square = u**2 / (gravity * depth)
     volume = block * beam * draught * model.symbol("ship.length")
-    described = (
-        ("squat.barrass", "Largest sinkage by squat, Barrass (2004)", barrass_squat(block, u)),
-        (
-            "squat.icorels",
-            "Largest sinkage by squat, ICORELS (1980)",
-            icorels_squat(volume, model.symbol("ship.length"), ca.fmin(square, 0.9)),
-        ),
+    sinkages = (
+        ("Barrass (2004)", "barrass", barrass_squat(block, u)),
+        ("ICORELS (1980)", "icorels", icorels_squat(volume, model.symbol("ship.length"), ca.fmin(square, 0.9))),
     )
     squats = [
-        Quantity(name=name, unit="m", description=description, nominal=0.1 * usual, value=value)
-        for name, description, value in described
+        Quantity(f"squat.{name}", "m", f"Largest sinkage by squat, {source}", value, nominal=0.1 * usual)
+        for source, name, value in sinkages
     ]
     clearance = Quantity(
-        name="water.under_keel_clearance",
-        unit="m",
-        description="Water under the keel: depth less draught less the larger squat; not above zero: aground",
+        "water.under_keel_clearance",
+        "m",
+        "Water under the keel: depth less draught less the larger squat; not above zero: aground",
+        depth - draught - ca.fmax(squats[0].symbol, squats[1].symbol),
         nominal=usual,
-        value=depth - draught - ca.fmax(squats[0].symbol, squats[1].symbol),
     )
     left = inside_range(CLEARANCE_MARGIN - clearance.symbol / draught, CLEARANCE_MARGIN)
     critical = inside_range(ca.fabs(u) / ca.sqrt(gravity * depth) - LARGEST_DEPTH_FROUDE, DEPTH_FROUDE_MARGIN)
-    factors = (
-        validity_factor("under_keel_clearance", "water under the keel (0: aground)", left),
-        validity_factor("depth_froude", "the depth Froude number", critical),
-    )
-    shown = (*squats, clearance, *factors)
+    shown = (*squats, clearance)
     deep = slowed.extend(*shown, outputs=[quantity.name for quantity in shown])
-    return deep.redefine("validity", lambda validity: validity * factors[0].symbol * factors[1].symbol)
+    deep = with_validity(deep, "under_keel_clearance", "water under the keel (0: aground)", left)
+    return with_validity(deep, "depth_froude", "the depth Froude number", critical)
 
 
 FINITE_DEPTH = Effect(

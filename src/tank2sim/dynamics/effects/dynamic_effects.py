@@ -10,7 +10,7 @@ from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymb
 from tank2sim.dynamics.effects.forces import scales, speed_of_scaling, with_forces
 from tank2sim.dynamics.effects.froude_scale import time_scale_passages
 from tank2sim.dynamics.effects.particulars import model_particular
-from tank2sim.dynamics.kinematics import heel
+from tank2sim.dynamics.kinematics import heel, rate_of_heel
 from tank2sim.dynamics.model import Model, Quantity, State
 
 
@@ -21,9 +21,9 @@ def _remembering(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> M
     response function and ship motions; Nomoto (1975), 14th ITTC: derivatives of manoeuvring that depend on frequency.
     """
     z = State(
-        name="flow_memory.v",
-        unit="m/s",
-        description="Sway velocity that the flow remembers, positive to starboard",
+        "flow_memory.v",
+        "m/s",
+        "Sway velocity that the flow remembers, positive to starboard",
         display_unit="knots",
         nominal=0.1 * card.model.speed_mps,
         derivative="flow_memory.vdot",
@@ -32,10 +32,10 @@ def _remembering(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> M
     )
     late = model.symbol("motion.v") - z.symbol
     rate = Quantity(
-        name="flow_memory.vdot",
-        unit="m/s2",
-        description="Rate of change of the sway velocity that the flow remembers",
-        value=late / given["time_constant"],
+        "flow_memory.vdot",
+        "m/s2",
+        "Rate of change of the sway velocity that the flow remembers",
+        late / given["time_constant"],
     )
     scaling = scales(model, speed_of_scaling(model, card))
     Y, N = (
@@ -91,21 +91,14 @@ def _rolling(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model
     pulse = 2 * math.pi / given["roll_period"]
     driving = model.symbol("motion.u") * model.symbol("motion.r") / card.environment.gravity_mps2
     (phi, p), _ = heel(at_rest=True)
-    phidot = Quantity(
-        name=phi.derivative,
-        unit="rad/s",
-        description="Rate of change of heel",
-        display_unit="deg/s",
-        nominal=0.01,
-        value=p.symbol,
-    )
+    phidot = rate_of_heel(p.symbol)
     pdot = Quantity(
-        name=p.derivative,
-        unit="rad/s2",
-        description="Acceleration of heel",
+        p.derivative,
+        "rad/s2",
+        "Acceleration of heel",
+        -(pulse**2) * (phi.symbol + given["heel_ratio"] * driving) - 2 * given["damping"] * pulse * p.symbol,
         display_unit="deg/s2",
         nominal=1e-3,
-        value=-(pulse**2) * (phi.symbol + given["heel_ratio"] * driving) - 2 * given["damping"] * pulse * p.symbol,
     )
     scaling = scales(model, speed_of_scaling(model, card))
     rolling = with_forces(

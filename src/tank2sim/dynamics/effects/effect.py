@@ -108,9 +108,9 @@ class EffectParameter:
         unit, description = _UNITS.get(suffix, "1"), self.description[0].upper() + self.description[1:]
         if self.input_name:
             return Input(
-                name=self.input_name,
-                unit=unit,
-                description=description,
+                self.input_name,
+                unit,
+                description,
                 display_unit=_SHOWN.get(suffix),
                 # A direction may go round and round, and a negative speed is one the other way.
                 minimum={
@@ -124,15 +124,25 @@ class EffectParameter:
                 start=value,
             )
         return Parameter(
-            name=f"{effect}.{self.stem}",
-            unit=unit,
-            description=description,
+            f"{effect}.{self.stem}",
+            unit,
+            description,
             display_unit=_SHOWN.get(suffix),
             nominal=0.1 * (self.maximum - self.lowest(card)),
             minimum=self.lowest(card),
             maximum=self.maximum,
             start=value,
         )
+
+
+def side_force(cause: str, Y: float, N: float) -> tuple[EffectParameter, ...]:
+    """Parameters ``Y_prime`` and ``N_prime`` of a side force by a `cause`, with their typical values (prime)."""
+    return tuple(
+        EffectParameter(
+            f"{axis}_prime", f"{what} {cause}, positive to starboard", -0.01, 0.01, absent=0.0, typical=(size,)
+        )
+        for axis, what, size in (("Y", "sway force", Y), ("N", "yaw moment", N))
+    )
 
 
 EffectSymbols = Mapping[str, ca.SX]
@@ -303,21 +313,10 @@ class Effect:
     def apply(self, model: Model, values: Mapping[str, float], card: ManoeuvringCard) -> Model:
         """The model with this effect.
 
-        Parameters
-        ----------
-        model : Model
-            Model of the ship, with or without other effects.
-        values : mapping
-            SI, by the names of the parameters; those with a default may be absent.
-        card : ManoeuvringCard
-            Card of the ship, for what the effect needs to know of it.
-
-        Raises
-        ------
-        InputError
-            The card lacks something that the effect needs, or the model has one of its variables already.
-        KeyError
-            A required value is missing.
+        `model`: model of the ship, with or without other effects. `values`: SI, by the names of the parameters; those
+        with a default may be absent. `card`: card of the ship, for what the effect needs to know of it. Raises
+        InputError: the card lacks something that the effect needs, or the model has one of its variables already.
+        Raises KeyError: a required value is missing.
         """
         if self.in_mmg and card.model.kind == "mmg":
             raise card.fault("effects", f"{self.name} is part of the MMG method already", "leave it out")
@@ -341,12 +340,7 @@ class Effect:
 
 
 def card_for_effects(card: SteeredCard) -> ManoeuvringCard:
-    """The card as effects take it: an effect that fits a craft reads nothing of a card that only ships have.
-
-    Parameters
-    ----------
-    card : SteeredCard
-    """
+    """The card as effects take it: an effect that fits a craft reads nothing of a card that only ships have."""
     return cast(ManoeuvringCard, card)
 
 
@@ -368,12 +362,8 @@ def sensor_fault_of(effect: Effect) -> str:
 def with_readings(model: Model, shown: Mapping[str, ca.SX]) -> Model:
     """The model with quantities ``sensor.*`` of what its sensors show: ``sensor.psi`` for ``motion.psi``.
 
-    Parameters
-    ----------
-    model : Model
-        Where it has such a quantity already, the new fault acts on what the earlier one shows.
-    shown : mapping
-        Name of the variable measured to the expression shown, of the model's symbols.
+    `model`: where it has such a quantity already, the new fault acts on what the earlier one shows. `shown`: name of
+    the variable measured to the expression shown, of the model's symbols.
     """
     names = {name: name.replace("motion.", "sensor.") for name in shown}
     faulty = [name for name in shown if names[name] in model]
@@ -388,12 +378,7 @@ def with_readings(model: Model, shown: Mapping[str, ca.SX]) -> Model:
         description = f"What the sensor shows: {true.description[0].lower()}{true.description[1:]}"
         model = model.extend(
             Quantity(
-                name=names[name],
-                unit=true.unit,
-                description=description,
-                display_unit=true.display_unit,
-                nominal=true.nominal,
-                value=ca.SX(value),
+                names[name], true.unit, description, ca.SX(value), display_unit=true.display_unit, nominal=true.nominal
             )
         )
     return model

@@ -11,9 +11,9 @@ import numpy as np
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, with_steps_for
 from tank2sim.dynamics.effects.forces import with_forces
-from tank2sim.dynamics.effects.froude_scale import DIRECTION_SIGNS, speeds, wave_speeds
+from tank2sim.dynamics.effects.froude_scale import first, speeds, time_scale_passages, wave_speeds
 from tank2sim.dynamics.effects.particulars import with_particulars
-from tank2sim.dynamics.effects.surroundings import STILL_MPS, WIND, relative_air
+from tank2sim.dynamics.effects.surroundings import STILL_MPS, WIND, bearing, relative_air
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model, Parameter, Quantity, State
 
@@ -39,14 +39,7 @@ def _horizontal(
             absent=0.0,
             typical=typical,
         ),
-        EffectParameter(
-            "direction_rad",
-            f"direction {direction}, clockwise from north",
-            -2 * math.pi,
-            2 * math.pi,
-            input_name=f"{prefix}direction",
-            typical=DIRECTION_SIGNS,
-        ),
+        bearing(direction, f"{prefix}direction"),
         *(
             EffectParameter(
                 f"{side}_mps",
@@ -82,28 +75,28 @@ def _with_changing_current(model: Model, given: EffectSymbols, card: Manoeuvring
     started = {"north": math.cos(angle), "east": math.sin(angle)}
     for side in ("north", "east"):
         start = Parameter(
-            name=f"initial.current_{side}",
-            unit="m/s",
-            description=f"Velocity to {side} at the start of the water in which the ship is",
+            f"initial.current_{side}",
+            "m/s",
+            f"Velocity to {side} at the start of the water in which the ship is",
             display_unit="knots",
             start=inputs["current.speed"] * started[side] + inputs[f"current.{side}"],
             tunable=False,
         )
         target = given["speed"] * by_direction[side] + given[side]
         state = State(
-            name=f"current_field.{side}_reached",
-            unit="m/s",
-            description=f"Velocity to {side} of the water in which the ship is",
+            f"current_field.{side}_reached",
+            "m/s",
+            f"Velocity to {side} of the water in which the ship is",
             display_unit="knots",
             derivative=f"current_field.{side}_rate",
             start=start.symbol,
             trim=target,
         )
         rate = Quantity(
-            name=f"current_field.{side}_rate",
-            unit="m/s2",
-            description=f"Acceleration to {side} of the water in which the ship is",
-            value=(target - state.symbol) / given["entry_time"],
+            f"current_field.{side}_rate",
+            "m/s2",
+            f"Acceleration to {side} of the water in which the ship is",
+            (target - state.symbol) / given["entry_time"],
         )
         states, starts, rates = [*states, state], [*starts, start], [*rates, rate]
     carried = model.extend(*states, *starts, *rates)
@@ -129,7 +122,7 @@ CURRENT_FIELD = Effect(
             "time in which the hull comes into the water of the input, by default L/u0",
             0.1,
             600.0,
-            lambda card: card.ship.length_m / card.model.speed_mps,
+            first(time_scale_passages(1.0)),
         ),
     ),
     equations=_with_changing_current,

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.scaling import Scales
+from tank2sim.dynamics.hull import validity_factor
 from tank2sim.dynamics.model import Model
 
 
@@ -27,3 +30,15 @@ def with_forces(model: Model, *, X: ca.SX | float = 0.0, Y: ca.SX | float = 0.0,
         .redefine("force.Y", lambda force: force + Y)
         .redefine("force.N", lambda moment: moment + N)
     )
+
+
+def with_validity(model: Model, name: str, cause: str, value: ca.SX) -> Model:
+    """The model with one more factor of ``validity``, the output of :func:`.validity_factor`."""
+    factor = validity_factor(name, cause, value)
+    extended = model.extend(factor, outputs=[factor.name])
+    return extended.redefine("validity", lambda validity: validity * factor.symbol)
+
+
+def with_side_force(model: Model, given: Mapping[str, ca.SX], force: ca.SX) -> Model:
+    """The model with Y' = ``given["Y"]`` and N' = ``given["N"]`` (prime) times `force` (N), and L for the moment."""
+    return with_forces(model, Y=force * given["Y"], N=force * model.symbol("ship.length") * given["N"])

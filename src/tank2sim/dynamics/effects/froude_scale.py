@@ -14,6 +14,12 @@ from tank2sim.cards.card import ManoeuvringCard
 
 _Sizes = Callable[[ManoeuvringCard], tuple[float, ...]]
 
+
+def first(sizes: _Sizes) -> Callable[[ManoeuvringCard], float]:
+    """The first of `sizes`, as a default of a parameter."""
+    return lambda card: sizes(card)[0]
+
+
 DIRECTION_SIGNS = tuple(math.radians(degrees) for degrees in range(-135, 181, 45))
 """Every 45 deg, rad: the nearest is within the half wave in which a search downhill finds any direction."""
 

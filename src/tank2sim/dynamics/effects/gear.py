@@ -11,7 +11,7 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, with_steps_for
 from tank2sim.dynamics.effects.froude_scale import rates, time_scale_passages
 from tank2sim.dynamics.model import Model, Quantity, State
-from tank2sim.dynamics.steering_gear import assumed_lag_notice
+from tank2sim.dynamics.steering_gear import assumed_lag_notice, rudder_rate, rudder_state
 
 
 def _limited(value: ca.SX, limit: ca.SX) -> ca.SX:
@@ -96,24 +96,11 @@ def _with_backlash(model: Model, given: EffectSymbols, card: ManoeuvringCard) ->
     rudder, rate = model["rudder.angle"], model["rudder.rate"]
     assert isinstance(rudder, State) and isinstance(rate, Quantity)
     contact = CONTACT * card.ship.length_m / card.model.speed_mps
-    gear = State(
-        name="rudder_backlash.gear",
-        unit="rad",
-        description="Angle of the steering gear before its play, positive to starboard",
-        display_unit="deg",
-        nominal=0.35,
-        derivative="rudder_backlash.rate",
-        start=rudder.start,
-        trim=rudder.trim,
+    words = "of the steering gear before its play, positive to starboard"
+    gear = rudder_state(
+        "rudder_backlash.gear", f"Angle {words}", "rudder_backlash.rate", rudder.start, trim=rudder.trim
     )
-    turning = Quantity(
-        name="rudder_backlash.rate",
-        unit="rad/s",
-        description="Rate of the steering gear before its play, positive to starboard",
-        display_unit="deg/s",
-        nominal=0.05,
-        value=rate.value,
-    )
+    turning = rudder_rate(gear.derivative, f"Rate {words}", rate.value)
     played = _beyond(gear.symbol - rudder.symbol, given["width"] / 2) / contact
     return (
         model.extend(gear, turning)
@@ -176,24 +163,15 @@ def _with_telemotor_lag(model: Model, given: EffectSymbols, card: ManoeuvringCar
     van Amerongen (1982): telemotor before rudder servo. In model tests it is the lag of the controller.
     """
     command = model.symbol("rudder.command")
-    order = State(
-        name="telemotor_lag.order",
-        unit="rad",
-        description="Rudder order as it reaches the gear, positive to starboard",
-        display_unit="deg",
-        nominal=0.35,
-        derivative="telemotor_lag.rate",
-        start=model.symbol("initial.rudder_angle"),
+    order = rudder_state(
+        "telemotor_lag.order",
+        "Rudder order as it reaches the gear, positive to starboard",
+        "telemotor_lag.rate",
+        model.symbol("initial.rudder_angle"),
         steady=True,
     )
-    rate = Quantity(
-        name="telemotor_lag.rate",
-        unit="rad/s",
-        description="Rate of the rudder order that reaches the gear, positive to starboard",
-        display_unit="deg/s",
-        nominal=0.05,
-        value=ca.SX(0),
-    )
+    words = "Rate of the rudder order that reaches the gear, positive to starboard"
+    rate = rudder_rate(order.derivative, words, ca.SX(0))
     # Its rate last: it alone still holds the command, which gives way to q everywhere else.
     lagging = (
         model.extend(order, rate)

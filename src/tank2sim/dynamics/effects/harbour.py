@@ -9,7 +9,7 @@ import casadi as ca
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
 from tank2sim.dynamics.effects.forces import with_forces
-from tank2sim.dynamics.effects.froude_scale import wave_speeds
+from tank2sim.dynamics.effects.froude_scale import first, lengths, wave_speeds
 from tank2sim.dynamics.effects.particulars import model_particular
 from tank2sim.dynamics.model import Model
 
@@ -57,9 +57,7 @@ def largest_force(card: ManoeuvringCard) -> float:
 
 
 def _thruster(end: str, sign: float) -> tuple[EffectParameter, ...]:
-    def place(card: ManoeuvringCard) -> float:
-        return sign * THRUSTER_PLACE * card.ship.length_m
-
+    place = first(lengths(sign * THRUSTER_PLACE))
     return (
         EffectParameter(
             "command",
@@ -77,7 +75,7 @@ def _thruster(end: str, sign: float) -> tuple[EffectParameter, ...]:
             "speed at which the thruster has lost half of its force",
             0.01,
             10.0,
-            lambda card: wave_speeds(HALF_SPEED)(card)[0],
+            first(wave_speeds(HALF_SPEED)),
         ),
     )
 
@@ -120,18 +118,15 @@ def _with_tugs(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mod
 
 
 def _tug(tug: int) -> tuple[EffectParameter, ...]:
-    first = tug == 1
-
-    def place(card: ManoeuvringCard) -> float:
-        return (TUG_PLACE if tug % 2 else -TUG_PLACE) * card.ship.length_m
-
+    default = None if tug == 1 else 0.0
+    place = first(lengths(TUG_PLACE if tug % 2 else -TUG_PLACE))
     return (
         EffectParameter(
             f"force_{tug}_N",
             f"force of tug {tug} on the ship",
             0.0,
             5e6,
-            None if first else 0.0,
+            default,
             input_name=f"tug.force_{tug}",
             absent=0.0,
             typical=lambda card: (largest_force(card),),
@@ -141,7 +136,7 @@ def _tug(tug: int) -> tuple[EffectParameter, ...]:
             f"direction of the force of tug {tug}, clockwise from the bow",
             -2 * math.pi,
             2 * math.pi,
-            None if first else 0.0,
+            default,
             input_name=f"tug.direction_{tug}",
             typical=(math.pi / 2,),
         ),

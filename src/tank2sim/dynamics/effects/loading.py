@@ -9,10 +9,10 @@ from tank2sim.cards.estimates import CLARKE_BRACKETS
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.effects.derivatives import TRIM, hydrodynamic, inertial_parts, trimmed, with_changes
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
-from tank2sim.dynamics.effects.forces import scales, with_forces
+from tank2sim.dynamics.effects.forces import scales, with_forces, with_validity
 from tank2sim.dynamics.effects.particulars import model_particular, volume_exponent, with_particulars
 from tank2sim.dynamics.effects.propeller import resistance_prime
-from tank2sim.dynamics.hull import inside_range, validity_factor
+from tank2sim.dynamics.hull import inside_range
 from tank2sim.dynamics.model import Model, Quantity
 
 BY_REGRESSION = ("Yv", "Nv", "Nr", "Yvdot", "Nrdot")
@@ -34,12 +34,7 @@ less: the blades come out of the water. Project choice."""
 
 
 def mean_draught(card: SteeredCard) -> float | None:
-    """Return the mean draught of a card's ship, m: that of its effect ``loading``, else its own; None without either.
-
-    Parameters
-    ----------
-    card : SteeredCard
-    """
+    """Mean draught of a card's ship, m: that of its effect ``loading``, else its own; None without either."""
     loaded = (entry.parameters for entry in card.effects if entry.name == LOADING.name)
     return next((one["mean_draught_m"] for one in loaded), card.ship.draught_m)
 
@@ -124,11 +119,11 @@ def _loaded(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     }
     model = with_changes(model, changes, card)
     displacement = Quantity(
-        name="loading.displacement",
-        unit="kg",
-        description="Mass of the ship at the mean draught",
+        "loading.displacement",
+        "kg",
+        "Mass of the ship at the mean draught",
+        mass * filled,
         nominal=card.rigid_body.mass * card.scales.mass,
-        value=mass * filled,
     )
     stern = (draught + trim / 2) / model_particular(card, "propeller_diameter_m")
     valid = (
@@ -137,9 +132,8 @@ def _loaded(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
         * inside_range(ca.fabs(trim) / draught - LARGEST_TRIM, TRIM_MARGIN)
         * inside_range(1 - stern, EMERGED)
     )
-    factor = validity_factor("loading", "a loading condition that is not the card's", valid)
-    model = model.extend(displacement, factor, outputs=[displacement.name, factor.name])
-    return model.redefine("validity", lambda validity: validity * factor.symbol)
+    model = model.extend(displacement, outputs=[displacement.name])
+    return with_validity(model, "loading", "a loading condition that is not the card's", valid)
 
 
 _WITH_MASS = ("ship.mass", "ship.yaw_inertia", "ship.roll_inertia", "ship.weight")

@@ -78,11 +78,7 @@ ESTIMABLE = tuple(_ESTIMATES)
 def model_particular(card: ManoeuvringCard, key: str) -> float:
     """A number of the card's ``[ship]``, or an estimate of it (SI).
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-    key : str
-        One of :data:`ESTIMABLE`.
+    `key`: one of :data:`ESTIMABLE`.
     """
     value = getattr(card.ship, key)
     return float(_ESTIMATES[key][-1](card) if value is None else value)
@@ -106,10 +102,7 @@ def volume_exponent(block: float) -> float:
     dV/dT = C_WP L B, with C_WP = (1 + 2 C_B)/3 of usual sections (Schneekluth and Bertram 1998, Ship Design for
     Efficiency and Economy); that C_WP/C_B is the same at all draughts is the usual way to estimate C_B at another one.
 
-    Parameters
-    ----------
-    block : float
-        Block coefficient at the card's draught.
+    `block`: block coefficient at the card's draught.
     """
     return (1 + 2 * block) / 3 / block
 

@@ -8,35 +8,12 @@ import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.form import ASTERN_THRUST
-from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, with_steps_for
-from tank2sim.dynamics.effects.forces import scales, with_forces
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, side_force, with_steps_for
+from tank2sim.dynamics.effects.forces import scales, with_forces, with_side_force
 from tank2sim.dynamics.effects.particulars import with_particulars
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
 from tank2sim.dynamics.propulsion import propeller_force
 from tank2sim.notices import Notice
-
-
-def _side_force(Y: float, N: float) -> tuple[EffectParameter, EffectParameter]:
-    """Parameters of a side force by the propeller, with their typical values (prime)."""
-    return (
-        EffectParameter(
-            "Y_prime",
-            "sway force at nominal revolutions, prime at u0, positive to starboard",
-            -0.01,
-            0.01,
-            absent=0.0,
-            typical=(Y,),
-        ),
-        EffectParameter(
-            "N_prime",
-            "yaw moment at nominal revolutions, prime at u0, positive to starboard",
-            -0.01,
-            0.01,
-            absent=0.0,
-            typical=(N,),
-        ),
-    )
-
 
 RESISTANCE = 6e-4
 """Resistance, and so effective thrust, at u0 over 1/2 rho L^2 u0^2 where a card states no propulsion: between those of
@@ -67,7 +44,7 @@ def _with_side_force(model: Model, given: EffectSymbols, card: ManoeuvringCard) 
     """
     n = _relative_revolutions(model)
     force = scales(model, model.symbol("ship.speed")).force * n * ca.fabs(n)
-    return with_forces(model, Y=force * given["Y"], N=force * model.symbol("ship.length") * given["N"])
+    return with_side_force(model, given, force)
 
 
 PROPELLER_SIDE_FORCE = Effect(
@@ -76,7 +53,7 @@ PROPELLER_SIDE_FORCE = Effect(
     description="A single propeller pushes the stern to one side as it turns.",
     source="Saunders (1957), Hydrodynamics in Ship Design; Brix (ed.) (1993), Manoeuvring Technical Manual",
     # Y0 and N0 of the Mariner (Chislett and Strom-Tejsen 1965), a ship with one screw.
-    parameters=_side_force(-4e-5, 3e-5),
+    parameters=side_force("at nominal revolutions, prime at u0", -4e-5, 3e-5),
     equations=_with_side_force,
 )
 
@@ -91,7 +68,7 @@ def _with_walk(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mod
         raise card.fault("propulsion", "is missing", "propeller_walk needs nominal_rpm and Xnn")
     astern = ca.fmin(_relative_revolutions(model), 0)
     force = scales(model, model.symbol("ship.speed")).force * astern**2
-    return with_forces(model, Y=force * given["Y"], N=force * model.symbol("ship.length") * given["N"])
+    return with_side_force(model, given, force)
 
 
 PROPELLER_WALK = Effect(
@@ -100,7 +77,7 @@ PROPELLER_WALK = Effect(
     description="A propeller that turns astern throws the stern to one side.",
     source="Brix (ed.) (1993), Manoeuvring Technical Manual",
     # A few times the side force ahead (project choice).
-    parameters=_side_force(-2e-4, 1e-4),
+    parameters=side_force("at nominal revolutions, prime at u0", -2e-4, 1e-4),
     equations=_with_walk,
 )
 
@@ -116,7 +93,7 @@ def _with_loading_side_force(model: Model, given: EffectSymbols, card: Manoeuvri
     # U^2 eta, without its division by U at rest
     loading = speed * (_relative_revolutions(model) * model.symbol("ship.speed") - speed)
     force = scales(model, ca.SX(1)).force * loading
-    return with_forces(model, Y=force * given["Y"], N=force * model.symbol("ship.length") * given["N"])
+    return with_side_force(model, given, force)
 
 
 LOADING_SIDE_FORCE = Effect(
@@ -124,25 +101,8 @@ LOADING_SIDE_FORCE = Effect(
     acts_on="force",
     description="The harder the propeller works for the ship's speed, the more it pushes the stern to one side.",
     source="form chosen here, after the asymmetry of the KVLCC2 in SIMMAN 2008",
-    parameters=(
-        # The Mariner's side force, at the loading of a ship that has lost a third of its speed (project choice).
-        EffectParameter(
-            "Y_prime",
-            "sway force by propeller loading, prime, positive to starboard",
-            -0.01,
-            0.01,
-            absent=0.0,
-            typical=(-8e-5,),
-        ),
-        EffectParameter(
-            "N_prime",
-            "yaw moment by propeller loading, prime, positive to starboard",
-            -0.01,
-            0.01,
-            absent=0.0,
-            typical=(6e-5,),
-        ),
-    ),
+    # The Mariner's side force, at the loading of a ship that has lost a third of its speed (project choice).
+    parameters=side_force("by propeller loading, prime", -8e-5, 6e-5),
     equations=_with_loading_side_force,
 )
 
@@ -187,9 +147,9 @@ ENGINE_DROOP = Effect(
 def _start(model: Model, order: Input) -> tuple[Parameter, ca.SX]:
     """Parameter ``initial.propeller_speed``, and the revolutions (rad/s) at the start that follow from it."""
     start = Parameter(
-        name="initial.propeller_speed",
-        unit=order.unit,
-        description=f"Revolutions at the start, positive ahead; at {order.start:g}, where it is not set, those of a "
+        "initial.propeller_speed",
+        order.unit,
+        f"Revolutions at the start, positive ahead; at {order.start:g}, where it is not set, those of a "
         "ship that starts at rest (initial.u = 0) are zero",
         display_unit=order.display_unit,
         nominal=order.nominal,
@@ -202,9 +162,9 @@ def _start(model: Model, order: Input) -> tuple[Parameter, ca.SX]:
 
 def _revolutions_reached(effect: str, order: Input, start: ca.SX) -> State:
     return State(
-        name=f"{effect}.speed",
-        unit=order.unit,
-        description="Revolutions that the engine has reached, positive ahead",
+        f"{effect}.speed",
+        order.unit,
+        "Revolutions that the engine has reached, positive ahead",
         display_unit=order.display_unit,
         nominal=order.nominal,
         derivative=f"{effect}.rate",
@@ -226,13 +186,7 @@ def _with_engine_lag(model: Model, given: EffectSymbols, card: ManoeuvringCard) 
     assert isinstance(order, Input)
     start, begun = _start(model, order)
     turning = _revolutions_reached("engine_lag", order, begun)
-    rate = Quantity(
-        name="engine_lag.rate",
-        unit="rad/s2",
-        description="Rate of the revolutions",
-        nominal=0.1 * order.nominal,
-        value=ca.SX(0),
-    )
+    rate = Quantity("engine_lag.rate", "rad/s2", "Rate of the revolutions", ca.SX(0), nominal=0.1 * order.nominal)
     # Its rate last: it alone still holds the order, which gives way to what the engine has reached everywhere else.
     lagging = (
         model.extend(start, turning, rate)
@@ -277,9 +231,9 @@ def _with_telegraph(model: Model, given: EffectSymbols, card: ManoeuvringCard) -
     least = STOP_ORDER * model.symbol("propulsion.nominal_speed") if "propulsion.nominal_speed" in model else STOP_ORDER
     wanted = (order.symbol > least) - (order.symbol < -least)
     gear = State(
-        name="engine_telegraph.gear",
-        unit="1",
-        description="The engine's gear: 1 running ahead, 0 stopped, -1 running astern",
+        "engine_telegraph.gear",
+        "1",
+        "The engine's gear: 1 running ahead, 0 stopped, -1 running astern",
         derivative="engine_telegraph.gear_rate",
         start=(begun > least) - (begun < -least),
         trim=wanted,
@@ -293,10 +247,8 @@ def _with_telegraph(model: Model, given: EffectSymbols, card: ManoeuvringCard) -
     moving = ca.fmax(-1, ca.fmin(1, step * (wanted - gear.symbol))) * pace
     engaged = ca.fmax(0, ca.fmin(1, (gear.symbol * wanted - (1 - 2 * _CLUTCHING)) / _CLUTCHING))
     rates = (
-        Quantity(name="engine_telegraph.rate", unit="rad/s2", description="Rate of the revolutions", value=ca.SX(0)),
-        Quantity(
-            name="engine_telegraph.gear_rate", unit="1/s", description="Rate of the engine's gear", value=ca.SX(0)
-        ),
+        Quantity("engine_telegraph.rate", "rad/s2", "Rate of the revolutions", ca.SX(0)),
+        Quantity("engine_telegraph.gear_rate", "1/s", "Rate of the engine's gear", ca.SX(0)),
     )
     lagging = (
         model.extend(start, turning, gear, *rates)

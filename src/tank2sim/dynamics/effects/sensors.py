@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import casadi as ca
@@ -264,18 +264,24 @@ def _measured(signals: _Columns, effect: Effect, values: Mapping[str, float]) ->
     names = [name for name in readings if _SIGNALS[name] in signals]
     if not names:
         return {}
+    others, solve = _solved(readings, names, motion)
+    if lacking := [_SIGNALS[name] for name in others if _SIGNALS[name] not in signals]:
+        raise ValueError(f"{effect.name} cannot be corrected without {lacking[0]}")
+    rows: list[Any] = [np.vstack([signals[_SIGNALS[name]] for name in names])]
+    rows += [signals[_SIGNALS[name]].reshape(1, -1) for name in others]
+    return {_SIGNALS[name]: row for name, row in zip(names, np.array(solve(*rows)), strict=True)}
+
+
+def _solved(
+    readings: Mapping[str, ca.SX], names: Sequence[str], motion: Mapping[str, ca.SX]
+) -> tuple[list[str], ca.Function]:
+    """The function of what is shown that gives `names`, and the other motions that it takes."""
     x, shown = ca.vcat([motion[name] for name in names]), ca.SX.sym("shown", len(names))
     expression = ca.vcat([readings[name] for name in names])
     constant_part = ca.substitute(expression, x, ca.SX.zeros(len(names)))
     solution = ca.solve(ca.jacobian(expression, x), shown - constant_part)
     others = [name for name in MEASURED_BEFOREHAND if name not in names and ca.depends_on(solution, motion[name])]
-    for name in others:
-        if _SIGNALS[name] not in signals:
-            raise ValueError(f"{effect.name} cannot be corrected without {_SIGNALS[name]}")
-    solve = ca.Function("measured", [shown, *(motion[name] for name in others)], [solution])
-    rows: list[Any] = [np.vstack([signals[_SIGNALS[name]] for name in names])]
-    rows += [signals[_SIGNALS[name]].reshape(1, -1) for name in others]
-    return {_SIGNALS[name]: row for name, row in zip(names, np.array(solve(*rows)), strict=True)}
+    return others, ca.Function("measured", [shown, *(motion[name] for name in others)], [solution])
 
 
 def _held(time_s: NDArray[np.float64], column: NDArray[np.float64], asked: NDArray[np.float64]) -> NDArray[np.float64]:

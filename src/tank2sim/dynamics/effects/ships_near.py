@@ -13,10 +13,10 @@ from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics.effects.banks import FAR_M
 from tank2sim.dynamics.effects.depth import DEPTH_FROUDE_MARGIN, LARGEST_DEPTH_FROUDE, MIDSHIP_COEFFICIENT
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
-from tank2sim.dynamics.effects.forces import with_forces
+from tank2sim.dynamics.effects.forces import with_forces, with_validity
 from tank2sim.dynamics.effects.froude_scale import lengths, speeds
 from tank2sim.dynamics.effects.particulars import FINEST, FULLEST, model_particular, with_particulars
-from tank2sim.dynamics.hull import inside_range, validity_factor
+from tank2sim.dynamics.hull import inside_range
 from tank2sim.dynamics.model import Model, Quantity
 
 POINTS, OTHER_POINTS = 8, 6
@@ -229,19 +229,19 @@ def _with_other_ship(model: Model, given: EffectSymbols, card: ManoeuvringCard) 
     )
     X, Y, N = (density * ca.sum1(hull.weights * one) for one in per_length)
     left = Quantity(
-        name="other_ship.clearance",
-        unit="m",
-        description="Distance of the centre lines of both ships, where they are nearest, less half of both beams",
+        "other_ship.clearance",
+        "m",
+        "Distance of the centre lines of both ships, where they are nearest, less half of both beams",
+        clearance(given, ship, other) - mean_beam,
         nominal=model_particular(card, "beam_m"),
-        value=clearance(given, ship, other) - mean_beam,
     )
     inside = inside_range(CLEAR_BEAMS - left.symbol / mean_beam, CLEAR_BEAMS)
     if depth is not None:
         froude = ca.fabs(speed) / ca.sqrt(card.environment.gravity_mps2 * depth)
         inside *= inside_range(froude - LARGEST_DEPTH_FROUDE, DEPTH_FROUDE_MARGIN)
-    factor = validity_factor("other_ship", "the distance of the other ship and its depth Froude number", inside)
-    met = with_forces(model, X=X, Y=Y, N=N).extend(left, factor, outputs=[left.name, factor.name])
-    return met.redefine("validity", lambda validity: validity * factor.symbol)
+    met = with_forces(model, X=X, Y=Y, N=N).extend(left, outputs=[left.name])
+    cause = "the distance of the other ship and its depth Froude number"
+    return with_validity(met, "other_ship", cause, inside)
 
 
 def _place(name: str, description: str, typical: float) -> EffectParameter:

@@ -9,12 +9,12 @@ from dataclasses import replace
 import casadi as ca
 
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
-from tank2sim.dynamics.effects.forces import scales, with_forces
+from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, side_force
+from tank2sim.dynamics.effects.forces import scales, with_forces, with_side_force
 from tank2sim.dynamics.effects.froude_scale import DIRECTION_SIGNS, lengths, speeds, wave_speeds
 from tank2sim.dynamics.effects.particulars import AREA_ERROR, with_particulars
 from tank2sim.dynamics.kinematics import earth_velocity
-from tank2sim.dynamics.model import Model, same_symbol
+from tank2sim.dynamics.model import Model
 
 STILL_MPS = 1e-6
 """Added to the square of a relative speed, so that its root has a slope at rest; far below any speed of air."""
@@ -26,15 +26,16 @@ _WEATHER = {
 """Inputs and parameters that are zero in calm water."""
 
 
-def in_calm(model: Model) -> Model:
-    """The ship of a model without wind, waves and current, unless its inputs are set to others.
+def bearing(words: str, input_name: str | None = None) -> EffectParameter:
+    """Parameter ``direction_rad``: the direction that the `words` say, of the input `input_name` if it is one."""
+    description, turn = f"direction {words}, clockwise from north", 2 * math.pi
+    return EffectParameter("direction_rad", description, -turn, turn, input_name=input_name, typical=DIRECTION_SIGNS)
 
-    Parameters
-    ----------
-    model : Model
-    """
+
+def in_calm(model: Model) -> Model:
+    """The ship of a model without wind, waves and current, unless its inputs are set to others."""
     still = model.with_values({name: 0.0 for name in _WEATHER if name in model.parameter_names})
-    inputs = (same_symbol(one, replace(one, start=0.0)) if one.name in _WEATHER else one for one in still.inputs)
+    inputs = (replace(one, start=0.0) if one.name in _WEATHER else one for one in still.inputs)
     return replace(still, inputs=tuple(inputs))
 
 
@@ -64,14 +65,7 @@ CURRENT = Effect(
             absent=0.0,
             typical=speeds(0.05),  # 0.4 m/s at 15 knots (project choice)
         ),
-        EffectParameter(
-            "direction_rad",
-            "direction towards which the current sets, clockwise from north",
-            -2 * math.pi,
-            2 * math.pi,
-            input_name="current.direction",
-            typical=DIRECTION_SIGNS,
-        ),
+        bearing("towards which the current sets", "current.direction"),
     ),
     equations=_with_current,
     of_craft=True,
@@ -150,14 +144,7 @@ WIND = Effect(
             absent=0.0,
             typical=wave_speeds(0.25),  # 10 m/s, a fresh breeze (Beaufort 5), for a ship of 160 m (project choice)
         ),
-        EffectParameter(
-            "direction_rad",
-            "direction from which the wind comes, clockwise from north",
-            -2 * math.pi,
-            2 * math.pi,
-            input_name="wind.direction",
-            typical=DIRECTION_SIGNS,
-        ),
+        bearing("from which the wind comes", "wind.direction"),
         # Spreads: half the ranges of Fossen (2011) above; that of the centroid is a project choice.
         EffectParameter(
             "surge_coefficient",
@@ -246,13 +233,7 @@ WAVE_DRIFT = Effect(
             absent=0.0,
             typical=lengths(0.0125),  # 2 m, sea state 4, for a ship of 160 m (project choice)
         ),
-        EffectParameter(
-            "direction_rad",
-            "direction from which the waves come, clockwise from north",
-            -2 * math.pi,
-            2 * math.pi,
-            typical=DIRECTION_SIGNS,
-        ),
+        bearing("from which the waves come"),
         # Spreads: waves that are not short are reflected in part, and hulls differ (project choice).
         EffectParameter(
             "surge_coefficient", "wave drift coefficient in surge, on the beam", 0.0, 3.0, 2 / 3, spread=0.3
@@ -273,8 +254,7 @@ def _with_bank_suction(model: Model, given: EffectSymbols, card: ManoeuvringCard
     Norrbin (1974), Bank effects on a ship moving through a short dredged channel: force and moment are proportional to
     the square of the speed. A bank to starboard draws the ship (Y' > 0) and turns its bow away (N' < 0).
     """
-    scaling = scales(model, model.symbol("motion.u"))
-    return with_forces(model, Y=scaling.force * given["Y"], N=scaling.force * scaling.length * given["N"])
+    return with_side_force(model, given, scales(model, model.symbol("motion.u")).force)
 
 
 BANK_SUCTION = Effect(
@@ -282,14 +262,7 @@ BANK_SUCTION = Effect(
     acts_on="force",
     description="A bank or wall alongside draws the ship to it and turns its bow away.",
     source="Norrbin (1974), 10th Symposium on Naval Hydrodynamics, 71-88",
-    parameters=(
-        # A tenth of the Mariner's force and moment at 10 deg of rudder: a bank that is felt (project choice).
-        EffectParameter(
-            "Y_prime", "sway force by a bank, prime, positive to starboard", -0.01, 0.01, absent=0.0, typical=(5e-5,)
-        ),
-        EffectParameter(
-            "N_prime", "yaw moment by a bank, prime, positive to starboard", -0.01, 0.01, absent=0.0, typical=(-2.5e-5,)
-        ),
-    ),
+    # A tenth of the Mariner's force and moment at 10 deg of rudder: a bank that is felt (project choice).
+    parameters=side_force("by a bank, prime", 5e-5, -2.5e-5),
     equations=_with_bank_suction,
 )

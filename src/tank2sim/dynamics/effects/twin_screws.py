@@ -12,8 +12,9 @@ from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymb
 from tank2sim.dynamics.effects.forces import scales, with_forces
 from tank2sim.dynamics.effects.froude_scale import rates
 from tank2sim.dynamics.effects.particulars import model_particular
-from tank2sim.dynamics.model import Input, Model, Quantity, State, same_symbol
+from tank2sim.dynamics.model import Input, Model, Quantity, State, Variable
 from tank2sim.dynamics.propulsion import propeller_force
+from tank2sim.dynamics.steering_gear import rudder_quantity, rudder_rate, rudder_state
 
 SIDES = {"starboard": (1.0, "_right"), "port": (-1.0, "_left")}
 """Side to the sign of its y, and to the ending of its quantities in the MMG method."""
@@ -38,23 +39,19 @@ def _with_separate_orders(model: Model, given: EffectSymbols, card: ManoeuvringC
     if isinstance(card, MmgCard) and card.propeller.number == 1:
         raise card.fault("propeller.number", "is 1", "twin_orders is for two propellers and rudders")
     common = model["propeller.speed"]
-    for side in SIDES:
-        order = model[f"propeller.{side}_offset"]
-        assert isinstance(order, Input) and isinstance(common, Input)
-        bounded = replace(order, minimum=common.minimum, maximum=common.maximum, nominal=common.nominal)
-        model = replace(model, inputs=tuple(same_symbol(one, bounded) if one is order else one for one in model.inputs))
+    model = _with_bounds(model, common)
     model = _with_rudders(model, given)
     mean = (given["propeller_starboard"] + given["propeller_port"]) / 2
     model = model.redefine("propeller.speed_actual", lambda speed: speed + mean)
     shown = []
     for side, (_, suffix) in SIDES.items():
         turning = Quantity(
-            name=f"propeller.speed_{side}",
-            unit="rad/s",
-            description=f"Revolutions of the {side} propeller, positive ahead",
+            f"propeller.speed_{side}",
+            "rad/s",
+            f"Revolutions of the {side} propeller, positive ahead",
+            model.symbol("propeller.speed_actual") + given[f"propeller_{side}"] - mean,
             display_unit="rpm",
             nominal=common.nominal,
-            value=model.symbol("propeller.speed_actual") + given[f"propeller_{side}"] - mean,
         )
         model = model.extend(turning)
         shown.append(turning.name)
@@ -68,6 +65,16 @@ def _with_separate_orders(model: Model, given: EffectSymbols, card: ManoeuvringC
     return _with_thrust_of_each(model, given["place"])
 
 
+def _with_bounds(model: Model, common: Variable) -> Model:
+    """The offset of each propeller within the bounds of the order to both."""
+    for side in SIDES:
+        order = model[f"propeller.{side}_offset"]
+        assert isinstance(order, Input) and isinstance(common, Input)
+        bounded = replace(order, minimum=common.minimum, maximum=common.maximum, nominal=common.nominal)
+        model = replace(model, inputs=tuple(bounded if one is order else one for one in model.inputs))
+    return model
+
+
 def _with_rudders(model: Model, given: EffectSymbols) -> Model:
     """A rudder to each side, with a gear as the model's and its angle in addition to ``rudder.angle`` as state."""
     common, rate = model["rudder.angle"], model["rudder.rate"]
@@ -77,31 +84,19 @@ def _with_rudders(model: Model, given: EffectSymbols) -> Model:
     added = []
     for side, (_, suffix) in SIDES.items():
         ordered = order + given[f"rudder_{side}"]
-        own = State(
-            name=f"rudder.added_{side}",
-            unit="rad",
-            description=f"Angle of the {side} rudder in addition to rudder.angle, positive to starboard",
-            display_unit="deg",
-            nominal=0.35,
-            derivative=f"rudder.rate_{side}",
-            start=0.0,
+        own = rudder_state(
+            f"rudder.added_{side}",
+            f"Angle of the {side} rudder in addition to rudder.angle, positive to starboard",
+            f"rudder.rate_{side}",
+            0.0,
             trim=ca.substitute(common.trim, order, ordered) - common.trim,
         )
-        angle = Quantity(
-            name=f"rudder.angle_{side}",
-            unit="rad",
-            description=f"Angle of the {side} rudder, positive to starboard",
-            display_unit="deg",
-            nominal=0.35,
-            value=common.symbol + own.symbol,
-        )
-        moving = Quantity(
-            name=own.derivative,
-            unit="rad/s",
-            description=f"Rate of the {side} rudder less that of rudder.angle, positive to starboard",
-            display_unit="deg/s",
-            nominal=0.05,
-            value=ca.substitute(expanded, both, ca.vertcat(common.symbol + own.symbol, ordered)) - rate.symbol,
+        total = common.symbol + own.symbol
+        angle = rudder_quantity(f"rudder.angle_{side}", f"Angle of the {side} rudder, positive to starboard", total)
+        moving = rudder_rate(
+            own.derivative,
+            f"Rate of the {side} rudder less that of rudder.angle, positive to starboard",
+            ca.substitute(expanded, both, ca.vertcat(total, ordered)) - rate.symbol,
         )
         model = model.extend(own, angle, moving)
         added.append(own.symbol)

@@ -12,9 +12,10 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.wave_table import MIRRORED, WAVE_MOTIONS, WAVE_ROTATIONS, WaveTable, wave_table
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
-from tank2sim.dynamics.effects.forces import with_forces
-from tank2sim.dynamics.effects.froude_scale import DIRECTION_SIGNS, lengths
-from tank2sim.dynamics.hull import inside_range, validity_factor
+from tank2sim.dynamics.effects.forces import with_forces, with_validity
+from tank2sim.dynamics.effects.froude_scale import lengths
+from tank2sim.dynamics.effects.surroundings import bearing
+from tank2sim.dynamics.hull import inside_range
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model, Quantity, State
 
@@ -161,10 +162,8 @@ def _with_waves(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mo
         raise card.fault("waves", "is missing", "the effect waves needs the table [waves] of the ship's own answer")
     table = wave_table(card.waves.columns, card.waves.rows)
     chosen = components(table)
-    clock = State(
-        name="waves.clock", unit="s", description="Time since the start", derivative="waves.clock_rate", start=0.0
-    )
-    rate = Quantity(name="waves.clock_rate", unit="1", description="Rate of the time since the start", value=ca.SX(1))
+    clock = State("waves.clock", "s", "Time since the start", derivative="waves.clock_rate", start=0.0)
+    rate = Quantity("waves.clock_rate", "1", "Rate of the time since the start", ca.SX(1))
     motion, direction = model.symbol, given["direction"]
     relative = direction - motion("motion.psi")
     frequencies = ca.DM(chosen.frequencies)
@@ -187,12 +186,7 @@ def _with_waves(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mo
     angle = frequencies * clock.symbol + numbers * way + phases(given["seed"])
     waves = heights * ca.cos(angle), heights * ca.sin(angle)
     shown = [
-        Quantity(
-            name="waves.elevation",
-            unit="m",
-            description="Surface of the undisturbed sea at midships, positive up",
-            value=ca.sum1(waves[0]),
-        ),
+        Quantity("waves.elevation", "m", "Surface of the undisturbed sea at midships, positive up", ca.sum1(waves[0])),
         *(_shown(name, _motion(table, name, chosen, waves, relative)) for name in table.motions),
     ]
     added = {name: ca.SX(0) for name in WAVE_MOTIONS} | {
@@ -201,20 +195,14 @@ def _with_waves(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mo
     poses = _pose(model, added)
     variance = (given["height"] + 1e-6) ** 2 / 8
     covered = ca.sum1(heights**2) / variance
-    factor = validity_factor(
-        "waves",
-        "the share of the sea within the frequencies of the table",
-        inside_range((COVERED - covered) * given["height"] / (given["height"] + 0.01), COVERED_MARGIN),
-    )
+    covering = inside_range((COVERED - covered) * given["height"] / (given["height"] + 0.01), COVERED_MARGIN)
     steepest = 2 * math.pi / given["period"] * ca.sqrt(approach**2 + across**2 + 1e-12) / card.environment.gravity_mps2
-    slow = validity_factor(
-        "wave_speed",
-        "the speed in waves, over that of the first order of its effect on the mean drift",
-        inside_range((steepest - LARGEST_TAU) * given["height"] / (given["height"] + 0.01), TAU_MARGIN),
-    )
-    outputs = [quantity.name for quantity in (*shown, *poses, factor, slow)]
-    sea = with_forces(model, **forces).extend(clock, rate, *shown, *poses, factor, slow, outputs=outputs)
-    return sea.redefine("validity", lambda validity: validity * factor.symbol * slow.symbol)
+    slow = inside_range((steepest - LARGEST_TAU) * given["height"] / (given["height"] + 0.01), TAU_MARGIN)
+    outputs = [quantity.name for quantity in (*shown, *poses)]
+    sea = with_forces(model, **forces).extend(clock, rate, *shown, *poses, outputs=outputs)
+    sea = with_validity(sea, "waves", "the share of the sea within the frequencies of the table", covering)
+    cause = "the speed in waves, over that of the first order of its effect on the mean drift"
+    return with_validity(sea, "wave_speed", cause, slow)
 
 
 _SENSES = ("forward", "to starboard", "down", "to starboard", "bow up", "to starboard")
@@ -223,12 +211,12 @@ _SENSES = ("forward", "to starboard", "down", "to starboard", "bow up", "to star
 def _shown(name: str, value: ca.SX) -> Quantity:
     rotation = name in WAVE_ROTATIONS
     return Quantity(
-        name=f"waves.{name}",
-        unit="rad" if rotation else "m",
-        description=f"{name.capitalize()} by the waves alone, positive {_SENSES[WAVE_MOTIONS.index(name)]}",
+        f"waves.{name}",
+        "rad" if rotation else "m",
+        f"{name.capitalize()} by the waves alone, positive {_SENSES[WAVE_MOTIONS.index(name)]}",
+        value,
         display_unit="deg" if rotation else None,
         nominal=0.01 if rotation else 1.0,
-        value=value,
     )
 
 
@@ -247,11 +235,11 @@ def _pose(model: Model, added: dict[str, ca.SX]) -> tuple[Quantity, ...]:
     )
     return tuple(
         Quantity(
-            name=f"pose.{name}",
-            unit=unit,
-            description=f"{description}, with the motions in waves",
+            f"pose.{name}",
+            unit,
+            f"{description}, with the motions in waves",
+            value,
             display_unit="deg" if unit == "rad" else None,
-            value=value,
         )
         for name, unit, description, value in described
     )
@@ -280,14 +268,7 @@ WAVES = Effect(
             input_name="waves.period",
             typical=lambda card: (2 * math.sqrt(card.ship.length_m / card.environment.gravity_mps2),),
         ),
-        EffectParameter(
-            "direction_rad",
-            "direction from which the waves come, clockwise from north",
-            -2 * math.pi,
-            2 * math.pi,
-            input_name="waves.direction",
-            typical=DIRECTION_SIGNS,
-        ),
+        bearing("from which the waves come", "waves.direction"),
         EffectParameter(
             "peakedness", "gamma of the JONSWAP spectrum (1: Bretschneider, 3.3: a young wind sea)", 1.0, 7.0, 1.0
         ),

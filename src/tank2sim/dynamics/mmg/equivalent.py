@@ -37,13 +37,7 @@ def straight_inflow(model: Model, name: str = "rudder.inflow") -> float:
 def linear_equivalent(card: MmgCard, model: Model, side: Literal["plus", "minus"]) -> dict[str, float]:
     """Yd, Nd, Yv, Yr, Nv, Nr (prime, rudder to starboard) with the gamma_R of one side; Yr with -m_x'.
 
-    Parameters
-    ----------
-    card : MmgCard
-    model : Model
-        Model of the card.
-    side : str
-        ``plus`` for beta_R > 0, ``minus`` for beta_R < 0.
+    `model`: model of the card. `side`: ``plus`` for beta_R > 0, ``minus`` for beta_R < 0.
     """
     rudder, known = card.rudder, card.derivatives
     ratio = straight_inflow(model) / card.model.speed_mps
@@ -74,11 +68,7 @@ def linear_form(card: MmgCard, model: Model) -> ManoeuvringCard:
 
     It states no standard error of the velocity terms.
 
-    Parameters
-    ----------
-    card : MmgCard
-    model : Model
-        Model of the card.
+    `model`: model of the card.
     """
     plus, minus = (linear_equivalent(card, model, side) for side in ("plus", "minus"))
     derivatives = {name: 0.5 * (plus[name] + minus[name]) for name in plus}

@@ -29,18 +29,9 @@ from tank2sim.dynamics.mmg.propeller import LARGEST_PRIME_RATE
 def rudder_inflow(p: Mapping[str, Any], eta: ca.SX, u_P: ca.SX, race: ca.SX, still: ca.SX) -> ca.SX:
     """u_R (m/s), positive from ahead.
 
-    Parameters
-    ----------
-    p : mapping
-        With eps and kappa.
-    eta : casadi.SX
-        D_P/H_R, 0 to 1.
-    u_P : casadi.SX
-        Flow to the propeller, m/s.
-    race : casadi.SX
-        8 T/(rho pi D_P^2), what the propeller adds to the square of the speed in its race, m2/s2.
-    still : casadi.SX
-        A speed (m/s) that counts as none, so that the roots have slopes at rest.
+    `p`: with eps and kappa. `eta`: D_P/H_R, 0 to 1. `u_P`: flow to the propeller, m/s. `race`: 8 T/(rho pi D_P^2), what
+    the propeller adds to the square of the speed in its race, m2/s2. `still`: a speed (m/s) that counts as none, so
+    that the roots have slopes at rest.
     """
     far = ca.sqrt(ca.fmax(u_P**2 + race, 0) + still**2)
     behind = u_P + p["kappa"] * (far - ca.sqrt(u_P**2 + still**2))
@@ -68,18 +59,9 @@ def normal_force(
 ) -> ca.SX:
     """F_N (N) of one rudder at an angle delta (rad, positive to starboard).
 
-    Parameters
-    ----------
-    p : mapping
-        With f_alpha, and ``rudder_astern``, the share of the force that is left when the flow comes from aft.
-    pressure_area : casadi.SX
-        1/2 rho A_R, kg/m.
-    flow : tuple of casadi.SX
-        u_R and v_R, m/s.
-    delta : casadi.SX
-        Rudder angle.
-    still : casadi.SX
-        As in :func:`rudder_inflow`.
+    `p`: with f_alpha, and ``rudder_astern``, the share of the force that is left when the flow comes from aft.
+    `pressure_area`: 1/2 rho A_R, kg/m. `flow`: u_R and v_R, m/s. `delta`: rudder angle. `still`: as in
+    :func:`rudder_inflow`.
     """
     u_R, v_R = flow
     speed = ca.sqrt(u_R**2 + v_R**2 + still**2)

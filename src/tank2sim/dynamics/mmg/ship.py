@@ -81,9 +81,7 @@ def mmg_parameters(card: MmgCard) -> tuple[Parameter, ...]:
     """Parameters ``mmg.*`` of propeller and rudder, and the sizes that they go with."""
 
     def size(name: str, unit: str, description: str, value: float) -> Parameter:
-        return Parameter(
-            name=name, unit=unit, description=description, nominal=value, minimum=1e-9, start=value, tunable=False
-        )
+        return Parameter(name, unit, description, nominal=value, minimum=1e-9, start=value, tunable=False)
 
     coefficients = []
     for key in card.interaction_places():
@@ -91,13 +89,7 @@ def mmg_parameters(card: MmgCard) -> tuple[Parameter, ...]:
         low, high = _BOUNDS.get(key, (0.0 if key in _NOT_NEGATIVE else None, None))
         coefficients.append(
             Parameter(
-                name=f"mmg.{key}",
-                unit="1",
-                description=DESCRIPTIONS[key],
-                nominal=abs(value) or 0.1,
-                minimum=low,
-                maximum=high,
-                start=value,
+                f"mmg.{key}", "1", DESCRIPTIONS[key], nominal=abs(value) or 0.1, minimum=low, maximum=high, start=value
             )
         )
     nominal = card.propulsion.nominal_radps if card.propulsion else 1.0
@@ -106,9 +98,9 @@ def mmg_parameters(card: MmgCard) -> tuple[Parameter, ...]:
         size("ship.rudder_area", "m2", "Area of one rudder", card.ship.rudder_area_m2),
         size("ship.rudder_height", "m", "Height of the rudder", card.rudder.height_m),
         Parameter(
-            name="propulsion.nominal_speed",
-            unit="rad/s",
-            description="Revolutions that hold the speed of approach",
+            "propulsion.nominal_speed",
+            "rad/s",
+            "Revolutions that hold the speed of approach",
             display_unit="rpm",
             nominal=nominal,
             minimum=1e-6 * nominal,
@@ -133,14 +125,8 @@ def is_symmetric(card: MmgCard) -> bool:
 class Side:
     """One propeller with its rudder.
 
-    Parameters
-    ----------
-    suffix : str
-        Ending of its quantities: empty, or ``_right`` and ``_left`` if there are two.
-    mirror : float
-        1, or -1 for the left one.
-    y_P, y_R : float
-        Their places over L, positive to starboard.
+    `suffix`: ending of its quantities: empty, or ``_right`` and ``_left`` if there are two. `mirror`: 1, or -1 for the
+    left one. `y_P`, `y_R`: their places over L, positive to starboard.
     """
 
     suffix: str
@@ -161,11 +147,7 @@ def sides(card: MmgCard) -> tuple[Side, ...]:
 class MmgShip:
     """The symbols of a ship by the method.
 
-    Parameters
-    ----------
-    hull : Hull
-        Symbols of all variables, scales and speed.
-    sides : tuple of Side
+    `hull`: symbols of all variables, scales and speed.
     """
 
     hull: Hull
@@ -209,12 +191,12 @@ def mmg_forces(ship: MmgShip) -> tuple[Quantity, ...]:
         X_R, Y_R, N_R = X_R + X, Y_R + Y, N_R + N - side.y_R * hull["ship.length"] * X
     by_rudder = rudder_quantities((X_R, Y_R, N_R))
     by_propeller = (
-        Quantity(name="propeller.X", unit="N", description="Surge force by propellers, positive forward", value=X_P),
-        Quantity(name="propeller.N", unit="N.m", description="Yaw moment by propellers, + to starboard", value=N_P),
+        Quantity("propeller.X", "N", "Surge force by propellers, positive forward", X_P),
+        Quantity("propeller.N", "N.m", "Yaw moment by propellers, + to starboard", N_P),
     )
     if "q_0" in ship.p:
         description = "Power delivered to the propellers"
-        found.append(Quantity(name="propeller.power", unit="W", description=description, nominal=1e6, value=power))
+        found.append(Quantity("propeller.power", "W", description, power, nominal=1e6))
     bare, inertial = bare_hull_forces(hull), inertial_forces_with_water(hull)
     X, Y, N = (a + b + c.symbol for a, b, c in zip(bare, inertial, by_rudder, strict=True))
     forces = X + by_propeller[0].symbol, Y, N + by_propeller[1].symbol
@@ -247,7 +229,7 @@ def _side_quantities(ship: MmgShip, side: Side) -> tuple[list[Quantity], ca.SX, 
     in_race = p["eta"] if "eta" in p else diameter / hull["ship.rudder_height"]
 
     def quantity(name: str, unit: str, description: str, value: ca.SX) -> Quantity:
-        return Quantity(name=f"{name}{side.suffix}", unit=unit, description=description, value=value)
+        return Quantity(f"{name}{side.suffix}", unit, description, value)
 
     own: list[Quantity] = []
     if side.suffix:  # what an effect with separate orders changes

@@ -24,14 +24,8 @@ Rates = Callable[[Mapping[str, ca.SX], ca.SX, ca.SX, ca.SX], tuple[ca.SX, ca.SX]
 class SteeringCoefficient:
     """A coefficient of a steering model, without unit.
 
-    Parameters
-    ----------
-    name : str
-        As in a card: ``C_y_b`` for the paper's C_y^beta.
-    description : str
-        What it multiplies, and with which sign.
-    default : float, optional
-        Its value where a card gives none; without one the card must give it.
+    `name`: as in a card: ``C_y_b`` for the paper's C_y^beta. `description`: what it multiplies, and with which sign.
+    `default`: its value where a card gives none; without one the card must give it.
     """
 
     name: str
@@ -43,22 +37,10 @@ class SteeringCoefficient:
 class SteeringForm:
     """The equations of one steering model, and what of it is not published.
 
-    Parameters
-    ----------
-    name, title : str
-        Key in the catalogue; words for a reader.
-    source : str
-        The source of the equations.
-    coefficients : tuple of SteeringCoefficient
-        In the order of the paper's tables, first those of Y.
-    rates : callable
-        The equations (:data:`Rates`).
-    static_moment, damping : tuples of str
-        Coefficients of the hull's linear static yaw moment and of its linear yaw damping.
-    rudder : tuple of str
-        Coefficients that are proportional to the force of the rudder.
-    missing : tuple of str
-        What the paper does not print of it; empty if nothing.
+    `name`, `title`: key in the catalogue; words for a reader. `source`: the source of the equations. `coefficients`: in
+    the order of the paper's tables, first those of Y. `rates`: the equations (:data:`Rates`). `static_moment`,
+    `damping`: coefficients of the hull's linear static yaw moment and of its linear yaw damping. `rudder`: coefficients
+    that are proportional to the force of the rudder. `missing`: what the paper does not print of it; empty if nothing.
     """
 
     name: str

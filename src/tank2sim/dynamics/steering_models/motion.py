@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import casadi as ca
 
-from tank2sim.dynamics.kinematics import planar_kinematics, yaw_rate
+from tank2sim.dynamics.kinematics import planar_kinematics, started, yaw_rate
 from tank2sim.dynamics.model import Model, Parameter, Quantity, State
 from tank2sim.dynamics.steering_gear import steering_gear
 from tank2sim.dynamics.steering_models.form import SteeringForm
@@ -29,30 +29,31 @@ def steering_model(
     Its variables are named as those of every ship (``motion.beta`` is a state here, and ``motion.u``, ``motion.v``
     follow from it), so that manoeuvres, figures and steady turns work on it alike.
 
-    Parameters
-    ----------
-    name : str
-        The ship.
-    form : SteeringForm
-        The equations.
-    coefficients : mapping
-        Values by name, parameters ``coefficients.*``; those with a default may be left out.
-    length_m, speed_mps : float
-        L and v.
-
-    Raises
-    ------
-    ValueError
-        A coefficient without default is not given, or one is given that the form does not have.
+    `name`: the ship. `form`: the equations. `coefficients`: values by name, parameters ``coefficients.*``; those with a
+    default may be left out. `length_m`, `speed_mps`: l and v. Raises ValueError: a coefficient without default is not
+    given, or one is given that the form does not have.
     """
     known = {coefficient.name: coefficient.default for coefficient in form.coefficients}
     values = known | dict(coefficients)
     wrong = [name for name, value in values.items() if value is None or name not in known]
     if wrong:
         raise ValueError(f"{form.name}: missing or unknown: {', '.join(wrong)}")
-    states, starts = zip(_drift(), yaw_rate(nominal_radps=0.01), strict=True)
-    own_coefficients = _coefficients(form, {k: float(v or 0.0) for k, v in values.items()})
-    constants = (*_ship(length_m, speed_mps), *starts, *own_coefficients)
+    beta = State(
+        "motion.beta",
+        "rad",
+        "Drift angle, positive when the water meets the port bow: v = -speed sin(beta)",
+        display_unit="deg",
+        nominal=0.2,
+        derivative="motion.betadot",
+        steady=True,
+    )
+    drift = started(beta, "Drift angle at the start")
+    states, starts = zip(drift, yaw_rate(nominal_radps=0.01), strict=True)
+    own = (
+        Parameter(f"coefficients.{one.name}", "1", one.description, start=float(values[one.name] or 0.0))
+        for one in form.coefficients
+    )
+    constants = (*_ship(length_m, speed_mps), *starts, *own)
     gear, notices = steering_gear(None, length_m / speed_mps)
     given = (*states, *constants, *gear)
     motion = (*states, *_quantities(form, {variable.name: variable.symbol for variable in given}))
@@ -60,11 +61,6 @@ def steering_model(
     empty = Model(
         name=name,
         description=f"{name}: {form.title}, steering at a constant speed",
-        states=(),
-        inputs=(),
-        parameters=(),
-        quantities=(),
-        outputs=(),
         step_s=length_m / speed_mps / _STEPS_PER_LENGTH,
         notices=(*notices, Notice("the speed of a steering model does not fall in a turn")),
     )
@@ -73,49 +69,14 @@ def steering_model(
 
 def _ship(length_m: float, speed_mps: float) -> tuple[Parameter, ...]:
     def speed(name: str, description: str) -> Parameter:
-        return Parameter(name=name, unit="m/s", description=description, start=speed_mps, nominal=speed_mps)
+        return Parameter(name, "m/s", description, start=speed_mps, nominal=speed_mps)
 
     return (
-        Parameter(name="ship.length", unit="m", description="Length L", start=length_m, nominal=length_m),
+        Parameter("ship.length", "m", "Length L", start=length_m, nominal=length_m),
         speed("ship.speed", "Speed v, which stays constant"),
         speed("ship.slowest", "Lowest speed at which the model holds"),
         speed("ship.fastest", "Highest speed at which the model holds"),
     )
-
-
-def _coefficients(form: SteeringForm, values: Mapping[str, float]) -> tuple[Parameter, ...]:
-    return tuple(
-        Parameter(
-            name=f"coefficients.{coefficient.name}",
-            unit="1",
-            description=coefficient.description,
-            start=values[coefficient.name],
-        )
-        for coefficient in form.coefficients
-    )
-
-
-def _drift() -> tuple[State, Parameter]:
-    """State ``motion.beta`` and its start."""
-    start = Parameter(
-        name="initial.beta",
-        unit="rad",
-        description="Drift angle at the start",
-        display_unit="deg",
-        start=0.0,
-        tunable=False,
-    )
-    state = State(
-        name="motion.beta",
-        unit="rad",
-        description="Drift angle, positive when the water meets the port bow: v = -speed sin(beta)",
-        display_unit="deg",
-        nominal=0.2,
-        derivative="motion.betadot",
-        start=start.symbol,
-        steady=True,
-    )
-    return state, start
 
 
 def _quantities(form: SteeringForm, symbols: Mapping[str, ca.SX]) -> tuple[Quantity, ...]:
@@ -128,13 +89,10 @@ def _quantities(form: SteeringForm, symbols: Mapping[str, ca.SX]) -> tuple[Quant
     }
     sway, yaw = form.rates(own_coefficients, beta, r / per_second, symbols["rudder.effective"])
 
-    def quantity(name: str, unit: str, description: str, value: ca.SX) -> Quantity:
-        return Quantity(name=name, unit=unit, description=description, value=value)
-
     return (
-        quantity("motion.betadot", "rad/s", "Rate of the drift angle", sway * per_second),
-        quantity("motion.rdot", "rad/s2", "Yaw acceleration, positive to starboard", yaw * per_second**2),
-        quantity("motion.u", "m/s", "Surge velocity, positive forward", speed * ca.cos(beta)),
-        quantity("motion.v", "m/s", "Sway velocity, positive to starboard", -speed * ca.sin(beta)),
-        quantity("motion.speed", "m/s", "Speed through the water", speed),
+        Quantity("motion.betadot", "rad/s", "Rate of the drift angle", sway * per_second),
+        Quantity("motion.rdot", "rad/s2", "Yaw acceleration, positive to starboard", yaw * per_second**2),
+        Quantity("motion.u", "m/s", "Surge velocity, positive forward", speed * ca.cos(beta)),
+        Quantity("motion.v", "m/s", "Sway velocity, positive to starboard", -speed * ca.sin(beta)),
+        Quantity("motion.speed", "m/s", "Speed through the water", speed),
     )
