@@ -118,30 +118,6 @@ def test_trim_leaves_a_failed_rudder_where_it_is(integrator) -> None:
     assert running.state("motion.r") > 0
 
 
-@pytest.mark.parametrize("compiled", [True, False])
-def test_of_many_steps_every_tenth_and_the_last_are_kept(mariner, compiled: bool) -> None:
-    whole, thin = Integrator(mariner, compiled), Integrator(mariner, compiled, every=10)
-    p, u = mariner.parameter_values(), mariner.input_values({"rudder.command": 0.3})
-    x = np.array(mariner.initial(p)).ravel()
-    each = whole.rollout(x, u, p, 0.1, 123)
-    kept = thin.rollout(x, u, p, 0.1, 123, every=10)
-    np.testing.assert_array_equal(kept, each[[*range(0, 123, 10), 123]])
-
-
-def test_events_are_as_exact_where_only_every_tenth_step_is_kept(mariner) -> None:
-    zigzag = parse_manoeuvre("zigzag:20/20")
-    parameters = mariner.parameter_values()
-    names = dict(zip(mariner.parameter_names, parameters, strict=True))
-    found = []
-    for every in (1, 10):
-        running = Running(Integrator(mariner, compiled=False, every=every), {}, {})
-        zigzag.drive(running, names["ship.length"] / names["ship.speed"], None)
-        run = running.trajectory()
-        found.append(run.t[1:][np.diff(run["rudder.command"]) != 0])
-    assert len(found[0]) >= 3
-    np.testing.assert_allclose(found[1], found[0], atol=1e-9)
-
-
 def test_what_a_short_run_does_not_show_is_named_in_words(mariner) -> None:
     (reported,) = (
         one for one in simulate(mariner, parse_manoeuvre("turn:35"), duration_s=60.0).notices if "not show" in one
