@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import cycle
 
 import numpy as np
 
 from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.straight_course import straight_course
@@ -18,6 +21,39 @@ RUNAWAY = "the motion leaves all bounds"
 _CHUNK = 256  # steps between searches for an event: long enough for efficient machine code, short against a manoeuvre
 _TRIM_STEPS = 50
 _TRIM_ACCURACY = 1e-13  # of the change in a Newton step, relative to the nominal size of a state
+
+
+@dataclass(frozen=True)
+class SwitchingPlan:
+    """Two orders that take turns, each until a state reaches its level.
+
+    Parameters
+    ----------
+    orders : (mapping, mapping)
+        Inputs by name at the execute, and after the first change.
+    state : str
+        The state at a level of which the order changes.
+    levels : (float, float)
+        Levels at which the orders end, beyond `of_start` times the state at the start.
+    side : float
+        1 or -1: whether the state rises or falls to its first level; then it falls or rises to the other, and so on.
+    changes : int or None
+        Changes of order at which a run ends; 0: the first order is held to the end; None: no limit.
+    longest : float
+        Longest run without a given duration, L/u0.
+    wait_s, lag_s : float
+        Time from each order to the movement of the rudder, and from reaching a level to the order.
+    """
+
+    orders: tuple[Mapping[str, float], Mapping[str, float]]
+    state: str
+    levels: tuple[float, float]
+    side: float
+    changes: int | None
+    longest: float
+    of_start: float = 1.0
+    wait_s: float = 0.0
+    lag_s: float = 0.0
 
 
 class Running:
@@ -110,6 +146,23 @@ class Running:
 
         return bool(beyond(self._x) >= 0) or self._advance_to(self._time + at_most, beyond)
 
+    def follow(self, plan: SwitchingPlan, duration: float) -> None:
+        """Follow a plan to its end, for at most `duration` s."""
+        begin, end, side = plan.of_start * self.state(plan.state), self._time + duration, plan.side
+        self.run(min(plan.wait_s, duration))
+        for number, (orders, level) in enumerate(cycle(zip(plan.orders, plan.levels, strict=True))):
+            if (number == plan.changes and number) or self._time >= end:
+                return
+            self.order(orders)
+            if plan.changes == 0:
+                self.run(end - self._time)
+                return
+            at_most = end - self._time
+            if not self.run_until(plan.state, begin + level, rising=side > 0, at_most=at_most):
+                return
+            self.run(max(0.0, min(plan.lag_s + plan.wait_s, end - self._time)))
+            side = -side
+
     def trajectory(self) -> Trajectory:
         """The trajectory up to the present time.
 
@@ -186,3 +239,16 @@ class Running:
             raise InputError(
                 self.model.origin, "initial.trim", "no steady motion exists near the start", "start without it"
             )
+
+
+class SwitchedManoeuvre:
+    """A manoeuvre by a :class:`SwitchingPlan`."""
+
+    def plan(self, model: Model, duration_s: float | None = None) -> SwitchingPlan:
+        """The plan for a model, with or without a given duration."""
+        raise NotImplementedError
+
+    def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
+        """Run for `duration` s, or to the end of the plan."""
+        plan = self.plan(running.model, duration)
+        running.follow(plan, plan.longest * ship_time if duration is None else duration)
