@@ -39,6 +39,9 @@ DRAWS = 1000
 """Most draws of a member until it is within all bounds (project choice). Nearly all members need one; with a parameter
 at its bound every other draw is within, with ten such parameters one in a thousand."""
 
+_SUMMED = 64
+"""Members whose sums are formed together: the terms fit the cache (project choice)."""
+
 NOT_WITHIN = f"not one of {DRAWS} draws is within the bounds of all parameters"
 
 SCARCE = 10
@@ -83,73 +86,55 @@ class Draws:
 
     def member(self, number: int) -> dict[str, float]:
         """Parameters of a member, by name."""
-        return self.drawn(number).values
-
-    def drawn(self, number: int) -> Drawn:
-        """A member, from numpy's ``SeedSequence(seed, spawn_key=(number,))``: the first draw within the bounds."""
-        stream = member_stream(self.seed, number)
-        beyond: tuple[str, ...] = ()
-        for draw in range(DRAWS):
-            # Summed by NumPy, row by row: the order of sums in a linear algebra library depends on the processor.
-            standard = stream.standard_normal(len(self.names))
-            values = self.at(standard)
-            if self.samples is not None:
-                values[self.sampled] = self.samples[stream.integers(len(self.samples))]
-            outside = (values < self.lowest) | (values > self.highest)
-            if not outside.any():
-                return Drawn(dict(zip(self.names, values.tolist(), strict=True)), beyond, standard=standard)
-            if draw == 0:
-                beyond = tuple(name for name, out in zip(self.names, outside, strict=True) if out)
-        held = np.clip(values, self.lowest, self.highest)
-        return Drawn(dict(zip(self.names, held.tolist(), strict=True)), beyond, trouble=NOT_WITHIN, standard=standard)
+        return dict(zip(self.names, self.members(number, 1).values[0].tolist(), strict=True))
 
     def members(self, first: int, count: int) -> DrawnMembers:
-        """The members from `first` on, the same as by :meth:`drawn`."""
-        names = len(self.names)
-        values, products = np.empty((count, names)), np.empty_like(self.root)
-        for row in range(count):
-            stream = member_stream(self.seed, first + row)
-            np.multiply(self.root, stream.standard_normal(names), out=products)
-            np.add(self.mean, products.sum(axis=1), out=values[row])
-            if self.samples is not None:
-                values[row, self.sampled] = self.samples[stream.integers(len(self.samples))]
-        again = np.flatnonzero(((values < self.lowest) | (values > self.highest)).any(axis=1))
-        return self._by_themselves(first, values, again)
+        """The members from `first` on, each from numpy's ``SeedSequence(seed, spawn_key=(number,))``: its first draw
+        within the bounds."""
+        streams = [member_stream(self.seed, first + row) for row in range(count)]
+        standard, values = self._drawn(streams)
+        outside = self._outside(values)
+        again: list[int] = np.flatnonzero(outside.any(axis=1)).tolist()
+        troubles = [""] * count
+        for row in again:
+            for _ in range(DRAWS - 1):
+                standard[[row]], values[[row]] = self._drawn([streams[row]])
+                if not self._outside(values[row]).any():
+                    break
+            else:
+                values[row], troubles[row] = np.clip(values[row], self.lowest, self.highest), NOT_WITHIN
+        beyond = {first + row: tuple(self.names[place] for place in np.flatnonzero(outside[row])) for row in again}
+        return DrawnMembers(values, beyond, troubles, standard)
 
-    def _by_themselves(self, first: int, values: Array, rows: NDArray[np.intp]) -> DrawnMembers:
-        """Members with `values` (n, k), those of `rows` drawn one by one."""
-        beyond: dict[int, tuple[str, ...]] = {}
-        troubles = [""] * len(values)
-        for row in rows.tolist():
-            draw = self.drawn(first + row)
-            values[row], troubles[row] = list(draw.values.values()), draw.trouble
-            if draw.beyond:
-                beyond[first + row] = draw.beyond
-        return DrawnMembers(values, beyond, troubles)
+    def _drawn(self, streams: Sequence[np.random.Generator]) -> tuple[Array, Array]:
+        """Standard normal values (n, k) and parameters (n, k) of the next draw of each stream."""
+        standard = np.array([stream.standard_normal(len(self.names)) for stream in streams])
+        values = self.at(standard)
+        if self.samples is not None:
+            values[:, self.sampled] = self.samples[[stream.integers(len(self.samples)) for stream in streams]]
+        return standard, values
+
+    def _outside(self, values: Array) -> NDArray[np.bool_]:
+        return np.asarray((values < self.lowest) | (values > self.highest), dtype=np.bool_)
 
     def at(self, standard: Array) -> Array:
-        """Parameters (k,) at standard normal values (k,)."""
-        values: Array = self.mean + (self.root * standard).sum(axis=1)
+        """Parameters (n, k) at standard normal values (n, k)."""
+        values = np.empty_like(standard)
+        for begin in range(0, len(standard), _SUMMED):
+            # Summed by NumPy, row by row: the order of sums in a linear algebra library depends on the processor.
+            part = slice(begin, begin + _SUMMED)
+            values[part] = self.mean + (self.root * standard[part, None, :]).sum(axis=2)
         return values
 
 
-class Drawn(NamedTuple):
-    """Parameters of a member by name; names beyond a bound in the first draw; if every draw was beyond, the reason
-    that it is unusable (with the values of the last draw, clipped); and the standard normal values (k,) of the draw."""
-
-    values: dict[str, float]
-    beyond: tuple[str, ...] = ()
-    trouble: str = ""
-    standard: Array | None = None
-
-
 class DrawnMembers(NamedTuple):
-    """Parameters of n members (n, k); names beyond a bound in the first draw, by the member's number; and the reason
-    that each is unusable, empty for others."""
+    """Parameters of n members (n, k); names beyond a bound in the first draw, by the member's number; why each is
+    unusable, empty for others (it has the values of the last draw, clipped); and the standard normal values (n, k)."""
 
     values: Array
     beyond: Mapping[int, tuple[str, ...]]
     troubles: list[str]
+    standard: Array
 
 
 OUT_OF_BOUNDS = "a number is beyond its bounds"
@@ -175,39 +160,21 @@ class MixtureDraws(Draws):
     shares: Array = field(default_factory=lambda: np.ones(1))
     round: int = 0
 
-    def drawn(self, number: int) -> Drawn:
-        """A member, from numpy's ``SeedSequence(seed, spawn_key=(round, number))``."""
-        stream = member_stream(self.seed, number, self.round)
-        centre = self.centres[int(np.searchsorted(np.cumsum(self.shares)[:-1], stream.random(), side="right"))]
-        standard = centre + stream.standard_normal(len(self.names))
-        values = self.at(standard)
-        within = bool(((values >= self.lowest) & (values <= self.highest)).all())
-        held = np.clip(values, self.lowest, self.highest).tolist()
-        trouble = "" if within else OUT_OF_BOUNDS
-        return Drawn(dict(zip(self.names, held, strict=True)), (), trouble, standard)
-
     def members(self, first: int, count: int) -> DrawnMembers:
-        """The members from `first` on, the same as by :meth:`drawn`."""
-        return self._by_themselves(first, np.empty((count, len(self.names))), np.arange(count))
+        """The members from `first` on, each from numpy's ``SeedSequence(seed, spawn_key=(round, number))``."""
+        streams = [member_stream(self.seed, first + row, self.round) for row in range(count)]
+        chosen = [stream.random() for stream in streams]
+        centres = self.centres[np.searchsorted(np.cumsum(self.shares)[:-1], chosen, side="right")]
+        standard = centres + np.array([stream.standard_normal(len(self.names)) for stream in streams])
+        values = self.at(standard)
+        troubles = [OUT_OF_BOUNDS if out else "" for out in np.any(self._outside(values), axis=1).tolist()]
+        return DrawnMembers(np.clip(values, self.lowest, self.highest), {}, troubles, standard)
 
     def weights(self, standard: Array) -> Array:
         """Density of the card's distribution over that of this mixture (n,), at standard normal values (n, k)."""
         exponents = standard @ self.centres.T - 0.5 * np.sum(self.centres**2, axis=1)
         largest = exponents.max(axis=1)
         return np.asarray(np.exp(-largest) / (np.exp(exponents - largest[:, None]) @ self.shares))
-
-
-class MemberResult(NamedTuple):
-    """Result of a member: figures by name, histories (signals, times), nan where absent; the reason of an unusable
-    member."""
-
-    figures: Mapping[str, float]
-    histories: Histories | None = None
-    trouble: str = ""
-
-
-Ask = Callable[[Sequence[Mapping[str, float]]], Sequence[MemberResult]]
-"""Function from the parameters of members, with the same names, to the independent result of each."""
 
 
 class BatchResult(NamedTuple):
@@ -221,18 +188,18 @@ class BatchResult(NamedTuple):
     beyond: Mapping[int, tuple[str, ...]] = {}
 
 
-@dataclass(frozen=True)
-class AskTogether:
-    """Evaluation of a batch at once.
+class MemberResult(NamedTuple):
+    """Result of a member: figures by name, histories (signals, times), nan where absent; the reason of an unusable
+    member."""
 
-    Parameters
-    ----------
-    function : callable
-        Takes the number n of members, their parameters by name, (n,) each, and of how many of them, the first,
-        histories are kept.
-    """
+    figures: Mapping[str, float]
+    histories: Histories | None = None
+    trouble: str = ""
 
-    function: Callable[[int, Mapping[str, Array], int], BatchResult]
+
+Ask = Callable[[int, Mapping[str, Array], int], BatchResult]
+"""Evaluation of a batch: from the number n of members, their parameters by name, (n,) each, and of how many of them,
+the first, histories are kept."""
 
 
 class Question(Protocol):
@@ -242,8 +209,27 @@ class Question(Protocol):
     are more, up to :data:`LARGE_BATCHES` times as many.
     """
 
-    def prepared(self) -> Ask | AskTogether:
+    def prepared(self) -> Ask:
         """Return the evaluating function, once in each process."""
+
+
+def each_alone(ask: Callable[[Mapping[str, float]], MemberResult]) -> Ask:
+    """The members of a batch one after the other, by their parameters."""
+
+    def all_of(count: int, values: Mapping[str, Array], kept: int) -> BatchResult:
+        rows = zip(*(column.tolist() for column in values.values()), strict=True) if values else count * [()]
+        answers = [ask(dict(zip(values, row, strict=True))) for row in rows]
+        names = dict.fromkeys(name for answer in answers for name in answer.figures)
+        figures = {name: np.array([answer.figures.get(name, np.nan) for answer in answers]) for name in names}
+        histories: Histories | None = None
+        for number, answer in enumerate(answers[:kept]):
+            if answer.histories is not None:
+                if histories is None:
+                    histories = np.full((kept, *answer.histories.shape), np.nan, dtype=np.float32)
+                histories[number] = answer.histories
+        return BatchResult(figures, histories, [answer.trouble for answer in answers])
+
+    return all_of
 
 
 @dataclass(frozen=True)
@@ -370,37 +356,19 @@ def _in_order(tasks: list[_Task], executor: Executor | None) -> Iterable[BatchRe
 
 
 def _answers(task: _Task) -> BatchResult:
-    ask, kept = _prepared(task.question), min(max(KEPT - task.first, 0), task.count)
-    names, drawn = task.draws.names, task.draws.members(task.first, task.count)
-    if isinstance(ask, AskTogether):
-        answer = ask.function(task.count, dict(zip(names, drawn.values.T, strict=True)), kept)
-    else:
-        members = [dict(zip(names, row, strict=True)) for row in drawn.values.tolist()]
-        answer = gathered(ask(members), kept=kept > 0)
-    outside = [number for number, trouble in enumerate(drawn.troubles) if trouble]
+    kept, drawn = min(max(KEPT - task.first, 0), task.count), task.draws.members(task.first, task.count)
+    columns = dict(zip(task.draws.names, drawn.values.T, strict=True))
+    answer = _prepared(task.question)(task.count, columns, kept)
+    outside = np.array([bool(trouble) for trouble in drawn.troubles])
     troubles = [first or other for first, other in zip(drawn.troubles, answer.troubles, strict=True)]
     for figure in answer.figures.values():
         figure[outside] = np.nan
     if answer.histories is not None:
-        answer.histories[[number for number in outside if number < len(answer.histories)]] = np.nan
+        answer.histories[outside[: len(answer.histories)]] = np.nan
     return answer._replace(troubles=troubles, beyond=drawn.beyond)
 
 
-def gathered(answers: Sequence[MemberResult], *, kept: bool = False) -> BatchResult:
-    """The results of single members as those of a batch, with histories if they are `kept`."""
-    figures: dict[str, Array] = {}
-    histories: Histories | None = None
-    for number, answer in enumerate(answers):
-        for name, value in answer.figures.items():
-            figures.setdefault(name, np.full(len(answers), np.nan))[number] = value
-        if kept and answer.histories is not None:
-            if histories is None:
-                histories = np.full((len(answers), *answer.histories.shape), np.nan, dtype=np.float32)
-            histories[number] = answer.histories
-    return BatchResult(figures, histories, [answer.trouble for answer in answers])
-
-
 @lru_cache(maxsize=2)
-def _prepared(question: bytes) -> Ask | AskTogether:
+def _prepared(question: bytes) -> Ask:
     made: Question = pickle.loads(question)
     return made.prepared()

@@ -200,8 +200,7 @@ def tails(
             None,
             [Notice(f"no probability below what the members show: {LEAST} members are needed for its search")],
         )
-    drawn = [draws.drawn(number).standard for number in range(found.members)]
-    standard = np.array([values for values in drawn if values is not None])
+    standard = draws.members(0, found.members).standard
     lines = {}
     for name in names:
         line = _linear(standard, found.figures[name], limits[name])
@@ -277,14 +276,13 @@ def _mixture(draws: Draws, centres: Sequence[Array], number: int) -> MixtureDraw
 
 def _sampled(question: Question, mixture: MixtureDraws, members: int, executor: Executor | None) -> _Sample:
     found = ensemble(question, mixture, members, executor)
-    drawn = [mixture.drawn(number).standard for number in range(members)]
-    standard = np.array([values for values in drawn if values is not None])
+    standard = mixture.members(0, members).standard
     return _Sample(standard, mixture.weights(standard), found)
 
 
 def _figure_at(question: Question, draws: Draws, line: _Linear, name: str) -> float | None:
     """The figure of the ship on the way to the limit."""
-    values = np.clip(draws.at(line.point * line.direction), draws.lowest, draws.highest)
+    values = np.clip(draws.at(line.point * line.direction[None])[0], draws.lowest, draws.highest)
     at = Draws(draws.names, values, np.zeros_like(draws.root), draws.lowest, draws.highest, draws.seed)
     value = float(ensemble(question, at, 1).figures.get(name, np.array([math.nan]))[0])
     return value if math.isfinite(value) else None
