@@ -108,12 +108,7 @@ def whole_run(run: Trajectory, length: float, end_s: float | None = None) -> Kep
 def figures_of(manoeuvre: object, trajectory: Trajectory, length: float) -> Figures:
     """Figures of a manoeuvre of :mod:`tank2sim.simulation.manoeuvres`; None where the run was too short to show it.
 
-    Parameters
-    ----------
-    trajectory : Trajectory
-        Trajectory of a ship.
-    length : float
-        Length between perpendiculars, m.
+    `trajectory`: Trajectory of a ship. `length`: Length between perpendiculars, m.
     """
     whole = whole_run(trajectory, length)
     match manoeuvre:
@@ -308,11 +303,8 @@ def _pull_out(run: Trajectory, rudder: float) -> Figures:
 def zero_rate_rudders(rudders: Array, rates: Array) -> tuple[float, float]:
     """Return the rudder at which the yaw rate of a spiral is zero, on its way out and on its way back.
 
-    Parameters
-    ----------
-    rudders, rates : array (n,)
-        Rudder angles and steady yaw rates in the order they were run, in any units; the way back has the rudders of
-        the way out.
+    `rudders`, `rates` (n,): Rudder angles and steady yaw rates in the order they were run, in any units; the way back
+    has the rudders of the way out.
     """
     half = len(rudders) // 2
     outward, back = (

@@ -62,20 +62,12 @@ USUAL_PACE = Pace()
 class LaneFigures:
     """Figures of n ships in a manoeuvre.
 
-    Parameters
-    ----------
-    figures : mapping
-        Name with unit to the figure of each ship (n,), nan where its run does not show it; entries of lists by their
-        own names (``overshoot_1_deg``).
-    states : array (n, times, nx)
-        States at the requested times; nan after the end.
-    fine : array (n,)
-        False for a ship whose motion left all bounds.
-    left_s : array (n,)
-        Time at which a ship first left the range of its card, s; inf if it did not, nan if it is not `fine`.
-    doubtful : array (n,)
-        True for a ship whose figures another :class:`Pace` may turn into none, or none into a figure: one is none,
-        the turn is near the limit of a steady one (:data:`NEAR_STEADY`), or the ship left the range of its card.
+    `figures`: Name with unit to the figure of each ship (n,), nan where its run does not show it; entries of lists by
+    their own names (``overshoot_1_deg``). `states` (n, times, nx): States at the requested times; nan after the end.
+    `fine` (n,): False for a ship whose motion left all bounds. `left_s` (n,): Time at which a ship first left the range
+    of its card, s; inf if it did not, nan if it is not `fine`. `doubtful` (n,): True for a ship whose figures another
+    :class:`Pace` may turn into none, or none into a figure: one is none, the turn is near the limit of a steady one
+    (:data:`NEAR_STEADY`), or the ship left the range of its card.
     """
 
     figures: Mapping[str, Array]
@@ -124,19 +116,11 @@ def runs_in_lanes(manoeuvre: Manoeuvre, duration_s: float | None = None) -> Type
 class LaneManoeuvres:
     """Runs turns, zigzags, stops and spirals of a model in lanes.
 
-    Parameters
-    ----------
-    model : Model
-        A ship that begins where its parameters say, without a trim.
-    lanes : int, optional
-        As for :class:`tank2sim.simulation.lane_runs.LaneRunner`.
-    longest : float, optional
-        Longest run without a given duration, L/u0; by default that of the manoeuvre.
+    `model`: A ship that begins where its parameters say, without a trim. `lanes`, optional: As for
+    :class:`tank2sim.simulation.lane_runs.LaneRunner`. `longest`, optional: Longest run without a given duration, L/u0;
+    by default that of the manoeuvre.
 
-    Raises
-    ------
-    NoLanesError
-        The model cannot be run in lanes.
+    Raises NoLanesError: The model cannot be run in lanes.
     """
 
     def __init__(self, model: Model, lanes: int | None = None, longest: float | None = None):
@@ -169,21 +153,10 @@ class LaneManoeuvres:
     ) -> LaneFigures:
         """Figures of ships with parameters `p` (n, np), and their states at `times`.
 
-        Parameters
-        ----------
-        manoeuvre : Turn, Zigzag, Stop or SpiralManoeuvre
-            One of those for which :func:`runs_in_lanes` is true.
-        p : array (n, np)
-            Parameters of the model.
-        duration_s : float, optional
-            As for :func:`tank2sim.simulation.run.simulate`.
-        times : array (m,)
-            Times at which states are kept, s.
-        inputs : mapping, optional
-            Values in place of the model's, by name.
-        pace : Pace
-            Step and precision. Ships that are `doubtful` are run again with the model's step in double precision, and
-            so are all spirals.
+        `manoeuvre`: One of those for which :func:`runs_in_lanes` is true. `p` (n, np): Parameters of the model.
+        `duration_s`, optional: As for :func:`tank2sim.simulation.run.simulate`. `times` (m,): Times at which states are
+        kept, s. `inputs`, optional: Values in place of the model's, by name. `pace`: Step and precision. Ships that are
+        `doubtful` are run again with the model's step in double precision, and so are all spirals.
         """
         p, model = np.ascontiguousarray(p, dtype=float), self.model
         (starts,) = self._start(p)

@@ -117,21 +117,11 @@ class LaneResults:
 class LaneRunner:
     """Runs manoeuvres of a model for many ships at once.
 
-    Parameters
-    ----------
-    model : Model
-        A ship.
-    lanes : int, optional
-        Numbers of double precision in a vector: 8, 4, 2 or 1; by default what this machine's vectors hold. No result
-        depends on it.
-    single : bool
-        In single precision, with compensated sums of the states.
+    `model`: A ship. `lanes`, optional: Numbers of double precision in a vector: 8, 4, 2 or 1; by default what this
+    machine's vectors hold. No result depends on it. `single`: In single precision, with compensated sums of the states.
 
-    Raises
-    ------
-    NoLanesError
-        The model cannot be run in lanes: there is no C compiler, an operation has no lanes, or the model lacks one of
-        the states of a ship.
+    Raises NoLanesError: The model cannot be run in lanes: there is no C compiler, an operation has no lanes, or the
+    model lacks one of the states of a ship.
     """
 
     def __init__(self, model: Model, lanes: int | None = None, *, single: bool = False):

@@ -36,13 +36,7 @@ class _Seed(ISeedSequence):
 def member_stream(seed: int, number: int, round_number: int | None = None) -> np.random.Generator:
     """The stream of a member, with the spawn key ``(number,)`` or ``(round_number, number)``.
 
-    Parameters
-    ----------
-    seed : int
-    number : int
-        Below 2^32.
-    round_number : int, optional
-        Below 2^32.
+    `number`: Below 2^32. `round_number`, optional: Below 2^32.
 
     Examples
     --------

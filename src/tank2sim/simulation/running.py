@@ -27,22 +27,12 @@ _TRIM_ACCURACY = 1e-13  # of the change in a Newton step, relative to the nomina
 class SwitchingPlan:
     """Two orders that take turns, each until a state reaches its level.
 
-    Parameters
-    ----------
-    orders : (mapping, mapping)
-        Inputs by name at the execute, and after the first change.
-    state : str
-        The state at a level of which the order changes.
-    levels : (float, float)
-        Levels at which the orders end, beyond `of_start` times the state at the start.
-    side : float
-        1 or -1: whether the state rises or falls to its first level; then it falls or rises to the other, and so on.
-    changes : int or None
-        Changes of order at which a run ends; 0: the first order is held to the end; None: no limit.
-    longest : float
-        Longest run without a given duration, L/u0.
-    wait_s, lag_s : float
-        Time from each order to the movement of the rudder, and from reaching a level to the order.
+    `orders` (mapping, mapping): Inputs by name at the execute, and after the first change. `state`: The state at a
+    level of which the order changes. `levels`: Levels at which the orders end, beyond `of_start` times the state at the
+    start. `side`: 1 or -1: whether the state rises or falls to its first level; then it falls or rises to the other,
+    and so on. `changes`: Changes of order at which a run ends; 0: the first order is held to the end; None: no limit.
+    `longest`: Longest run without a given duration, L/u0. `wait_s`, `lag_s`: Time from each order to the movement of
+    the rudder, and from reaching a level to the order.
     """
 
     orders: tuple[Mapping[str, float], Mapping[str, float]]
@@ -62,17 +52,10 @@ class Running:
     Samples are on a grid of whole steps from the start; an event between two of them is an additional sample, after
     which the grid continues.
 
-    Parameters
-    ----------
-    integrator : Integrator
-        Integrator of the model.
-    inputs, parameters : mapping, optional
-        Values by name that replace the model's start values.
+    `integrator`: Integrator of the model. `inputs`, `parameters`, optional: Values by name that replace the model's
+    start values.
 
-    Raises
-    ------
-    InputError
-        ``initial.trim`` is set and no steady motion exists near the start.
+    Raises InputError: ``initial.trim`` is set and no steady motion exists near the start.
     """
 
     def __init__(
@@ -120,10 +103,7 @@ class Running:
     def order(self, inputs: Mapping[str, float]) -> None:
         """Set inputs, by name, from now on.
 
-        Raises
-        ------
-        InputError
-            A value is beyond the bounds of its input.
+        Raises InputError: A value is beyond the bounds of its input.
         """
         self.model.check_inputs(inputs)
         self._u = self._u.copy()
@@ -166,10 +146,7 @@ class Running:
     def trajectory(self) -> Trajectory:
         """The trajectory up to the present time.
 
-        Raises
-        ------
-        InputError
-            The motion left all bounds.
+        Raises InputError: The motion left all bounds.
         """
         t = np.append(np.concatenate([*self._t_parts, []]), self._time)
         x = np.concatenate([*self._x_parts, self._x[None, :]])

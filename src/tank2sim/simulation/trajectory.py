@@ -85,18 +85,8 @@ class EventSamples:
 class Trajectory:
     """A simulated motion, sampled at every integration step and at every event.
 
-    Parameters
-    ----------
-    model : Model
-        The simulated model.
-    t : array (n,)
-        Time, s, rising.
-    x : array (n, nx)
-        States.
-    u : array (n, nu)
-        Inputs; a row is valid from its time until the next.
-    y : array (n, ny)
-        Outputs.
+    `model`: The simulated model. `t` (n,): Time, s, rising. `x` (n, nx): States. `u` (n, nu): Inputs; a row is valid
+    from its time until the next. `y` (n, ny): Outputs.
     """
 
     model: Model
@@ -163,10 +153,7 @@ def bracketed_root(function: Callable[[float], float], low: float, high: float, 
     Method of Ridders (1979, IEEE Trans. Circuits Syst. 26, 979). ``scipy.optimize.ridder`` is equivalent, but its
     import takes a third of a second, half of a short simulation.
 
-    Raises
-    ------
-    ValueError
-        The function has the same sign at both ends.
+    Raises ValueError: The function has the same sign at both ends.
     """
     at_low, at_high = function(low), function(high)
     for x, value in ((low, at_low), (high, at_high)):

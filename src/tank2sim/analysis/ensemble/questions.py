@@ -358,12 +358,7 @@ def fastest_pace(question: OfManoeuvre, draws: Draws) -> Pace:
     The result depends on the card, the manoeuvre and the seed alone. It is the usual pace for other manoeuvres and for
     ships without lanes.
 
-    Parameters
-    ----------
-    question : OfManoeuvre
-        The manoeuvre.
-    draws : Draws
-        Draws of the members.
+    `question`: The manoeuvre. `draws`: Draws of the members.
     """
     manoeuvre = question.manoeuvre
     if isinstance(manoeuvre, SpiralManoeuvre) or not runs_in_lanes(manoeuvre, question.duration_s):
