@@ -11,8 +11,7 @@ import pytest
 
 from tank2sim.simulation import ensemble as module
 from tank2sim.simulation.bands import FOLLOWED, figure_bands, history_bands, track_band
-from tank2sim.simulation.ensemble import Draws, Ensemble, MemberResult, each_alone, ensemble
-from tank2sim.simulation.member_streams import member_stream
+from tank2sim.simulation.ensemble import Draws, Ensemble, MemberResult, each_alone, ensemble, member_stream
 
 COVARIANCE = np.array([[4.0, 1.0], [1.0, 9.0]])
 DRAWS = Draws(
