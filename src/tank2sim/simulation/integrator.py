@@ -39,7 +39,7 @@ class Integrator:
         self.compiled = self._outputs is not None
 
     def rollout(self, x: Array, u: Array, p: Array, h: float, n: int) -> Array:
-        """States (n + 1, nx) at the start `x` (nx,) and after each of `n` steps of `h` s with constant inputs `u`."""
+        """States (n + 1, nx): the start `x`, then after each of `n` steps of `h` s with inputs `u` (nu,) or (n, nu)."""
         return self._steps.run(x, u, p, np.array(self._constants(p)).ravel(), np.full((n, 1), h))
 
     def step(self, x: Array, u: Array, p: Array, h: float) -> Array:
