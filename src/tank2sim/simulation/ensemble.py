@@ -156,14 +156,15 @@ class Draws:
     def members(self, first: int, count: int) -> DrawnMembers:
         """The members from `first` on, each from numpy's ``SeedSequence(seed, spawn_key=(number,))``: its first draw
         within the bounds."""
-        streams = [member_stream(self.seed, first + row) for row in range(count)]
-        standard, values = self._drawn(streams)
+        standard, values = self._drawn(member_stream(self.seed, first + row) for row in range(count))
         outside = self._outside(values)
         again: list[int] = np.flatnonzero(outside.any(axis=1)).tolist()
         troubles = [""] * count
         for row in again:
+            stream = member_stream(self.seed, first + row)
+            self._drawn([stream])  # the draw that is beyond a bound
             for _ in range(DRAWS - 1):
-                standard[[row]], values[[row]] = self._drawn([streams[row]])
+                standard[[row]], values[[row]] = self._drawn([stream])
                 if not self._outside(values[row]).any():
                     break
             else:
@@ -171,12 +172,14 @@ class Draws:
         beyond = {first + row: tuple(self.names[place] for place in np.flatnonzero(outside[row])) for row in again}
         return DrawnMembers(values, beyond, troubles, standard)
 
-    def _drawn(self, streams: Sequence[np.random.Generator]) -> tuple[Array, Array]:
+    def _drawn(self, streams: Iterable[np.random.Generator]) -> tuple[Array, Array]:
         """Standard normal values (n, k) and parameters (n, k) of the next draw of each stream."""
-        standard = np.array([stream.standard_normal(len(self.names)) for stream in streams])
+        size, rows = len(self.names), 0 if self.samples is None else len(self.samples)
+        drawn = [(stream.standard_normal(size), int(stream.integers(rows)) if rows else 0) for stream in streams]
+        standard = np.array([normal for normal, _ in drawn])
         values = self.at(standard)
         if self.samples is not None:
-            values[:, self.sampled] = self.samples[[stream.integers(len(self.samples)) for stream in streams]]
+            values[:, self.sampled] = self.samples[[row for _, row in drawn]]
         return standard, values
 
     def _outside(self, values: Array) -> NDArray[np.bool_]:
@@ -227,10 +230,10 @@ class MixtureDraws(Draws):
 
     def members(self, first: int, count: int) -> DrawnMembers:
         """The members from `first` on, each from numpy's ``SeedSequence(seed, spawn_key=(round, number))``."""
-        streams = [member_stream(self.seed, first + row, self.round) for row in range(count)]
-        chosen = [stream.random() for stream in streams]
-        centres = self.centres[np.searchsorted(np.cumsum(self.shares)[:-1], chosen, side="right")]
-        standard = centres + np.array([stream.standard_normal(len(self.names)) for stream in streams])
+        streams = (member_stream(self.seed, first + row, self.round) for row in range(count))
+        drawn = [(stream.random(), stream.standard_normal(len(self.names))) for stream in streams]
+        places = np.searchsorted(np.cumsum(self.shares)[:-1], [chosen for chosen, _ in drawn], side="right")
+        standard = self.centres[places] + np.array([normal for _, normal in drawn])
         values = self.at(standard)
         troubles = [OUT_OF_BOUNDS if out else "" for out in np.any(self._outside(values), axis=1).tolist()]
         return DrawnMembers(np.clip(values, self.lowest, self.highest), {}, troubles, standard)
