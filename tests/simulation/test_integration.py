@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -10,7 +12,7 @@ from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import NO_COMPILER, Integrator
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
-from tank2sim.simulation.running import Running
+from tank2sim.simulation.running import Running, SwitchingPlan
 
 
 @pytest.fixture(scope="module")
@@ -71,8 +73,6 @@ def test_a_zigzag_switches_at_the_heading_and_not_at_a_step(mariner) -> None:
 
 
 def test_halving_the_step_hardly_moves_the_figures(mariner) -> None:
-    from dataclasses import replace
-
     finer = replace(mariner, step_s=mariner.step_s / 2)
     for text in ("zigzag:20/20", "turn:35"):
         coarse, fine = (simulate(model, parse_manoeuvre(text)).figures for model in (mariner, finer))
@@ -85,6 +85,24 @@ def test_a_crossing_that_never_comes_ends_at_the_limit(integrator) -> None:
     assert not running.run_until("motion.psi", 3.0, rising=True, at_most=33.33)
     assert running.time == pytest.approx(33.33)
     assert running.trajectory().t[-1] == pytest.approx(33.33)
+
+
+def test_orders_of_a_plan_follow_their_level_by_lag_and_wait(mariner, integrator) -> None:
+    """The rudder to port is ordered 3 s after the heading is reached, and moves 2 s later; headings count from 0.1."""
+    start = {"initial.psi": 0.1}
+    orders = {"rudder.command": 0.3}, {"rudder.command": -0.2}
+    running = Running(integrator, {}, start)
+    plan = SwitchingPlan(orders, "motion.psi", (0.2, -0.1), 1.0, 2, 150.0, wait_s=2.0, lag_s=3.0)
+    running.follow(plan, 900.0)
+    run = running.trajectory()
+    rows = np.flatnonzero(np.diff(run["rudder.command"])) + 1
+    assert run["rudder.command"][rows].tolist() == [0.3, -0.2]
+    assert run.t[rows[0]] == pytest.approx(2.0)
+    (reached, back) = run.crossings("motion.psi", "motion.r", 0.3)[0], run.crossings("motion.psi", "motion.r", 0.0)[-1]
+    assert run.t[rows[1]] == pytest.approx(reached + 5.0) and run.t[-1] == pytest.approx(back + 5.0)
+    held = Running(integrator, {}, start)
+    held.follow(replace(plan, changes=0), 100.0)
+    assert held.time == pytest.approx(100.0) and set(held.trajectory()["rudder.command"]) == {0.0, 0.3}
 
 
 def test_splitting_a_run_does_not_change_it(integrator) -> None:
