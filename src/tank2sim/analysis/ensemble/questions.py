@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from tank2sim.analysis.influence.figures import TURN, ZIGZAG, InfluenceFigure, parse_figure
 from tank2sim.analysis.stability.imo import (
-    TRACK_REACH,
     imo_criteria,
     largest_trial_rudder,
     manoeuvring_trials,
@@ -236,7 +235,8 @@ class OfCriteria:
         ask_each, lanes = each_ship(model, criteria_of), lanes_of(whole)
         if lanes is None:
             return ask_each
-        trials = manoeuvring_trials(largest_trial_rudder(parameters))
+        can_stop = "propeller.speed" in model.input_names
+        trials = manoeuvring_trials(largest_trial_rudder(parameters))[: None if can_stop else -1]
 
         def ask(count: int, values: Mapping[str, Array], kept: int) -> BatchResult:
             p, troubles = ships_of(model, count, values)
@@ -249,13 +249,9 @@ class OfCriteria:
                 sides = [lanes.run(manoeuvre, p, inputs=undisturbed_inputs(model)) for manoeuvre in trial.manoeuvres]
                 for name, figure in trial.criteria.items():
                     shown = [side.figures.get(figure, np.full(count, np.nan)) for side in sides]
-                    figures[name] = np.maximum(*shown)
+                    figures[name] = np.max(shown, axis=0)
                     beyond = np.any([side.outside(figure) for side in sides], axis=0)
                     figures[name + BEYOND_CARD_MARK] = beyond.astype(float)
-            if "propeller.speed" in model.input_names:
-                stopping = lanes.run(Stop(), p, inputs=undisturbed_inputs(model))
-                figures[TRACK_REACH] = stopping.figures["track_reach_lengths"]
-                figures[TRACK_REACH + BEYOND_CARD_MARK] = stopping.outside("track_reach_lengths").astype(float)
             return _usable(figures, troubles)
 
         return ask
