@@ -56,7 +56,7 @@ from tank2sim.executors import executing
 from tank2sim.native.compiler import FLAGS, SHARED_SUFFIX, require_compiler
 from tank2sim.native.lanes import widest_lanes
 from tank2sim.simulation.bands import figure_bands, history_bands
-from tank2sim.simulation.ensemble import KEPT, AskTogether, Draws, Ensemble, Question, _prepared, ensemble
+from tank2sim.simulation.ensemble import KEPT, Draws, Ensemble, Question, _prepared, ensemble
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag, parse_manoeuvre
 from tank2sim.simulation.run import simulate
@@ -168,9 +168,8 @@ def peers(rounds: int, part: int = 512) -> None:
 
     def lanes(question: OfManoeuvre) -> Callable[[], None]:
         ask = question.prepared()
-        assert isinstance(ask, AskTogether)
         values = draws.members(0, part).values
-        return lambda: (ask.function(part, dict(zip(draws.names, values.T, strict=True)), 0), None)[1]
+        return lambda: (ask(part, dict(zip(draws.names, values.T, strict=True)), 0), None)[1]
 
     with tempfile.TemporaryDirectory() as name:
         library = by_hand(Path(name))

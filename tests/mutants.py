@@ -94,7 +94,7 @@ ROOMS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("tests/fmu/test_simulator_rules.py", "tests/fmu/test_passport.py"),
     ),
     "lanes": (
-        ("simulation/lane_runs.py", "simulation/lane_spirals.py", "simulation/lane_figures.py"),
+        ("simulation/lane_runs.py", "simulation/lane_figures.py"),
         ("tests/simulation/test_lanes.py", "tests/simulation/test_stop.py"),
     ),
 }

@@ -11,8 +11,7 @@ import pytest
 
 from tank2sim.simulation import ensemble as module
 from tank2sim.simulation.bands import FOLLOWED, figure_bands, history_bands, track_band
-from tank2sim.simulation.ensemble import Draws, Ensemble, MemberResult, ensemble
-from tank2sim.simulation.member_streams import member_stream
+from tank2sim.simulation.ensemble import Draws, Ensemble, MemberResult, each_alone, ensemble, member_stream
 
 COVARIANCE = np.array([[4.0, 1.0], [1.0, 9.0]])
 DRAWS = Draws(
@@ -36,7 +35,7 @@ class Linear:
             slope = 3 * values["a"] - values["b"]
             return MemberResult({"slope": slope}, np.array([[0.0, slope, 2 * slope]], dtype=np.float32))
 
-        return lambda members: [ask(values) for values in members]
+        return each_alone(ask)
 
 
 def test_draws_are_those_of_numpy_with_the_same_seeds() -> None:
@@ -122,10 +121,12 @@ def test_members_drawn_together_are_those_drawn_by_themselves_to_the_bit() -> No
     own = {field.name: getattr(usual, field.name) for field in fields(Draws)}
     mixture = module.MixtureDraws(**own, centres=np.zeros((2, 45)), shares=np.array([0.5, 0.5]), round=1)
     for draws in (usual, sampled, mixture):
-        together, single = draws.members(250, 12), [draws.drawn(number) for number in range(250, 262)]
-        np.testing.assert_array_equal(together.values, [list(draw.values.values()) for draw in single])
-        assert together.beyond == {250 + row: draw.beyond for row, draw in enumerate(single) if draw.beyond}
-        assert together.troubles == [draw.trouble for draw in single]
+        together, single = draws.members(250, 12), [draws.members(number, 1) for number in range(250, 262)]
+        for row, draw in enumerate(single):
+            np.testing.assert_array_equal(draw.values[0], together.values[row])
+            np.testing.assert_array_equal(draw.standard[0], together.standard[row])
+            assert draw.beyond == {number: names for number, names in together.beyond.items() if number == 250 + row}
+        assert together.troubles == [trouble for draw in single for trouble in draw.troubles]
     assert usual.members(250, 12).beyond and any(mixture.members(250, 12).troubles)
 
 

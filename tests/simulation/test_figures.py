@@ -31,6 +31,18 @@ def made_up(model, t, **signals) -> Trajectory:
     return Trajectory(model, t, x, u, y)
 
 
+def test_crossings_and_values_of_a_cubic_are_exact_between_uneven_samples(mariner) -> None:
+    """psi = (t - 1)(t - 2)(t - 4) crosses zero at 1, 2 and 4 s; near the ends fewer samples make a parabola."""
+    t = np.array([0.0, 0.7, 1.1, 1.9, 2.3, 3.2, 3.9, 4.4, 5.0])
+    psi, rate = np.poly1d(np.poly([1.0, 2.0, 4.0])), np.polyder(np.poly1d(np.poly([1.0, 2.0, 4.0])))
+    run = made_up(mariner, t, motion_psi=psi(t), motion_r=rate(t), motion_x=t**2)
+    np.testing.assert_allclose(run.crossings("motion.psi", "motion.r", 0.0), [1.0, 2.0, 4.0], rtol=1e-12)
+    assert len(run.crossings("motion.psi", "motion.r", 99.0)) == 0
+    for time in (1.0, 2.7, 4.0):
+        assert run.at("motion.psi", time) == pytest.approx(psi(time), abs=1e-12)
+    assert [run.at("motion.x", time) for time in (0.3, 1.1, 4.9)] == pytest.approx([0.09, 1.21, 24.01], rel=1e-12)
+
+
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize("start", [0.0, 2.5])
 def test_a_circle_has_the_figures_of_a_circle(mariner, side: int, start: float) -> None:

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -10,7 +12,7 @@ from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import NO_COMPILER, Integrator
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
-from tank2sim.simulation.running import Running
+from tank2sim.simulation.running import Running, SwitchingPlan
 
 
 @pytest.fixture(scope="module")
@@ -71,8 +73,6 @@ def test_a_zigzag_switches_at_the_heading_and_not_at_a_step(mariner) -> None:
 
 
 def test_halving_the_step_hardly_moves_the_figures(mariner) -> None:
-    from dataclasses import replace
-
     finer = replace(mariner, step_s=mariner.step_s / 2)
     for text in ("zigzag:20/20", "turn:35"):
         coarse, fine = (simulate(model, parse_manoeuvre(text)).figures for model in (mariner, finer))
@@ -85,6 +85,24 @@ def test_a_crossing_that_never_comes_ends_at_the_limit(integrator) -> None:
     assert not running.run_until("motion.psi", 3.0, rising=True, at_most=33.33)
     assert running.time == pytest.approx(33.33)
     assert running.trajectory().t[-1] == pytest.approx(33.33)
+
+
+def test_orders_of_a_plan_follow_their_level_by_lag_and_wait(mariner, integrator) -> None:
+    """The rudder to port is ordered 3 s after the heading is reached, and moves 2 s later; headings count from 0.1."""
+    start = {"initial.psi": 0.1}
+    orders = {"rudder.command": 0.3}, {"rudder.command": -0.2}
+    running = Running(integrator, {}, start)
+    plan = SwitchingPlan(orders, "motion.psi", (0.2, -0.1), 1.0, 2, 150.0, wait_s=2.0, lag_s=3.0)
+    running.follow(plan, 900.0)
+    run = running.trajectory()
+    rows = np.flatnonzero(np.diff(run["rudder.command"])) + 1
+    assert run["rudder.command"][rows].tolist() == [0.3, -0.2]
+    assert run.t[rows[0]] == pytest.approx(2.0)
+    (reached, back) = run.crossings("motion.psi", "motion.r", 0.3)[0], run.crossings("motion.psi", "motion.r", 0.0)[-1]
+    assert run.t[rows[1]] == pytest.approx(reached + 5.0) and run.t[-1] == pytest.approx(back + 5.0)
+    held = Running(integrator, {}, start)
+    held.follow(replace(plan, changes=0), 100.0)
+    assert held.time == pytest.approx(100.0) and set(held.trajectory()["rudder.command"]) == {0.0, 0.3}
 
 
 def test_splitting_a_run_does_not_change_it(integrator) -> None:
@@ -116,30 +134,6 @@ def test_trim_leaves_a_failed_rudder_where_it_is(integrator) -> None:
     running = Running(integrator, {"rudder.command": np.radians(20.0), "steering.failed": 1.0}, start)
     assert running.state("rudder.angle") == pytest.approx(np.radians(5.0))
     assert running.state("motion.r") > 0
-
-
-@pytest.mark.parametrize("compiled", [True, False])
-def test_of_many_steps_every_tenth_and_the_last_are_kept(mariner, compiled: bool) -> None:
-    whole, thin = Integrator(mariner, compiled), Integrator(mariner, compiled, every=10)
-    p, u = mariner.parameter_values(), mariner.input_values({"rudder.command": 0.3})
-    x = np.array(mariner.initial(p)).ravel()
-    each = whole.rollout(x, u, p, 0.1, 123)
-    kept = thin.rollout(x, u, p, 0.1, 123, every=10)
-    np.testing.assert_array_equal(kept, each[[*range(0, 123, 10), 123]])
-
-
-def test_events_are_as_exact_where_only_every_tenth_step_is_kept(mariner) -> None:
-    zigzag = parse_manoeuvre("zigzag:20/20")
-    parameters = mariner.parameter_values()
-    names = dict(zip(mariner.parameter_names, parameters, strict=True))
-    found = []
-    for every in (1, 10):
-        running = Running(Integrator(mariner, compiled=False, every=every), {}, {})
-        zigzag.drive(running, names["ship.length"] / names["ship.speed"], None)
-        run = running.trajectory()
-        found.append(run.t[1:][np.diff(run["rudder.command"]) != 0])
-    assert len(found[0]) >= 3
-    np.testing.assert_allclose(found[1], found[0], atol=1e-9)
 
 
 def test_what_a_short_run_does_not_show_is_named_in_words(mariner) -> None:

@@ -19,7 +19,7 @@ from tank2sim.errors import InputError
 from tank2sim.native.generate import c_loop
 from tank2sim.native.lanes import FLAGS_OF_LANES, NoLanesError, lane_function, widest_lanes
 from tank2sim.native.library import cached_library
-from tank2sim.simulation import lane_runs, lane_spirals, manoeuvres
+from tank2sim.simulation import lane_figures, lane_runs, manoeuvres
 from tank2sim.simulation.card_range import single_figures
 from tank2sim.simulation.lane_figures import LaneManoeuvres, Pace, runs_in_lanes
 from tank2sim.simulation.manoeuvres import PullOut, SpiralManoeuvre, Stop, Turn, Zigzag
@@ -103,7 +103,7 @@ def test_spirals_in_lanes_are_those_of_single_runs_to_the_error_of_their_steps(n
 @pytest.mark.parametrize("lengths", [None, 3.3])
 def test_a_spiral_holds_each_rudder_for_the_longest_time_at_most(monkeypatch, mariner_card, mariner, lengths) -> None:
     """Of 3.3 L/u0 the turn is not steady: 3 rudders end at 9.9 L/u0, however the longest time was said."""
-    for module in (lane_spirals, manoeuvres):
+    for module in (lane_figures, manoeuvres):
         monkeypatch.setattr(module, "SPIRAL_HOLD", 3.3)
     passage = mariner_card.ship.length_m / mariner_card.model.speed_mps
     hold = None if lengths is None else lengths * passage

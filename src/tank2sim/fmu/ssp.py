@@ -104,10 +104,11 @@ def _joined(models: Mapping[str, Model], every_input: bool) -> tuple[list[Part],
 def _documents(ship: Model, autopilot: Model) -> Documents:
     """What the autopilot's FMU says of itself."""
     found = stability(ship)
-    nomoto = found.nomoto
+    nomoto = found.nomoto.dimensional
     source = (
         f"Pole placement (relative damping {DAMPING:g}, integral {SLOWNESS:g} of the natural frequency) on Nomoto's "
-        f"model of {ship.name} at {found.speed_mps:.4g} m/s: K = {nomoto.K_per_s:.5g} 1/s, T = {nomoto.T_s:.5g} s"
+        f"model of {ship.name} at {found.operating_point.speed_mps:.4g} m/s: "
+        f"K = {nomoto.K_per_s:.5g} 1/s, T = {nomoto.T_s:.5g} s"
     )
     tuned = (parameter.name for parameter in autopilot.parameters if parameter.name.startswith("autopilot."))
     return Documents(source=source, origins={name: ValueOrigin(source) for name in tuned})

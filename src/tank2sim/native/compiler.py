@@ -51,10 +51,7 @@ def find_compiler() -> list[str] | None:
 def require_compiler(purpose: str) -> list[str]:
     """Command of the C compiler.
 
-    Raises
-    ------
-    InputError
-        There is none that works; `purpose` says what it is needed for.
+    Raises InputError: There is none that works; `purpose` says what it is needed for.
     """
     command, chosen = _named_compiler(), os.environ.get("CC")
     source = f"CC={chosen}" if chosen else " ".join(command or ("C compiler",))
@@ -84,12 +81,8 @@ def compile_shared(
     enters the library and the same sources give the same bytes; on each source by itself, as many at a time as this
     machine has processors.
 
-    Raises
-    ------
-    InputError
-        There is no compiler that works, or it makes nothing and says nothing.
-    RuntimeError
-        The compiler refused the sources: a fault of the program, with the compiler's words.
+    Raises InputError: There is no compiler that works, or it makes nothing and says nothing; RuntimeError: The compiler
+    refused the sources: a fault of the program, with the compiler's words.
     """
     compiler = require_compiler("compiling a model")
     all_flags = [*flags, *(f"-I{path}" for path in include)]

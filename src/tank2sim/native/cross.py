@@ -38,10 +38,7 @@ class CompileTarget:
 def require_cross_compiler() -> None:
     """Make sure that the compiler for other machines is there.
 
-    Raises
-    ------
-    InputError
-        It is not installed.
+    Raises InputError: It is not installed.
     """
     _compiler()
 
@@ -54,17 +51,10 @@ def has_compiled(target: CompileTarget) -> bool:
 def cross_compiled(sources: Mapping[str, str], target: CompileTarget) -> bytes:
     """The shared library of C sources for a target; kept, and compiled only if it is not kept yet.
 
-    Parameters
-    ----------
-    sources : mapping
-        Name to text of every source and header; all lie in one folder.
+    `sources`: Name to text of every source and header; all lie in one folder.
 
-    Raises
-    ------
-    InputError
-        The compiler is not installed or cannot be run, or the folder that ZIG_GLOBAL_CACHE_DIR names cannot be made.
-    RuntimeError
-        The compiler refused the sources: a fault of the program, with the compiler's words.
+    Raises InputError: The compiler is not installed or cannot be run, or the folder that ZIG_GLOBAL_CACHE_DIR names
+    cannot be made; RuntimeError: The compiler refused the sources: a fault of the program, with the compiler's words.
     """
     compiler = _compiler()
 

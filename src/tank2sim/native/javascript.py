@@ -30,16 +30,9 @@ def javascript_function(function: ca.Function, name: str) -> str:
 
     The operations are those of the function, in its order. Numbers equal those of C except for the last bits of sines.
 
-    Parameters
-    ----------
-    function : casadi.Function
-        Of scalar operations (SX), with dense arguments and results.
-    name : str
+    `function`: Of scalar operations (SX), with dense arguments and results.
 
-    Raises
-    ------
-    ValueError
-        An operation has no JavaScript.
+    Raises ValueError: An operation has no JavaScript.
     """
     lines = [_statement(step) for step in instructions(function)]
     arguments = [f"i{place}" for place in range(function.n_in())] + [f"o{place}" for place in range(function.n_out())]

@@ -55,10 +55,7 @@ def lane_function(function: ca.Function, name: str) -> str:
 
     Arguments and results are dense vectors of lanes, in the function's order. It needs ``vectors.h`` before it.
 
-    Raises
-    ------
-    NoLanesError
-        An operation cannot be evaluated in lanes.
+    Raises NoLanesError: An operation cannot be evaluated in lanes.
     """
     return _Lanes(function).code(name)
 

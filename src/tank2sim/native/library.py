@@ -63,21 +63,11 @@ def kept(sources: Mapping[str, str], making: Iterable[str], suffix: str, make: C
     The name of an entry holds a hash of its content, which is compared before it is used: one that was cut short or
     changed is made again.
 
-    Parameters
-    ----------
-    sources : mapping
-        Name to text of every source and header; all lie in one folder.
-    making : iterable of str
-        What else the library depends on: compiler, flags.
-    suffix : str
-        How its name ends.
-    make : callable
-        Takes the folder in which the sources lie, makes the library there, and returns its path.
+    `sources`: Name to text of every source and header; all lie in one folder. `making`: What else the library depends
+    on: compiler, flags. `suffix`: How its name ends. `make`: Takes the folder in which the sources lie, makes the
+    library there, and returns its path.
 
-    Raises
-    ------
-    InputError
-        There is no room for it.
+    Raises InputError: There is no room for it.
     """
     parts = [*making, "", *(part for name in sorted(sources) for part in (name, sources[name]))]
     key = hashlib.sha256("\0".join(parts).encode("utf-8")).hexdigest()[:32]
@@ -152,10 +142,7 @@ def cached_library(sources: Mapping[str, str], *, flags: Collection[str] = (), s
 
     `flags` and `seldom` are those of :func:`tank2sim.native.compiler.compile_shared`.
 
-    Raises
-    ------
-    InputError
-        There is no compiler that works, or no room for the library.
+    Raises InputError: There is no compiler that works, or no room for the library.
     """
 
     def make(folder: Path) -> Path:

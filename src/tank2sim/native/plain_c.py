@@ -37,19 +37,10 @@ def plain_c(function: ca.Function, prefix: str, arguments: Iterable[str], result
     With ``<PREFIX>_C(x)`` as ``x`` and ``<PREFIX>_SIN`` as ``sin`` they calculate what
     :func:`tank2sim.native.generate.generate_c` does, to the last bit.
 
-    Parameters
-    ----------
-    function : casadi.Function
-        Of scalar operations (SX), with dense arguments and results.
-    prefix : str
-        Of the macros (in capitals) and of the type ``<prefix>_real``.
-    arguments, results : iterable of str
-        Names of the arrays.
+    `function`: Of scalar operations (SX), with dense arguments and results. `prefix`: Of the macros (in capitals) and
+    of the type ``<prefix>_real``. `arguments`, `results`: Names of the arrays.
 
-    Raises
-    ------
-    ValueError
-        An operation has no C.
+    Raises ValueError: An operation has no C.
     """
     sources, targets, lines = tuple(arguments), tuple(results), []
     for operation, to, given, constant in instructions(function):

@@ -33,16 +33,10 @@ _FIRST_HEADING = ("initial_turning_time_s", "initial_turning_distance_m", "initi
 class CardRangeReading:
     """Figures of a run, with their times and the exit from the card's range.
 
-    Parameters
-    ----------
-    figures : mapping
-        Figure by name with unit; entries of a list have separate names (``overshoot_1_deg``).
-    read_s : mapping
-        Time at which each is known, s from the order; the end of the run for absent names.
-    exit_s : float or None
-        Time at which the output ``validity`` first falls below 1; None if it does not.
-    how : str
-        The quantities that leave the range, with both ranges, or else what effects do not hold for.
+    `figures`: Figure by name with unit; entries of a list have separate names (``overshoot_1_deg``). `read_s`: Time at
+    which each is known, s from the order; the end of the run for absent names. `exit_s`: Time at which the output
+    ``validity`` first falls below 1; None if it does not. `how`: The quantities that leave the range, with both ranges,
+    or else what effects do not hold for.
     """
 
     figures: Numbers
@@ -144,12 +138,8 @@ def _fallen_factors(run: Trajectory) -> str:
 def exceeded_range(values: Mapping[str, float], speed: Array, rate: Array, drift: Array, rudder: Array) -> str:
     """Text on the quantities of a motion that leave the card's range, with both ranges; empty if none does.
 
-    Parameters
-    ----------
-    values : mapping
-        Parameters of the ship's model, by name.
-    speed, rate, drift, rudder : arrays (n,)
-        U (m/s), r L/U, drift angle and rudder angle (rad).
+    `values`: Parameters of the ship's model, by name. `speed`, `rate`, `drift`, `rudder` (n,): U (m/s), r L/U, drift
+    angle and rudder angle (rad).
     """
     slowest, fastest = values["ship.slowest"], values["ship.fastest"]
     parts = []

@@ -22,6 +22,7 @@ from tank2sim.native.generate import c_loop
 from tank2sim.native.lanes import FLAGS_OF_LANES, NoLanesError, lane_function, widest_lanes
 from tank2sim.native.library import cached_library
 from tank2sim.simulation.card_range import INSIDE
+from tank2sim.simulation.running import SwitchingPlan
 from tank2sim.simulation.scheme import step_and_constants
 from tank2sim.simulation.trajectory import TIMES_BEYOND
 from tank2sim.units import UNITS
@@ -71,38 +72,16 @@ class _Found(ctypes.Structure):
 
 
 @dataclass(frozen=True, eq=False)
-class LanePlan:
-    """A manoeuvre of two rudder orders that take turns, each until a state reaches its level.
+class LaneKeeping:
+    """What is kept of runs, and their step.
 
-    Parameters
-    ----------
-    orders : tuple of float
-        Rudder at the execute and, after the first change, the other one, rad to starboard.
-    changing : str
-        The state at a level of which the order changes.
-    side : float
-        1 or -1: whether that state rises or falls to its level first; then it falls or rises to the other, and so on.
-    limit : int
-        Changes of order at which a run ends; 0: none, the order is held to the end; -1: no limit.
-    watched : tuple of str
-        At most two states whose crossings of levels are kept.
-    most : int
-        Crossings of each that are kept: 1, with the motion two lengths before the end, or up to :data:`CROSSINGS`.
-    inputs : array (nu,)
-        Inputs of the model; the rudder order among them is not used.
-    times : array (m,) or (n, m)
-        Times at which states are kept, s, rising; of all ships, or of each.
-    step_factor : int
-        Length of an integration step over the model's.
+    `watched`: at most two states with levels (n,), whose crossings are kept; `most`: how many of each, 1, with the
+    motion two lengths before the end, or up to :data:`CROSSINGS`. `times` (m,) or (n, m): times at which states are
+    kept, s, rising; of all ships, or of each. `step_factor`: length of an integration step over the model's.
     """
 
-    orders: tuple[float, float]
-    changing: str
-    side: float
-    limit: int
-    watched: tuple[str, ...]
-    most: int
-    inputs: Array
+    watched: Sequence[tuple[str, Array]] = ()
+    most: int = 0
     times: Sequence[float] | Array = ()
     step_factor: int = 1
 
@@ -111,30 +90,13 @@ class LanePlan:
 class LaneResults:
     """What is kept of the runs of n ships; nan where there is none.
 
-    Parameters
-    ----------
-    end, last : arrays (n,), (n, nx)
-        Time, s, and states at the end.
-    way : array (n,)
-        Length of the track, m.
-    then : array (n, 2)
-        Yaw rate (rad/s) and speed (m/s) two lengths before the end.
-    speeds : array (n, 4)
-        First, lowest, highest and last speed, m/s.
-    left : array (n,)
-        Time at which the card's range (the output ``validity``) was first left, s; inf if it was not.
-    order_times, order_states : arrays (n, orders), (n, orders, nx)
-        Times and states at the changes of order, at most :data:`CROSSINGS`.
-    windows : array (n, watches, most, :data:`SAMPLES`, 2 + nx)
-        Time, rudder order from then on, and states about each crossing.
-    states : array (n, times, nx)
-        At the requested times.
-    ended : array (n,)
-        :data:`FINE`, :data:`RUNAWAY_LANE` or :data:`UNKNOWN`.
-    orders : array (n,)
-        Number of changes of order.
-    crossings : array (n, watches)
-        Number of crossings.
+    `end`, `last` (n,), (n, nx): time, s, and states at the end; `way` (n,): length of the track, m. `then` (n, 2): yaw
+    rate (rad/s) and speed (m/s) two lengths before the end; `speeds` (n, 4): first, lowest, highest and last, m/s.
+    `left` (n,): time at which the card's range (the output ``validity``) was first left, s; inf if it was not.
+    `order_times`, `order_states` (n, orders), (n, orders, nx): at the changes of order, at most :data:`CROSSINGS`.
+    `windows` (n, watches, most, :data:`SAMPLES`, 2 + nx): time, rudder order from then on, and states about each
+    crossing. `states` (n, times, nx): at the requested times. `ended` (n,): :data:`FINE`, :data:`RUNAWAY_LANE` or
+    :data:`UNKNOWN`; `orders` (n,), `crossings` (n, watches): numbers of changes of order and of crossings.
     """
 
     end: Array
@@ -155,21 +117,11 @@ class LaneResults:
 class LaneRunner:
     """Runs manoeuvres of a model for many ships at once.
 
-    Parameters
-    ----------
-    model : Model
-        A ship.
-    lanes : int, optional
-        Numbers of double precision in a vector: 8, 4, 2 or 1; by default what this machine's vectors hold. No result
-        depends on it.
-    single : bool
-        In single precision, with compensated sums of the states.
+    `model`: A ship. `lanes`, optional: Numbers of double precision in a vector: 8, 4, 2 or 1; by default what this
+    machine's vectors hold. No result depends on it. `single`: In single precision, with compensated sums of the states.
 
-    Raises
-    ------
-    NoLanesError
-        The model cannot be run in lanes: there is no C compiler, an operation has no lanes, or the model lacks one of
-        the states of a ship.
+    Raises NoLanesError: The model cannot be run in lanes: there is no C compiler, an operation has no lanes, or the
+    model lacks one of the states of a ship.
     """
 
     def __init__(self, model: Model, lanes: int | None = None, *, single: bool = False):
@@ -180,20 +132,25 @@ class LaneRunner:
             raise NoLanesError("there is no C compiler, or the model is not that of a ship")
         self._run = self._compiled()
 
-    def runs(self, plan: LanePlan, p: Array, starts: Array, ends: Array, levels: Array, goals: Array) -> LaneResults:
-        """Runs of n ships with parameters `p` (n, np) from `starts` (n, nx), each at most to its time in `ends` (n,).
+    def runs(
+        self, plan: SwitchingPlan, p: Array, starts: Array, ends: Array, inputs: Array, kept: LaneKeeping
+    ) -> LaneResults:
+        """Runs of n ships by a plan of rudder orders: parameters (n, np), initial states (n, nx), longest times (n,).
 
-        `levels` (n, watches) are those of the watched states, `goals` (n, 2) those at which the order changes from the
-        first and from the second.
+        `inputs` (nu,) are those of the model; a rudder order among them holds if the plan has none.
         """
         model, n, nx = self.model, len(starts), len(self.model.states)
-        at = np.ascontiguousarray(plan.times, dtype=float)
-        inputs = np.ascontiguousarray(plan.inputs, dtype=float)
+        at = np.ascontiguousarray(kept.times, dtype=float)
+        u = np.ascontiguousarray(inputs, dtype=float)
         limits = TIMES_BEYOND * np.array([UNITS[state.unit].extent for state in model.states])
-        first, second = plan.orders
-        watched = np.array([model.state_names.index(name) for name in plan.watched], dtype=np.int32)
-        limit = np.iinfo(np.int32).max if plan.limit < 0 else plan.limit
-        shape, kept = (n, len(watched)), min(limit, CROSSINGS)
+        amidships = float(u[model.input_names.index("rudder.command")])
+        first, second = (orders.get("rudder.command", amidships) for orders in plan.orders)
+        changing = model.state_names.index(plan.state)
+        goals = plan.of_start * starts[:, [changing]] + np.array(plan.levels)
+        places = np.array([model.state_names.index(name) for name, _ in kept.watched], dtype=np.int32)
+        levels = np.column_stack([np.zeros((n, 0)), *(level for _, level in kept.watched)])
+        limit = np.iinfo(np.int32).max if plan.changes is None else plan.changes
+        shape, changes = (n, len(places)), min(limit, CROSSINGS)
         found = LaneResults(
             end=np.full(n, np.nan),
             last=np.full((n, nx), np.nan),
@@ -201,9 +158,9 @@ class LaneRunner:
             then=np.full((n, 2), np.nan),
             speeds=np.full((n, 4), np.nan),
             left=np.full(n, np.nan),
-            order_times=np.full((n, kept), np.nan),
-            order_states=np.full((n, kept, nx), np.nan),
-            windows=np.full((*shape, plan.most, SAMPLES, 2 + nx), np.nan),
+            order_times=np.full((n, changes), np.nan),
+            order_states=np.full((n, changes, nx), np.nan),
+            windows=np.full((*shape, kept.most, SAMPLES, 2 + nx), np.nan),
             states=np.full((n, at.shape[-1], nx), np.nan),
             ended=np.zeros(n, dtype=np.int32),
             orders=np.zeros(n, dtype=np.int32),
@@ -211,24 +168,12 @@ class LaneRunner:
         )
         lengths = p[:, model.parameter_names.index("ship.length")]
         numbers = [np.ascontiguousarray(values, dtype=float) for values in (p, starts, ends, goals, levels, lengths)]
-        asked = _Plan(
-            plan.step_factor * model.step_s,
-            first,
-            second,
-            plan.side,
-            model.state_names.index(plan.changing),
-            limit,
-            kept,
-            len(watched),
-            plan.most,
-            at.shape[-1],
-            at.shape[-1] if at.ndim == 2 else 0,
-            inputs.ctypes.data,
-            limits.ctypes.data,
-            at.ctypes.data,
-        )
+        lasting = at.shape[-1], at.shape[-1] if at.ndim == 2 else 0
+        step = kept.step_factor * model.step_s
+        asked = _Plan(step, first, second, plan.side, changing, limit, changes, len(places), kept.most, *lasting)
+        asked.inputs, asked.limits, asked.at = u.ctypes.data, limits.ctypes.data, at.ctypes.data
         results = _Found(*(getattr(found, name).ctypes.data for name in _FOUND))
-        self._run(n, asked, *(values.ctypes.data for values in numbers), watched.ctypes.data, results)
+        self._run(n, asked, *(values.ctypes.data for values in numbers), places.ctypes.data, results)
         return found
 
     def _compiled(self) -> ctypes._NamedFuncPointer:

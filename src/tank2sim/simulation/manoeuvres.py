@@ -11,7 +11,6 @@ import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +20,7 @@ from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Input, Model
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.records.csv_table import LONGEST_RUN_S, read_table
-from tank2sim.simulation.running import Running
+from tank2sim.simulation.running import Running, SwitchedManoeuvre, SwitchingPlan
 from tank2sim.simulation.thruster_manoeuvres import (
     DifferenceTurn,
     Spin,
@@ -86,7 +85,7 @@ def _check_angles(name: str, **angles: float) -> None:
 
 
 @dataclass(frozen=True)
-class Turn:
+class Turn(SwitchedManoeuvre):
     """Turning circle: the rudder (rad, positive to starboard) is put over and held.
 
     It begins to move `wait_s` after the order (a gear's dead time).
@@ -108,20 +107,16 @@ class Turn:
         """The text form of :func:`parse_manoeuvre`, in deg."""
         return f"turn:{_degrees(self.rudder)}"
 
-    def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
-        """Run for `duration` s, or until the heading has changed by :data:`TURN_HEADING` (at most 150 L/u0)."""
-        running.run(self.wait_s if duration is None else min(self.wait_s, duration))
-        running.order({"rudder.command": self.rudder})
-        if duration is not None:
-            running.run(max(0.0, duration - self.wait_s))
-            return
-        side = math.copysign(1.0, self.rudder)
-        goal = running.state("motion.psi") + side * TURN_HEADING
-        running.run_until("motion.psi", goal, rising=side > 0, at_most=LONGEST_LENGTHS * ship_time)
+    def plan(self, model: Model, duration_s: float | None = None) -> SwitchingPlan:
+        """Held, or until the heading has changed by :data:`TURN_HEADING` (at most 150 L/u0)."""
+        order, side = {"rudder.command": self.rudder}, math.copysign(1.0, self.rudder)
+        ends = 2 * (side * TURN_HEADING,)
+        changes = 1 if duration_s is None else 0
+        return SwitchingPlan((order, order), "motion.psi", ends, side, changes, LONGEST_LENGTHS, wait_s=self.wait_s)
 
 
 @dataclass(frozen=True)
-class Zigzag:
+class Zigzag(SwitchedManoeuvre):
     """Zigzag: rudder `rudder` until the heading has changed by `heading`, then the other way, and so on.
 
     A negative rudder begins to port; `heading` is positive. The order comes `lag_s` after the heading is reached: the
@@ -158,22 +153,22 @@ class Zigzag:
         """Changes of heading at which the first and the second side of the rudder are reversed, rad."""
         return self.heading, self.heading if self.opposite_heading is None else self.opposite_heading
 
-    def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
-        """Run for `duration` s, or to the heading's return after the fifth execute (at most 150 L/u0)."""
-        begin = running.state("motion.psi") if self.course is None else self.course
-        end = LONGEST_LENGTHS * ship_time if duration is None else duration
-        side = math.copysign(1.0, self.rudder)
-        angles = cycle((self.rudder, -self.rudder if self.opposite is None else self.opposite))
-        headings = cycle(self.headings)
-        executes = 0
-        running.run(min(self.wait_s, end))
-        while running.time < end and (duration is not None or executes < ZIGZAG_EXECUTES):
-            running.order({"rudder.command": next(angles)})
-            goal = begin + side * next(headings)
-            if not running.run_until("motion.psi", goal, rising=side > 0, at_most=end - running.time):
-                return
-            running.run(max(0.0, min(self.lag_s + self.wait_s, end - running.time)))
-            side, executes = -side, executes + 1
+    def plan(self, model: Model, duration_s: float | None = None) -> SwitchingPlan:
+        """Without a duration to the heading's return after the fifth execute (at most 150 L/u0)."""
+        side, (first, second) = math.copysign(1.0, self.rudder), self.headings
+        course = 0.0 if self.course is None else self.course
+        opposite = -self.rudder if self.opposite is None else self.opposite
+        return SwitchingPlan(
+            ({"rudder.command": self.rudder}, {"rudder.command": opposite}),
+            "motion.psi",
+            (course + side * first, course - side * second),
+            side,
+            ZIGZAG_EXECUTES if duration_s is None else None,
+            LONGEST_LENGTHS,
+            of_start=1.0 if self.course is None else 0.0,
+            wait_s=self.wait_s,
+            lag_s=self.lag_s,
+        )
 
 
 @dataclass(frozen=True)
@@ -228,7 +223,7 @@ class SpiralManoeuvre:
 
 
 @dataclass(frozen=True)
-class Stop:
+class Stop(SwitchedManoeuvre):
     """Crash stop (full astern stopping test), or coasting with the engine stopped, rudder amidships.
 
     Parameters
@@ -245,51 +240,34 @@ class Stop:
         """The text form of :func:`parse_manoeuvre`, in rpm."""
         return "stop" if self.revolutions is None else f"stop:{self.revolutions * 60 / math.tau:.10g}"
 
-    def final_speed(self, approach: float) -> float:
+    def final_speed(self, approach: Array) -> Array:
         """Surge velocity (m/s) at which the ship has stopped: 0, or :data:`COASTING_END` of that of the approach."""
-        return COASTING_END * approach if self.revolutions == 0 else 0.0
+        return (COASTING_END if self.revolutions == 0 else 0.0) * approach
 
-    def order(self, model: Model) -> float:
-        """Revolutions (rad/s) ordered from the propeller of a ship.
-
-        Raises
-        ------
-        InputError
-            The ship has no propulsion.
-        """
-        if "propeller.speed" not in model.input_names:
-            problem = "is missing: the ship's engine cannot be stopped or reversed"
-            raise InputError(model.origin, "propulsion", problem, "add [propulsion] to the card")
-        nominal = model["propeller.speed"]
-        assert isinstance(nominal, Input)
-        return -FULL_ASTERN * nominal.start if self.revolutions is None else self.revolutions
-
-    def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
-        """Run for `duration` s, or until the ship is dead in the water (at most :data:`LONGEST_STOP` L/u0).
+    def orders(self, model: Model) -> dict[str, float]:
+        """Revolutions (rad/s) ordered from the propeller of a ship, or from the thrusters of a craft that push ahead.
 
         Raises
         ------
         InputError
             The ship has no propulsion.
         """
-        if commands := thruster_commands(running.model):
-            orders = {
-                command.name: -FULL_ASTERN * command.start if self.revolutions is None else self.revolutions
-                for command in commands
-                if command.start
-            }
-            running.order(orders)
-            self._until_stopped(running, ship_time, duration)
-            return
-        running.order({"propeller.speed": self.order(running.model)})
-        self._until_stopped(running, ship_time, duration)
+        engines = [command for command in thruster_commands(model) if command.start]
+        if not thruster_commands(model):
+            if "propeller.speed" not in model.input_names:
+                problem = "is missing: the ship's engine cannot be stopped or reversed"
+                raise InputError(model.origin, "propulsion", problem, "add [propulsion] to the card")
+            propeller = model["propeller.speed"]
+            assert isinstance(propeller, Input)
+            engines = [propeller]
+        ordered = self.revolutions
+        return {engine.name: -FULL_ASTERN * engine.start if ordered is None else ordered for engine in engines}
 
-    def _until_stopped(self, running: Running, ship_time: float, duration: float | None) -> None:
-        if duration is not None:
-            running.run(duration)
-            return
-        end = self.final_speed(running.state("motion.u"))
-        running.run_until("motion.u", end, rising=False, at_most=LONGEST_STOP * ship_time)
+    def plan(self, model: Model, duration_s: float | None = None) -> SwitchingPlan:
+        """Without a duration until the ship is dead in the water (at most :data:`LONGEST_STOP` L/u0)."""
+        orders, share = self.orders(model), float(self.final_speed(np.ones(())))
+        changes = 1 if duration_s is None else 0
+        return SwitchingPlan((orders, orders), "motion.u", (0.0, 0.0), -1.0, changes, LONGEST_STOP, of_start=share)
 
 
 @dataclass(frozen=True)

@@ -51,20 +51,10 @@ seconds) would ask for gigabytes. Project choice: records of what a ship does ha
 class MotionRecord:
     """The rows of a trial.
 
-    Parameters
-    ----------
-    name, file : str
-        Name of the trial, and its file for messages.
-    time_s : array (n,)
-        s, rising.
-    inputs : array (n, nu)
-        The model's inputs at the rows: an order as the row shows it, other inputs straight between their readings.
-    orders : array (nu,) of bool
-        True for inputs that are orders: each holds until the next.
-    measured : array (n, ny)
-        In the order of `seen`; nan where not measured.
-    seen : tuple of str
-        Names of the model's variables that are measured.
+    `name`, `file`: Name of the trial, and its file for messages. `time_s` (n,): s, rising. `inputs` (n, nu): The
+    model's inputs at the rows: an order as the row shows it, other inputs straight between their readings. `orders`
+    (nu,): True for inputs that are orders: each holds until the next. `measured` (n, ny): In the order of `seen`; nan
+    where not measured. `seen`: Names of the model's variables that are measured.
     """
 
     name: str
@@ -87,14 +77,8 @@ class MotionRecord:
 
         Before the first row and after the last one an input keeps its value.
 
-        Parameters
-        ----------
-        column : int
-            Place of the input among the model's.
-        edges : array (k,)
-            Times, s, rising.
-        given_before : bool
-            Whether an order begins at :attr:`given_s`; otherwise it begins at the row that shows it.
+        `column`: Place of the input among the model's. `edges` (k,): Times, s, rising. `given_before`: Whether an order
+        begins at :attr:`given_s`; otherwise it begins at the row that shows it.
         """
         time, values = self.time_s, self.inputs[:, column]
         if self.orders[column]:
@@ -107,18 +91,10 @@ class MotionRecord:
 def motion_record(model: Model, trial: Trial, seen: Sequence[str]) -> MotionRecord:
     """Return the rows of a trial for a model that the trial's rudder drives, by angle or by order.
 
-    Parameters
-    ----------
-    model : Model
-    trial : Trial
-        With ``delta_rad``, or ``delta_order_rad``, if the model has a rudder.
-    seen : sequence of str
-        Variables of the model to be compared, those of :data:`OBSERVED_SIGNALS`.
+    `trial`: With ``delta_rad``, or ``delta_order_rad``, if the model has a rudder. `seen`: Variables of the model to be
+    compared, those of :data:`OBSERVED_SIGNALS`.
 
-    Raises
-    ------
-    InputError
-        The trial lasts much longer than its rows can show, as with one bad time.
+    Raises InputError: The trial lasts much longer than its rows can show, as with one bad time.
     """
     lasts, sampling = float(trial.time_s[-1] - trial.time_s[0]), sampling_step(trial)
     if lasts > MOST_INSTANTS_A_ROW * len(trial.time_s) * sampling:

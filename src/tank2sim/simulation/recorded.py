@@ -47,28 +47,14 @@ HALF_TURNS = 2.0
 class Recorded:
     """The manoeuvre of a trial.
 
-    Parameters
-    ----------
-    trial : Trial
-        The record, at the scale of the model that simulates it.
-    manoeuvre : Turn or Zigzag
-        With the reached rudder angle, and the controller's lag.
-    begin_s, end_s : float
-        Execute (the step of the order where the record has it, else the rudder's first movement), and end of the
-        manoeuvre (a turn ends when its rudder is reduced), s.
-    rudder_rate_radps : float or None
-        Rate of the rudder; None where only its order is known, which the gear of the ship follows.
-    start : dict
-        ``initial.*`` parameters of a model for the state at the execute.
-    inputs : dict
-        Other inputs of a model, at their mean.
-    figures : Figures
-        As measured.
-    errors : dict
-        Standard errors of the joint fit of a zigzag's reversals (:func:`.fitted_zigzag`).
-    reading_errors : dict
-        Standard errors of figures by what is uncertain of the measured point, of the heading's zero and of the time of
-        the first order: m for distances of turns, rad for overshoots, s for times.
+    `trial`: The record, at the scale of the model that simulates it. `manoeuvre`: With the reached rudder angle, and
+    the controller's lag. `begin_s`, `end_s`: Execute (the step of the order where the record has it, else the rudder's
+    first movement), and end of the manoeuvre (a turn ends when its rudder is reduced), s. `rudder_rate_radps`: Rate of
+    the rudder; None where only its order is known, which the gear of the ship follows. `start`: ``initial.*``
+    parameters of a model for the state at the execute. `inputs`: Other inputs of a model, at their mean. `figures`: As
+    measured. `errors`: Standard errors of the joint fit of a zigzag's reversals (:func:`.fitted_zigzag`).
+    `reading_errors`: Standard errors of figures by what is uncertain of the measured point, of the heading's zero and
+    of the time of the first order: m for distances of turns, rad for overshoots, s for times.
     """
 
     trial: Trial
@@ -125,13 +111,9 @@ def recognise(trial: Trial, model: Model) -> Recorded | str:
     Both begin on a straight course. A record that begins in a manoeuvre has no figures, and a rudder that is held at
     other angles in between makes no zigzag.
 
-    Parameters
-    ----------
-    trial : Trial
-        With a rudder, heading and positions. Unmeasured yaw rate and velocities through the water are derived from
-        them, less the current of the model.
-    model : Model
-        Model of a ship of the trial's size: for L/u0 and the names of its variables.
+    `trial`: With a rudder, heading and positions. Unmeasured yaw rate and velocities through the water are derived from
+    them, less the current of the model. `model`: Model of a ship of the trial's size: for L/u0 and the names of its
+    variables.
     """
     held = held_rudders(trial)
     if not held:
@@ -249,19 +231,10 @@ def steerable(card: ManoeuvringCard) -> ManoeuvringCard:
 def repeat(record: Recorded, integrator: Integrator, parameters: dict[str, float] | None = None) -> Run:
     """Simulate a recorded manoeuvre in closed loop from its measured start.
 
-    Parameters
-    ----------
-    what : Recorded
-        From :func:`recorded`.
-    integrator : Integrator
-        Integrator of a model with steering gear (card made :func:`steerable`, so that the recorded rate can be set).
-    parameters : dict, optional
-        Values of the model's parameters by name.
+    `what`: From :func:`recorded`. `integrator`: Integrator of a model with steering gear (card made :func:`steerable`,
+    so that the recorded rate can be set). `parameters`, optional: Values of the model's parameters by name.
 
-    Raises
-    ------
-    InputError
-        The motion leaves all bounds.
+    Raises InputError: The motion leaves all bounds.
     """
     model = integrator.model
     values = {}
@@ -343,14 +316,7 @@ def _state_before(trial: Trial, smooth: dict[str, Array], execute_s: float, ship
 def drift_over_ground(model: Model, inputs: Array, psi: Array) -> Array:
     """Velocity over the ground of a ship that rests in the water, north and east (n, 2), m/s: that of the current.
 
-    Parameters
-    ----------
-    model : Model
-        With or without a current.
-    inputs : array (n, nu)
-        The model's inputs.
-    psi : array (n,)
-        Heading, rad.
+    `model`: With or without a current. `inputs` (n, nu): The model's inputs. `psi` (n,): Heading, rad.
     """
     rates = model.expand(ca.vcat([model.symbol(f"motion.{axis}dot") for axis in "xy"]))
     states = np.zeros((len(psi), len(model.states)))
@@ -415,12 +381,7 @@ def _slope(time: Array, values: Array, ship_time: float) -> Array:
 def straight_over_gaps(time: Array, values: Array) -> Array:
     """Return a signal with straight lines in place of what was not measured.
 
-    Parameters
-    ----------
-    time : array (n,)
-        s.
-    values : array (n,)
-        nan where nothing was measured.
+    `time` (n,): s. `values` (n,): nan where nothing was measured.
     """
     known = ~np.isnan(values)
     return np.interp(time, time[known], values[known])

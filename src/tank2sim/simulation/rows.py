@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cached_property
+from types import EllipsisType
 from typing import Any
 
 import casadi as ca
@@ -20,6 +21,7 @@ from tank2sim.errors import InputError
 from tank2sim.native.compiler import find_compiler
 from tank2sim.native.generate import c_loop, generate_c
 from tank2sim.native.library import cached_library
+from tank2sim.native.operations import instructions
 
 _NUMPY: dict[int, Callable[..., Any]] = {
     **{ca.OP_ADD: np.add, ca.OP_SUB: np.subtract, ca.OP_MUL: np.multiply, ca.OP_DIV: np.divide, ca.OP_NEG: np.negative},
@@ -45,33 +47,19 @@ class ArrayFunction:
     """Evaluates a function of scalar operations for each row of its arguments, each operation over all rows in NumPy.
 
     Over some thousand rows 9 to 15 times as fast as CasADi's own loop, which is meant for single points. For functions
-    that are evaluated too seldom to be worth compiling.
-
-    Parameters
-    ----------
-    function : casadi.Function
-        Of scalar operations, or one that expands to them, with dense arguments and results; a matrix result is in
-        CasADi's order, by columns.
+    that are evaluated too seldom to be worth compiling. Arguments and results are dense; a matrix result is in CasADi's
+    order, by columns.
     """
 
     def __init__(self, function: ca.Function):
-        function = function if function.is_a("SXFunction") else function.expand()
-        self.function = function
-        self._program = []
-        for k in range(function.n_instructions()):
-            operation, to, source = (
-                function.instruction_id(k),
-                function.instruction_output(k),
-                function.instruction_input(k),
-            )
-            constant = np.float64(function.instruction_constant(k)) if operation == ca.OP_CONST else None
-            known = (ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST)
-            compute = None if operation in known else _NUMPY[operation]
-            self._program.append((operation, tuple(to), tuple(source), constant, compute))
+        self.function = function if function.is_a("SXFunction") else function.expand()
+        known = (ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST)
+        steps = instructions(self.function)
+        self._program = [(step, None if step.operation in known else _NUMPY[step.operation]) for step in steps]
 
     def __call__(self, *arguments: Array) -> tuple[Array, ...]:
         """Results (n, elements) each; an argument is (elements,), the same for every row, or (n, elements)."""
-        n = max(len(argument) for argument in arguments if argument.ndim == 2)
+        n = _rows_of(arguments)
         # Columns in one piece each; a scalar stays one.
         columns = [np.array(argument.T, dtype=float, order="C") for argument in arguments]
         results = [np.empty((self.function.numel_out(place), n)) for place in range(self.function.n_out())]
@@ -83,13 +71,13 @@ class ArrayFunction:
 
     def _run(self, arguments: Sequence[Array], results: Sequence[Array]) -> None:
         work: list[Any] = [None] * self.function.sz_w()
-        for operation, to, source, constant, compute in self._program:
+        for (operation, to, source, constant), compute in self._program:
             if compute is not None:
                 work[to[0]] = compute(*[work[place] for place in source])
             elif operation == ca.OP_INPUT:
                 work[to[0]] = arguments[source[0]][source[1]]
             elif operation == ca.OP_CONST:
-                work[to[0]] = constant
+                work[to[0]] = np.float64(constant)
             else:
                 results[to[0]][to[1]] = work[source[0]]
 
@@ -97,22 +85,18 @@ class ArrayFunction:
 class RowFunction:
     """Evaluates a function of vectors for each row of its arguments.
 
-    Parameters
-    ----------
-    function : casadi.Function
-        Dense arguments and results; a matrix result is in CasADi's order, by columns.
-    library : ctypes.CDLL, optional
-        From :func:`compiled_rows` of this function, among others.
+    Arguments and results are dense; a matrix result is in CasADi's order, by columns. The `library` is that of
+    :func:`compiled_rows` with this function, among others; None: nothing is compiled.
     """
 
-    def __init__(self, function: ca.Function, library: ctypes.CDLL | None = None):
+    def __init__(self, function: ca.Function, library: ctypes.CDLL | EllipsisType | None = ...):
         self.function = function
-        library = library or compiled_rows([function])
+        library = compiled_rows([function]) if library is ... else library
         self._rows = None if library is None else library[f"{function.name()}_rows"]
 
     def __call__(self, *arguments: Array) -> tuple[Array, ...]:
         """Results (n, elements) each; an argument is (elements,), the same for every row, or (n, elements)."""
-        n = max(len(argument) for argument in arguments if argument.ndim == 2)
+        n = _rows_of(arguments)
         arrays = [np.ascontiguousarray(argument, dtype=float) for argument in arguments]
         if self._rows is None:
             return self._in_numpy(*arrays)
@@ -136,9 +120,14 @@ class RowFunction:
 class Chain(RowFunction):
     """Evaluates a function whose result is its first argument in the next step."""
 
+    @cached_property
+    def _in_casadi(self) -> dict[int, ca.Function]:
+        """Loops of 1, 2, 4, ... steps, so that few different ones are necessary."""
+        return {}
+
     def run(self, start: Array, *arguments: Array) -> Array:
         """States (n + 1, nx): `start` (nx,), then the result of each step with its row of the other arguments."""
-        n = max(len(argument) for argument in arguments if argument.ndim == 2)
+        n = _rows_of(arguments)
         states = np.empty((n + 1, len(start)))
         states[0] = start
         arrays = [np.ascontiguousarray(argument, dtype=float) for argument in arguments]
@@ -146,25 +135,28 @@ class Chain(RowFunction):
             strides = [states.shape[1], *(array.shape[1] if array.ndim == 2 else 0 for array in arrays)]
             self._loop(n, [states, *arrays], strides, [states[1:]])
             return states
-        for row in range(n):
-            step = self.function(states[row], *(array[row] if array.ndim == 2 else array for array in arrays))
-            states[row + 1] = np.array(step).ravel()
+        done = 0
+        while done < n:
+            length = 1 << ((n - done).bit_length() - 1)
+            if length not in self._in_casadi:
+                self._in_casadi[length] = self.function.mapaccum(length)
+            part = slice(done, done + length)
+            given = [array[part].T if array.ndim == 2 else ca.repmat(array, 1, length) for array in arrays]
+            states[done + 1 : done + 1 + length] = np.array(self._in_casadi[length](states[done], *given)).T
+            done += length
         return states
+
+
+def _rows_of(arguments: Sequence[Array]) -> int:
+    return max(len(argument) for argument in arguments if argument.ndim == 2)
 
 
 def compiled_rows(
     functions: Sequence[ca.Function], sources: Mapping[str, str] | None = None, flags: Collection[str] = ()
 ) -> ctypes.CDLL | None:
-    """Library of functions, each with its loop over rows; None without a compiler that works.
+    """Library of functions, each with a name of its own and its loop over rows; None without a compiler that works.
 
-    Parameters
-    ----------
-    functions : sequence of casadi.Function
-        Each with a name of its own.
-    sources : mapping, optional
-        Name to text of further C sources, which may call the functions.
-    flags : collection of str
-        More flags of the compiler.
+    `sources`: name to text of further C sources, which may call the functions; `flags`: more flags of the compiler.
     """
     if find_compiler() is None:
         return None

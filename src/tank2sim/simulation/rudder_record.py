@@ -49,19 +49,10 @@ LEAVING = 0.05
 class HeldAngle:
     """A rudder angle that was held.
 
-    Parameters
-    ----------
-    angle : float
-        The angle reached, rad, positive to starboard.
-    execute_s : float
-        Time of the order where the record has it, before the first row that shows it
-        (:data:`.ROWS_TO_SHOW_AN_ORDER`), else the start of the rudder's motion.
-    moves_s : float
-        Start of the rudder's motion; the execute where only the order is known.
-    rate : float or None
-        Rate of the rudder, rad/s; None where only the order is known.
-    end_s : float
-        Time until which it was held.
+    `angle`: The angle reached, rad, positive to starboard. `execute_s`: Time of the order where the record has it,
+    before the first row that shows it (:data:`.ROWS_TO_SHOW_AN_ORDER`), else the start of the rudder's motion.
+    `moves_s`: Start of the rudder's motion; the execute where only the order is known. `rate`: Rate of the rudder,
+    rad/s; None where only the order is known. `end_s`: Time until which it was held.
     """
 
     angle: float

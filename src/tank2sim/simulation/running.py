@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import cycle
 
 import numpy as np
 
 from tank2sim.arrays import Array
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.straight_course import straight_course
@@ -21,23 +23,39 @@ _TRIM_STEPS = 50
 _TRIM_ACCURACY = 1e-13  # of the change in a Newton step, relative to the nominal size of a state
 
 
+@dataclass(frozen=True)
+class SwitchingPlan:
+    """Two orders that take turns, each until a state reaches its level.
+
+    `orders` (mapping, mapping): Inputs by name at the execute, and after the first change. `state`: The state at a
+    level of which the order changes. `levels`: Levels at which the orders end, beyond `of_start` times the state at the
+    start. `side`: 1 or -1: whether the state rises or falls to its first level; then it falls or rises to the other,
+    and so on. `changes`: Changes of order at which a run ends; 0: the first order is held to the end; None: no limit.
+    `longest`: Longest run without a given duration, L/u0. `wait_s`, `lag_s`: Time from each order to the movement of
+    the rudder, and from reaching a level to the order.
+    """
+
+    orders: tuple[Mapping[str, float], Mapping[str, float]]
+    state: str
+    levels: tuple[float, float]
+    side: float
+    changes: int | None
+    longest: float
+    of_start: float = 1.0
+    wait_s: float = 0.0
+    lag_s: float = 0.0
+
+
 class Running:
     """A running simulation.
 
     Samples are on a grid of whole steps from the start; an event between two of them is an additional sample, after
     which the grid continues.
 
-    Parameters
-    ----------
-    integrator : Integrator
-        Integrator of the model.
-    inputs, parameters : mapping, optional
-        Values by name that replace the model's start values.
+    `integrator`: Integrator of the model. `inputs`, `parameters`, optional: Values by name that replace the model's
+    start values.
 
-    Raises
-    ------
-    InputError
-        ``initial.trim`` is set and no steady motion exists near the start.
+    Raises InputError: ``initial.trim`` is set and no steady motion exists near the start.
     """
 
     def __init__(
@@ -52,7 +70,6 @@ class Running:
         self._u = self.model.input_values(inputs)
         self._time = 0.0
         self._steps_done = 0
-        self._every = integrator.every
         self._x: Array = np.array(self.model.initial(self._p)).ravel()
         if "initial.trim" in self.model and self._p[self.model.parameter_names.index("initial.trim")]:
             self._trim()
@@ -86,10 +103,7 @@ class Running:
     def order(self, inputs: Mapping[str, float]) -> None:
         """Set inputs, by name, from now on.
 
-        Raises
-        ------
-        InputError
-            A value is beyond the bounds of its input.
+        Raises InputError: A value is beyond the bounds of its input.
         """
         self.model.check_inputs(inputs)
         self._u = self._u.copy()
@@ -105,47 +119,34 @@ class Running:
 
         Returns False, after `at_most` s, if it does not. A state already beyond the level counts as crossed.
         """
-        place = self.model.state_names.index(state)
-        sign = 1.0 if rising else -1.0
+        place, sign = self.model.state_names.index(state), 1.0 if rising else -1.0
 
-        def beyond(x: Array) -> float:
-            return sign * (float(x[place]) - level)
+        def beyond(x: Array) -> Array:
+            return np.asarray(sign * (x[..., place] - level))
 
-        end = self._time + at_most
-        if beyond(self._x) >= 0:
-            return True
-        while end - self._time > self._tolerance:
-            begin_time, begin_x, parts, steps = self._time, self._x, len(self._t_parts), self._steps_done
-            self._advance_to(min(end, (steps + _CHUNK) * self.model.step_s))
-            times = np.concatenate([*self._t_parts[parts:], [self._time]])
-            states = np.concatenate([*self._x_parts[parts:], self._x[None, :]])
-            over = np.flatnonzero(sign * (states[:, place] - level) >= 0)
-            if not len(over):
-                continue
-            last = int(over[0]) - 1
-            if self._every > 1:  # to the last sample before the event, and then step by step
-                del self._t_parts[parts:], self._x_parts[parts:], self._u_parts[parts:]
-                self._time, self._x, self._steps_done = begin_time, begin_x, steps
-                self._advance_to(float(times[last]))
-                with self._step_by_step():
-                    return self.run_until(state, level, rising=rising, at_most=end - self._time)
-            gap = float(times[last + 1] - times[last])
-            h = bracketed_root(self._after_step_from(states[last], beyond), 0.0, gap)
-            # Discard the chunk, and advance to the event instead.
-            del self._t_parts[parts:], self._x_parts[parts:], self._u_parts[parts:]
-            self._time, self._x, self._steps_done = begin_time, begin_x, steps
-            self._advance_to(float(times[last]))
-            self._partial(h)
-            return True
-        return False
+        return bool(beyond(self._x) >= 0) or self._advance_to(self._time + at_most, beyond)
+
+    def follow(self, plan: SwitchingPlan, duration: float) -> None:
+        """Follow a plan to its end, for at most `duration` s."""
+        begin, end, side = plan.of_start * self.state(plan.state), self._time + duration, plan.side
+        self.run(min(plan.wait_s, duration))
+        for number, (orders, level) in enumerate(cycle(zip(plan.orders, plan.levels, strict=True))):
+            if (number == plan.changes and number) or self._time >= end:
+                return
+            self.order(orders)
+            if plan.changes == 0:
+                self.run(end - self._time)
+                return
+            at_most = end - self._time
+            if not self.run_until(plan.state, begin + level, rising=side > 0, at_most=at_most):
+                return
+            self.run(max(0.0, min(plan.lag_s + plan.wait_s, end - self._time)))
+            side = -side
 
     def trajectory(self) -> Trajectory:
         """The trajectory up to the present time.
 
-        Raises
-        ------
-        InputError
-            The motion left all bounds.
+        Raises InputError: The motion left all bounds.
         """
         t = np.append(np.concatenate([*self._t_parts, []]), self._time)
         x = np.concatenate([*self._x_parts, self._x[None, :]])
@@ -158,51 +159,47 @@ class Running:
             raise InputError(self.model.origin, when, RUNAWAY, remedy)
         return result
 
-    def _after_step_from(self, x: Array, measure: Callable[[Array], float]) -> Callable[[float], float]:
-        return lambda h: measure(self._integrator.step(x, self._u, self._p, h))
-
-    def _advance_to(self, end: float) -> None:
-        h = self.model.step_s
-        tolerance = self._tolerance
-        to_grid = (self._steps_done + 1) * h - self._time
-        if self._time > self._steps_done * h + tolerance and to_grid <= end - self._time + tolerance:
-            self._partial(to_grid)
-            self._steps_done += 1
-        whole = 0
-        if self._time <= self._steps_done * h + tolerance:
-            whole = int(np.floor((end - self._time) / h + 1e-9))
-        if whole > 0:
-            states = self._integrator.rollout(self._x, self._u, self._p, h, whole, every=self._every)
-            times: Array = np.asarray((self._steps_done + np.arange(0, whole, self._every)) * h, dtype=float)
+    def _advance_to(self, end: float, beyond: Callable[[Array], Array] | None = None) -> bool:
+        """Advance to a time, or until what is `beyond` a level (of states (..., nx)) is zero; True in that case."""
+        while end - self._time > self._tolerance:
+            h = self.model.step_s
+            to_grid = (self._steps_done + 1) * h - self._time
+            length, count, passed = end - self._time, 1, 0
+            if self._time > self._steps_done * h + self._tolerance:
+                if to_grid <= length + self._tolerance:
+                    length, passed = to_grid, 1
+            elif whole := int(np.floor(length / h + 1e-9)):
+                count = whole if beyond is None else min(whole, _CHUNK)
+                length, passed = h, count
+            times: Array = np.asarray((self._steps_done + np.arange(count + 1)) * h, dtype=float)
             times[0] = self._time
-            self._keep(times, states[:-1])
-            self._x = states[-1]
-            self._steps_done += whole
-            self._time = self._steps_done * h
-        if end - self._time > tolerance:
-            self._partial(end - self._time)
+            if length is not h:
+                times[1] = self._time + length
+            if length > 0.0 and self._take(times, length, beyond):
+                return True
+            self._steps_done += passed
+        return False
 
-    @contextmanager
-    def _step_by_step(self) -> Iterator[None]:
-        """Keep each step within the context."""
-        every, self._every = self._every, 1
-        try:
-            yield
-        finally:
-            self._every = every
+    def _take(self, times: Array, length: float, beyond: Callable[[Array], Array] | None) -> bool:
+        """Take steps of a length to `times` (n + 1,), or the steps before an event and one to it."""
+        states = self._integrator.rollout(self._x, self._u, self._p, length, len(times) - 1)
+        over = [] if beyond is None else np.flatnonzero(beyond(states[1:]) >= 0).tolist()
+        last = over[0] if over else len(times) - 2
+        self._t_parts.append(times[: last + 1])
+        self._x_parts.append(states[: last + 1])
+        self._u_parts.append(np.repeat(self._u[None, :], last + 1, axis=0))
+        self._time, self._x = float(times[last + 1]), states[last + 1]
+        if not over or beyond is None:
+            return False
+        before = states[last]
 
-    def _partial(self, h: float) -> None:
-        """Take a step of a given length."""
-        if h <= 0.0:
-            return
-        self._keep(np.array([self._time]), self._x[None, :])
-        self._x = self._integrator.step(self._x, self._u, self._p, h)
-        self._time += h
+        def after(h: float) -> float:
+            return float(beyond(self._integrator.step(before, self._u, self._p, h)))
 
-    def _keep(self, times: Array, states: Array) -> None:
-        self._t_parts.append(times)
-        self._x_parts.append(states)
-        self._u_parts.append(np.repeat(self._u[None, :], len(times), axis=0))
+        h = bracketed_root(after, 0.0, float(times[last + 1] - times[last]))
+        self._time, self._x = float(times[last]) + h, self._integrator.step(before, self._u, self._p, h)
+        self._steps_done += last
+        return True
 
     def _trim(self) -> None:
         step = self.model.trim_step
@@ -219,3 +216,16 @@ class Running:
             raise InputError(
                 self.model.origin, "initial.trim", "no steady motion exists near the start", "start without it"
             )
+
+
+class SwitchedManoeuvre:
+    """A manoeuvre by a :class:`SwitchingPlan`."""
+
+    def plan(self, model: Model, duration_s: float | None = None) -> SwitchingPlan:
+        """The plan for a model, with or without a given duration."""
+        raise NotImplementedError
+
+    def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
+        """Run for `duration` s, or to the end of the plan."""
+        plan = self.plan(running.model, duration)
+        running.follow(plan, plan.longest * ship_time if duration is None else duration)

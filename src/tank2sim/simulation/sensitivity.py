@@ -30,14 +30,8 @@ _SOURCE = Path(__file__).with_suffix(".c")
 class Sensitivity:
     """Motion of a model and its derivatives.
 
-    Parameters
-    ----------
-    model : Model
-        nx states, nu inputs, np parameters.
-    free : sequence of str
-        Names of the k parameters of the derivatives.
-    seen : sequence of str
-        Names of the ny states and quantities to be compared with measurements.
+    `model`: nx states, nu inputs, np parameters. `free`: Names of the k parameters of the derivatives. `seen`: Names of
+    the ny states and quantities to be compared with measurements.
     """
 
     def __init__(self, model: Model, free: Sequence[str], seen: Sequence[str]):
@@ -55,20 +49,11 @@ class Sensitivity:
     def derivatives(self, states: Array, inputs: Array, p: Array, h: float) -> tuple[Array, Array, Array]:
         """Observed values and final states, with their derivatives by initial state and parameters.
 
-        Parameters
-        ----------
-        states : array (pieces, n + 1, nx)
-            Motions from :meth:`motion`.
-        inputs : array (pieces, n + 1, nu)
-            The last row of each is only for the observed values at its end.
+        `states` (pieces, n + 1, nx): Motions from :meth:`motion`. `inputs` (pieces, n + 1, nu): The last row of each is
+        only for the observed values at its end.
 
-        Returns
-        -------
-        seen : array (pieces, n + 1, ny)
-        by : array (pieces, n + 1, ny, nx + k)
-            Derivatives of `seen` by the initial state of its piece, and by the free parameters.
-        end_by : array (pieces, nx, nx + k)
-            Derivatives of the final state.
+        Returns seen (pieces, n + 1, ny); by (pieces, n + 1, ny, nx + k): Derivatives of `seen` by the initial
+        state of its piece, and by the free parameters; end_by (pieces, nx, nx + k): Derivatives of the final state.
         """
         pieces, rows, nx = states.shape
         ny, columns = len(self.seen), nx + len(self.free)
@@ -134,14 +119,9 @@ def augmented_step(
 
     For models of a state or two, whose whole step is one expression; :class:`Sensitivity` is for ships.
 
-    Parameters
-    ----------
-    following : casadi.SX (nx,)
-        States after a step from `x` (nx,) with the parameters `theta` (k,).
-    others : sequence of casadi.SX
-        Further arguments, with `theta` or a vector that holds it.
-    of_starts : int
-        Further columns of S (nx, k + of_starts): by unknowns that act through the first states alone.
+    `following` (nx,): States after a step from `x` (nx,) with the parameters `theta` (k,). `others`: Further arguments,
+    with `theta` or a vector that holds it. `of_starts`: Further columns of S (nx, k + of_starts): by unknowns that act
+    through the first states alone.
     """
     S = ca.SX.sym("S", x.numel(), theta.numel() + of_starts)
     moved = ca.jacobian(following, x) @ S

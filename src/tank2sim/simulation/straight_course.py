@@ -16,10 +16,7 @@ from tank2sim.errors import InputError
 class OperatingPoint:
     """Operating point of a linearisation.
 
-    Parameters
-    ----------
-    x, u, p : arrays (nx,), (nu,), (np,)
-        States, inputs and parameters of the model.
+    `x`, `u`, `p` (nx,), (nu,), (np,): States, inputs and parameters of the model.
     """
 
     x: Array
@@ -35,19 +32,10 @@ def straight_course(
     For an asymmetric ship (Y0, N0) neither is zero: the rudder angle is the neutral one. The speed is constant,
     independent of the engine.
 
-    Parameters
-    ----------
-    model : Model
-        A ship.
-    speed_mps : float, optional
-        Surge velocity; by default that at the start.
-    inputs, parameters : arrays (nu,), (np,), optional
-        Values that replace the model's.
+    `model`: A ship. `speed_mps`, optional: Surge velocity; by default that at the start. `inputs`, `parameters` (nu,),
+    (np,), optional: Values that replace the model's.
 
-    Raises
-    ------
-    InputError
-        The model is not a ship, or the course does not exist.
+    Raises InputError: The model is not a ship, or the course does not exist.
     """
     if "rudder.angle" not in model:
         raise InputError(

@@ -8,11 +8,12 @@ port (``thrusters.<name>.y`` < 0) that pushes ahead turns the craft to starboard
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tank2sim.dynamics.model import Input, Model, Parameter
 from tank2sim.errors import InputError
-from tank2sim.simulation.running import Running
+from tank2sim.simulation.running import Running, SwitchedManoeuvre, SwitchingPlan
 from tank2sim.units import from_si
 
 SPIN_HEADING = 4 * math.pi
@@ -98,7 +99,7 @@ class StraightRun:
 
 
 @dataclass(frozen=True)
-class DifferenceTurn:
+class DifferenceTurn(SwitchedManoeuvre):
     """Turn from the cruising speed by a difference of revolutions, rad/s, port less starboard.
 
     Half of it is added to the cruising revolutions at one side and taken off at the other; positive turns to starboard.
@@ -115,18 +116,16 @@ class DifferenceTurn:
         """Parameters of the start: those of the model, at the cruising speed."""
         return {}
 
-    def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
-        """Run for `duration` s, or until the heading has changed by :data:`DIFFERENCE_HEADING` (at most 150 L/u0)."""
-        model = running.model
+    def plan(self, model: Model, duration_s: float | None = None) -> SwitchingPlan:
+        """Without a duration until the heading has changed by :data:`DIFFERENCE_HEADING` (at most 150 L/u0)."""
         starts = {command.name: command.start for command in thruster_commands(model)}
         sides = _opposed(model, self.words)
         orders = {name: starts[name] + side * self.difference / 2 for name, side in sides.items()}
-        running.order(_within(model, orders, self.words))
-        _turn_on(running, self.difference, DIFFERENCE_HEADING, ship_time, duration)
+        return _turned(_within(model, orders, self.words), self.difference, DIFFERENCE_HEADING, duration_s)
 
 
 @dataclass(frozen=True)
-class Spin:
+class Spin(SwitchedManoeuvre):
     """From rest, port thrusters at `revolutions` (rad/s) and those at starboard at as many astern; + to starboard."""
 
     revolutions: float
@@ -140,21 +139,17 @@ class Spin:
         """Parameters of the start."""
         return _at_rest(model)
 
-    def drive(self, running: Running, ship_time: float, duration: float | None) -> None:
-        """Run for `duration` s, or until the heading has changed by :data:`SPIN_HEADING` (at most 150 L/u0)."""
-        sides = _opposed(running.model, self.words)
-        orders = {name: side * self.revolutions for name, side in sides.items()}
-        running.order(_within(running.model, orders, self.words))
-        _turn_on(running, self.revolutions, SPIN_HEADING, ship_time, duration)
+    def plan(self, model: Model, duration_s: float | None = None) -> SwitchingPlan:
+        """Without a duration until the heading has changed by :data:`SPIN_HEADING` (at most 150 L/u0)."""
+        orders = {name: side * self.revolutions for name, side in _opposed(model, self.words).items()}
+        return _turned(_within(model, orders, self.words), self.revolutions, SPIN_HEADING, duration_s)
 
 
-def _turn_on(running: Running, order: float, heading: float, ship_time: float, duration: float | None) -> None:
-    if duration is not None:
-        running.run(duration)
-        return
+def _turned(orders: Mapping[str, float], order: float, heading: float, duration_s: float | None) -> SwitchingPlan:
+    """Orders until the heading has changed to the side of one of them."""
     side = math.copysign(1.0, order)
-    goal = running.state("motion.psi") + side * heading
-    running.run_until("motion.psi", goal, rising=side > 0, at_most=_LONGEST_LENGTHS * ship_time)
+    changes = 1 if duration_s is None else 0
+    return SwitchingPlan((orders, orders), "motion.psi", 2 * (side * heading,), side, changes, _LONGEST_LENGTHS)
 
 
 ThrusterManoeuvre = StraightRun | DifferenceTurn | Spin

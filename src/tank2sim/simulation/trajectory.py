@@ -9,6 +9,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
@@ -18,26 +19,74 @@ TIMES_BEYOND = 10.0
 """Factor on the extent of a unit beyond which a state is meaningless. Project choice: no manoeuvre reaches the extent
 itself. FMUs use the same number."""
 
+_TRIES, _ROUNDED = 60, 1e-14
+"""Most tries in the search of a crossing, by Newton's method or by halving where that leaves the step; and the change,
+in steps, below which it ends, less than the rounding of times (project choices)."""
+
 _MOST_STEPS = 200
 """Each step at least halves the interval; 200 steps exceed the number of bits of a double. Project choice."""
+
+
+@dataclass(frozen=True, eq=False)
+class EventSamples:
+    """EventSamples about events, two before and two after each: their times (..., 4), s, and any signal (..., 4) then.
+
+    A sample before the start or after the end of a run is nan.
+    """
+
+    t: Array
+    signal: Callable[[str], Array]
+
+    def crossing(self, name: str, rate: str, level: float | Array) -> Array:
+        """Times (...) at which a signal crosses a level (...) between the middle two samples.
+
+        There it is the Hermite cubic by its values and those of its time derivative `rate`.
+        """
+        times, slope = self.t, self.signal(rate)
+        offset = self.signal(name) - np.asarray(level)[..., None]
+        begin, step = times[..., 1], times[..., 2] - times[..., 1]
+        low, high = offset[..., 1], offset[..., 2]
+        below, near = low < 0, _ROUNDED * step
+        before, after = np.zeros_like(step), step.copy()
+        with np.errstate(invalid="ignore", divide="ignore"):
+            rise = (high - low) / step
+            square = (3 * rise - 2 * slope[..., 1] - slope[..., 2]) / step
+            cube = (slope[..., 1] + slope[..., 2] - 2 * rise) / step**2
+            root = low * step / (low - high)
+            for _ in range(_TRIES):
+                value = low + root * (slope[..., 1] + root * (square + root * cube))
+                same = (value < 0) == below
+                before, after = np.where(same, root, before), np.where(same, after, root)
+                moved = root - value / (slope[..., 1] + root * (2 * square + 3 * root * cube))
+                moved = np.where((moved > before) & (moved < after) | (value == 0), moved, (before + after) / 2)
+                change, root = np.abs(moved - root), moved
+                if not (change > near).any():
+                    break
+        found: Array = begin + root
+        return found
+
+    def at(self, name: str, times: Array) -> Array:
+        """A signal (...) at `times` (...): the polynomial through the samples that are not nan."""
+        values, known = self.signal(name), np.isfinite(self.t)
+        found = np.zeros(times.shape)
+        for k in range(self.t.shape[-1]):
+            weight = np.ones(times.shape)
+            for other in range(self.t.shape[-1]):
+                if other != k:
+                    with np.errstate(invalid="ignore", divide="ignore"):
+                        factor = (times - self.t[..., other]) / (self.t[..., k] - self.t[..., other])
+                    weight = weight * np.where(known[..., other], factor, 1.0)
+            with np.errstate(invalid="ignore"):
+                found += np.where(known[..., k], weight * values[..., k], 0.0)
+        return np.where(np.isfinite(times), found, np.nan)
 
 
 @dataclass(frozen=True)
 class Trajectory:
     """A simulated motion, sampled at every integration step and at every event.
 
-    Parameters
-    ----------
-    model : Model
-        The simulated model.
-    t : array (n,)
-        Time, s, rising.
-    x : array (n, nx)
-        States.
-    u : array (n, nu)
-        Inputs; a row is valid from its time until the next.
-    y : array (n, ny)
-        Outputs.
+    `model`: The simulated model. `t` (n,): Time, s, rising. `x` (n, nx): States. `u` (n, nu): Inputs; a row is valid
+    from its time until the next. `y` (n, ny): Outputs.
     """
 
     model: Model
@@ -57,26 +106,34 @@ class Trajectory:
         parts = (model.input_names, self.u), (model.state_names, self.x), (model.outputs, self.y)
         return {name: values[:, place] for names, values in parts for place, name in enumerate(names)}
 
+    def samples(self, rows: NDArray[np.intp]) -> EventSamples:
+        """The samples about k gaps, each between a row and the next."""
+        places = rows[:, None] + np.arange(-1, 3)
+        known, held = (places >= 0) & (places < len(self.t)), np.clip(places, 0, len(self.t) - 1)
+        return EventSamples(
+            np.where(known, self.t[held], np.nan), lambda name: np.where(known, self[name][held], np.nan)
+        )
+
+    def gap(self, times: Array) -> NDArray[np.intp]:
+        """Rows (k,) of the samples before times (k,), s."""
+        return np.searchsorted(self.t, times) - 1
+
     def at(self, name: str, time: float) -> float:
         """A signal at a time between samples: a cubic through the four around it."""
-        after = int(np.searchsorted(self.t, time))
-        near = slice(max(after - 2, 0), min(after, len(self.t) - 2) + 2)
-        return _through(self.t[near].tolist(), self[name][near].tolist(), time)
+        times = np.array([time])
+        return float(self.samples(self.gap(times)).at(name, times)[0])
 
     def crossings(self, name: str, rate: str, level: float) -> Array:
         """Times at which a signal crosses a level, from its values and those of its time derivative `rate`.
 
         Between samples it is the Hermite cubic, whose error is of fourth order in their distance.
         """
-        offset, slope = self[name] - level, self[rate]
-        before = np.flatnonzero((offset[:-1] < 0) != (offset[1:] < 0))
-        times = [
-            bracketed_root(
-                _hermite(*(p[k : k + 2].tolist() for p in (self.t, offset, slope))), self.t[k], self.t[k + 1]
-            )
-            for k in before
-        ]
-        return np.array(times)
+        return self.samples(self.rows_before(name, level)).crossing(name, rate, level)
+
+    def rows_before(self, name: str, level: float) -> NDArray[np.intp]:
+        """Rows (k,) after which a signal crosses a level."""
+        below = self[name] - level < 0
+        return np.flatnonzero(below[:-1] != below[1:])
 
     def columns(self) -> dict[str, Array]:
         """All signals by name, inputs first; time as ``time``."""
@@ -90,40 +147,13 @@ class Trajectory:
         return bool(np.all(np.abs(self.x) <= largest) and np.isfinite(self.y).all())
 
 
-def _through(times: list[float], values: list[float], time: float) -> float:
-    """Value at a time of the polynomial through a few points (Neville)."""
-    for order in range(1, len(times)):
-        for k in range(len(times) - order):
-            before, after = time - times[k], times[k + order] - time
-            values[k] = (after * values[k] + before * values[k + 1]) / (before + after)
-    return values[0]
-
-
-def _hermite(times: list[float], values: list[float], slopes: list[float]) -> Callable[[float], float]:
-    """The cubic with these values and slopes at two times."""
-    length = times[1] - times[0]
-    rise = (values[1] - values[0]) / length
-    square = (3 * rise - 2 * slopes[0] - slopes[1]) / length
-    cube = (slopes[0] + slopes[1] - 2 * rise) / length**2
-
-    def cubic(time: float) -> float:
-        s = time - times[0]
-        # Exact at the far end, too: a root lies between values of different signs.
-        return values[1] if time == times[1] else values[0] + s * (slopes[0] + s * (square + s * cube))
-
-    return cubic
-
-
 def bracketed_root(function: Callable[[float], float], low: float, high: float, tolerance: float = 1e-13) -> float:
     """The x between `low` and `high` at which a continuous function is zero, to `tolerance` in x.
 
     Method of Ridders (1979, IEEE Trans. Circuits Syst. 26, 979). ``scipy.optimize.ridder`` is equivalent, but its
     import takes a third of a second, half of a short simulation.
 
-    Raises
-    ------
-    ValueError
-        The function has the same sign at both ends.
+    Raises ValueError: The function has the same sign at both ends.
     """
     at_low, at_high = function(low), function(high)
     for x, value in ((low, at_low), (high, at_high)):

@@ -44,15 +44,9 @@ ASTRAY = 0.2
 class FittedZigzag:
     """A zigzag as it fits the reversals of a record.
 
-    Parameters
-    ----------
-    manoeuvre : Zigzag
-    errors : dict
-        Standard errors of the fit: ``heading_rad``, ``course_rad``, ``lag_s``.
-    reading_errors : dict
-        Standard errors of figures by that of the course and of the reversals: rad for overshoots, s for times.
-    late_by : array (k,)
-        Heading beyond the manoeuvre's at which each reversal was made, rad: 0 for a controller, a helmsman's scatter.
+    `errors`: Standard errors of the fit: ``heading_rad``, ``course_rad``, ``lag_s``. `reading_errors`: Standard errors
+    of figures by that of the course and of the reversals: rad for overshoots, s for times. `late_by` (k,): Heading
+    beyond the manoeuvre's at which each reversal was made, rad: 0 for a controller, a helmsman's scatter.
     """
 
     manoeuvre: Zigzag
@@ -63,10 +57,7 @@ class FittedZigzag:
     def from_reversals(self, figures: Figures) -> Figures:
         """Figures with overshoots beyond the heading of their reversal in place of the manoeuvre's.
 
-        Parameters
-        ----------
-        figures : Figures
-            Overshoots in deg.
+        `figures`: Overshoots in deg.
         """
         overshoots = figures["overshoots_deg"]
         assert isinstance(overshoots, list)
@@ -85,18 +76,8 @@ def fitted_zigzag(
     the lag. The nominal heading is then that of a usual zigzag, if one agrees. Sides that disagree (:func:`_sides`)
     have a heading each, counted from the course of the approach.
 
-    Parameters
-    ----------
-    time : array (n,)
-        s.
-    held : list of HeldAngle
-        Angles of the rudder, to alternating sides.
-    smooth : dict
-        Smoothed ``psi_rad`` and ``r_radps`` (n,).
-    noise : float
-        Standard deviation of the smoothed heading, rad.
-    ship_time : float
-        L/u0, s.
+    `time` (n,): s. `held`: Angles of the rudder, to alternating sides. `smooth`: Smoothed ``psi_rad`` and ``r_radps``
+    (n,). `noise`: Standard deviation of the smoothed heading, rad. `ship_time`: L/u0, s.
     """
     times = np.array([each_angle.execute_s for each_angle in held[1:]])
     sides = np.array([math.copysign(1.0, each_angle.angle) for each_angle in held[:-1]])
@@ -147,16 +128,8 @@ class _Fit:
 class _Reversals:
     """Least-squares problem of the reversals of a zigzag.
 
-    Parameters
-    ----------
-    time, heading : array (n,)
-        s, rad.
-    times, sides : array (k,)
-        Time of each reversal's order, and the side of the rudder before it.
-    approach : (float, float)
-        Course by the approach, and its standard error, rad.
-    lag_scale : float
-        Prior scale of lags, s.
+    `time`, `heading` (n,): s, rad. `times`, `sides` (k,): Time of each reversal's order, and the side of the rudder
+    before it. `approach`: Course by the approach, and its standard error, rad. `lag_scale`: Prior scale of lags, s.
     """
 
     time: Array

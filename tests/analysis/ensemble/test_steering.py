@@ -28,7 +28,7 @@ MEMBERS = 6
 
 def grid_of(card: ManoeuvringCard) -> Grid:
     model = build(card)
-    return Grid.of(model, steering_responses(model, straight_course(model), stability(model).nomoto)[0])
+    return Grid.of(model, steering_responses(model, straight_course(model), stability(model).nomoto.dimensional)[0])
 
 
 @pytest.fixture(scope="module", params=["mariner", pytest.param("kvlcc2-captive", marks=pytest.mark.slow)])

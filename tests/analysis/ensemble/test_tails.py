@@ -11,7 +11,7 @@ from scipy.stats import norm
 
 from tank2sim.analysis.ensemble.questions import BEYOND_CARD_MARK
 from tank2sim.analysis.ensemble.tails import EFFECTIVE, FEW_FAILING, tails
-from tank2sim.simulation.ensemble import AskTogether, BatchResult, Draws, MixtureDraws, ensemble
+from tank2sim.simulation.ensemble import Ask, BatchResult, Draws, MixtureDraws, ensemble
 
 SLOPES = np.array([3.0, -2.0, 0.5, 0.0, 1.0])
 
@@ -26,7 +26,7 @@ class Made:
     missing: float = math.inf
     broken: float = math.inf
 
-    def prepared(self) -> AskTogether:
+    def prepared(self) -> Ask:
         def ask(count, values, kept) -> BatchResult:
             x = np.array([values[f"x{k}"] for k in range(5)])
             a = SLOPES @ x
@@ -36,7 +36,7 @@ class Made:
                 figures[figure + BEYOND_CARD_MARK] = (figures[figure] > 5.0).astype(float)
             return BatchResult(figures, None, ["broken" if number > self.broken else "" for number in x[2]])
 
-        return AskTogether(ask)
+        return ask
 
 
 def draws(*, correlated: bool = False, lowest: float = -np.inf) -> Draws:
@@ -159,5 +159,5 @@ def test_weights_are_ratios_of_normal_densities() -> None:
         for row in z
     ]
     assert np.log(mixture.weights(z)) == pytest.approx(ratio, rel=1e-12)
-    drawn = np.array([mixture.drawn(number).standard for number in range(4000)])
+    drawn = mixture.members(0, 4000).standard
     assert drawn.mean(axis=0) == pytest.approx(0.7 * centres[1], abs=0.08)

@@ -80,7 +80,7 @@ def test_the_integral_takes_no_more_than_its_band() -> None:
 
 def test_the_autopilot_of_a_ship_is_of_its_nomoto_model_and_gear(mariner: Model) -> None:
     made = {one.name: one.start for one in heading_autopilot(mariner).parameters}
-    gains = heading_gains(stability(mariner).nomoto)
+    gains = heading_gains(stability(mariner).nomoto.dimensional)
     assert made["autopilot.Kp"] == gains.proportional == pytest.approx(1 + 2 * DAMPING * SLOWNESS)
     assert made["autopilot.Kd"] == gains.derivative
     assert math.degrees(made["autopilot.max_rudder"]) == pytest.approx(35.0)  # the gear of the card goes to 40

@@ -45,9 +45,9 @@ def kvlcc2() -> Model:
 def test_the_poles_of_a_pd_are_where_they_were_placed(mariner: Model, K: float, T: float, unstable: bool) -> None:
     K, T = (-K, -T) if unstable else (K, T)
     found, w = stability(mariner), math.sqrt(K / T)
-    object.__setattr__(found, "nomoto", Nomoto(K, T, None, None, 0.0))
+    object.__setattr__(found.nomoto, "dimensional", Nomoto(K, T, None, None, 0.0))
     plant = SteeringPlant(found, w, np.zeros((4, 4)), np.zeros((4, 1)), 0.6, 0.1)
-    gains = _without_integral(plant, heading_gains(found.nomoto))
+    gains = _without_integral(plant, heading_gains(found.nomoto.dimensional))
     # psi' = r, T r' = -r - K (Kp psi + Kd r)
     loop = [[0, 1], [-K * gains.proportional / T, -(1 + K * gains.derivative) / T]]
     wanted = np.roots([1, 2 * DAMPING * w, w**2])
@@ -86,7 +86,7 @@ def test_the_loop_of_the_regulator_has_the_poles_of_the_regulator_and_of_its_obs
 @pytest.mark.parametrize("kind", ["pd", "pid", "lqr"])
 def test_a_ship_that_is_unstable_is_held_on_her_course(kvlcc2: Model, kind: str) -> None:
     design = design_heading(kvlcc2, kind)
-    assert not design.found.stable
+    assert not design.found.stability_criterion.stable
     margins = loop_margins(kvlcc2, design.autopilot)
     assert margins.stable
     assert 0 < margins.gain_margin_down < 0.5  # with too little gain she goes her own way
@@ -101,7 +101,7 @@ def test_the_robust_loop_is_robust_and_no_mode_of_it_is_slower_than_asked(name: 
     margins = loop_margins(ship, design.autopilot)
     assert margins.sensitivity_peak < 1.7
     assert margins.phase_margin_deg > 38
-    w = math.sqrt(design.found.nomoto.K_per_s / design.found.nomoto.T_s)
+    w = math.sqrt(design.found.nomoto.dimensional.K_per_s / design.found.nomoto.dimensional.T_s)
     assert max(pole.real for pole in margins.poles) < -0.99 * POLE_SHIFT * w
 
 

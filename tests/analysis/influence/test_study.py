@@ -96,8 +96,16 @@ def test_linear_figures_are_those_of_the_stability_analysis(ship) -> None:
     card = read_card(ship)
     found = study_of(card, "K_per_s", "T_s", "T1_s", "T2_s", "T3_s", "T_prime", "criterion_C").base
     known = stability(build(card))
-    own = known.nomoto
-    wanted = [own.K_per_s, own.T_s, own.T1_s, own.T2_s, own.T3_s, known.nomoto_prime.T_prime, known.criterion]
+    own = known.nomoto.dimensional
+    wanted = [
+        own.K_per_s,
+        own.T_s,
+        own.T1_s,
+        own.T2_s,
+        own.T3_s,
+        known.nomoto.prime.T_prime,
+        known.stability_criterion.C_prime,
+    ]
     assert found == pytest.approx(wanted, rel=1e-9)
 
 

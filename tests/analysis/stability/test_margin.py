@@ -47,7 +47,9 @@ def test_sensitivities_are_those_of_finite_differences_of_the_whole_analysis(nam
     value = card.derivatives[name]
     step = 1e-4 * abs(value)
     ends = [
-        stability(build(read_card("mariner", {f"derivatives.{name}": value + side * step})), 6.0).criterion
+        stability(
+            build(read_card("mariner", {f"derivatives.{name}": value + side * step})), 6.0
+        ).stability_criterion.C_prime
         for side in (1, -1)
     ]
     slope = next((one.slope for one in found.derivatives if one.short_name == name), None)
@@ -65,7 +67,7 @@ def test_a_ship_with_the_neutral_value_is_neutral() -> None:
     for name in ("Nr", "Nv", "Yr"):
         neutral = influence(found, name).neutral_value
         there = stability(build(read_card("kvlcc2-captive", {f"derivatives.{name}": neutral})))
-        assert abs(there.criterion) < 1e-7 * abs(found.C_prime)
+        assert abs(there.stability_criterion.C_prime) < 1e-7 * abs(found.C_prime)
 
 
 def test_the_curve_over_speed_is_the_analysis_at_each_speed(mariner) -> None:
@@ -73,7 +75,7 @@ def test_the_curve_over_speed_is_the_analysis_at_each_speed(mariner) -> None:
     assert found is not None
     for row in (6, 12, 24):
         there = stability(mariner, float(found.speed_mps[row]))
-        assert found.C_prime[row] == pytest.approx(there.criterion, rel=1e-3)  # U there, u here
+        assert found.C_prime[row] == pytest.approx(there.stability_criterion.C_prime, rel=1e-3)  # U there, u here
     slope = (found.C_prime[13] - found.C_prime[11]) / (found.speed_mps[13] - found.speed_mps[11])
     assert found.slope_s_per_m[12] == pytest.approx(slope, rel=0.02)
 

@@ -8,7 +8,7 @@ from tank2sim.analysis.linearisation import jacobians, state_space, straight_cou
 from tank2sim.analysis.stability.imo import imo_criteria
 from tank2sim.analysis.stability.margin import stability_margin
 from tank2sim.analysis.stability.response import steering_responses
-from tank2sim.analysis.stability.straight_line import nomoto, stability
+from tank2sim.analysis.stability.straight_line import nomoto, stability, steering_modes
 from tank2sim.cards import linear_card, parse_card, read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
@@ -20,21 +20,21 @@ from tests.analysis.symmetric_ship import SYMMETRIC
 def test_the_mariner_is_stable_with_the_criterion_computed_by_hand() -> None:
     """C' = Y_v N_r - N_v Y_r of the printed numbers, which contain the inertia terms."""
     found = stability(build(read_card("mariner", SYMMETRIC)))
-    assert found.criterion == pytest.approx(1160e-5 * 166e-5 - 264e-5 * 499e-5, rel=1e-9)
-    assert found.stable and all(value.real < 0 for value in found.eigenvalues)
+    assert found.stability_criterion.C_prime == pytest.approx(1160e-5 * 166e-5 - 264e-5 * 499e-5, rel=1e-9)
+    assert found.stability_criterion.stable and all(value.real < 0 for value in found.eigenvalues)
 
 
 @pytest.mark.slow
 def test_reading_the_printed_yaw_terms_as_bare_derivatives_makes_the_stable_mariner_unstable() -> None:
     """The trap: Y_r, N_r, X_vr, X_rr as printed already contain the inertia terms."""
     trapped = stability(build(read_card("mariner", {"model.yaw_rate_terms": "hydrodynamic"})))
-    assert not trapped.stable and trapped.eigenvalues[0].real > 0
-    assert stability(build(read_card("mariner"))).stable
+    assert not trapped.stability_criterion.stable and trapped.eigenvalues[0].real > 0
+    assert stability(build(read_card("mariner"))).stability_criterion.stable
 
 
 def test_nomoto_of_the_mariner_is_that_of_the_literature() -> None:
     """K' = 3.86, T1' = 5.66, T2' = 0.38, T3' = 0.89 (Chislett and Strom-Tejsen, as in Fossen 1994, table 5.1)."""
-    found = stability(build(read_card("mariner", SYMMETRIC))).nomoto_prime
+    found = stability(build(read_card("mariner", SYMMETRIC))).nomoto.prime
     assert found.K_prime == pytest.approx(3.86, abs=0.01)
     assert found.T1_prime == pytest.approx(5.66, abs=0.01)
     assert found.T2_prime == pytest.approx(0.38, abs=0.01)
@@ -66,7 +66,7 @@ def test_a_small_rudder_step_settles_at_nomotos_gain(mariner) -> None:
     start = {"initial.v": at["motion.v"], "initial.rudder_angle": at["rudder.angle"]}
     running = Running(Integrator(mariner), {"rudder.command": at["rudder.angle"] + small}, start)
     running.run(100.0)
-    found = stability(mariner).nomoto
+    found = stability(mariner).nomoto.dimensional
     rise = 1 - (found.T1_s - found.T3_s) / (found.T1_s - found.T2_s) * np.exp(-100.0 / found.T1_s)
     # the steering gear delays by its time constant of 1 s
     assert running.state("motion.r") / small == pytest.approx(found.K_per_s * rise, rel=0.02)
@@ -95,7 +95,7 @@ def test_a_straight_course_is_straight_also_for_an_asymmetric_ship(mariner) -> N
 def test_linear_and_third_order_models_agree_at_the_speed_of_expansion() -> None:
     card = read_card("mariner", SYMMETRIC)
     third, first = stability(build(card)), stability(build(linear_card(card)))
-    assert first.criterion == pytest.approx(third.criterion)
+    assert first.stability_criterion.C_prime == pytest.approx(third.stability_criterion.C_prime)
     np.testing.assert_allclose(first.eigenvalues, third.eigenvalues, rtol=1e-9)
 
 
@@ -158,15 +158,20 @@ def test_a_trial_that_cannot_be_run_leaves_its_criteria_open_with_the_reason() -
 def test_a_neutral_ship_has_a_gain_without_end() -> None:
     changed = {"model.kind": "linear", "derivatives.Nv": 0.0, "derivatives.Nr": 0.0}
     found = stability(build(read_card("mariner", changed)))
-    assert found.criterion == 0.0 and not found.stable and not np.isfinite(found.nomoto.K_per_s)
+    assert (
+        found.stability_criterion.C_prime == 0.0
+        and not found.stability_criterion.stable
+        and not np.isfinite(found.nomoto.dimensional.K_per_s)
+    )
 
 
 def test_a_ship_whose_modes_both_grow_is_not_called_stable() -> None:
     """C' > 0 is necessary, not sufficient: with positive Y_v and N_r both modes of sway and yaw grow."""
     changed = {"model.kind": "linear", "derivatives.Nv": 0.0, "derivatives.Yv": 0.0005, "derivatives.Nr": 0.0001}
-    found = stability(build(read_card("mariner", changed)))
-    assert found.criterion > 0 and any(mode.real > 0 for mode in found.steering_modes)
-    assert not found.stable
+    model = build(read_card("mariner", changed))
+    found, modes = stability(model), steering_modes(model, straight_course(model))
+    assert found.stability_criterion.C_prime > 0 and any(mode.real > 0 for mode in modes)
+    assert not found.stability_criterion.stable
 
 
 @pytest.mark.slow
@@ -181,8 +186,10 @@ def test_a_flow_with_memory_changes_no_slow_motion() -> None:
     effect = "\n[[effects]]\nname = 'flow_memory'\n[effects.parameters]\nshare = 0.3\ntime_constant_s = 8.0\n"
     with_memory = stability(build(parse_card(card.text + effect, "memory.toml")))
     without = stability(build(card))
-    assert with_memory.criterion == pytest.approx(without.criterion, rel=0.02)  # about a slightly other course
-    assert with_memory.nomoto.K_per_s == pytest.approx(without.nomoto.K_per_s, rel=0.02)
+    assert with_memory.stability_criterion.C_prime == pytest.approx(
+        without.stability_criterion.C_prime, rel=0.02
+    )  # about a slightly other course
+    assert with_memory.nomoto.dimensional.K_per_s == pytest.approx(without.nomoto.dimensional.K_per_s, rel=0.02)
 
 
 def test_settled_states_are_those_of_the_slow_limit() -> None:
@@ -218,15 +225,22 @@ def test_a_ship_whose_roll_grows_is_unstable_whatever_her_slow_motions_say(rolli
     motion = [f"motion.{one}" for one in ("u", "v", "r", "phi", "p")]
     truth = np.linalg.eigvals(state_space(rolling, point, states=motion).A)
     np.testing.assert_allclose(np.sort_complex(found.eigenvalues), np.sort_complex(truth), rtol=1e-9)
-    assert found.growth_per_s == pytest.approx(0.0171, abs=1e-4)
-    assert found.criterion > 0 and not found.stable and not found.criterion_decides
-    assert found.effect_states == ("motion.phi", "motion.p")
+    assert found.stability_criterion.growth_per_s == pytest.approx(0.0171, abs=1e-4)
+    assert (
+        found.stability_criterion.C_prime > 0
+        and not found.stability_criterion.stable
+        and not found.stability_criterion.C_prime_decides
+    )
+    assert found.stability_criterion.settled_states == ("motion.phi", "motion.p")
 
 
 def test_the_step_of_the_whole_system_grows_with_the_roll(rolling) -> None:
     found = stability(rolling)
-    hull, gear, _ = steering_responses(rolling, straight_course(rolling), found.nomoto)
-    assert hull.poles.real.max() == pytest.approx(found.growth_per_s, rel=1e-2) and len(hull.poles) == 4
+    hull, gear, _ = steering_responses(rolling, straight_course(rolling), found.nomoto.dimensional)
+    assert (
+        hull.poles.real.max() == pytest.approx(found.stability_criterion.growth_per_s, rel=1e-2)
+        and len(hull.poles) == 4
+    )
     assert len(gear.poles) == 5  # the gear besides
     crossings = np.diff(np.sign(np.diff(hull.step_per_s)))
     # at least eight samples from one turn of the curve to the next
@@ -239,31 +253,37 @@ def test_the_flows_memory_is_among_the_modes() -> None:
     """Eigenvalues of the matrix written by hand: v in Y_v v and N_v v is v - share (v - z), dz/dt = (v - z)/tau."""
     share, tau = 0.5, 20.0
     linear_ship = {"model.kind": "linear", **SYMMETRIC}
-    found = stability(with_effect("flow_memory", {"share": share, "time_constant_s": tau}, linear_ship))
+    ship = with_effect("flow_memory", {"share": share, "time_constant_s": tau}, linear_ship)
+    found, modes = stability(ship), steering_modes(ship, straight_course(ship))
     bare = build(read_card("mariner", linear_ship))
     A = state_space(bare, straight_course(bare), states=["motion.v", "motion.r"]).A
     late = share * A[:, :1]
     whole = np.block([[A - np.hstack([late, np.zeros((2, 1))]), late], [np.array([[1 / tau, 0.0, -1 / tau]])]])
-    np.testing.assert_allclose(np.sort(np.real(found.steering_modes)), np.sort(np.linalg.eigvals(whole)), rtol=1e-9)
-    assert found.stable and found.criterion == pytest.approx(stability(bare).criterion)
+    np.testing.assert_allclose(np.sort(np.real(modes)), np.sort(np.linalg.eigvals(whole)), rtol=1e-9)
+    assert found.stability_criterion.stable and found.stability_criterion.C_prime == pytest.approx(
+        stability(bare).stability_criterion.C_prime
+    )
 
 
 def test_an_engine_that_lags_is_no_state_that_answers_to_sway_and_yaw() -> None:
     card = read_card(
         "esso-osaka-estimated", {"effects": [{"name": "engine_lag", "parameters": {"time_constant_s": 2.0}}]}
     )
-    assert stability(build(card)).effect_states == ()
+    assert stability(build(card)).stability_criterion.settled_states == ()
 
 
 def test_a_linear_card_is_that_of_its_own_speed_alone() -> None:
     model = build(read_card("mariner", {"model.kind": "linear", **SYMMETRIC}))
     own, other = stability(model), stability(model, 5.4)
-    assert own.criterion == pytest.approx(1160e-5 * 166e-5 - 264e-5 * 499e-5, rel=1e-9)
-    assert other.criterion == pytest.approx(own.criterion) and other.nomoto_prime == own.nomoto_prime
+    assert own.stability_criterion.C_prime == pytest.approx(1160e-5 * 166e-5 - 264e-5 * 499e-5, rel=1e-9)
+    assert (
+        other.stability_criterion.C_prime == pytest.approx(own.stability_criterion.C_prime)
+        and other.nomoto.prime == own.nomoto.prime
+    )
     margin = stability_margin(model, 5.4)
-    assert margin.C_prime == pytest.approx(own.criterion) and margin.speed is None
+    assert margin.C_prime == pytest.approx(own.stability_criterion.C_prime) and margin.speed is None
     third = build(read_card("mariner", SYMMETRIC))
-    assert stability(third, 5.4).criterion < 0.5 * stability(third).criterion
+    assert stability(third, 5.4).stability_criterion.C_prime < 0.5 * stability(third).stability_criterion.C_prime
 
 
 def test_a_ship_that_sway_does_not_push_is_reported_so() -> None:

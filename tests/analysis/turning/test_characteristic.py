@@ -18,12 +18,12 @@ from tests.analysis.turning.cubic_ship import LENGTH_M, N_D, N_RRR, SPEED_MPS, S
 
 
 def responses(model):
-    found = steering_responses(model, straight_course(model), stability(model).nomoto)
+    found = steering_responses(model, straight_course(model), stability(model).nomoto.dimensional)
     return {one.label: one for one in found}
 
 
 def test_the_response_is_that_of_nomotos_transfer_function(mariner) -> None:
-    found, nomoto = responses(mariner), stability(mariner).nomoto
+    found, nomoto = responses(mariner), stability(mariner).nomoto.dimensional
     s = control.tf("s")
     system = nomoto.K_per_s * (1 + nomoto.T3_s * s) / ((1 + nomoto.T1_s * s) * (1 + nomoto.T2_s * s))
     hull = found[HULL]
@@ -53,7 +53,7 @@ def test_norrbin_and_bech_of_a_cubic_ship_are_her_own_coefficients(N_r: float) -
         found.norrbin.coefficients, [0, math.copysign(1, b1), 0, b3 / abs(b1)], rtol=1e-5, atol=1e-5
     )
     assert found.bech.error.largest_deg < 1e-3 and found.norrbin.error.largest_beyond_fit_deg < 1e-3
-    assert found.norrbin.K_per_s == pytest.approx(abs(stability(model).nomoto.K_per_s), rel=1e-6)
+    assert found.norrbin.K_per_s == pytest.approx(abs(stability(model).nomoto.dimensional.K_per_s), rel=1e-6)
 
 
 def test_the_error_of_a_cubic_is_reported_where_a_ship_is_none(mariner) -> None:
@@ -68,7 +68,7 @@ def test_the_error_of_a_cubic_is_reported_where_a_ship_is_none(mariner) -> None:
 def test_spirals_lie_on_the_diagram_the_reverse_one_on_its_unstable_branch_too() -> None:
     model = cubic_ship(UNSTABLE)
     turning = steady_turning(model)
-    direct, reverse = direct_spiral(model, turning), reverse_spiral(model, turning, stability(model).nomoto)
+    direct, reverse = direct_spiral(model, turning), reverse_spiral(model, turning, stability(model).nomoto.dimensional)
     assert reverse is not None and turning.loop is not None
     rate = abs(math.degrees(turning.folds[0].yaw_rate_radps))
     steady, reverse_steady = np.array(direct.steady), np.array(reverse.steady)

@@ -126,7 +126,7 @@ def test_a_symmetric_ship_turns_alike_to_both_sides() -> None:
 def test_the_straight_course_of_the_diagram_is_stable_where_the_criterion_says_so(mariner) -> None:
     for model in (mariner, build(read_card("kvlcc2-captive"))):
         found = steady_turning(model)
-        assert bool(found.stable[found.straight]) == stability(model).stable
+        assert bool(found.stable[found.straight]) == stability(model).stability_criterion.stable
         assert abs(found.yaw_rate_radps[found.straight]) < 1e-12
 
 

@@ -25,10 +25,7 @@ def draws_of(card: SteeredCard, seed: int) -> tuple[Draws, list[Notice]]:
 
     Numbers in the card's covariance are correlated; all other numbers are independent, with their standard errors.
 
-    Raises
-    ------
-    InputError
-        The covariance to which the card refers has an error.
+    Raises InputError: The covariance to which the card refers has an error.
     """
     errors = joint_errors(card, card_parameters(card, study_model(card)))
     return draws_with(errors, seed), errors.in_words

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from tank2sim.analysis.influence.figures import TURN, ZIGZAG, InfluenceFigure, parse_figure
 from tank2sim.analysis.stability.imo import (
-    TRACK_REACH,
     imo_criteria,
     largest_trial_rudder,
     manoeuvring_trials,
@@ -27,7 +26,7 @@ from tank2sim.dynamics.ship import mass_fault, mass_faults
 from tank2sim.errors import InputError
 from tank2sim.native.lanes import NoLanesError
 from tank2sim.simulation.card_range import Numbers, single_figures
-from tank2sim.simulation.ensemble import BATCH, Ask, AskTogether, BatchResult, Draws, MemberResult, gathered
+from tank2sim.simulation.ensemble import BATCH, Ask, BatchResult, Draws, MemberResult, each_alone
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.lane_figures import USUAL_PACE, LaneFigures, LaneManoeuvre, LaneManoeuvres, Pace, runs_in_lanes
 from tank2sim.simulation.manoeuvres import Manoeuvre, SpiralManoeuvre, Stop, Turn, Zigzag
@@ -35,8 +34,6 @@ from tank2sim.simulation.run import simulate
 from tank2sim.simulation.running import RUNAWAY
 from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, StraightRun
 from tank2sim.units import from_si
-
-AskOne = Callable[[Mapping[str, float]], MemberResult]
 
 ENSEMBLE_SIGNALS: Mapping[str, tuple[str, float]] = {
     "x_m": ("motion.x", 1.0),
@@ -111,16 +108,16 @@ class OfManoeuvre:
         """Members of a batch."""
         return LANE_BATCH if runs_in_lanes(self.manoeuvre, self.duration_s) else BATCH
 
-    def prepared(self) -> Ask | AskTogether:
+    def prepared(self) -> Ask:
         """See :class:`tank2sim.simulation.ensemble.Question`."""
         model = study_model(self.ship.card())
         signals = {name for name, _ in signals_with_bands(model).values()}
         shown = signals <= set(model.state_names)
         if shown and runs_in_lanes(self.manoeuvre, self.duration_s) and (lanes := lanes_of(model)) is not None:
-            return AskTogether(self._in_lanes(self.manoeuvre, model, lanes))
-        return each_ship(self._driven(_reading_off(model, *_READ_OFF.get(type(self.manoeuvre), ()))))
+            return self._in_lanes(self.manoeuvre, model, lanes)
+        return self._driven(_reading_off(model, *_READ_OFF.get(type(self.manoeuvre), ())))
 
-    def _driven(self, model: Model) -> AskOne:
+    def _driven(self, model: Model) -> Ask:
         """Single runs of the members, for a manoeuvre or a model without lanes."""
         integrator, signals = Integrator(model), signals_with_bands(model).values()
 
@@ -132,11 +129,9 @@ class OfManoeuvre:
             sampled = [factor * np.interp(self.times, path.t, path[name], right=np.nan) for name, factor in signals]
             return MemberResult(figures | single_figures(run.figures), np.array(sampled, dtype=np.float32))
 
-        return one_ship(model, run)
+        return each_ship(model, run)
 
-    def _in_lanes(
-        self, manoeuvre: LaneManoeuvre, model: Model, lanes: LaneManoeuvres
-    ) -> Callable[[int, Mapping[str, Array], int], BatchResult]:
+    def _in_lanes(self, manoeuvre: LaneManoeuvre, model: Model, lanes: LaneManoeuvres) -> Ask:
         """Joint runs of the members of a batch."""
         signals = signals_with_bands(model).values()
         rows = [model.state_names.index(name) for name, _ in signals]
@@ -167,7 +162,7 @@ class OfFigures:
 
     batch = LANE_BATCH
 
-    def prepared(self) -> AskTogether:
+    def prepared(self) -> Ask:
         """See :class:`tank2sim.simulation.ensemble.Question`."""
         # It takes python-control with it, slow to load: processes that run manoeuvres do without.
         from tank2sim.analysis.influence.study import Study
@@ -185,7 +180,7 @@ class OfFigures:
             found = one_by_one.figures_at(np.array([given[name] for name in names]))
             return MemberResult(dict(zip([figure.text for figure in one_by_one.figures], found.tolist(), strict=True)))
 
-        ask_one = one_ship(study.model, figures_of)
+        ask_each = each_ship(study.model, figures_of)
 
         def ask(count: int, values: Mapping[str, Array], kept: int) -> BatchResult:
             p, troubles = ships_of(study.model, count, values)
@@ -198,13 +193,12 @@ class OfFigures:
                     if figure.manoeuvre == manoeuvre:
                         found[figure.text] = runs.figures.get(_lane_figure(figure), np.full(count, np.nan))
             if single or not joint:
-                members = _members_of(count, values)
-                answer = gathered([ask_one(member) for member in members])
+                answer = ask_each(count, values, 0)
                 found |= answer.figures
                 troubles = [first or other for first, other in zip(troubles, answer.troubles, strict=True)]
             return _usable({text: found[text] for text in self.figures if text in found}, troubles)
 
-        return AskTogether(ask)
+        return ask
 
 
 BEYOND_CARD_MARK = ": beyond the card"
@@ -222,7 +216,7 @@ class OfCriteria:
 
     batch = LANE_BATCH
 
-    def prepared(self) -> Ask | AskTogether:
+    def prepared(self) -> Ask:
         """See :class:`tank2sim.simulation.ensemble.Question`."""
         whole = build(self.ship.card())
         model = _reading_off(whole, *(name for names in _READ_OFF.values() for name in names))
@@ -238,33 +232,29 @@ class OfCriteria:
                 figures[criterion.name + BEYOND_CARD_MARK] = float(criterion.beyond_card)
             return MemberResult(figures)
 
-        ask_one, lanes = one_ship(model, criteria_of), lanes_of(whole)
+        ask_each, lanes = each_ship(model, criteria_of), lanes_of(whole)
         if lanes is None:
-            return each_ship(ask_one)
-        trials = manoeuvring_trials(largest_trial_rudder(parameters))
+            return ask_each
+        can_stop = "propeller.speed" in model.input_names
+        trials = manoeuvring_trials(largest_trial_rudder(parameters))[: None if can_stop else -1]
 
         def ask(count: int, values: Mapping[str, Array], kept: int) -> BatchResult:
-            members = _members_of(count, values)
             p, troubles = ships_of(model, count, values)
             stops = values.get("steering.max_angle", np.zeros(0))
             rudders = {largest_trial_rudder({"steering.max_angle": stop}) for stop in stops.tolist()}
             if rudders - {largest_trial_rudder(parameters)}:  # the gear's stops are uncertain
-                return gathered([ask_one(member) for member in members])
+                return ask_each(count, values, kept)
             figures: dict[str, Array] = {}
             for trial in trials:
                 sides = [lanes.run(manoeuvre, p, inputs=undisturbed_inputs(model)) for manoeuvre in trial.manoeuvres]
                 for name, figure in trial.criteria.items():
                     shown = [side.figures.get(figure, np.full(count, np.nan)) for side in sides]
-                    figures[name] = np.maximum(*shown)
+                    figures[name] = np.max(shown, axis=0)
                     beyond = np.any([side.outside(figure) for side in sides], axis=0)
                     figures[name + BEYOND_CARD_MARK] = beyond.astype(float)
-            if "propeller.speed" in model.input_names:
-                stopping = lanes.run(Stop(), p, inputs=undisturbed_inputs(model))
-                figures[TRACK_REACH] = stopping.figures["track_reach_lengths"]
-                figures[TRACK_REACH + BEYOND_CARD_MARK] = stopping.outside("track_reach_lengths").astype(float)
             return _usable(figures, troubles)
 
-        return AskTogether(ask)
+        return ask
 
 
 def lanes_of(model: Model) -> LaneManoeuvres | None:
@@ -278,12 +268,6 @@ def lanes_of(model: Model) -> LaneManoeuvres | None:
 def _lane_figure(figure: InfluenceFigure) -> str:
     """Name of a figure of a turning circle or zigzag among those of runs; empty for others."""
     return figure.kind.name if figure.kind.family in (TURN, ZIGZAG) else ""
-
-
-def _members_of(count: int, values: Mapping[str, Array]) -> list[dict[str, float]]:
-    """The parameters of each of n members by name."""
-    columns = [value.tolist() for value in values.values()]
-    return [dict(zip(values, row, strict=True)) for row in zip(*columns, strict=True)] if columns else [{}] * count
 
 
 def _joined(parts: Sequence[tuple[Mapping[str, Array], int]]) -> dict[str, Array]:
@@ -317,8 +301,8 @@ def _with_runaways(troubles: Sequence[str], fine: Sequence[bool] | NDArray[np.bo
     return [trouble or ("" if well else RUNAWAY) for trouble, well in zip(troubles, fine, strict=True)]
 
 
-def one_ship(model: Model, answer: AskOne) -> AskOne:
-    """What is asked of a member: its `answer` to values in place of the model's, or the reason without one."""
+def each_ship(model: Model, answer: Callable[[Mapping[str, float]], MemberResult]) -> Ask:
+    """The members one after the other: the `answer` to values in place of the model's, or the reason without one."""
     defaults = parameters_of(model)
 
     def ask(values: Mapping[str, float]) -> MemberResult:
@@ -329,12 +313,7 @@ def one_ship(model: Model, answer: AskOne) -> AskOne:
         except InputError as error:
             return MemberResult({}, trouble=error.problem)
 
-    return ask
-
-
-def each_ship(ask: AskOne) -> Ask:
-    """The members one after the other, by `ask`."""
-    return lambda members: [ask(values) for values in members]
+    return each_alone(ask)
 
 
 def parameters_of(model: Model) -> dict[str, float]:
@@ -375,12 +354,7 @@ def fastest_pace(question: OfManoeuvre, draws: Draws) -> Pace:
     The result depends on the card, the manoeuvre and the seed alone. It is the usual pace for other manoeuvres and for
     ships without lanes.
 
-    Parameters
-    ----------
-    question : OfManoeuvre
-        The manoeuvre.
-    draws : Draws
-        Draws of the members.
+    `question`: The manoeuvre. `draws`: Draws of the members.
     """
     manoeuvre = question.manoeuvre
     if isinstance(manoeuvre, SpiralManoeuvre) or not runs_in_lanes(manoeuvre, question.duration_s):

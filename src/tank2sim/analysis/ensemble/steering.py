@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tank2sim.analysis.ensemble.questions import ShipText, each_ship, one_ship
+from tank2sim.analysis.ensemble.questions import ShipText, each_ship
 from tank2sim.analysis.linearisation import state_space, straight_course
 from tank2sim.analysis.stability.response import SteeringResponse
 from tank2sim.analysis.stability.straight_line import steering_states
@@ -73,7 +73,7 @@ class OfSteering:
             width = turning.loop.width_deg if turning.loop else 0.0
             return MemberResult({"loop_width_deg": width}, np.array(rows, dtype=np.float32))
 
-        return each_ship(one_ship(model, curves))
+        return each_ship(model, curves)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,14 +134,14 @@ def steering_bands(
     """
     speed, grid = about
     question = OfSteering(ship, speed, grid)
-    (reference,) = question.prepared()([{}])
+    reference = question.prepared()(1, {}, 1)
     found = ensemble(question, draws, min(members, CURVES), executor)
     if found.histories is None or reference.histories is None:
         return None, []
     messages = [notice.of("no steady turns") for notice in found.of_unusable]
     if members > CURVES:
         messages.append(Notice(f"bands of steady turns, Bode diagram and step are of the first {CURVES} members"))
-    bands = [_band(found, row, own.astype(float)) for row, own in enumerate(reference.histories)]
+    bands = [_band(found, row, own.astype(float)) for row, own in enumerate(reference.histories[0])]
     from_starboard, from_port, magnitude, phase, step = bands
     if not all(np.isfinite(side.p5).all() for side in (from_starboard, from_port)):
         share = f"{100 * (1 - STILL_RUNNING):.2g} % of the members"

@@ -62,28 +62,16 @@ NAMED = 5
 class Tail:
     """A small probability that a criterion is not met.
 
-    Parameters
-    ----------
-    probability, standard_error : float or None
-        By importance sampling; None where the effective size does not carry it.
-    effective_size : float
-        Effective number of failing members.
-    members, failing, not_shown, unusable, beyond_card : int
-        Members drawn about the failing ships; those that do not meet the criterion, of these the ones whose trial does
-        not show the figure; those that cannot be used; failing ones whose trial left the card's range.
-    unusable_probability : float
-        Probability of ships that cannot be used: they count neither as failing nor as meeting.
-    distance : float
-        From the card to the limit along the steepest change of the figure, in standard deviations, if it were linear.
-    linear_probability : float
-        Probability of the figure beyond the limit, if it were linear.
-    linear_figure, figure : float, and float or None
-        The figure of the ship at that distance (at most :data:`FARTHEST_LIMIT`), if it were linear, and as it is.
-    failing_ships : dict
-        Number of the card (name in the model) to the mean of failing ships less the card, in standard errors: the
-        largest.
-    remark : str
-        Why the probability is missing; empty where it is known.
+    `probability`, `standard_error`: By importance sampling; None where the effective size does not carry it.
+    `effective_size`: Effective number of failing members. `members`, `failing`, `not_shown`, `unusable`, `beyond_card`:
+    Members drawn about the failing ships; those that do not meet the criterion, of these the ones whose trial does not
+    show the figure; those that cannot be used; failing ones whose trial left the card's range. `unusable_probability`:
+    Probability of ships that cannot be used: they count neither as failing nor as meeting. `distance`: From the card to
+    the limit along the steepest change of the figure, in standard deviations, if it were linear. `linear_probability`:
+    Probability of the figure beyond the limit, if it were linear. `linear_figure`, `figure`: The figure of the ship at
+    that distance (at most :data:`FARTHEST_LIMIT`), if it were linear, and as it is. `failing_ships`: Number of the card
+    (name in the model) to the mean of failing ships less the card, in standard errors: the largest. `remark`: Why the
+    probability is missing; empty where it is known.
     """
 
     distance: float
@@ -165,25 +153,11 @@ def tails(
 ) -> tuple[dict[str, Tail], Tail | None, list[Notice]]:
     """Probabilities of failing the criteria of :func:`rare_names`, by importance sampling.
 
-    Parameters
-    ----------
-    question : Question
-        Figures by the names of `limits`.
-    draws : Draws
-        Draws of the ensemble `found`.
-    found : Ensemble
-        Ensemble of this question.
-    limits : mapping
-        Name to the largest allowed value of each criterion that counts.
+    `question`: Figures by the names of `limits`. `draws`: Draws of the ensemble `found`. `found`: Ensemble of this
+    question. `limits`: Name to the largest allowed value of each criterion that counts.
 
-    Returns
-    -------
-    tails : dict
-        By criterion.
-    any : Tail or None
-        Tail of ships that fail at least one of `limits`; None if that is not rare.
-    notices : list of Notice
-        Why there are none.
+    Returns tails: By criterion; any: Tail of ships that fail at least one of `limits`; None if that is not rare;
+    notices: Why there are none.
     """
     names = rare_names(found, limits)
     if not names:
@@ -200,8 +174,7 @@ def tails(
             None,
             [Notice(f"no probability below what the members show: {LEAST} members are needed for its search")],
         )
-    drawn = [draws.drawn(number).standard for number in range(found.members)]
-    standard = np.array([values for values in drawn if values is not None])
+    standard = draws.members(0, found.members).standard
     lines = {}
     for name in names:
         line = _linear(standard, found.figures[name], limits[name])
@@ -277,14 +250,13 @@ def _mixture(draws: Draws, centres: Sequence[Array], number: int) -> MixtureDraw
 
 def _sampled(question: Question, mixture: MixtureDraws, members: int, executor: Executor | None) -> _Sample:
     found = ensemble(question, mixture, members, executor)
-    drawn = [mixture.drawn(number).standard for number in range(members)]
-    standard = np.array([values for values in drawn if values is not None])
+    standard = mixture.members(0, members).standard
     return _Sample(standard, mixture.weights(standard), found)
 
 
 def _figure_at(question: Question, draws: Draws, line: _Linear, name: str) -> float | None:
     """The figure of the ship on the way to the limit."""
-    values = np.clip(draws.at(line.point * line.direction), draws.lowest, draws.highest)
+    values = np.clip(draws.at(line.point * line.direction[None])[0], draws.lowest, draws.highest)
     at = Draws(draws.names, values, np.zeros_like(draws.root), draws.lowest, draws.highest, draws.seed)
     value = float(ensemble(question, at, 1).figures.get(name, np.array([math.nan]))[0])
     return value if math.isfinite(value) else None

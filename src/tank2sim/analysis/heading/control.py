@@ -54,7 +54,7 @@ def heading_autopilot(ship: Model) -> Model:
     """
     limits = [parameter.start for parameter in ship.parameters if parameter.name == "steering.max_angle"]
     try:
-        gains = heading_gains(stability(ship).nomoto, min([*limits, LARGEST_RUDDER_RAD]))
+        gains = heading_gains(stability(ship).nomoto.dimensional, min([*limits, LARGEST_RUDDER_RAD]))
     except ValueError as error:
         raise InputError(ship.origin, "", str(error), "check Yd and Nd of the card, and its rudder_sign") from None
     return autopilot_model(f"Autopilot of {ship.name}", gains, ship.step_s)

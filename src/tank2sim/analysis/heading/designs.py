@@ -172,7 +172,7 @@ def steering_plant(ship: Model, speed_mps: float | None = None) -> SteeringPlant
     if not abs(hull.B[1, 0]) > 0:
         raise InputError(ship.origin, "", "its rudder has no effect on yaw", remedy)
     found = stability(ship, speed_mps)
-    K, T = found.nomoto.K_per_s, found.nomoto.T_s
+    K, T = found.nomoto.dimensional.K_per_s, found.nomoto.dimensional.T_s
     if not K / T > 0:
         raise InputError(ship.origin, "", "the rudder turns the ship the wrong way", remedy)
     lag = values[acting_variable(ship, "steering.time_constant")]
@@ -184,13 +184,13 @@ def steering_plant(ship: Model, speed_mps: float | None = None) -> SteeringPlant
 
 
 def _placed(plant: SteeringPlant, name: str, *, integral: bool) -> HeadingDesign:
-    gains = heading_gains(plant.found.nomoto, plant.largest_rudder_rad)
+    gains = heading_gains(plant.found.nomoto.dimensional, plant.largest_rudder_rad)
     note = f"integral {SLOWNESS:g} of the natural frequency"
     if not integral:
         gains, note = _without_integral(plant, gains), "no integral"
     source = (
-        f"Pole placement (relative damping {DAMPING:g}, {note}) on Nomoto's model of {plant.found.name} at "
-        f"{plant.found.speed_mps:.4g} m/s"
+        f"Pole placement (relative damping {DAMPING:g}, {note}) on Nomoto's model of {plant.found.ship} at "
+        f"{plant.found.operating_point.speed_mps:.4g} m/s"
     )
     return HeadingDesign(
         kind="pid" if integral else "pd",
@@ -228,7 +228,7 @@ def _filtered(plant: SteeringPlant, name: str, frequency: float) -> HeadingDesig
 
 def _without_integral(plant: SteeringPlant, gains: HeadingGains) -> HeadingGains:
     """PD gains for T s^2 + (1 + K Kd) s + K Kp = T (s^2 + 2 z w s + w^2), on the states heading and yaw rate."""
-    K, T, w = plant.found.nomoto.K_per_s, plant.found.nomoto.T_s, plant.frequency_radps
+    K, T, w = plant.found.nomoto.dimensional.K_per_s, plant.found.nomoto.dimensional.T_s, plant.frequency_radps
     poles = np.roots([1, 2 * DAMPING * w, w**2])
     Kp, Kd = np.asarray(control.place([[0, 1], [0, -1 / T]], [[0], [K / T]], poles)).ravel()
     return replace(gains, proportional=float(Kp), derivative=float(Kd), integral=0.0)
@@ -263,7 +263,7 @@ def _quadratic(plant: SteeringPlant, name: str, weights: LqrWeights) -> HeadingD
         largest_rudder_rad=plant.largest_rudder_rad,
     )
     source = (
-        f"LQR on {plant.found.name} with its steering gear at {plant.found.speed_mps:.4g} m/s, "
+        f"LQR on {plant.found.ship} with its steering gear at {plant.found.operating_point.speed_mps:.4g} m/s, "
         f"{math.degrees(bad):g} deg of heading as bad as {math.degrees(weights.rudder_rad):g} deg of rudder"
     )
     gains = {"Kp": Kp, "Kd_s": Kd, "Ki_per_s": Ki, "Kv_radpmps": Kv, "Kdelta": Kdelta}
@@ -316,8 +316,8 @@ def robust_design(plant: SteeringPlant, name: str, origin: str) -> HeadingDesign
         largest_rudder_rad=plant.largest_rudder_rad,
     )
     source = (
-        f"Mixed sensitivity on {plant.found.name} with its steering gear at {plant.found.speed_mps:.4g} m/s: "
-        f"gamma {gamma:.3g}, order {n + 1}"
+        f"Mixed sensitivity on {plant.found.ship} with its steering gear "
+        f"at {plant.found.operating_point.speed_mps:.4g} m/s: gamma {gamma:.3g}, order {n + 1}"
     )
     gains = {"gamma": gamma, "order": float(n + 1), "steady_gain": steady, "integral_radps": INTEGRAL * w}
     description = "Heading autopilot: mixed sensitivity (H-infinity) on the heading error, limits and anti-windup"

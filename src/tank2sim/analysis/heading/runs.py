@@ -14,8 +14,7 @@ from tank2sim.dynamics.autopilot_loop import closed_loop_model
 from tank2sim.dynamics.effects import acting_variable
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.simulation.rows import Chain, RowFunction
-from tank2sim.simulation.scheme import runge_kutta_step
+from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.trajectory import Trajectory
 
 _SETTLED = 0.02
@@ -27,8 +26,7 @@ class HeadingLoop:
 
     def __init__(self, ship: Model, autopilot: Model):
         self.model = closed_loop_model(ship, autopilot)
-        self._chain = Chain(runge_kutta_step(self.model))
-        self._outputs = RowFunction(self.model.output)
+        self._integrator = Integrator(self.model)
 
     def start(self, parameters: Mapping[str, float] | None = None) -> Array:
         """State (nx,) at the beginning."""
@@ -42,7 +40,7 @@ class HeadingLoop:
         for name, values in inputs.items():
             u[:, self.model.input_names.index(name)] = values
         p = self.model.parameter_values(parameters)
-        return self._chain.run(state, u, p, np.array([self.model.step_s])), u
+        return self._integrator.rollout(state, u, p, self.model.step_s, steps), u
 
     def run(
         self,
@@ -79,7 +77,7 @@ class HeadingLoop:
     def trajectory(self, x: Array, u: Array, parameters: Mapping[str, float] | None = None) -> Trajectory:
         """States (n + 1, nx) and inputs (n, nu) with their times and outputs. Raises as :meth:`run`."""
         u = np.vstack([u, u[-1]])
-        (y,) = self._outputs(x, u, self.model.parameter_values(parameters))
+        y = self._integrator.outputs(x, u, self.model.parameter_values(parameters))
         time = np.asarray(self.model.step_s * np.arange(len(x)), dtype=np.float64)
         made = Trajectory(self.model, time, x, u, y)
         if not made.is_finite():

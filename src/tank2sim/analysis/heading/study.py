@@ -210,7 +210,7 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
     loop = HeadingLoop(outside, design.autopilot)
     start = {} if settings.speed_mps is None else {"initial.u": settings.speed_mps}
     ahead = undisturbed_inputs(outside)
-    unit = math.sqrt(design.found.nomoto.T_s / design.found.nomoto.K_per_s)
+    unit = math.sqrt(design.found.nomoto.dimensional.T_s / design.found.nomoto.dimensional.K_per_s)
     runs, changes = _changes(loop, design, settings, ahead, start, _CHANGE_TIMES * unit)
     steps = round(_KEEPING_TIMES * unit / loop.model.step_s)
     waves = wave_yaw_acceleration(weather, loop.model.step_s, steps)
@@ -222,17 +222,17 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
     later = {name: runs["keeping"][name][begin:] for name in ("motion.u", "rudder.angle")}
     alone = design.found
     study = AutopilotStudy(
-        ship=alone.name,
+        ship=alone.ship,
         design=design.kind,
         source=design.source,
         gains=dict(design.gains),
         limits=_limits(design.autopilot),
         ship_alone=ShipAlone(
-            speed_mps=alone.speed_mps,
-            stable=alone.stable,
-            rudder_deg=alone.rudder_deg,
-            K_per_s=alone.nomoto.K_per_s,
-            T_s=alone.nomoto.T_s,
+            speed_mps=alone.operating_point.speed_mps,
+            stable=alone.stability_criterion.stable,
+            rudder_deg=alone.operating_point.rudder_deg,
+            K_per_s=alone.nomoto.dimensional.K_per_s,
+            T_s=alone.nomoto.dimensional.T_s,
         ),
         margins=margins,
         responses=_responses(ship, design, margins),

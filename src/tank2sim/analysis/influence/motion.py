@@ -14,7 +14,7 @@ kink would mix the slopes of both sides.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -30,7 +30,7 @@ from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.rows import RowFunction
 from tank2sim.simulation.sensitivity import Sensitivity
-from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, Spin, StraightRun
+from tank2sim.simulation.thruster_manoeuvres import Spin, StraightRun
 from tank2sim.simulation.trajectory import Trajectory
 
 Sloped = tuple[float, Array]
@@ -86,73 +86,53 @@ class MotionSlopes:
 
         The run is not evaluated after the last event of the figures in `names`.
         """
-        if isinstance(manoeuvre, StraightRun | DifferenceTurn | Spin):
-            return self._by_thrusters(run, manoeuvre, p, length, names)
-        side = math.copysign(1.0, manoeuvre.rudder)
-        axes = _Axes(run.x[0], self.model, side, length)
-        if isinstance(manoeuvre, Turn):
-            half = any(name.startswith(HALF_TURN) for name in names)
-            return self._turn(run, axes, p, [math.pi / 2, math.pi] if half else [math.pi / 2])
-        return self._zigzag(run, manoeuvre, axes, p, overshoots_in(names))
-
-    def _turn(self, run: Trajectory, axes: _Axes, p: Array, changes: Sequence[float]) -> dict[str, Sloped]:
-        found: dict[str, Sloped] = {}
-        crossings = [run.crossings("motion.psi", "motion.r", axes.heading + axes.side * change) for change in changes]
-        places = [("motion.psi", float(times[0])) for times in crossings if len(times)]
-        for number, event in enumerate(self.events(run, places, p)):
-            if number == 0:
-                found |= {"advance_m": axes.ahead(event), "transfer_m": axes.aside(event)}
-                found |= {"advance_lengths": axes.over_length(found["advance_m"])}
-                found |= {"time_90_s": (event.time, event.time_by)}
-            else:
-                found |= {"tactical_diameter_m": axes.aside(event), "time_180_s": (event.time, event.time_by)}
-                found |= {"tactical_diameter_lengths": axes.over_length(found["tactical_diameter_m"])}
-        return found
-
-    def _by_thrusters(
-        self,
-        run: Trajectory,
-        manoeuvre: StraightRun | DifferenceTurn | Spin,
-        p: Array,
-        length: float,
-        names: Collection[str],
-    ) -> dict[str, Sloped]:
-        places = [self.model.state_names.index(f"motion.{letter}") for letter in "uvr"]
         if isinstance(manoeuvre, StraightRun):
-            end = len(run.t) - 1
+            end, place = len(run.t) - 1, self.model.state_names.index("motion.u")
             slopes = self._forward(_Course(run.t, run.x, run.u), {end: None}, p)[end]
-            return {"final_speed_mps": (float(run.x[end][places[0]]), slopes[places[0]])}
-        turning = isinstance(manoeuvre, DifferenceTurn)
-        order = manoeuvre.difference if isinstance(manoeuvre, DifferenceTurn) else manoeuvre.revolutions
-        side = math.copysign(1.0, order)
-        axes = _Axes(run.x[0], self.model, side, length)
-        changes = [math.pi / 2, math.pi] if turning else [math.pi, 2 * math.pi]
-        found: dict[str, Sloped] = {}
-        if any(name in ("advance_m", "transfer_m", "tactical_diameter_m") or name.startswith("time") for name in names):
-            if turning:
-                found |= self._turn(run, axes, p, changes)
-            else:
-                crossings = [
-                    run.crossings("motion.psi", "motion.r", axes.heading + side * change) for change in changes
-                ]
-                events = self.events(run, [("motion.psi", float(times[0])) for times in crossings if len(times)], p)
-                shown = zip(("time_180_s", "time_360_s"), events, strict=False)
-                found |= {name: (event.time, event.time_by) for name, event in shown}
-        if any(name.startswith(("steady", "final")) for name in names):
-            (last,) = self.events(run, [("motion.psi", float(run.t[-1]))], p)
-            u, v, r = last.x[places]
-            u_by, v_by, r_by = last.x_by[places]
-            speed = math.hypot(u, v)
-            speed_by = (u * u_by + v * v_by) / speed
-            rate = math.degrees(r), np.degrees(r_by)
-            diameter = 2 * speed / abs(r)
-            found |= {
-                "steady_diameter_m": (diameter, diameter * (speed_by / speed - r_by / r)),
-                "steady_rate_degps": rate,
-                "steady_speed_mps": (speed, speed_by),
-                "final_rate_degps": rate,
-            }
+            return {"final_speed_mps": (float(run.x[end][place]), slopes[place])}
+        axes = _Axes(run.x[0], self.model, manoeuvre.plan(self.model).side, length)
+        if isinstance(manoeuvre, Zigzag):
+            return self._zigzag(run, manoeuvre, axes, p, overshoots_in(names))
+        changes = {"time_90_s": math.pi / 2, "time_180_s": math.pi}
+        if isinstance(manoeuvre, Spin):
+            changes = {"time_180_s": math.pi, "time_360_s": 2 * math.pi}
+        elif isinstance(manoeuvre, Turn) and not any(name.startswith(HALF_TURN) for name in names):
+            del changes["time_180_s"]
+        at_end = [name for name in names if name.startswith(("steady", "final"))]
+        found = self._turned(run, axes, p, changes) if len(at_end) < len(names) else {}
+        return found | self._last(run, p) if at_end else found
+
+    def _turned(self, run: Trajectory, axes: _Axes, p: Array, changes: Mapping[str, float]) -> dict[str, Sloped]:
+        """Figures at changes of heading, rad, by the names of their times."""
+        crossings = [
+            run.crossings("motion.psi", "motion.r", axes.heading + axes.side * change) for change in changes.values()
+        ]
+        events = self.events(run, [("motion.psi", float(times[0])) for times in crossings if len(times)], p)
+        shown = dict(zip(changes, events, strict=False))
+        found = {name: (event.time, event.time_by) for name, event in shown.items()}
+        if quarter := shown.get("time_90_s"):
+            found |= {"advance_m": axes.ahead(quarter), "transfer_m": axes.aside(quarter)}
+            found["advance_lengths"] = axes.over_length(found["advance_m"])
+            if half := shown.get("time_180_s"):
+                found["tactical_diameter_m"] = axes.aside(half)
+                found["tactical_diameter_lengths"] = axes.over_length(found["tactical_diameter_m"])
         return found
+
+    def _last(self, run: Trajectory, p: Array) -> dict[str, Sloped]:
+        """Figures at the end of a turn by thrusters."""
+        places = [self.model.state_names.index(f"motion.{letter}") for letter in "uvr"]
+        (last,) = self.events(run, [("motion.psi", float(run.t[-1]))], p)
+        (u, v, r), (u_by, v_by, r_by) = last.x[places], last.x_by[places]
+        speed = math.hypot(u, v)
+        speed_by = (u * u_by + v * v_by) / speed
+        rate = math.degrees(r), np.degrees(r_by)
+        diameter = 2 * speed / abs(r)
+        return {
+            "steady_diameter_m": (diameter, diameter * (speed_by / speed - r_by / r)),
+            "steady_rate_degps": rate,
+            "steady_speed_mps": (speed, speed_by),
+            "final_rate_degps": rate,
+        }
 
     def _zigzag(self, run: Trajectory, zigzag: Zigzag, axes: _Axes, p: Array, overshoots: int) -> dict[str, Sloped]:
         executes = run.t[_orders(run)]

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import root
 
-from tank2sim.analysis.ensemble.questions import ShipText, each_ship, one_ship
+from tank2sim.analysis.ensemble.questions import ShipText, each_ship
 from tank2sim.analysis.ensemble.results import StabilityBands
 from tank2sim.analysis.linearisation import OperatingPoint
 from tank2sim.analysis.stability.straight_line import steering_constants
@@ -190,7 +190,7 @@ class OfCraft:
                 }
             )
 
-        return each_ship(one_ship(craft.model, figures))
+        return each_ship(craft.model, figures)
 
 
 def keeps_nearly_straight(run: CraftAtSpeed, turns: Sequence[SteadyCraftTurn], length_m: float) -> bool:

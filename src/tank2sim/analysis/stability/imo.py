@@ -43,9 +43,9 @@ FIRST_OF_TWENTY, TRACK_REACH = "20/20 zigzag, first overshoot", "stopping, full 
 
 @dataclass(frozen=True)
 class ManoeuvringTrial:
-    """Trials to both sides, and the figure of each criterion: the larger of the two sides."""
+    """A trial, to both sides where it has sides, and the figure of each criterion: the larger of the two sides."""
 
-    manoeuvres: tuple[Turn, Turn] | tuple[Zigzag, Zigzag]
+    manoeuvres: tuple[Turn | Zigzag | Stop, ...]
     criteria: Mapping[str, str]
 
 
@@ -55,7 +55,7 @@ def largest_trial_rudder(parameters: Mapping[str, float]) -> float:
 
 
 def manoeuvring_trials(rudder: float) -> tuple[ManoeuvringTrial, ...]:
-    """Turning circles at `rudder`, 10/10 and 20/20 zigzags, with their criteria."""
+    """Turning circles at `rudder`, 10/10 and 20/20 zigzags, and at last the stop with full astern: their criteria."""
     ten, twenty = math.radians(10.0), math.radians(20.0)
     of_turn = {ADVANCE: "advance_lengths", TACTICAL: "tactical_diameter_lengths"}
     of_ten = {
@@ -69,6 +69,7 @@ def manoeuvring_trials(rudder: float) -> tuple[ManoeuvringTrial, ...]:
         ManoeuvringTrial(
             (Zigzag(twenty, twenty), Zigzag(-twenty, twenty)), {FIRST_OF_TWENTY: entry_name("overshoots_deg", 0)}
         ),
+        ManoeuvringTrial((Stop(),), {TRACK_REACH: "track_reach_lengths"}),
     )
 
 
@@ -181,7 +182,8 @@ def imo_criteria(
     time = parameters["ship.length"] / parameters["ship.speed"]
     scale = _SCALE if parameters["ship.length"] < SHORTEST_SHIP_M else ""
     worst: dict[str, _Worse] = {}
-    for trial in manoeuvring_trials(largest_trial_rudder(parameters)):
+    can_stop = "propeller.speed" in model.input_names
+    for trial in manoeuvring_trials(largest_trial_rudder(parameters))[: None if can_stop else -1]:
         found = trials.worst(trial.manoeuvres, *trial.criteria.values())
         worst |= dict(zip(trial.criteria, found, strict=True))
 
@@ -198,7 +200,7 @@ def imo_criteria(
         criterion(FIRST_OF_TEN, "deg", scale),
         criterion(SECOND_OF_TEN, "deg", scale),
         criterion(FIRST_OF_TWENTY, "deg"),
-        _stopping(trials),
+        _stopping(worst.get(TRACK_REACH)),
     )
 
 
@@ -235,23 +237,20 @@ def limits_of(manoeuvre: Manoeuvre, model: Model) -> dict[str, float]:
     """
     values = dict(zip(model.parameter_names, model.parameter_values(None).tolist(), strict=True))
     allowed = largest_allowed(values["ship.length"] / values["ship.speed"])
-    if manoeuvre == Stop():
-        return {"track_reach_lengths": allowed[TRACK_REACH]}
     trials = manoeuvring_trials(largest_trial_rudder(values))
     criteria = next((trial.criteria for trial in trials if manoeuvre in trial.manoeuvres), {})
     left_out = (FIRST_OF_TEN, SECOND_OF_TEN) if values["ship.length"] < SHORTEST_SHIP_M else ()
     return {figure: allowed[name] for name, figure in criteria.items() if name not in left_out}
 
 
-def _stopping(trials: _Trials) -> ImoCriterion:
-    """Track reach of full astern stopping, for a card with propulsion."""
-    name = TRACK_REACH
-    if "propeller.speed" not in trials.model.input_names:
+def _stopping(worst: _Worse | None) -> ImoCriterion:
+    """Track reach of full astern stopping; None: the card has no propulsion."""
+    if worst is None:
         remark = "the card has no [propulsion]: its engine cannot be reversed"
-        return ImoCriterion.judged(name, None, STOPPING, "L", remark)
-    ((found, left, beyond),) = trials.worst([Stop()], "track_reach_lengths")
+        return ImoCriterion.judged(TRACK_REACH, None, STOPPING, "L", remark)
+    found, left, beyond = worst
     remark = f"at {FULL_ASTERN:.0%} of the nominal revolutions astern, reached at once: an assumption of the simulation"
     if found is not None and STOPPING < found <= STOPPING_OF_LARGE_SHIPS:
         remark += "; up to 20 L may be allowed to a ship of large displacement"
     remark = "; ".join(filter(None, (left, remark if found is not None else "")))
-    return ImoCriterion.judged(name, found, STOPPING, "L", remark, beyond)
+    return ImoCriterion.judged(TRACK_REACH, found, STOPPING, "L", remark, beyond)

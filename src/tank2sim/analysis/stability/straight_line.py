@@ -68,8 +68,25 @@ class StraightCourse:
 
 @dataclass(frozen=True, kw_only=True)
 class CourseCriterion:
-    """The criterion of straight-line stability, as of :class:`Stability`; `settled_states` follow slow motions at once
-    (:func:`answering_states`)."""
+    """The criterion of straight-line stability.
+
+    Parameters
+    ----------
+    C_prime : float
+        C' = Y'_v (N'_r - m' x'_G u') - N'_v (Y'_r - m' u'): positive for a ship that is stable on a straight course.
+        Prime system; the slopes are those of the full forces at the operating point, in slow motion: states of effects
+        follow at once (:func:`settled_states`).
+    stable : bool
+        True if the straight course is stable with the rudder fixed: all modes of steering decay, and none grows.
+        C' > 0 alone is not sufficient: it also holds with two growing modes, and with a growing roll.
+    C_prime_decides : bool
+        True if the sign of C' agrees with the modes; else it is not a margin of stability.
+    growth_per_s : float
+        Real part of the mode that decays least or grows most, 1/s.
+    settled_states : tuple of str
+        States of effects that respond to sway and yaw and act on them (:func:`answering_states`): C' and Nomoto's
+        models include them only at rest.
+    """
 
     C_prime: float
     stable: bool
@@ -79,89 +96,23 @@ class CourseCriterion:
 
 
 @dataclass(frozen=True, kw_only=True)
-class StraightLine:
-    """Straight-line stability of a ship as results report it; fields are those of :class:`Stability`."""
+class Stability:
+    """Straight-line stability of a ship about a straight course.
+
+    Parameters
+    ----------
+    eigenvalues : tuple of complex
+        Of surge, sway and yaw with the states of effects that act on the hull (roll, the memory of the flow), rudder
+        and heading held, 1/s, least damped first.
+    nomoto : NomotoModels
+        Of slow motion, as C' is.
+    """
 
     ship: str
     operating_point: StraightCourse
     eigenvalues: tuple[ComplexNumber, ...]
     stability_criterion: CourseCriterion
     nomoto: NomotoModels
-
-
-@dataclass(frozen=True)
-class Stability:
-    """Straight-line stability of a ship at a speed.
-
-    Parameters
-    ----------
-    name : str
-        The ship.
-    speed_mps, drift_deg, rudder_deg : float
-        The straight course about which it was linearised (beta and rudder, starboard positive).
-    eigenvalues : tuple of complex
-        Of surge, sway and yaw with the states of effects that act on the hull (roll, the memory of the flow), rudder
-        and heading held, 1/s, least damped first.
-    criterion : float
-        C' = Y'_v (N'_r - m' x'_G u') - N'_v (Y'_r - m' u'): positive for a ship that is stable on a straight course.
-        Prime system; the slopes are those of the full forces at the operating point, in slow motion: states of effects
-        follow at once (:func:`settled_states`).
-    steering_modes : tuple of complex
-        The same at a held speed: of sway and yaw with the states of effects, 1/s.
-    nomoto, nomoto_prime : Nomoto, NomotoPrime
-        Of slow motion, as C' is.
-    effect_states : tuple of str
-        States of effects that respond to sway and yaw and act on them: C' and Nomoto's models include them only at
-        rest.
-    """
-
-    name: str
-    speed_mps: float
-    drift_deg: float
-    rudder_deg: float
-    eigenvalues: tuple[complex, ...]
-    criterion: float
-    steering_modes: tuple[complex, ...]
-    nomoto: Nomoto
-    nomoto_prime: NomotoPrime
-    effect_states: tuple[str, ...] = ()
-
-    @property
-    def growth_per_s(self) -> float:
-        """Real part of the mode that decays least or grows most, 1/s."""
-        return max(mode.real for mode in (*self.eigenvalues, *self.steering_modes))
-
-    @property
-    def stable(self) -> bool:
-        """True if the straight course is stable with the rudder fixed: all modes of steering decay, and none grows.
-
-        C' > 0 alone is not sufficient: it also holds with two growing modes, and with a growing roll.
-        """
-        nothing = _ROUNDING * max(abs(mode) for mode in self.eigenvalues)
-        return all(mode.real < 0 for mode in self.steering_modes) and self.growth_per_s <= nothing
-
-    @property
-    def criterion_decides(self) -> bool:
-        """True if the sign of C' agrees with the modes; else it is not a margin of stability."""
-        return self.stable == (self.criterion > 0)
-
-    def reported(self) -> StraightLine:
-        """Return the part that results report."""
-        return StraightLine(
-            ship=self.name,
-            operating_point=StraightCourse(
-                speed_mps=self.speed_mps, drift_deg=self.drift_deg, rudder_deg=self.rudder_deg
-            ),
-            eigenvalues=self.eigenvalues,
-            stability_criterion=CourseCriterion(
-                C_prime=self.criterion,
-                stable=self.stable,
-                C_prime_decides=self.criterion_decides,
-                growth_per_s=self.growth_per_s,
-                settled_states=self.effect_states,
-            ),
-            nomoto=NomotoModels(self.nomoto, self.nomoto_prime),
-        )
 
 
 def stability(model: Model, speed_mps: float | None = None) -> Stability:
@@ -180,6 +131,7 @@ def stability(model: Model, speed_mps: float | None = None) -> Stability:
     scaling = speed if speed_acts(model, point) else values["ship.speed"]
 
     settled = settled_states(model)
+    modes = steering_modes(model, point)
     eigenvalues = sorted(_modes(model, point, hull_states(model)), key=lambda value: -value.real)
     slopes, _ = jacobians(model, point, ["force.Y", "force.N"], ["motion.v", "motion.r"], [], settled=settled)
     # Y_v N_r and N_v Y_r are both in (1/2 rho)^2 L^6 V^2.
@@ -189,24 +141,40 @@ def stability(model: Model, speed_mps: float | None = None) -> Stability:
     )
     models = nomoto(steering)
     time = length / scaling
+    growth = max(mode.real for mode in (*eigenvalues, *modes))
+    nothing = _ROUNDING * max(abs(mode) for mode in eigenvalues)
+    stable = all(mode.real < 0 for mode in modes) and growth <= nothing
     return Stability(
-        name=model.name,
-        speed_mps=speed,
-        drift_deg=float(np.degrees(-np.arcsin(at["motion.v"] / speed))),
-        rudder_deg=float(np.degrees(at["rudder.angle"])),
-        eigenvalues=tuple(eigenvalues),
-        criterion=criterion,
-        steering_modes=_modes(model, point, steering_states(model)),
-        nomoto=models,
-        nomoto_prime=NomotoPrime(
-            models.K_per_s * time,
-            models.T_s / time,
-            models.T1_s and models.T1_s / time,
-            models.T2_s and models.T2_s / time,
-            models.T3_s / time,
+        ship=model.name,
+        operating_point=StraightCourse(
+            speed_mps=speed,
+            drift_deg=float(np.degrees(-np.arcsin(at["motion.v"] / speed))),
+            rudder_deg=float(np.degrees(at["rudder.angle"])),
         ),
-        effect_states=answering_states(model),
+        eigenvalues=tuple(eigenvalues),
+        stability_criterion=CourseCriterion(
+            C_prime=criterion,
+            stable=stable,
+            C_prime_decides=stable == (criterion > 0),
+            growth_per_s=growth,
+            settled_states=answering_states(model),
+        ),
+        nomoto=NomotoModels(
+            models,
+            NomotoPrime(
+                models.K_per_s * time,
+                models.T_s / time,
+                models.T1_s and models.T1_s / time,
+                models.T2_s and models.T2_s / time,
+                models.T3_s / time,
+            ),
+        ),
     )
+
+
+def steering_modes(model: Model, point: OperatingPoint) -> tuple[complex, ...]:
+    """Modes of sway and yaw with the states of effects at a held speed, 1/s."""
+    return _modes(model, point, steering_states(model))
 
 
 def _modes(model: Model, point: OperatingPoint, states: Sequence[str]) -> tuple[complex, ...]:

@@ -13,7 +13,7 @@ from tank2sim.analysis.linearisation import straight_course
 from tank2sim.analysis.stability.imo import ImoCriterion, imo_criteria
 from tank2sim.analysis.stability.margin import Margin, TrimEffect, stability_margin, trim_effect
 from tank2sim.analysis.stability.response import SteeringResponse, steering_responses
-from tank2sim.analysis.stability.straight_line import Stability, StraightLine, stability
+from tank2sim.analysis.stability.straight_line import Stability, stability
 from tank2sim.analysis.turning.characteristic import SteeringCharacteristic, steering_characteristic
 from tank2sim.analysis.turning.diagram import SteadyTurning, TurningDiagram, steady_turning
 from tank2sim.analysis.turning.spirals import SpiralPoints, direct_spiral, reverse_spiral
@@ -50,7 +50,7 @@ class SteadySpeed:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class StabilityStudy(StraightLine):
+class StabilityStudy(Stability):
     """Stability and manoeuvrability of a ship: the straight course at the requested speed, and
 
     Parameters
@@ -109,10 +109,10 @@ def stability_study(model: Model, speed_mps: float | None = None, *, spirals: bo
         spiralled, spiral_notes = _spirals(model, turning)
         notices += spiral_notes
     return StabilityStudy(
-        **vars(found.reported()),
+        **vars(found),
         margins=margin,
         trim=trim_effect(model, margin),
-        responses=steering_responses(model, straight_course(model, speed_mps), found.nomoto),
+        responses=steering_responses(model, straight_course(model, speed_mps), found.nomoto.dimensional),
         steady_turning=turning.reported() if turning else None,
         characteristic=steering_characteristic(turning) if turning else None,
         spirals=spiralled,
@@ -129,15 +129,15 @@ def _reason(error: InputError) -> str:
 def _about_speed(model: Model, found: Stability, *, by_speed: bool) -> list[Notice]:
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
     slowest, fastest, card_speed = values["ship.slowest"], values["ship.fastest"], values["ship.speed"]
-    messages = []
+    messages, speed = [], found.operating_point.speed_mps
     if not by_speed:
         messages.append(
             f"the forces of this card do not change with speed: a linear card is that of {card_speed:.4g} m/s alone, "
             "C' and the prime numbers are made with that speed, and there is no curve over speed"
         )
-    if not slowest <= found.speed_mps <= fastest:
-        messages.append(f"{found.speed_mps:.4g} m/s is outside the card's range of {slowest:g} to {fastest:g} m/s")
-    if abs(found.speed_mps / card_speed - 1) > _SAME_SPEED:
+    if not slowest <= speed <= fastest:
+        messages.append(f"{speed:.4g} m/s is outside the card's range of {slowest:g} to {fastest:g} m/s")
+    if abs(speed / card_speed - 1) > _SAME_SPEED:
         messages.append(
             f"steady turns, spirals and the IMO criteria are those at the card's speed, {card_speed:.4g} m/s"
         )
@@ -166,16 +166,16 @@ def _about_steady_speeds(held: tuple[SteadySpeed, ...]) -> list[Notice]:
 
 def _about_effects(found: Stability) -> list[Notice]:
     """Notices on effects that C' and Nomoto's models neglect, and on modes that contradict them."""
-    messages = []
-    if found.effect_states:
+    messages, judged = [], found.stability_criterion
+    if judged.settled_states:
         messages.append(
-            f"C', its margin and Nomoto's K and T are those of slow motions, which {', '.join(found.effect_states)} "
+            f"C', its margin and Nomoto's K and T are those of slow motions, which {', '.join(judged.settled_states)} "
             "follow at once; T1 and T2 are then no time constants of the whole ship: its eigenvalues, the word stable "
             "or unstable, and the response to the rudder are with these states"
         )
-    if not found.criterion_decides and found.criterion > 0:
+    if not judged.C_prime_decides and judged.C_prime > 0:
         messages.append(
-            f"C' > 0, and yet a mode grows at {found.growth_per_s:.3g} 1/s: it is unstable, and the margin of C' says "
+            f"C' > 0, and yet a mode grows at {judged.growth_per_s:.3g} 1/s: it is unstable, and the margin of C' says "
             "nothing of that"
         )
     return [Notice(text) for text in messages]
@@ -206,7 +206,7 @@ def _spirals(model: Model, turning: SteadyTurning) -> tuple[Spirals, list[Notice
     except InputError as error:
         messages.append(f"no spiral: {_reason(error)}")
     try:
-        reverse = reverse_spiral(model, turning, stability(model).nomoto)
+        reverse = reverse_spiral(model, turning, stability(model).nomoto.dimensional)
         if reverse is None:
             messages.append("no reverse spiral: the rudder turns the ship the wrong way, or not at all")
     except InputError as error:

@@ -229,38 +229,46 @@ def calm_inputs(model: Model) -> Array:
 
 
 class TurningEquations:
-    """The equations of steady turning in scaled unknowns y = (states of the hull, rudder)."""
+    """The equations of steady turning in calm water, in scaled unknowns y = (states of the hull, rudder).
 
-    def __init__(self, model: Model):
-        self.model, self.names = model, hull_states(model)
+    Parameters
+    ----------
+    model : Model
+        A ship, or a steering model with the state ``motion.beta``.
+    free : bool
+        Whether the parameters are arguments of the functions; else they are numbers, and the functions are short.
+    """
+
+    def __init__(self, model: Model, *, free: bool = False):
+        self.model = model
+        self.names = ("motion.beta", "motion.r") if "motion.beta" in model.state_names else hull_states(model)
         nominal = {state.name: state.nominal for state in model.states}
         values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
         speed = float(values["ship.speed"])
         self.ship_time = float(values["ship.length"]) / speed
         sizes = {"motion.u": speed, "motion.v": speed, "motion.r": 1 / self.ship_time}
         self.scale: Array = np.array([*(sizes.get(name, nominal[name]) for name in self.names), 1.0])
-        self._symbol = ca.SX.sym("y", len(self.scale))
-        self._rates = self._scaled_rates()
-        # what stays where it is: inputs and parameters are numbers here, and the functions short
-        jacobian = ca.densify(ca.jacobian(self._rates, self._symbol))
-        self._function = ca.Function("steady", [self._symbol], [self._rates, jacobian], {"cse": True})
-
-    def _scaled_rates(self) -> ca.SX:
-        model, n = self.model, len(self.names)
+        self.yaw: Array = np.eye(len(self.scale))[self.names.index("motion.r")]
+        self.symbol, self.p = ca.SX.sym("y", len(self.scale)), model.p if free else ca.SX(model.parameter_values())
         derivative = {state.name: state.derivative for state in model.states}
-        p = model.parameter_values()
-        states = ca.SX(model.initial(p))
-        for row, name in enumerate((*self.names, "rudder.angle")):
-            states[model.state_names.index(name)] = self._symbol[row] * self.scale[row]
         rates = model.expand(ca.vcat([model.symbol(derivative[name]) for name in self.names]))
-        arguments = [model.x, model.u, model.p]
-        rates = ca.substitute([rates], arguments, [states, ca.SX(calm_inputs(model)), ca.SX(p)])[0]
-        scaled: ca.SX = rates * self.ship_time / self.scale[:n]
-        return scaled
+        self.rates = self.along(rates) * self.ship_time / self.scale[:-1]
+        slopes = ca.densify(ca.jacobian(self.rates, self.symbol))
+        arguments = [self.symbol, model.p] if free else [self.symbol]
+        self.function = ca.Function("steady", arguments, [self.rates, slopes], {"cse": True})
+
+    def along(self, expression: ca.SX) -> ca.SX:
+        """An expression of states, inputs and parameters in the unknowns, in calm water."""
+        model = self.model
+        states = ca.substitute(ca.vcat([ca.SX(state.start) for state in model.states]), model.p, self.p)
+        for row, name in enumerate((*self.names, "rudder.angle")):
+            states[model.state_names.index(name)] = self.symbol[row] * self.scale[row]
+        (found,) = ca.substitute([expression], [model.x, model.u, model.p], [states, ca.SX(calm_inputs(model)), self.p])
+        return found
 
     def __call__(self, y: Array) -> tuple[Array, Array]:
         """Residual (n,) and Jacobian (n, n + 1)."""
-        residual, jacobian = self._function(y)
+        residual, jacobian = self.function(y)
         return np.array(residual).ravel(), np.array(jacobian)
 
     def growth(self, y: Array) -> float:
@@ -272,9 +280,9 @@ class TurningEquations:
         n = len(self.names)
         null = direction[:n] / np.linalg.norm(direction[:n])
         phi = ca.SX.sym("phi", n)
-        slopes = ca.jacobian(self._rates, self._symbol)[:, :n]
-        unknown = ca.vertcat(self._symbol, phi)
-        system = ca.vertcat(self._rates, slopes @ phi, ca.dot(ca.SX(null), phi) - 1)
+        slopes = ca.jacobian(self.rates, self.symbol)[:, :n]
+        unknown = ca.vertcat(self.symbol, phi)
+        system = ca.vertcat(self.rates, slopes @ phi, ca.dot(ca.SX(null), phi) - 1)
         newton = ca.Function("fold", [unknown], [system, ca.densify(ca.jacobian(system, unknown))], {"cse": True})
         value = np.concatenate([near, null])
         for _ in range(12):
@@ -300,8 +308,7 @@ def steady_turning(model: Model) -> SteadyTurning:
     equations = TurningEquations(model)
     at = dict(zip(model.state_names, point.x.tolist(), strict=True))
     guess = np.array([at[name] for name in (*equations.names, "rudder.angle")]) / equations.scale
-    yaw = np.eye(len(guess))[equations.names.index("motion.r")]
-    straight = corrector_step(equations, guess, yaw)
+    straight = corrector_step(equations, guess, equations.yaw)
     if straight is None or not straight[0][0] > 0:
         remedy = "check X0, Xu, Xuu and Xuuu of the card: resistance and thrust balance at no speed near u0"
         raise InputError(model.origin, "", "keeps no steady speed on a straight course", remedy)
@@ -313,7 +320,7 @@ def steady_turning(model: Model) -> SteadyTurning:
     most[:3] = _FASTEST, _FASTEST, _MOST_YAW
     most[-1] = largest
     bounds = Bounds(-most, most)
-    curves = [follow_branch(equations, straight[0], side * yaw, bounds) for side in (-1.0, 1.0)]
+    curves = [follow_branch(equations, straight[0], side * equations.yaw, bounds) for side in (-1.0, 1.0)]
     return _diagram(equations, curves[0], curves[1])
 
 

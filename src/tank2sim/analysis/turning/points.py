@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 
 from tank2sim.analysis.turning.continuation import EDGE, Bounds, corrector_step, follow_branch
-from tank2sim.analysis.turning.diagram import calm_inputs, hull_states
+from tank2sim.analysis.turning.diagram import TurningEquations
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
@@ -64,42 +64,14 @@ class TurnInDegrees:
 
 
 class TurningPoints:
-    """Steady turns of a model in calm water at any values of its parameters.
-
-    The unknowns y (n + 1,) are the states that move with the hull, over their sizes, and the rudder (rad).
-    """
+    """Steady turns of a model in calm water at any values of its parameters, by :class:`.TurningEquations`."""
 
     def __init__(self, model: Model):
-        self.model = model
-        steering = "motion.beta" in model.state_names
-        self.names = ("motion.beta", "motion.r") if steering else hull_states(model)
-        nominal = {state.name: state.nominal for state in model.states}
-        start = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
-        speed = start["ship.speed"]
-        self.ship_time = start["ship.length"] / speed
-        sizes = {"motion.u": speed, "motion.v": speed, "motion.r": 1 / self.ship_time}
-        self.scale: Array = np.array([*(sizes.get(name, nominal[name]) for name in self.names), 1.0])
-        self.yaw: Array = np.eye(len(self.scale))[self.names.index("motion.r")]
-        self.y = ca.SX.sym("y", len(self.scale))
-        self.rates, self.shown = self._expressions()
-        slopes = ca.densify(ca.jacobian(self.rates, self.y))
-        self._function = ca.Function("steady", [self.y, model.p], [self.rates, slopes], {"cse": True})
-        self._shown = ca.Function("shown", [self.y, model.p], [self.shown], {"cse": True})
-
-    def _expressions(self) -> tuple[ca.SX, ca.SX]:
-        """Scaled rates (n, 1) and yaw rate, speed and drift, of y and p."""
-        model = self.model
-        derivative = {state.name: state.derivative for state in model.states}
-        places = [model.state_names.index(name) for name in (*self.names, "rudder.angle")]
-        states = ca.vcat([ca.SX(state.start) for state in model.states])
-        for row, place in enumerate(places):
-            states[place] = self.y[row] * self.scale[row]
-        rates = model.expand(ca.vcat([model.symbol(derivative[name]) for name in self.names]))
-        rates = rates * self.ship_time / self.scale[:-1]
+        self.model, self.equations = model, TurningEquations(model, free=True)
+        self.rates, self.y, self.yaw = self.equations.rates, self.equations.symbol, self.equations.yaw
         u, v, r = (model.symbol(f"motion.{name}") for name in "uvr")
-        shown = model.expand(ca.vertcat(r, ca.sqrt(u**2 + v**2), -ca.atan2(v, u)))
-        found = ca.substitute([rates, shown], [model.x, model.u], [states, ca.SX(calm_inputs(model))])
-        return found[0], found[1]
+        self.shown = self.equations.along(model.expand(ca.vertcat(r, ca.sqrt(u**2 + v**2), -ca.atan2(v, u))))
+        self._shown = ca.Function("shown", [self.y, model.p], [self.shown], {"cse": True})
 
     def turn_at(self, rudder_rad: float, parameters: Mapping[str, float] | None = None) -> tuple[SteadyTurn, Array]:
         """The steady turn to the side of a rudder angle, and its unknowns y (n + 1,).
@@ -112,8 +84,7 @@ class TurningPoints:
         p = self.model.parameter_values(parameters)
         straight = self._straight(p)
         side = -1.0 if rudder_rad < 0 else 1.0
-        most = np.full(len(self.scale), _MOST)
-        most[self.names.index("motion.r")] = _MOST_YAW
+        most = np.where(self.yaw > 0, _MOST_YAW, _MOST)
         least = -most
         # Before a fold the rudder lies beyond the straight course's: only the side of the turn has a limit.
         most[-1], least[-1] = (rudder_rad, -math.pi) if side > 0 else (math.pi, rudder_rad)
@@ -137,7 +108,7 @@ class TurningPoints:
         """The branch from the straight course to a rudder angle, as followed by :meth:`turn_at` (without its start)."""
         p = self.model.parameter_values(parameters)
         side = -1.0 if largest_rad < 0 else 1.0
-        most = np.full(len(self.scale), _MOST)
+        most = np.full(len(self.yaw), _MOST)
         least = -most
         most[-1], least[-1] = (largest_rad, -math.pi) if side > 0 else (math.pi, largest_rad)
         curve = follow_branch(self._equations(p), self._straight(p), side * self.yaw, Bounds(least, most))
@@ -150,13 +121,13 @@ class TurningPoints:
         return bool(np.linalg.eigvals(slopes).real.max() < 0)
 
     def _equations(self, p: Array) -> _At:
-        return _At(self._function, p)
+        return _At(self.equations.function, p)
 
     def _straight(self, p: Array) -> Array:
         """The straight course: steady, with a yaw rate of zero."""
         start = np.array(self.model.initial(p)).ravel()
-        places = [self.model.state_names.index(name) for name in (*self.names, "rudder.angle")]
-        found = corrector_step(self._equations(p), start[places] / self.scale * (1 - self.yaw), self.yaw)
+        places = [self.model.state_names.index(name) for name in (*self.equations.names, "rudder.angle")]
+        found = corrector_step(self._equations(p), start[places] / self.equations.scale * (1 - self.yaw), self.yaw)
         if found is None:
             raise InputError(self.model.origin, "", "keeps no straight course", "check the card's coefficients")
         return found[0]

@@ -173,9 +173,10 @@ def members(
         return (), ()
     errors = joint_errors(card, card_parameters(card, study_model(card)))
     draws, known = draws_with(errors, seed), set(model.parameter_names)
-    found = [draws.drawn(number) for number in range(count)]
-    words = Redrawn.of([draw.beyond for draw in found]).in_words(count)
-    drawn = tuple({name: value for name, value in draw.values.items() if name in known} for draw in found)
+    found = draws.members(0, count)
+    words = Redrawn.of(list(found.beyond.values())).in_words(count)
+    members = (zip(draws.names, row, strict=True) for row in found.values.tolist())
+    drawn = tuple({name: value for name, value in member if name in known} for member in members)
     if errors.together:
         return drawn, (Notice(errors.together_in_words), *words)
     alone = "no covariance is next to the card: errors are taken as independent, and deviations of figures may be too"

@@ -164,7 +164,7 @@ class SitlShip:
         duration_s : float
         """
         count = max(1, math.ceil(duration_s / self.model.step_s * (1 - 1e-9)))
-        self.x = self.integrator.rollout(self.x, self.u, self._p, duration_s / count, count, every=count)[-1]
+        self.x = self.integrator.rollout(self.x, self.u, self._p, duration_s / count, count)[-1]
         self.time += duration_s
 
     def answer(self, data: bytes) -> bytes | None:

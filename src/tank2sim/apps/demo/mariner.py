@@ -67,7 +67,7 @@ def mariner(workshop: Workshop) -> DemoOutcome:
     figures = _figures(reports, runs["turn-35"][THIRD], runs["zigzag-20-20"][THIRD], judged[THIRD])
     result: dict[str, object] = {
         "figures": {name: {kind: entry.figures for kind, entry in run.items()} for name, run in runs.items()},
-        "stability": {kind: study_values(entry.reported()) for kind, entry in judged.items()},
+        "stability": {kind: study_values(entry) for kind, entry in judged.items()},
         "imo": [study_values(criterion) for criterion in criteria],
         "checks": [asdict(report) for report in reports],
     }
@@ -176,7 +176,7 @@ def _stability_section(
     system = state_space(models[THIRD], point, states=["motion.v", "motion.r", "rudder.angle"], **channel)
     omega = np.logspace(-4, 0.5, 400)
     response = control.frequency_response(system, omega)
-    nomoto = judged[THIRD].nomoto
+    nomoto = judged[THIRD].nomoto.dimensional
     first_order = nomoto.K_per_s / (1 + 1j * omega * nomoto.T_s)
     chart = bode_chart(
         [
@@ -197,20 +197,21 @@ def _stability_section(
     )
     return Section(
         heading="Mariner: stability",
-        text=f"C′ = {format_number(judged[THIRD].criterion, 3)}: {_verdict(judged[THIRD])} on a straight course.",
+        text=f"C′ = {format_number(judged[THIRD].stability_criterion.C_prime, 3)}: {_verdict(judged[THIRD])} on a "
+        "straight course.",
         tables=[_nomoto_table(judged), imo],
         charts=[Illustration(chart=chart)],
     )
 
 
 def _verdict(judged: Stability) -> str:
-    return "stable" if judged.stable else "unstable"
+    return "stable" if judged.stability_criterion.stable else "unstable"
 
 
 def _nomoto_table(judged: dict[str, Stability]) -> Table:
     times = [Column(title=name, unit="s") for name in ("T", "T1", "T2", "T3")]
     columns = [Column(title="model"), Column(title="K", unit="1/s"), *times]
-    rows = [[kind, *vars(result.nomoto).values()] for kind, result in judged.items()]
+    rows = [[kind, *vars(result.nomoto.dimensional).values()] for kind, result in judged.items()]
     return Table(caption="Nomoto's coefficients at the speed of expansion", columns=columns, rows=rows)
 
 
@@ -236,8 +237,8 @@ def _figures(reports: list[CheckReport], turn: Run, zigzag: Run, judged: Stabili
         KeyFigure(
             label="Straight-line stability",
             value=_verdict(judged),
-            verdict=Verdict.PASSED if judged.stable else Verdict.CAUTION,
-            note=f"C′ = {format_number(judged.criterion, 3)}",
+            verdict=Verdict.PASSED if judged.stability_criterion.stable else Verdict.CAUTION,
+            note=f"C′ = {format_number(judged.stability_criterion.C_prime, 3)}",
         ),
     ]
 

@@ -81,7 +81,7 @@ class PlainIntegrator(Integrator):
         ends = np.cumsum([made.counts[name] for name in ("states", "inputs", "outputs", "parameters")])
         self._x, self._u, _, self._p = np.split(self._instance, ends)[:4]
 
-    def rollout(self, x: Array, u: Array, p: Array, h: float, n: int, *, every: int = 1) -> Array:
+    def rollout(self, x: Array, u: Array, p: Array, h: float, n: int) -> Array:
         """As of any integrator.
 
         Raises InputError: The states leave all bounds.
@@ -89,11 +89,10 @@ class PlainIntegrator(Integrator):
         self._x[:], self._u[:], self._p[:] = x, u, p
         place = self._instance.ctypes.data
         self._parameter(place, 0, p[0])  # which computes the constants
-        states = np.empty((-(-n // every) + 1, len(x)))
+        states = np.empty((n + 1, len(x)))
         states[0] = x
         for k in range(n):
             if self._step(place, h) != 0 and h > 0:
                 raise InputError(self.model.origin, "", "the motion leaves all bounds in ship.c", "check the card")
-            if (k + 1) % every == 0 or k + 1 == n:
-                states[-(-(k + 1) // every)] = self._x
+            states[k + 1] = self._x
         return states

@@ -48,9 +48,9 @@ def members_of(card: SteeredCard, model: Model, count: int = PAGE_MEMBERS, seed:
     known = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
     found: list[dict[str, float]] = []
     for number in range(_TRIES * count):
-        member = draws.drawn(number)
-        values = {name: value for name, value in member.values.items() if name in known}
-        if not member.trouble and not mass_fault(model, known | values):
+        (row,), _, (trouble,), _ = draws.members(number, 1)
+        values = {name: value for name, value in zip(draws.names, row.tolist(), strict=True) if name in known}
+        if not trouble and not mass_fault(model, known | values):
             found.append(values)
         if len(found) == count:
             break

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tank2sim.analysis.stability.imo import TRACK_REACH, TRIAL_RUDDER, largest_allowed, manoeuvring_trials
+from tank2sim.analysis.stability.imo import TRIAL_RUDDER, largest_allowed, manoeuvring_trials
 from tank2sim.analysis.validation.standard_trials import SEED, robust_deviation
 from tank2sim.apps.trial_office.full_load import Prediction
 from tank2sim.apps.trial_office.tried import Tried
@@ -101,7 +101,7 @@ def judge_criteria(
         False for a ship that is stable in one condition and unstable in the other: overshoots are then extrapolated.
     """
     length = card.ship.length_m
-    by_name: dict[str, str] = {TRACK_REACH: "track_reach_lengths"}
+    by_name: dict[str, str] = {}
     for trial in manoeuvring_trials(TRIAL_RUDDER):
         by_name |= trial.criteria
     verdicts = []
@@ -173,14 +173,14 @@ def _judged(
 def _is_trial_of(criterion: str, one: Tried) -> bool:
     """Whether a manoeuvre is one of the trials of a criterion, to a degree."""
     manoeuvre = one.manoeuvre
-    if criterion == TRACK_REACH:
-        return isinstance(manoeuvre, Stop) and manoeuvre.revolutions != 0
     for trial in manoeuvring_trials(TRIAL_RUDDER):
         if criterion not in trial.criteria:
             continue
         asked = trial.manoeuvres[0]
         if isinstance(asked, Turn):
             return isinstance(manoeuvre, Turn) and abs(manoeuvre.rudder) >= _NEARLY_OVER
+        if isinstance(asked, Stop):
+            return isinstance(manoeuvre, Stop) and manoeuvre.revolutions != 0
         close = math.radians(1.5)
         return isinstance(manoeuvre, Zigzag) and (
             abs(abs(manoeuvre.rudder) - asked.rudder) < close and abs(manoeuvre.heading - asked.heading) < close

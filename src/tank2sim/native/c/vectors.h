@@ -24,6 +24,12 @@ typedef long long Whole;
 #define LARGE_SIDE 1e300
 #define SMALL_SIDE 1e-290
 #endif
+/* A call would pass vectors through memory. */
+#ifdef __GNUC__
+#define INLINE static inline __attribute__((always_inline))
+#else
+#define INLINE static inline
+#endif
 #if LANES > 1
 typedef Real V __attribute__((vector_size(sizeof(Real) * LANES), may_alias));
 typedef Whole M __attribute__((vector_size(sizeof(Real) * LANES), may_alias));
@@ -109,7 +115,7 @@ EACH(ceil, ceil) EACH(sinh, sinh) EACH(cosh, cosh) EACH(tanh, tanh) EACH(erf, er
 EACH(expm1, expm1) EACH(asinh, asinh) EACH(acosh, acosh) EACH(atanh, atanh)
 EACH_OF_TWO(pow, pow) EACH_OF_TWO(fmod, fmod) EACH_OF_TWO(hypot, hypot)
 EACH_OF_TWO(copysign, copysign)
-static inline void lane_sincos(V x, V *sine, V *cosine) {
+INLINE void lane_sincos(V x, V *sine, V *cosine) {
   const V shifted = x * all(6.36619772367581382433e-01) + all(ROUNDING);
   const V n = shifted - all(ROUNDING);
 #if SINGLE
@@ -141,7 +147,7 @@ static inline void lane_sincos(V x, V *sine, V *cosine) {
       if (!(fabs(LANE(x, i)) <= EXACT_ANGLE)) { LANE(*sine, i) = sin(LANE(x, i)); LANE(*cosine, i) = cos(LANE(x, i)); }
 }
 /* After s_atan.c: of the smaller over the larger side, reduced by atan(1/2) or atan(1). */
-static inline V lane_atan2(V y, V x) {
+INLINE V lane_atan2(V y, V x) {
   const V ay = lane_fabs(y), ax = lane_fabs(x), zero = all(0.0);
   const M steep = LT(ax, ay);
   const V low = WHERE(steep, ax, ay), high = WHERE(steep, ay, ax);
