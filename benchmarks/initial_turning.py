@@ -167,7 +167,9 @@ def straight_rudder() -> None:
     at_speed = max(float(run["Speed(m/s)"]) for run in runs)
     by_angle = {int(run["delta(deg)"]): run for run in runs if float(run["Speed(m/s)"]) == at_speed}
     print(
-        f"\n{'captive, straight: each degree':34s}" + "".join(f"{angle:7d}" for angle in ANGLES_DEG) + "  deg, to port"
+        f"\n{'captive, straight: each degree':34s}"
+        + "".join(f"{angle:7d}" for angle in ANGLES_DEG)
+        + "  deg; both sides to 15 deg"
     )
     for name, column in (("normal force of the rudder", "RY'"), ("side force", "Y'"), ("yaw moment", "N'")):
         values = {angle: float(run[column]) for angle, run in by_angle.items()}
