@@ -96,6 +96,8 @@ def test_without_forces_the_motion_calls_for_none():
     estimate = output_error(posed, EXACT, OutputErrorSettings(piece_s=5 * posed.ship_time))
     forces = Disturbances(np.diag(([2e-5, 8e-5, 2e-5] * UNITS) ** 2), 15.0)
     assert motion_factor(posed, estimate, forces) < 0.3, "of the motion, sensor noise is all"
+    off = replace(estimate, values=np.where(np.array(ESTIMATED) == "Nd", 0.98, 1.0) * estimate.values)
+    assert motion_factor(posed, off, forces) < 0.3, "an error that coefficients explain is no force"
     assert motion_factor(posed, estimate, forces.times(0.0)) == 1.0, "no force has no size"
 
 

@@ -165,9 +165,7 @@ def motion_factor(problem: Problem, estimate: Estimate, disturbances: Disturbanc
     before = problem.before(estimate.values, scaled_prior(problem, estimate.prior_scale))[0]
     pull, information = products[count:, :count], products[count:, count:]
     taken = np.linalg.solve(information + before, pull)
-    squares = (
-        np.diag(products)[:count] - 2 * np.sum(taken * pull, axis=0) + np.sum(taken * (information @ taken), axis=0)
-    )
+    squares = np.diag(products)[:count] + np.sum(taken * (information @ taken - 2 * pull), axis=0)
     expected = float(np.mean(squares[1:]))
     return float(np.sqrt(np.clip((squares[0] - noise) / expected, 0.0, 1.0))) if 0 < expected < np.inf else 1.0
 
