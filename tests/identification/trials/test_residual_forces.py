@@ -21,10 +21,12 @@ from tank2sim.identification.trials.assessment.prediction_intervals import (
     draw_disturbances,
     flat,
     generators,
+    motion_factor,
 )
 from tank2sim.identification.trials.methods.equation_error import EquationErrorSettings as Equations
 from tank2sim.identification.trials.methods.equation_error import equation_error
-from tank2sim.identification.trials.problem.estimation_problem import DrivenShip, Estimate
+from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
+from tank2sim.identification.trials.problem.estimation_problem import DrivenShip, Estimate, Problem
 from tank2sim.identification.trials.problem.problem_from_card import problem_from_card
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.run import simulate
@@ -67,6 +69,36 @@ def test_forces_of_trials_are_found(correlation_s):
     found = disturbances_of(problem(trials), EXACT)
     assert found.correlation_s == pytest.approx(correlation_s, rel=0.6)  # 800 s tell no better
     np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)) / UNITS, deviations, rtol=0.3)
+
+
+@pytest.fixture(scope="module")
+def pushed() -> tuple[Problem, Estimate, Disturbances]:
+    """Trials under random forces, their fit by output error, and the true forces."""
+    deviations, correlation_s = np.array([2e-5, 8e-5, 2e-5]), 15.0
+    trials = [
+        trial(rudder, seed=k, duration=400.0, force=gusts(2001, 0.2, deviations, correlation_s, 10 + k))
+        for k, rudder in enumerate([zigzag(20), turn(-30)])
+    ]
+    posed = replace(problem(trials), ship=DrivenShip(CARD, "angle"))
+    estimate = output_error(posed, EXACT, OutputErrorSettings(piece_s=5 * posed.ship_time))
+    return posed, estimate, Disturbances(np.diag((deviations * UNITS) ** 2), correlation_s)
+
+
+@first_fast("times", [2.0, 1.0, 4.0])
+def test_forces_that_moved_the_ship_have_their_size_and_others_are_sized_by_the_motion(pushed, times):
+    posed, estimate, forces = pushed
+    assert motion_factor(posed, estimate, forces.times(times)) == pytest.approx(1 / times, rel=0.25)
+
+
+def test_without_forces_the_motion_calls_for_none():
+    trials = [trial(rudder, seed=k) for k, rudder in enumerate([zigzag(20), turn(-30)])]
+    posed = replace(problem(trials), ship=DrivenShip(CARD, "angle"))
+    estimate = output_error(posed, EXACT, OutputErrorSettings(piece_s=5 * posed.ship_time))
+    forces = Disturbances(np.diag(([2e-5, 8e-5, 2e-5] * UNITS) ** 2), 15.0)
+    assert motion_factor(posed, estimate, forces) < 0.3, "of the motion, sensor noise is all"
+    off = replace(estimate, values=np.where(np.array(ESTIMATED) == "Nd", 0.98, 1.0) * estimate.values)
+    assert motion_factor(posed, off, forces) < 0.3, "an error that coefficients explain is no force"
+    assert motion_factor(posed, estimate, forces.times(0.0)) == 1.0, "no force has no size"
 
 
 def test_sensor_noise_is_not_taken_for_forces():

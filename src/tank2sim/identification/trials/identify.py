@@ -195,7 +195,7 @@ def _identified(
     average = [
         (fit if name == structure else _fitted(card, name, silently), weight) for name, weight in weights.items()
     ]
-    disturbances = fit.disturbances if options.bootstrap else None  # unknown without velocities
+    disturbances = fit.disturbances() if options.bootstrap else None  # unknown without velocities
     again = fit.problem, fit.estimate, partial(_in_pieces, options=options)
     every = [*trials.trials, *(held.trials if held else ())]
     recognised = ((trial.name, recorded(trial, build(fit.card))) for trial in every)

@@ -33,9 +33,17 @@ from tank2sim.dynamics.model import Model, Parameter, Quantity, State
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.assessment.evaluation import Comparison, compare_card, or_none
 from tank2sim.identification.trials.assessment.model_selection import MethodChoice
-from tank2sim.identification.trials.methods.output_error import cut
+from tank2sim.identification.trials.methods.coloured_noise import white
+from tank2sim.identification.trials.methods.output_error import Pieces, Shooting, Shot, cut, whitened
 from tank2sim.identification.trials.methods.weak_form import WeakForm, WeakWindows, sensor_noise
-from tank2sim.identification.trials.problem.estimation_problem import DrivenShip, Estimate, Problem, model_bounds
+from tank2sim.identification.trials.options import PIECE
+from tank2sim.identification.trials.problem.estimation_problem import (
+    DrivenShip,
+    Estimate,
+    Problem,
+    model_bounds,
+    scaled_prior,
+)
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.water_current import WaterCurrent
 from tank2sim.simulation.figures import Figures
@@ -55,6 +63,10 @@ LAGS = 12
 
 FORCES = {"X": "N", "Y": "N", "N": "N.m"}
 
+FORCE_DRAWS = 12
+"""Draws of the forces on each run, from which their size follows: to 3 % with the KVLCC2's seven zigzags (project
+choice)."""
+
 
 @dataclass(frozen=True, eq=False)
 class Disturbances:
@@ -62,6 +74,10 @@ class Disturbances:
 
     covariance: Array  # (3, 3): Covariance of X, Y (N) and N (N m)
     correlation_s: float  # Time in which their correlation falls to 1/e, s
+
+    def times(self, factor: float) -> Disturbances:
+        """Forces `factor` times as large."""
+        return replace(self, covariance=factor**2 * self.covariance)
 
 
 def disturbances_of(problem: Problem, values: Array) -> Disturbances:
@@ -112,6 +128,74 @@ def gauss_markov(form: WeakForm, windows: WeakWindows) -> tuple[Array, float]:
     covariance = np.einsum("l,lij->ij", shape, covariances) / (shape @ shape)
     values, vectors = np.linalg.eigh((covariance + covariance.T) / 2 / np.outer(size, size))
     return (vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(size, size), correlation_s
+
+
+def motion_factor(problem: Problem, estimate: Estimate, disturbances: Disturbances) -> float:
+    """Factor on random forces with which simulated motion departs from the model's as far as the measured one does.
+
+    Accelerations that the model lacks are not independent of the motion: the fit lets them cancel over a manoeuvre, and
+    drawn at random they would drive a ship farther from the model than the trials are. Pieces of the runs are therefore
+    simulated with and without :data:`FORCE_DRAWS` draws of the forces. From both departures, drawn and measured, the
+    linearised model's initial states and coefficients take what they can explain; sensor noise does not count as
+    departure. At most 1: accelerations show every force, and the motion errors of sensors, too; 1 where the model
+    leaves all bounds or no force acts.
+    """
+    if not disturbances.covariance.any():
+        return 1.0
+    weights = [white(estimate.noise.get(name) or 1.0) for name in problem.seen]
+    settling, shooting = Shooting(problem, starts_alone=True), Shooting(problem)
+    count = 1 + FORCE_DRAWS  # departures, the measured one first
+    products, noise = np.zeros((count + len(problem.free), count + len(problem.free))), 0.0
+    rngs = generators(len(problem.runs))
+    for run, rng in zip(problem.runs, rngs, strict=True):
+        pieces = cut(problem, run, PIECE * problem.ship_time)
+        shot = settling.settled(pieces, estimate.values, weights)
+        if not np.isfinite(shot.cost):
+            return 1.0
+        residuals, by = shooting.linearised(pieces, shot, estimate.values, weights)
+        departures = [_departure(problem, estimate, disturbances, pieces, shot, rng) for _ in range(FORCE_DRAWS)]
+        changes = [whitened(shot.residuals, change, weights).reshape(residuals.shape) for change in departures]
+        every = np.stack([residuals, *changes], axis=-1)
+        starts = shot.starts.shape[1]
+        for columns, J in zip(every, by, strict=True):
+            free_of_starts = _without_span(J[:, :starts], np.column_stack([columns, J[:, starts:]]))
+            products += free_of_starts.T @ free_of_starts
+        deviations = sensor_noise(problem, run) / [weight.sigma for weight in weights]
+        noise += float(np.sum(np.where(np.isnan(shot.residuals), 0.0, deviations**2)))
+    before = problem.before(estimate.values, scaled_prior(problem, estimate.prior_scale))[0]
+    pull, information = products[count:, :count], products[count:, count:]
+    taken = np.linalg.solve(information + before, pull)
+    squares = np.diag(products)[:count] + np.sum(taken * (information @ taken - 2 * pull), axis=0)
+    expected = float(np.mean(squares[1:]))
+    return float(np.sqrt(np.clip((squares[0] - noise) / expected, 0.0, 1.0))) if 0 < expected < np.inf else 1.0
+
+
+def _departure(
+    problem: Problem,
+    estimate: Estimate,
+    disturbances: Disturbances,
+    pieces: Pieces,
+    shot: Shot,
+    rng: np.random.Generator,
+) -> Array:
+    """Seen variables with drawn forces, less those without (pieces, n + 1, ny)."""
+    assert problem.ship is not None
+    model, steps, shown = _simulator(problem.ship, problem.seen)
+    forces = draw_disturbances(disturbances, fastest_rate(model), rng)
+    p = model.parameter_values({**dict(zip(estimate.free, map(float, estimate.values), strict=True)), **forces})
+    step, count = pieces.run.step_s, pieces.inputs.shape[1] - 1
+    found = []
+    for number, (start, inputs) in enumerate(zip(shot.starts, pieces.inputs, strict=True)):
+        clock = number * count * step  # the last state
+        found.append(shown(steps.run(np.append(start, clock), inputs[:-1], p, np.array([step])), inputs, p)[0])
+    return np.stack(found) - (shot.residuals + pieces.measured)
+
+
+def _without_span(basis: Array, columns: Array) -> Array:
+    """Columns (n, m) less their projection on those of a basis (n, b), which may be dependent."""
+    left, sizes, _ = np.linalg.svd(basis, full_matrices=False)
+    span = left[:, sizes > 1e-9 * sizes.max(initial=0.0)]
+    return np.asarray(columns - span @ (span.T @ columns), dtype=np.float64)
 
 
 def disturbed(model: Model) -> Model:
@@ -216,10 +300,11 @@ class Fit:
         """Whether the card is compared with runs at all their speeds."""
         return self.started.model.valid_speed_mps is None
 
-    @property
     def disturbances(self) -> Disturbances | None:
-        """Random forces that the fit does not explain; None where the velocities were not measured."""
-        return or_none(disturbances_of, self.problem, self.estimate.values)
+        """Random forces that the fit does not explain, as large as the residuals of the motion show; None where the
+        velocities were not measured."""
+        found = or_none(disturbances_of, self.problem, self.estimate.values)
+        return found and found.times(motion_factor(self.problem, self.estimate, found))
 
 
 def generators(members: int, seed: int = 0) -> list[np.random.Generator]:
@@ -358,17 +443,18 @@ def compare_held_out(
     if not members or not plain.figures:
         return plain
     model = build(steerable(fit.card))
+    parts = [(part, part.disturbances(), round(weight * members)) for part, weight in average or ((fit, 1.0),)]
     intervals: dict[tuple[str, str], tuple[float, float]] = {}
     for trial in held.trials:
         manoeuvre = recorded(trial, model)
         if manoeuvre is None:
             continue
         pooled_members: dict[str, list[Array]] = {}
-        for part, weight in average or ((fit, 1.0),):
-            for name, values in _members(part, manoeuvre, round(weight * members), executor).items():
+        for part, forces, count in parts:
+            for name, values in _members(part, forces, manoeuvre, count, executor).items():
                 pooled_members.setdefault(name, []).append(values)
-        for name, parts in pooled_members.items():
-            lowest, median, highest = np.nanquantile(np.concatenate(parts), LEVELS)
+        for name, figures_of_parts in pooled_members.items():
+            lowest, median, highest = np.nanquantile(np.concatenate(figures_of_parts), LEVELS)
             figure = IN_BANDS.get(name, name)
             error = NORMAL_95 * from_si(figure, manoeuvre.reading_errors.get(figure, 0.0))
             below, above = math.hypot(median - lowest, error), math.hypot(highest - median, error)
@@ -377,11 +463,13 @@ def compare_held_out(
     return replace(plain, figures=figures)
 
 
-def _members(fit: Fit, manoeuvre: Recorded, members: int, executor: Executor | None) -> Mapping[str, Array]:
+def _members(
+    fit: Fit, forces: Disturbances | None, manoeuvre: Recorded, members: int, executor: Executor | None
+) -> Mapping[str, Array]:
     """Figure to its value in each member of a fit; empty where no member's motion stays within bounds."""
     ship = DrivenShip(steerable(fit.card).text, "order")
     # Without an executor by threads: half of a simulation is machine code, and processes would begin too slowly.
     making = nullcontext(executor) if executor is not None else ThreadPoolExecutor(os.cpu_count())
     with making as pool, suppress(InputError):
-        return bands(ship, fit.estimate, manoeuvre, generators(members), fit.disturbances, pool)
+        return bands(ship, fit.estimate, manoeuvre, generators(members), forces, pool)
     return {}
