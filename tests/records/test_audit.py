@@ -5,11 +5,13 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from statsmodels.regression.linear_model import OLS
 
 from tank2sim.records.audit import audit_and_repair, audit_trial, record_noise, repair_trial
 from tank2sim.records.audit.rudder import rudder_clock_findings, rudder_response
 from tank2sim.records.audit.weak import fit
+from tank2sim.records.audit.yaw import yaw_findings
 from tank2sim.records.reading import read_trial_file
 from tank2sim.records.trials import select_rows
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
@@ -626,3 +628,22 @@ def test_errors_of_a_regression_are_those_of_newey_and_west():
     assert found is not None
     assert found.values == pytest.approx(plain.params, rel=1e-9)
     assert found.errors == pytest.approx(np.maximum(plain.bse, robust.bse), rel=1e-9)
+
+
+@pytest.mark.parametrize(("memory_s", "size_degps"), [(15.0, 0.03), (60.0, 0.02), (60.0, 0.03)])
+def test_slow_drifts_of_a_straight_run_are_no_late_sensor(memory_s: float, size_degps: float) -> None:
+    """Few slow swings are alike at some lag by chance."""
+    t = np.arange(0.0, 500.0, 0.5)
+    fades = np.exp(-0.5 / memory_s)
+    for seed in range(20):
+        shocks = np.random.default_rng(seed).standard_normal(len(t) + 400)
+        r = lfilter([size_degps * DEG * np.sqrt(1 - fades**2)], [1, -fades], shocks)[400:]
+        straight = {
+            "t_s": t,
+            "u_mps": np.full(len(t), 7.7),
+            "v_mps": 0 * t,
+            "r_radps": r,
+            "psi_rad": 0.5 * np.cumsum(r),
+        }
+        record = trial(straight, seed=seed, noise={"r_radps": 0.1 * DEG, "psi_rad": 0.1 * DEG})
+        assert not [one for one in yaw_findings(record) if "lag_s" in one.evidence], seed

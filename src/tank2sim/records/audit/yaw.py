@@ -28,6 +28,10 @@ _ROUNDED = 1.5
 """Times what rounding is expected to leave that is put down to it: errors of rounding are not quite so random (project
 choice)."""
 _ALIKE = 0.9  # correlation from which two signals are taken for the same motion
+_BY_CHANCE = 4.0
+"""Standard errors of a correlation (Fisher's z) up to which chance makes it at one of the lags that are tried (project
+choice: p = 6e-5; slow drifts of a straight run reach 3.5, turns and zigzags 3.7 to 15)."""
+
 UNLIKE = 0.44
 """What a signal leaves of the spread of another that is the same motion: that of a correlation of 0.9."""
 
@@ -105,12 +109,19 @@ class _Comparison:
     lag_s: float
     lag_error_s: float
     correlation: float
+    independent: float
     step_s: float
     shift: int
 
     @property
     def alike(self) -> bool:
         return abs(self.correlation) > _ALIKE
+
+    @property
+    def beyond_chance(self) -> bool:
+        """Whether so few independent values have this correlation at none of many lags by chance: Fisher's z."""
+        z = np.arctanh(min(abs(self.correlation), 1 - 1e-9)) * np.sqrt(max(self.independent - 3, 0.0))
+        return bool(z > _BY_CHANCE)
 
     @property
     def factor(self) -> float:
@@ -155,7 +166,7 @@ def _comparison(windows: AuditWindows, rate: Array, heading: Array, step: float)
         return None
     found = first if first.alike else _at(windows, rate, heading, step, _coarse_lag(windows, rate, heading))
     for _ in range(3):  # the regression's lag is of first order: repeated from where it leads
-        if found is None or not found.alike:
+        if found is None or not found.alike or not (found is first or found.beyond_chance):
             return first
         shift = round(found.lag_s / step)
         if abs(shift - found.shift) <= 1:
@@ -173,8 +184,18 @@ def _at(windows: AuditWindows, rate: Array, heading: Array, step: float, shift: 
         return None
     whole = np.isfinite(r) & np.isfinite(target)
     correlation = float(np.corrcoef(r[whole], target[whole])[0, 1])
+    independent = _independent(r[whole], target[whole])
     lag, error = (float(value[2] / found.values[0]) for value in (found.values, found.errors))
-    return _Comparison(found, shift * step + lag, abs(error), correlation, step, shift)
+    return _Comparison(found, shift * step + lag, abs(error), correlation, independent, step, shift)
+
+
+def _independent(a: Array, b: Array) -> float:
+    """How many independent pairs the correlation of two series (n,) is of: Bartlett (1946), J. R. Stat. Soc. 8."""
+    n = len(a)
+    away = (values - values.mean() for values in (a, b))
+    of_each = [correlate(values, values, mode="full", method="fft")[n - 1 :] for values in away]
+    lags = np.prod([values / max(values[0], np.finfo(float).tiny) for values in of_each], axis=0)[1:]
+    return float(n / max(1 + 2 * np.sum((1 - np.arange(1, n) / n) * lags), 1.0))
 
 
 def _shifted(values: Array, samples: int) -> Array:
@@ -207,7 +228,8 @@ def _judged(trial: Trial, found: _Comparison) -> list[Finding]:
         findings.append(_factor(trial, found))
     if found.fit.differs(1):
         findings.append(_bias(trial, -float(found.fit.values[1]) / found.factor, float(found.fit.errors[1]) / factor))
-    if abs(found.lag_s) > max(found.step_s, 4.5 * found.lag_error_s):  # 4.5 errors: 1e-5 of normal ones
+    # 4.5 errors: 1e-5 of normal ones
+    if found.beyond_chance and abs(found.lag_s) > max(found.step_s, 4.5 * found.lag_error_s):
         late = "r is late" if found.lag_s > 0 else "psi is late"
         truth = f"{late} by {abs(found.lag_s):.3g} s (its clock, or a filter in the sensor)"
         what = "r and dpsi/dt are alike when one of them is shifted in time"
