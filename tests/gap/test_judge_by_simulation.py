@@ -87,6 +87,7 @@ def test_next_to_something_unknown_a_name_must_close_the_gap_clearly(after: floa
     [
         (1.2, 1.1, True, NO_EFFECT_MISSING),  # near the noise
         (2.9, 1.0, True, NO_EFFECT_MISSING),
+        (2.9, 1.3, False, NO_EFFECT_MISSING),
         (10.0, 2.9, True, COEFFICIENTS),  # near the noise with other coefficients
         (100.0, 19.0, True, COEFFICIENTS),
         (100.0, 21.0, True, OUTSIDE_LIBRARY),
@@ -99,7 +100,9 @@ def test_where_nothing_is_named_the_coefficients_explain_the_gap_or_nothing_does
     judged = judge(Prover(before, lambda effects: after, refits=refits), FOUND, decision(NO_EFFECT_MISSING, NONE))
     assert judged.decision.verdict == verdict and judged.withheld == ""
     odd = decision(OUTSIDE_LIBRARY, NONE, strange=("a push",))
-    assert judge(Prover(before, lambda effects: after, refits=refits), FOUND, odd).decision.verdict == OUTSIDE_LIBRARY
+    judged = judge(Prover(before, lambda effects: after, refits=refits), FOUND, odd)
+    followed = after <= 1.2  # to the noise: an odd passage of its innovations is then no missing effect
+    assert judged.decision.verdict == (verdict if followed else OUTSIDE_LIBRARY)
 
 
 @pytest.mark.parametrize(("moved", "alternatives"), [(4.0, (("linear_yaw_damping",),)), (2.0, ())])

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.gap.proof.cross_check import MUCH, closes_gap
+from tank2sim.gap.proof.cross_check import MUCH, NEAR_NOISE, closes_gap
 from tank2sim.gap.proof.improvement import Proof, Prover
 from tank2sim.gap.proof.refit import effects_like
 from tank2sim.gap.result import (
@@ -88,10 +88,11 @@ def judge(prover: Prover, search: Search, decision: Decision) -> Judged:
 def _verdict_without_name(decision: Decision, proof: Proof) -> str:
     """Whether the trials are followed to the noise without an effect, with other coefficients, or not at all."""
     before, after = (misfit_of(proof.results, version) for version in ("before", "after"))
+    unknown = bool(decision.strange) and after > NEAR_NOISE
     refitted = proof.coefficients and before > MUCH and closes_gap(proof.results)
-    if not decision.strange and refitted and after <= max(MUCH, EXPLAINED * before):
+    if not unknown and refitted and after <= max(MUCH, EXPLAINED * before):
         return COEFFICIENTS
-    return OUTSIDE_LIBRARY if decision.strange or after > MUCH else NO_EFFECT_MISSING
+    return OUTSIDE_LIBRARY if unknown or after > MUCH else NO_EFFECT_MISSING
 
 
 def _closes_clearly(results: Sequence[Passed]) -> bool:
