@@ -180,15 +180,7 @@ def test_two_hidden_effects_are_both_named(effects: tuple[str, str], tmp_path: P
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "effect",
-    [
-        *("rudder_stall", "cross_flow_drag", "rudder_rate_limit"),
-        pytest.param(
-            "linear_yaw_damping", marks=pytest.mark.xfail(reason="taken for trim, by hardly more than enough")
-        ),
-    ],
-)
+@pytest.mark.parametrize("effect", ["rudder_stall", "cross_flow_drag", "rudder_rate_limit", "linear_yaw_damping"])
 def test_straight_runs_alone_never_make_a_wrong_name_sure(effect: str, tmp_path: Path) -> None:
     """What shows in turns alone cannot be reported from straight runs."""
     case = hidden(tmp_path, effect, trials=("straight", "accel"))
