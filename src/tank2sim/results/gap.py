@@ -52,7 +52,6 @@ from tank2sim.results.gap_text import (
     effects_of,
     found_in_words,
     meaning,
-    others_in_words,
     parameter_cells,
     place_of_cause,
     probabilities_in_words,
@@ -79,8 +78,8 @@ _ALL_DIGITS = 7
 """Significant digits of misfits, which are rounded to hundredths of the noise before."""
 
 _COEFFICIENTS = (
-    "Coefficients of the card fitted together with the effects, within the card's standard errors (times a common "
-    "factor that the trials determine)."
+    "Coefficients of the card fitted together with the effects (if any are named), within the card's standard errors "
+    "(times a common factor that the trials determine)."
 )
 _ON = {"held out": "held out", "fitting": "used for fitting"}
 _BEFORE_AND_AFTER = (
@@ -95,7 +94,7 @@ _BLACK_BOX = (
 )
 _FIGURES = (
     "Advance, transfer, diameters and overshoots are of turns and zigzags simulated in closed loop, the others of the "
-    "trials replayed. Before is the card as given, after the card with the effect."
+    "trials replayed. Before is the card as given, after the improved card."
 )
 _AGREEMENT = (
     "A true effect has the same size in every trial. Where trials want different sizes, the name is wrong or "
@@ -119,8 +118,8 @@ _STRIPS = (
 )
 _MEANS = "Points: instants of all trials. Squares: means of bins, with 95 % bars by the spread between trials."
 _LINES = (
-    'Card before: as given. Card found: with the named effects ("after" in the tables). The lines coincide where '
-    "nothing was added."
+    'Card before: as given. Card found: the improved card ("after" in the tables). The lines coincide where nothing '
+    "was changed."
 )
 _RUN = f"Points: measured. Lines: simulated. {_LINES}"
 _CAPTIONS = {
@@ -262,14 +261,12 @@ class GapResult(Result[GapStudy]):
 
     @property
     def headline(self) -> tuple[str, ...]:
-        """Objections to the improved card, the verdict with its probability, explanations that these data cannot
-        distinguish, and the next test."""
+        """Objections to the improved card, the verdict with its probability, and the next test."""
         study, test = self.study, self.study.next_test
         return (
             *self._objections,
             f"{study.ship}: {found_in_words(study)}",
             *probabilities_in_words(study)[:1],
-            *([others_in_words(study)] if study.alternatives and study.verdict == MISSING else []),
             *([f"Next test: {test.manoeuvre}. {capital(test.why)}"] if test else []),
         )
 
@@ -615,11 +612,9 @@ def _place_of_the_gap(study: GapStudy) -> Section:
         ]
         for passage in study.acting[:_MOST_PASSAGES]
     ]
-    interval = [Column(title=head, unit="s", digits=3) for head in ("from", "to")]
-    share, size = (
-        Column(title=head, unit=unit, digits=2)
-        for head, unit in (("share of the misfit", "%"), ("size", "standard errors"))
-    )
+    interval = [Column(title=head, unit="s", digits=4) for head in ("from", "to")]
+    share = Column(title="share of the misfit", unit="%", digits=2)
+    size = Column(title="size", unit="standard errors", digits=3)
     tables = [
         table(
             "Where the misfit arises, beyond the noise", ["trial", "signal", *interval, share], places, on_screen=False

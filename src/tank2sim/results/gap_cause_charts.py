@@ -219,8 +219,9 @@ def rival_chart(study: GapStudy, *, title: str = "") -> ChartSpec | None:
 
 _COMPARED = (
     "A longer bar explains the data less well; the best has 0. In brackets: probability that the explanation is right "
-    "as a whole, with nothing more and nothing less missing. The probability of an effect is the sum over all "
-    "explanations that contain it."
+    "as a whole, with nothing more and nothing less missing. Each effect lowers it by its prior odds; an effect within "
+    "three standard errors of its absence makes it zero. The probability of an effect is the sum over all explanations "
+    "that contain it."
 )
 
 

@@ -107,8 +107,12 @@ def of_tried_effects(tried: Sequence[str], possible: Sequence[str]) -> tuple[Not
     """That not all effects were tried which the card and the trials allow; empty if all were."""
     if set(possible) <= set(tried):
         return ()
+    count = f"{len(possible)} possible effects; another one may be missing"
+    left_out = [name for name in possible if name not in tried]
+    if len(left_out) < min(len(tried), SHOWN + 1):
+        return (Notice(f"not tried, as asked: {', '.join(left_out)} of {count}"),)
     shown = ", ".join(tried) if len(tried) <= SHOWN else f"{len(tried)}"
-    return (Notice(f"tried, as asked: {shown} of {len(possible)} possible effects; another one may be missing"),)
+    return (Notice(f"tried, as asked: {shown} of {count}"),)
 
 
 def _partly_measured(fitted: Measured) -> list[Notice]:

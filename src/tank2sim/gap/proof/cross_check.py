@@ -34,8 +34,8 @@ CLOSES = 0.9
 """Largest ratio of the misfit after to that before, as the median over all signals of all trials (project choice)."""
 
 REMAINS = 1.5
-"""Misfit in noise units from which a gap remains, is reported, and more effects are sought (project choice): the misfit
-beyond the noise is then as large as the noise, sqrt(1.5^2 - 1) = 1.1."""
+"""Misfit in noise units from which a gap remains and is reported (project choice): the misfit beyond the noise is then
+as large as the noise, sqrt(1.5^2 - 1) = 1.1."""
 
 NEAR_NOISE = 1.2
 """Misfit in noise units up to which no simulation is closer than another (project choice): many coefficients follow a
