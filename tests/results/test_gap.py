@@ -137,6 +137,15 @@ def test_a_card_that_lacks_nothing_has_the_probability_that_it_does(none, other,
         assert probabilities_in_words(page.study) == said and [*page.headline[1:]] == said
 
 
+def test_outside_the_library_the_best_of_what_was_tried_is_on_the_page_and_no_test_is_promised() -> None:
+    gap = replace(made_up.outside(), rivals=(Rival(("wind", "rudder_lag"), 0.0, 0.99), Rival((), 90.0, 0.01)))
+    sections = {section.heading: section for section in result_of(gap).sections}
+    assert "is wind with rudder lag" in sections["How sure, and what else it could be"].text
+    assert "Next test" not in sections
+    page = result_of(replace(gap, rivals=(Rival((), 0.0, 0.9), Rival(("wind",), 9.0, 0.1))))
+    assert "what was tried" not in page.sections[1].text
+
+
 def test_a_sensor_at_fault_next_to_an_effect_of_the_ship_is_not_lacking_in_the_model() -> None:
     gap = made_up.missing()
     gyro = replace(gap.effects[0], name="gyro_bias", parameters={"rate_radps": np.deg2rad(0.1)}, standard_errors={})

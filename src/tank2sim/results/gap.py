@@ -713,8 +713,7 @@ def _could_hide(study: GapStudy) -> list[Table]:
 def _next_test(study: GapStudy) -> str:
     test = study.next_test
     if test is None:
-        sure = study.verdict in (MISSING, NO_EFFECT_MISSING, COEFFICIENTS)
-        return "" if sure else "No manoeuvre was found that would decide more."
+        return "No manoeuvre was found that would decide more." if study.verdict == AMBIGUOUS else ""
     # The command has a line of its own: among other words it is broken at its hyphens.
     command = f"tank2sim simulate improved.toml --manoeuvre {test.manoeuvre}"
     begin = f"{capital(test.why)}\n\nIts orders are in {NEXT_TEST_FILE}."

@@ -11,7 +11,7 @@ from tank2sim.answer.parts import Cell
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.outcome.study import EffectFound, GapStudy
 from tank2sim.gap.proof.cross_check import MUCH
-from tank2sim.gap.result import AMBIGUOUS, COEFFICIENTS, MISSING, NO_EFFECT_MISSING, Rival
+from tank2sim.gap.result import AMBIGUOUS, COEFFICIENTS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY, Rival
 from tank2sim.units import in_words, to_si
 
 GOOD = 1.5
@@ -191,10 +191,10 @@ def _unknown_in_words(study: GapStudy) -> str:
     acting = study.acting[0].trial if study.acting else ""
     doubts = [one for one in study.record_doubts if trial_name(acting) == one.trial]
     if doubts:
-        found = "; ".join(f"{one.column}, {one.likely_truth}" for one in doubts)
+        found = "; ".join(f"{one.column}: {one.likely_truth}" for one in doubts)
         return (
             f"The record of {doubts[0].trial} is in doubt, before any effect of the ship is: the misfit is in it, and "
-            f"the audit finds {found}. Correct it and search again."
+            f"the audit finds in {found}. Correct it and search again."
         )
     sentence = "Something is missing that no tried effect explains: the remaining misfit has a pattern, but no name."
     return " ".join([sentence, *([f"The cause acts most in {place_of_cause(study)}."] if study.acting else [])])
@@ -269,9 +269,21 @@ def verdict_context(study: GapStudy) -> list[str]:
     if study.alternatives and study.verdict == COEFFICIENTS:
         names = " or ".join(_together(effects_of(text)) for text in study.alternatives)
         sentences.append(f"These trials cannot distinguish coefficients that are off from {names}.")
+    if study.verdict == OUTSIDE_LIBRARY:
+        sentences += _best_of_tried(study)
     if study.verdict != NO_EFFECT_MISSING and study.equation:
         sentences.append(f"The gap is in {_EQUATIONS.get(study.equation, study.equation)}.")
     return sentences
+
+
+def _best_of_tried(study: GapStudy) -> list[str]:
+    """The explanation that would have been named if nothing else were in the trials."""
+    best = max(study.rivals, key=_by_probability, default=None)
+    if best is None or not best.effects:
+        return []
+    return [
+        f"The most probable of what was tried is {_together(best.effects)}. It leaves too much unexplained to be named."
+    ]
 
 
 def _likeliest_without(study: GapStudy) -> str:
