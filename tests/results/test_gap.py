@@ -146,6 +146,18 @@ def test_outside_the_library_the_best_of_what_was_tried_is_on_the_page_and_no_te
     assert "what was tried" not in page.sections[1].text
 
 
+def test_three_effects_are_listed_and_each_has_its_probability() -> None:
+    gap = made_up.missing()
+    others = [
+        replace(gap.effects[0], name=name, parameters={}, standard_errors={}, confidence=0.91)
+        for name in ("hull_fouling", "trim")
+    ]
+    study = gap_study(replace(gap, effects=(*gap.effects, *others)))
+    assert "), hull fouling and trim." in found_in_words(study)
+    line = probabilities_in_words(study)[0]
+    assert line == "Probability that each effect is there: current 97 %; hull fouling 91 %; trim 91 %."
+
+
 def test_a_sensor_at_fault_next_to_an_effect_of_the_ship_is_not_lacking_in_the_model() -> None:
     gap = made_up.missing()
     gyro = replace(gap.effects[0], name="gyro_bias", parameters={"rate_radps": np.deg2rad(0.1)}, standard_errors={})
@@ -262,7 +274,7 @@ def test_rivals_are_ranked_and_none_is_always_among_them() -> None:
     many = tuple(Rival((f"effect_{place}",), 10.0 + place, 0.0) for place in range(20))
     rows = rows_of(rival_chart(gap_study(replace(gap, rivals=(*many, *gap.rivals)))))
     names = [row["name"] for row in rows]
-    assert names[:2] == ["current", "effect 0"] and names[-1] == "none (the card as it is)" and len(names) == 13
+    assert names[:2] == ["current", "effect 0"] and names[-1] == "no effect (coefficients alone)" and len(names) == 13
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import PurePath
 
 from tank2sim.answer.numbers import format_column, format_number
@@ -57,7 +57,8 @@ def probabilities_in_words(study: GapStudy) -> list[str]:
     if not study.effects:
         return _probability_of_none(study)
     each = "; ".join(f"{effect_in_words(effect.name)} {as_percent(effect.confidence)}" for effect in study.effects)
-    sentences = [f"Probability that the effect is there, alone or with another one: {each}."]
+    what = "the effect is there, alone or with another one" if len(study.effects) == 1 else "each effect is there"
+    sentences = [f"Probability that {what}: {each}."]
     more = _unnamed(study)
     if more:
         likely = ", ".join(map(effect_in_words, more))
@@ -125,6 +126,12 @@ def _together(names: Sequence[str]) -> str:
     return " with ".join(map(effect_in_words, names)) or "no effect, with other coefficients of the card"
 
 
+def _listed(words: Iterable[str]) -> str:
+    """Words in a sentence: ``a, b and c``."""
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
+
+
 def as_percent(probability: float) -> str:
     """A probability in words of %, never 0 and 99 at most: an effect that was not tried may look the same."""
     if not math.isfinite(probability):
@@ -154,12 +161,12 @@ def _missing_in_words(study: GapStudy) -> str:
     lacking = [effect for effect in study.effects if effect not in sensors]
     sentences = []
     if lacking:
-        names = " and ".join(map(_with_values, lacking))
+        names = _listed(map(_with_values, lacking))
         sentences.append(f"The model lacks {'an effect' if len(lacking) == 1 else 'effects'}: {names}.")
     if sensors:
         at_fault = "A sensor is at fault" if len(sensors) == 1 else "Sensors are at fault"
         model = "" if lacking else ", not the model"
-        sentences.append(f"{at_fault}{model}: {' and '.join(map(_with_values, sensors))}.")
+        sentences.append(f"{at_fault}{model}: {_listed(map(_with_values, sensors))}.")
     known = [EFFECTS[effect.name].description for effect in (*lacking, *sensors) if effect.name in EFFECTS]
     return " ".join([*sentences, *known, *_refitted(study)])
 
