@@ -84,6 +84,8 @@ def _probability_of_none(study: GapStudy) -> list[str]:
     if likeliest is not None and likeliest.probability > none.probability:
         return []
     sentence = f"Probability that no tried effect is missing: {as_percent(none.probability)}"
+    if study.alternatives:
+        sentence += ", if the coefficients may be so far off"
     if likeliest is not None and likeliest.probability >= WORTH_A_WORD:
         sentence += f"; most probable otherwise: {_together(likeliest.effects)} ({as_percent(likeliest.probability)})"
     return [f"{sentence}."]
