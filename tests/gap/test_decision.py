@@ -15,7 +15,7 @@ from tank2sim.gap.inference.hypothesis import Hypothesis
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY
 from tank2sim.gap.search import decision as module
 from tank2sim.gap.search.decision import LISTED, PRICE, STANDARD_ERRORS, SUREST, TEMPER, decide, is_significant
-from tank2sim.gap.search.explanations import Search
+from tank2sim.gap.search.explanations import CLOSE, Search
 from tank2sim.gap.workflow import RIVALS, _rivals
 from tests.gap.made_scores import CALM, fit
 from tests.gap.toy import NAMES, Toy, toy_motion
@@ -200,3 +200,9 @@ def test_the_named_set_is_reported_however_many_larger_ones_score_better() -> No
     )
     losses = [rival.loss for rival in reported.values()]
     assert losses[0] == 0 and losses == sorted(losses)
+
+
+@pytest.mark.usefixtures("calm")
+def test_a_fit_that_was_given_up_is_not_reported_as_worse_than_nothing() -> None:
+    search = Search(CALM, (fit(-50, 0), fit(0), fit(CLOSE - 1, 1), fit(CLOSE + 1, 2)), ())
+    assert [rival.effects for rival in _rivals(search, decide(search))] == [(YAW,), (), (SURGE,)]

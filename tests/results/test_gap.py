@@ -157,6 +157,8 @@ def test_three_effects_are_listed_and_each_has_its_probability() -> None:
     study = gap_study(replace(gap, effects=(*gap.effects, *others)))
     assert "), hull fouling and trim." in found_in_words(study)
     line = probabilities_in_words(study)[0]
+    whole = Rival(("current", "hull_fouling", "trim"), 0.0, 0.9)
+    assert "current with hull fouling and trim are all" in probabilities_in_words(replace(study, rivals=(whole,)))[1]
     assert line == "Probability that each effect is there: current 97 %; hull fouling 91 %; trim 91 %."
 
 

@@ -50,7 +50,7 @@ from tank2sim.gap.result import (
 )
 from tank2sim.gap.search.decision import LIKELY, PRICE, Decision, decide
 from tank2sim.gap.search.detection_limit import could_hide
-from tank2sim.gap.search.explanations import Search, search
+from tank2sim.gap.search.explanations import CLOSE, Search, search
 from tank2sim.identification.trials.assessment.other_ship import evidence_of_other_ship, not_of_ship
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import (
@@ -298,10 +298,14 @@ def _noise(found: Search, best: ExplanationFit, fitted: Measured) -> dict[str, t
 
 
 def _rivals(found: Search, decision: Decision) -> tuple[Rival, ...]:
-    """The most probable explanations, and none, the best score first; those that were not compared have 0."""
+    """The most probable explanations, and none, the best score first; those that were not compared have 0.
+
+    Further behind none than :data:`.explanations.CLOSE`, a fit was given up before its noise was found.
+    """
     chances = {fit.hypothesis.effects: decision.probabilities.get(fit.hypothesis.effects, 0.0) for fit in found.fits}
     likeliest = {*sorted(chances, key=lambda effects: -chances[effects])[:RIVALS], ()}
-    shown = [fit for fit in found.fits if fit.hypothesis.effects in likeliest]
+    settled = [fit for fit in found.fits if fit.score < found.none.score + CLOSE]
+    shown = [fit for fit in settled if fit.hypothesis.effects in likeliest]
     return tuple(
         Rival(fit.hypothesis.effects, fit.score - shown[0].score, chances[fit.hypothesis.effects]) for fit in shown
     )

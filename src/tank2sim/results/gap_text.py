@@ -67,9 +67,9 @@ def probabilities_in_words(study: GapStudy) -> list[str]:
     whole = next((rival for rival in study.rivals if set(rival.effects) == set(names)), None)
     after = study.set_misfit("after", held_out=False)
     if whole is not None and not more and (after is None or after <= MUCH):
-        alone = f"{effect_in_words(names[0])} alone" if len(names) == 1 else _together(names)
+        all_missing = f"{effect_in_words(names[0])} alone is" if len(names) == 1 else f"{_together(names)} are"
         sentences.append(
-            f"Probability that {alone} is all that is missing, among the explanations compared: "
+            f"Probability that {all_missing} all that is missing, among the explanations compared: "
             f"{as_percent(whole.probability)}."
         )
     return sentences
@@ -125,7 +125,10 @@ def _probability(study: GapStudy, name: str) -> float:
 
 
 def _together(names: Sequence[str]) -> str:
-    return " with ".join(map(effect_in_words, names)) or "no effect, with other coefficients of the card"
+    if not names:
+        return "no effect, with other coefficients of the card"
+    first, *others = map(effect_in_words, names)
+    return f"{first} with {_listed(others)}" if others else first
 
 
 def _listed(words: Iterable[str]) -> str:
@@ -303,7 +306,7 @@ def _likeliest_without(study: GapStudy) -> str:
     likeliest = max(others, key=_by_probability, default=None)
     if likeliest is None or likeliest.probability < WORTH_A_WORD:
         return f"No explanation {without} has a probability of {as_percent(WORTH_A_WORD)} or more."
-    words = " with ".join(map(effect_in_words, likeliest.effects)) or "nothing is missing"
+    words = _together(likeliest.effects) if likeliest.effects else "nothing is missing"
     return f"Most probable explanation {without}: {words} ({as_percent(likeliest.probability)})."
 
 
