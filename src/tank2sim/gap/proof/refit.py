@@ -49,13 +49,13 @@ def effects_like(
     moved = np.array([(entry.value - entry.before) / entry.standard_error_before for entry in steady])
     found = {}
     for name, effect in EFFECTS.items():
-        changed = [entry for entry in steady if entry.name in effect.changes_on(card)]
-        most = max(changed, key=lambda entry: entry.moved, default=None)
-        if name in named or most is None or most.moved <= STANDARD_ERRORS or not effect.tried(card):
+        if name in named or not effect.tried(card) or not (effect.changes_on(card) or effect.reads_derivatives):
             continue
         by_effect = _changes(card, name, errors)
         explained = by_effect @ np.linalg.lstsq(by_effect, moved, rcond=None)[0]
-        if explained @ explained > EXPLAINS * (moved @ moved):
+        changed = [entry for entry, row in zip(steady, by_effect, strict=True) if np.any(row)]
+        most = max(changed, key=lambda entry: entry.moved, default=None)
+        if most and most.moved > STANDARD_ERRORS and explained @ explained > EXPLAINS * (moved @ moved):
             found[name] = most
     return found
 
