@@ -135,6 +135,9 @@ def test_a_card_that_lacks_nothing_has_the_probability_that_it_does(none, other,
     for gap in (made_up.nothing(), made_up.explained()):
         page = result_of(replace(gap, rivals=rivals))
         assert [*page.headline[1:]] == probabilities_in_words(page.study)
+        figures = [figure for figure in page.key_figures if figure.label == "Probability that nothing is missing"]
+        assert len(figures) == len(said) and all(figure.value in said[0] for figure in figures)
+        assert all((figure.verdict is Verdict.CAUTION) == (none < 0.9) for figure in figures)
         words = [line.replace(", if the coefficients may be so far off", "") for line in page.headline[1:]]
         assert words == said and (words != [*page.headline[1:]]) == bool(said and gap.alternatives)
 

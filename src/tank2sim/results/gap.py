@@ -55,6 +55,7 @@ from tank2sim.results.gap_text import (
     parameter_cells,
     place_of_cause,
     probabilities_in_words,
+    probability_of_none,
     sizes_of_candidates,
     trial_name,
     verdict_context,
@@ -283,30 +284,19 @@ class GapResult(Result[GapStudy]):
     @property
     def key_figures(self) -> Sequence[KeyFigure]:
         """The verdict, its probability, misfits, and the next test."""
-        study, effects = self.study, self.study.effects
-        named = ", ".join(effect_in_words(effect.name) for effect in effects)
+        study = self.study
+        named = ", ".join(effect_in_words(effect.name) for effect in study.effects)
         sure = study.verdict in (MISSING, NO_EFFECT_MISSING, COEFFICIENTS) and not foremost(study.notices)
         caution = Verdict.NONE if sure else Verdict.CAUTION
         missing = study.verdict == MISSING
         value, note = (named, MISSING) if missing else (study.verdict, named)
         label = "What is missing" if missing else "Verdict"
-        figures = [KeyFigure(label=label, value=value, verdict=caution, note=note)]
-        if effects:
-            least = min(effect.confidence for effect in effects)
-            unsure = Verdict.CAUTION if not least >= _SURE else Verdict.NONE
-            note = "alone or with another effect" if len(effects) == 1 else "of the less sure one, in any company"
-            label = "Probability that it is there"
-            figures.append(KeyFigure(label=label, value=as_percent(least), verdict=unsure, note=note))
-        for word, held in SETS.items():
-            before, after = (study.set_misfit(model, held_out=held) for model in ("before", "after"))
-            if before is not None and after is not None:
-                worse = Verdict.CAUTION if after > max(before, GOOD) else Verdict.NONE
-                note = f"noise units; before {format_number(before, 3)}" if changes_simulation(study) else "noise units"
-                label = f"Misfit, trials {_ON[word]}"
-                figures.append(KeyFigure(label=label, value=float(f"{after:.3g}"), verdict=worse, note=note))
-        if study.next_test:
-            figures.append(KeyFigure(label="Next test", value=study.next_test.manoeuvre))
-        return figures
+        return (
+            KeyFigure(label=label, value=value, verdict=caution, note=note),
+            *_probability_figure(study),
+            *_misfit_figures(study),
+            *([KeyFigure(label="Next test", value=study.next_test.manoeuvre)] if study.next_test else []),
+        )
 
     @cached_property
     def sections(self) -> Sequence[Section]:
@@ -462,6 +452,31 @@ def improved_files(card: Card, text: str, path: Path) -> tuple[GapFiles, list[No
         return found.files(path), list(messages)
     except InputError as error:
         return {path: not_referring(text)}, [Notice(f"{path.name} has no covariance: {error}")]
+
+
+def _probability_figure(study: GapStudy) -> list[KeyFigure]:
+    """Probability of the least sure of the named effects, or that nothing is missing where none is named."""
+    if study.effects:
+        probability = min(effect.confidence for effect in study.effects)
+        label = "Probability that it is there"
+        note = "alone or with another effect" if len(study.effects) == 1 else "of the least sure one, in any company"
+    elif (of_none := probability_of_none(study)) is not None:
+        probability, label, note = of_none, "Probability that nothing is missing", "of what was tried"
+    else:
+        return []
+    unsure = Verdict.NONE if probability >= _SURE else Verdict.CAUTION
+    return [KeyFigure(label=label, value=as_percent(probability), verdict=unsure, note=note)]
+
+
+def _misfit_figures(study: GapStudy) -> Iterator[KeyFigure]:
+    """Misfit of each set of trials."""
+    for word, held in SETS.items():
+        before, after = (study.set_misfit(model, held_out=held) for model in ("before", "after"))
+        if before is not None and after is not None:
+            worse = Verdict.CAUTION if after > max(before, GOOD) else Verdict.NONE
+            note = f"noise units; before {format_number(before, 3)}" if changes_simulation(study) else "noise units"
+            label = f"Misfit, trials {_ON[word]}"
+            yield KeyFigure(label=label, value=float(f"{after:.3g}"), verdict=worse, note=note)
 
 
 def _drawn(name: str, chart: ChartSpec | None) -> list[Illustration]:

@@ -55,7 +55,7 @@ def probabilities_in_words(study: GapStudy) -> list[str]:
     something more may be missing then. Where nothing is named, the probability that nothing is missing.
     """
     if not study.effects:
-        return _probability_of_none(study)
+        return _nothing_in_percent(study)
     each = "; ".join(f"{effect_in_words(effect.name)} {as_percent(effect.confidence)}" for effect in study.effects)
     what = "the effect is there, alone or with another one" if len(study.effects) == 1 else "each effect is there"
     sentences = [f"Probability that {what}: {each}."]
@@ -75,15 +75,24 @@ def probabilities_in_words(study: GapStudy) -> list[str]:
     return sentences
 
 
-def _probability_of_none(study: GapStudy) -> list[str]:
-    """How sure it is that nothing is missing, for a verdict that says so; empty where simulations withheld a name."""
-    none = next((rival for rival in study.rivals if not rival.effects), None)
-    if study.verdict not in (NO_EFFECT_MISSING, COEFFICIENTS) or none is None:
+def probability_of_none(study: GapStudy) -> float | None:
+    """Probability that nothing is missing, 0 to 1, for a verdict that says so.
+
+    None for other verdicts, and where an explanation is more probable whose name simulations withheld.
+    """
+    likeliest = max(study.rivals, key=_by_probability, default=None)
+    if study.verdict not in (NO_EFFECT_MISSING, COEFFICIENTS) or likeliest is None or likeliest.effects:
+        return None
+    return likeliest.probability
+
+
+def _nothing_in_percent(study: GapStudy) -> list[str]:
+    """How sure it is that nothing is missing, and what is most probable otherwise."""
+    probability = probability_of_none(study)
+    if probability is None:
         return []
     likeliest = max((rival for rival in study.rivals if rival.effects), key=_by_probability, default=None)
-    if likeliest is not None and likeliest.probability > none.probability:
-        return []
-    sentence = f"Probability that no tried effect is missing: {as_percent(none.probability)}"
+    sentence = f"Probability that no tried effect is missing: {as_percent(probability)}"
     if study.alternatives:
         sentence += ", if the coefficients may be so far off"
     if likeliest is not None and likeliest.probability >= WORTH_A_WORD:
