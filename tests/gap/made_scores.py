@@ -11,8 +11,7 @@ from tests.gap.toy import Toy
 from tests.gap.toy_likelihood import LOGS
 
 CALM = SimpleNamespace(belief=SimpleNamespace(waves=None))
-IN_A_SEA = SimpleNamespace(belief=SimpleNamespace(waves="a band"))
-"""Likelihoods of which a verdict reads no more."""
+"""A likelihood of which a verdict reads no more."""
 
 FORCE, DRAG, BIAS, LAG, LATE, PLAY, BAND = range(2, 9)
 FOUR = (0, FORCE, DRAG, LAG)

@@ -9,6 +9,7 @@ import numpy as np
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.gap.result import (
     AMBIGUOUS,
+    COEFFICIENTS,
     MISSING,
     NO_EFFECT_MISSING,
     OUTSIDE_LIBRARY,
@@ -18,6 +19,7 @@ from tank2sim.gap.result import (
     Named,
     NextTest,
     Passed,
+    Refitted,
     Rival,
 )
 from tank2sim.identification.trials.assessment.evaluation import FigureComparison
@@ -161,4 +163,26 @@ def outside() -> Gap:
     )
 
 
-EVERY = {MISSING: missing, NO_EFFECT_MISSING: nothing, AMBIGUOUS: ambiguous, OUTSIDE_LIBRARY: outside}
+def explained() -> Gap:
+    """A yaw damping of the card that is four of its standard errors off, or an effect that changes it alike."""
+    found = missing()
+    return replace(
+        found,
+        verdict=COEFFICIENTS,
+        effects=(),
+        coefficients=(Refitted("Nr", -0.0018, 2e-5, -0.0022, 1e-4), Refitted("Yr", 0.005, 1e-4, 0.005, 2e-4)),
+        alternatives=(("linear_yaw_damping",),),
+        rivals=(Rival((), 0.0, 0.96), Rival(("linear_yaw_damping",), 8.8, 0.04)),
+        equation="",
+        agreement={},
+        next_test=None,
+    )
+
+
+EVERY = {
+    MISSING: missing,
+    NO_EFFECT_MISSING: nothing,
+    AMBIGUOUS: ambiguous,
+    OUTSIDE_LIBRARY: outside,
+    COEFFICIENTS: explained,
+}

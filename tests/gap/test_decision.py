@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
@@ -14,7 +15,8 @@ from tank2sim.gap.inference.hypothesis import Hypothesis
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY
 from tank2sim.gap.search import decision as module
 from tank2sim.gap.search.decision import LISTED, PRICE, STANDARD_ERRORS, SUREST, TEMPER, decide, is_significant
-from tank2sim.gap.search.explanations import Search
+from tank2sim.gap.search.explanations import CLOSE, Search
+from tank2sim.gap.workflow import RIVALS, _rivals
 from tests.gap.made_scores import CALM, fit
 from tests.gap.toy import NAMES, Toy, toy_motion
 from tests.gap.toy_likelihood import LOGS, judge
@@ -184,3 +186,23 @@ def test_an_effect_without_amplitude_is_out_by_its_score_alone() -> None:
     card = parse_card(made_up_ship.CARD, "made_up.toml")
     hypothesis = Hypothesis(card, "order", ["rudder_lag"])
     assert is_significant(ExplanationFit(hypothesis, np.array([3.0]), np.array([[100.0]]), LOGS, 0.0, np.zeros(0)))
+
+
+@pytest.mark.usefixtures("calm")
+def test_the_named_set_is_reported_however_many_larger_ones_score_better() -> None:
+    pairs = [*combinations(range(1, 8), 2)]
+    larger = [fit(-60.0 - place / 10, 0, *pair, sure=1.0) for place, pair in enumerate(pairs)]
+    search = Search(CALM, (*sorted(larger, key=lambda one: one.score), fit(-50, 0), fit(0)), ())
+    reported = {rival.effects: rival for rival in _rivals(search, decide(search))}
+    assert {(YAW,), ()} <= set(reported) and len(reported) <= RIVALS + 1
+    assert reported[YAW,].probability > 0.9 and sum(rival.probability for rival in reported.values()) == pytest.approx(
+        1
+    )
+    losses = [rival.loss for rival in reported.values()]
+    assert losses[0] == 0 and losses == sorted(losses)
+
+
+@pytest.mark.usefixtures("calm")
+def test_a_fit_that_was_given_up_is_not_reported_as_worse_than_nothing() -> None:
+    search = Search(CALM, (fit(-50, 0), fit(0), fit(CLOSE - 1, 1), fit(CLOSE + 1, 2)), ())
+    assert [rival.effects for rival in _rivals(search, decide(search))] == [(YAW,), (), (SURGE,)]

@@ -33,3 +33,8 @@ def test_effects_that_were_not_tried_are_counted() -> None:
     assert of_tried_effects(("wind", "current"), ("current", "wind")) == ()
     (notice,) = of_tried_effects(("wind",), ("current", "wind", "rudder_bias"))
     assert "wind of 3 possible effects" in notice
+
+
+def test_the_few_effects_that_were_left_out_are_named() -> None:
+    (notice,) = of_tried_effects(("wind", "current"), ("current", "wind", "rudder_bias"))
+    assert notice.startswith("not tried, as asked: rudder_bias of 3 possible effects")

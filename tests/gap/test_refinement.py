@@ -7,7 +7,7 @@ import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.cards.reading import revised
-from tank2sim.gap.proof.refinement import CoefficientPrior, refined_coefficients
+from tank2sim.gap.proof.refinement import CoefficientPrior, _begin, _linearised, refined_coefficients
 from tank2sim.gap.proof.replay import replay_trials
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tests.gap.replay_noise import NOISE
@@ -48,6 +48,17 @@ def test_a_card_that_is_wrong_by_five_of_its_errors_is_followed_to_the_noise_in_
     assert replay.misfit("before") > 10 and replay.misfit("after") == pytest.approx(1.0, abs=0.1)
     for name in OFF:
         assert after.derivatives[name] == pytest.approx(made_up_ship.TRUTH[name], rel=0.01)
+
+
+def test_added_masses_that_no_ship_has_are_of_infinite_cost(wrong) -> None:
+    """J_z - Nrdot would be negative; half of that step is possible."""
+    names, trial = ("Nrdot", "Nr"), made_up_ship.trial(made_up_ship.turn(15.0), name="turn", duration=60.0, step=0.5)
+    at = np.array([wrong.derivatives[name] for name in names])
+    prior = CoefficientPrior(names, at, 0.1 * np.abs(at))
+    begun = _begin(wrong, "angle", NOISE, prior, trial, at)
+    step = np.array([1.2 * (wrong.rigid_body.yaw_inertia - at[0]), 0.0])
+    costs = [_linearised(wrong, "angle", NOISE, prior, begun, at + share * step).cost for share in (0.0, 0.5, 1.0)]
+    assert np.isfinite(costs[:2]).all() and costs[2] == np.inf
 
 
 def test_a_card_that_is_surer_moves_less(wrong) -> None:

@@ -57,6 +57,7 @@ def moved(changes: dict[str, float]) -> list[Refitted]:
         ({"Xvr": 0.3}, {"turning_drag"}),
         ({"Nr": 0.1, "Yv": 0.3, "Xu": 0.3}, set()),  # a small part of all that moved
         (dict.fromkeys(("Yd", "Nd", "Yddd", "Nddd", "Yvvd", "Nvvd", "Yvdd", "Nvdd"), 0.15), {"rudder_effectiveness"}),
+        (dict.fromkeys(("Yvdot", "Nrdot", "Yv", "Nv", "Nr", "Yvvv", "Nvvv", "Nvvr"), 0.12), {"shallow_water"}),
         ({"Yd": 0.15, "Nd": -0.15}, set()),  # no rudder is larger in Y and smaller in N
     ],
 )
@@ -65,8 +66,24 @@ def test_an_effect_that_changes_the_coefficients_as_they_moved_is_said_next_to_t
     found = effects_like(card, moved(changes))
     assert found.keys() == effects
     for name, coefficient in found.items():
-        assert coefficient.name in EFFECTS[name].changes and coefficient.name in changes
+        assert coefficient.name in (EFFECTS[name].changes or changes) and coefficient.name in changes
     assert effects_like(card, moved(changes), effects) == {}
+
+
+def test_added_masses_that_no_ship_has_remain_those_of_the_card(mariner_card: ManoeuvringCard) -> None:
+    """By regression of the others on them; J_z - Nrdot of the Mariner is 0.00083."""
+    names = ("derivatives.Nrdot", "derivatives.Nr", "derivatives.Yv")
+    covariance = np.array([[4e-8, 2e-8, 0.0], [2e-8, 9e-8, 1e-8], [0.0, 1e-8, 1e-6]])
+    possible = CoefficientEstimates(names, np.array([4e-4, 3e-4, 1e-4]), covariance)
+    refitted, _ = refit_coefficients(mariner_card, build(mariner_card), possible)
+    assert [entry.name for entry in refitted] == ["Nrdot", "Nr", "Yv"]
+    impossible = replace(possible, change=np.array([2e-3, 3e-4, 1e-4]))
+    refitted, base = refit_coefficients(mariner_card, build(mariner_card), impossible)
+    assert base.derivatives["Nrdot"] == pytest.approx(mariner_card.derivatives["Nrdot"])
+    assert {entry.name: entry.value - entry.before for entry in refitted} == pytest.approx(
+        {"Nr": 3e-4 - 2e-3 * 2e-8 / 4e-8, "Yv": 1e-4}
+    )
+    assert refitted[0].standard_error == pytest.approx(np.sqrt(9e-8 - (2e-8) ** 2 / 4e-8))
 
 
 def test_the_covariance_of_refitted_coefficients_is_written_with_the_sign_of_the_file(

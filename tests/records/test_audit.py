@@ -129,7 +129,8 @@ def test_a_clean_record_raises_no_alarm(kind):
 LESSER = {
     "current": (lambda m: moved(m, (0.3 - 0.4j) * m["t_s"]), {"speed_mps": 0.5, "direction_deg": 306.87}, "a current"),
     "log": (lambda m: {name: 1.05 * m[name] for name in ("u_mps", "v_mps")}, {"factor": 1 / 1.05}, "the log reads +"),
-    "compass": (lambda m: {"psi_rad": m["psi_rad"] + 3 * DEG}, {"angle_deg": 3.0}, "too much"),
+    "compass": (lambda m: {"psi_rad": m["psi_rad"] + 3 * DEG}, {"angle_deg": 3.0}, "deg too much"),
+    "compass to port": (lambda m: {"psi_rad": m["psi_rad"] - 3 * DEG}, {"angle_deg": -3.0}, "deg too little"),
     "antenna": (
         lambda m: moved(m, (30 - 5j) * np.exp(1j * m["psi_rad"])),
         {"forward_m": 30.0, "starboard_m": -5.0},

@@ -101,6 +101,80 @@ def test_an_explanation_is_all_that_is_missing_only_where_the_trials_are_followe
     assert sum("all that is missing" in line for line in lines) == whole
 
 
+@pytest.mark.parametrize(
+    ("probability", "said"), [(0.15, "nothing is missing (15 %)"), (0.004, "has a probability of 1 % or more")]
+)
+def test_the_likeliest_explanation_without_a_named_effect_is_reported_with_its_probability(probability, said) -> None:
+    gap = made_up.missing()
+    lag = Rival(("rudder_lag",), 9.0, 0.003)
+    rivals = (Rival(("current",), 0.0, 0.8), Rival(("current", "wind"), 3.0, 0.05), lag, Rival((), 19.0, probability))
+    text = result_of(replace(gap, rivals=rivals)).sections[1].text
+    assert said in text and "rudder lag" not in text
+
+
+def test_what_coefficients_that_explain_the_gap_may_be_instead_is_on_the_page() -> None:
+    (section,) = (
+        section for section in result_of(made_up.explained()).sections if section.heading.startswith("How sure")
+    )
+    assert "coefficients that are off from linear yaw damping" in section.text
+    assert "largest changes are Nr by 4.0" in words_of(made_up.explained())
+    assert [row[0] for row in section.tables[0].rows] == ["linear yaw damping"]
+    assert "4 %" in json.dumps(rival_chart(gap_study(made_up.explained())))
+
+
+@pytest.mark.parametrize(
+    ("none", "other", "said"),
+    [
+        (0.64, 0.36, ["Probability that no tried effect is missing: 64 %; most probable otherwise: wind (36 %)."]),
+        (0.998, 0.002, ["Probability that no tried effect is missing: 99 %."]),
+        (0.3, 0.6, []),  # the name was withheld by simulations
+    ],
+)
+def test_a_card_that_lacks_nothing_has_the_probability_that_it_does(none, other, said) -> None:
+    rivals = (Rival(("wind",), 0.0, other), Rival((), 6.0, none))
+    for gap in (made_up.nothing(), made_up.explained()):
+        page = result_of(replace(gap, rivals=rivals))
+        assert [*page.headline[1:]] == probabilities_in_words(page.study)
+        figures = [figure for figure in page.key_figures if figure.label == "Probability that nothing is missing"]
+        assert len(figures) == len(said) and all(figure.value in said[0] for figure in figures)
+        assert all((figure.verdict is Verdict.CAUTION) == (none < 0.9) for figure in figures)
+        words = [line.replace(", if the coefficients may be so far off", "") for line in page.headline[1:]]
+        assert words == said and (words != [*page.headline[1:]]) == bool(said and gap.alternatives)
+
+
+def test_outside_the_library_the_best_of_what_was_tried_is_on_the_page_and_no_test_is_promised() -> None:
+    gap = replace(made_up.outside(), rivals=(Rival(("wind", "rudder_lag"), 0.0, 0.99), Rival((), 90.0, 0.01)))
+    sections = {section.heading: section for section in result_of(gap).sections}
+    assert "is wind with rudder lag" in sections["How sure, and what else it could be"].text
+    assert "Next test" not in sections
+    page = result_of(replace(gap, rivals=(Rival((), 0.0, 0.9), Rival(("wind",), 9.0, 0.1))))
+    assert "what was tried" not in page.sections[1].text
+
+
+def test_three_effects_are_listed_and_each_has_its_probability() -> None:
+    gap = made_up.missing()
+    others = [
+        replace(gap.effects[0], name=name, parameters={}, standard_errors={}, confidence=0.91)
+        for name in ("hull_fouling", "trim")
+    ]
+    study = gap_study(replace(gap, effects=(*gap.effects, *others)))
+    assert "), hull fouling and trim." in found_in_words(study)
+    line = probabilities_in_words(study)[0]
+    whole = Rival(("current", "hull_fouling", "trim"), 0.0, 0.9)
+    assert "current with hull fouling and trim are all" in probabilities_in_words(replace(study, rivals=(whole,)))[1]
+    assert line == "Probability that each effect is there: current 97 %; hull fouling 91 %; trim 91 %."
+
+
+def test_a_sensor_at_fault_next_to_an_effect_of_the_ship_is_not_lacking_in_the_model() -> None:
+    gap = made_up.missing()
+    gyro = replace(gap.effects[0], name="gyro_bias", parameters={"rate_radps": np.deg2rad(0.1)}, standard_errors={})
+    words = words_of(replace(gap, effects=(gyro, *gap.effects)))
+    lacking, fault = words.split(" A sensor is at fault: ")
+    assert lacking.startswith("The model lacks an effect: current (") and fault.startswith(
+        "gyro bias (rate 0.1 deg/s)."
+    )
+
+
 def test_an_effect_that_only_scores_better_is_mentioned_without_a_probability() -> None:
     gap = made_up.missing()
     named = tuple(effect.name for effect in gap.effects)
@@ -207,7 +281,7 @@ def test_rivals_are_ranked_and_none_is_always_among_them() -> None:
     many = tuple(Rival((f"effect_{place}",), 10.0 + place, 0.0) for place in range(20))
     rows = rows_of(rival_chart(gap_study(replace(gap, rivals=(*many, *gap.rivals)))))
     names = [row["name"] for row in rows]
-    assert names[:2] == ["current", "effect 0"] and names[-1] == "none (the card as it is)" and len(names) == 13
+    assert names[:2] == ["current", "effect 0"] and names[-1] == "no effect (coefficients alone)" and len(names) == 13
 
 
 @pytest.mark.parametrize(

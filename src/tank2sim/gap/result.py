@@ -117,7 +117,7 @@ class Rival:
     loss : float
         Score (-2 log likelihood, penalised) above that of the best explanation; 0 for the best.
     probability : float
-        Calibrated.
+        Posterior of just these effects; 0 where one of them is within three standard errors of its absence.
     """
 
     effects: tuple[str, ...]
@@ -335,7 +335,8 @@ class Gap:
         ``fit`` and ``holdout`` to the misfit with the effects alone, noise units; empty where the given coefficients
         were kept.
     alternatives : tuple of tuples of str
-        Explanations that these data cannot distinguish from the named one.
+        Explanations that these data cannot distinguish from the named one, or from the coefficients where these explain
+        the gap.
     rivals : tuple of Rival
         Best first; "none" is among them.
     where : tuple of MisfitPlace

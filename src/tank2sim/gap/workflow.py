@@ -50,7 +50,7 @@ from tank2sim.gap.result import (
 )
 from tank2sim.gap.search.decision import LIKELY, PRICE, Decision, decide
 from tank2sim.gap.search.detection_limit import could_hide
-from tank2sim.gap.search.explanations import Search, search
+from tank2sim.gap.search.explanations import CLOSE, Search, search
 from tank2sim.identification.trials.assessment.other_ship import evidence_of_other_ship, not_of_ship
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import (
@@ -63,7 +63,7 @@ from tank2sim.records.trials import Trial
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 
 RIVALS = 12
-"""Explanations that are reported."""
+"""Explanations that are reported at most, besides none (project choice)."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class GapOptions:
     workers : int, optional
         Processes; by default as many as there are processors.
     false_discovery : float
-        Largest probability with which a name that is given alone may be wrong, 0.01 to 0.5.
+        Largest probability with which a set that is named alone may hold an effect that is not missing, 0.01 to 0.5.
     force : bool
         Write the improved card in spite of objections.
     """
@@ -298,13 +298,16 @@ def _noise(found: Search, best: ExplanationFit, fitted: Measured) -> dict[str, t
 
 
 def _rivals(found: Search, decision: Decision) -> tuple[Rival, ...]:
-    """The best explanations, and none; the probability of those that simulations excluded is 0."""
-    least = found.fits[0].score
-    shown = [*found.fits[:RIVALS]]
-    shown += [found.none] if found.none not in shown else []
+    """The most probable explanations, and none, the best score first; those that were not compared have 0.
+
+    Further behind none than :data:`.explanations.CLOSE`, a fit was given up before its noise was found.
+    """
+    chances = {fit.hypothesis.effects: decision.probabilities.get(fit.hypothesis.effects, 0.0) for fit in found.fits}
+    likeliest = {*sorted(chances, key=lambda effects: -chances[effects])[:RIVALS], ()}
+    settled = [fit for fit in found.fits if fit.score < found.none.score + CLOSE]
+    shown = [fit for fit in settled if fit.hypothesis.effects in likeliest]
     return tuple(
-        Rival(fit.hypothesis.effects, fit.score - least, decision.probabilities.get(fit.hypothesis.effects, 0.0))
-        for fit in shown
+        Rival(fit.hypothesis.effects, fit.score - shown[0].score, chances[fit.hypothesis.effects]) for fit in shown
     )
 
 

@@ -52,10 +52,10 @@ from tank2sim.results.gap_text import (
     effects_of,
     found_in_words,
     meaning,
-    others_in_words,
     parameter_cells,
     place_of_cause,
     probabilities_in_words,
+    probability_of_none,
     sizes_of_candidates,
     trial_name,
     verdict_context,
@@ -79,8 +79,8 @@ _ALL_DIGITS = 7
 """Significant digits of misfits, which are rounded to hundredths of the noise before."""
 
 _COEFFICIENTS = (
-    "Coefficients of the card fitted together with the effects, within the card's standard errors (times a common "
-    "factor that the trials determine)."
+    "Coefficients of the card fitted together with the effects (if any are named), within the card's standard errors "
+    "(times a common factor that the trials determine)."
 )
 _ON = {"held out": "held out", "fitting": "used for fitting"}
 _BEFORE_AND_AFTER = (
@@ -95,7 +95,7 @@ _BLACK_BOX = (
 )
 _FIGURES = (
     "Advance, transfer, diameters and overshoots are of turns and zigzags simulated in closed loop, the others of the "
-    "trials replayed. Before is the card as given, after the card with the effect."
+    "trials replayed. Before is the card as given, after the improved card."
 )
 _AGREEMENT = (
     "A true effect has the same size in every trial. Where trials want different sizes, the name is wrong or "
@@ -119,8 +119,8 @@ _STRIPS = (
 )
 _MEANS = "Points: instants of all trials. Squares: means of bins, with 95 % bars by the spread between trials."
 _LINES = (
-    'Card before: as given. Card found: with the named effects ("after" in the tables). The lines coincide where '
-    "nothing was added."
+    'Card before: as given. Card found: the improved card ("after" in the tables). The lines coincide where nothing '
+    "was changed."
 )
 _RUN = f"Points: measured. Lines: simulated. {_LINES}"
 _CAPTIONS = {
@@ -262,14 +262,12 @@ class GapResult(Result[GapStudy]):
 
     @property
     def headline(self) -> tuple[str, ...]:
-        """Objections to the improved card, the verdict with its probability, explanations that these data cannot
-        distinguish, and the next test."""
+        """Objections to the improved card, the verdict with its probability, and the next test."""
         study, test = self.study, self.study.next_test
         return (
             *self._objections,
             f"{study.ship}: {found_in_words(study)}",
             *probabilities_in_words(study)[:1],
-            *([others_in_words(study)] if study.alternatives and study.verdict == MISSING else []),
             *([f"Next test: {test.manoeuvre}. {capital(test.why)}"] if test else []),
         )
 
@@ -286,30 +284,19 @@ class GapResult(Result[GapStudy]):
     @property
     def key_figures(self) -> Sequence[KeyFigure]:
         """The verdict, its probability, misfits, and the next test."""
-        study, effects = self.study, self.study.effects
-        named = ", ".join(effect_in_words(effect.name) for effect in effects)
+        study = self.study
+        named = ", ".join(effect_in_words(effect.name) for effect in study.effects)
         sure = study.verdict in (MISSING, NO_EFFECT_MISSING, COEFFICIENTS) and not foremost(study.notices)
         caution = Verdict.NONE if sure else Verdict.CAUTION
         missing = study.verdict == MISSING
         value, note = (named, MISSING) if missing else (study.verdict, named)
         label = "What is missing" if missing else "Verdict"
-        figures = [KeyFigure(label=label, value=value, verdict=caution, note=note)]
-        if effects:
-            least = min(effect.confidence for effect in effects)
-            unsure = Verdict.CAUTION if not least >= _SURE else Verdict.NONE
-            note = "alone or with another effect" if len(effects) == 1 else "of the less sure one, in any company"
-            label = "Probability that it is there"
-            figures.append(KeyFigure(label=label, value=as_percent(least), verdict=unsure, note=note))
-        for word, held in SETS.items():
-            before, after = (study.set_misfit(model, held_out=held) for model in ("before", "after"))
-            if before is not None and after is not None:
-                worse = Verdict.CAUTION if after > max(before, GOOD) else Verdict.NONE
-                note = f"noise units; before {format_number(before, 3)}" if changes_simulation(study) else "noise units"
-                label = f"Misfit, trials {_ON[word]}"
-                figures.append(KeyFigure(label=label, value=float(f"{after:.3g}"), verdict=worse, note=note))
-        if study.next_test:
-            figures.append(KeyFigure(label="Next test", value=study.next_test.manoeuvre))
-        return figures
+        return (
+            KeyFigure(label=label, value=value, verdict=caution, note=note),
+            *_probability_figure(study),
+            *_misfit_figures(study),
+            *([KeyFigure(label="Next test", value=study.next_test.manoeuvre)] if study.next_test else []),
+        )
 
     @cached_property
     def sections(self) -> Sequence[Section]:
@@ -467,6 +454,31 @@ def improved_files(card: Card, text: str, path: Path) -> tuple[GapFiles, list[No
         return {path: not_referring(text)}, [Notice(f"{path.name} has no covariance: {error}")]
 
 
+def _probability_figure(study: GapStudy) -> list[KeyFigure]:
+    """Probability of the least sure of the named effects, or that nothing is missing where none is named."""
+    if study.effects:
+        probability = min(effect.confidence for effect in study.effects)
+        label = "Probability that it is there"
+        note = "alone or with another effect" if len(study.effects) == 1 else "of the least sure one, in any company"
+    elif (of_none := probability_of_none(study)) is not None:
+        probability, label, note = of_none, "Probability that nothing is missing", "of what was tried"
+    else:
+        return []
+    unsure = Verdict.NONE if probability >= _SURE else Verdict.CAUTION
+    return [KeyFigure(label=label, value=as_percent(probability), verdict=unsure, note=note)]
+
+
+def _misfit_figures(study: GapStudy) -> Iterator[KeyFigure]:
+    """Misfit of each set of trials."""
+    for word, held in SETS.items():
+        before, after = (study.set_misfit(model, held_out=held) for model in ("before", "after"))
+        if before is not None and after is not None:
+            worse = Verdict.CAUTION if after > max(before, GOOD) else Verdict.NONE
+            note = f"noise units; before {format_number(before, 3)}" if changes_simulation(study) else "noise units"
+            label = f"Misfit, trials {_ON[word]}"
+            yield KeyFigure(label=label, value=float(f"{after:.3g}"), verdict=worse, note=note)
+
+
 def _drawn(name: str, chart: ChartSpec | None) -> list[Illustration]:
     return [] if chart is None else [Illustration(chart=chart, caption=_CAPTIONS.get(name, ""), name=name)]
 
@@ -615,11 +627,9 @@ def _place_of_the_gap(study: GapStudy) -> Section:
         ]
         for passage in study.acting[:_MOST_PASSAGES]
     ]
-    interval = [Column(title=head, unit="s", digits=3) for head in ("from", "to")]
-    share, size = (
-        Column(title=head, unit=unit, digits=2)
-        for head, unit in (("share of the misfit", "%"), ("size", "standard errors"))
-    )
+    interval = [Column(title=head, unit="s", digits=4) for head in ("from", "to")]
+    share = Column(title="share of the misfit", unit="%", digits=2)
+    size = Column(title="size", unit="standard errors", digits=3)
     tables = [
         table(
             "Where the misfit arises, beyond the noise", ["trial", "signal", *interval, share], places, on_screen=False
@@ -718,8 +728,7 @@ def _could_hide(study: GapStudy) -> list[Table]:
 def _next_test(study: GapStudy) -> str:
     test = study.next_test
     if test is None:
-        sure = study.verdict in (MISSING, NO_EFFECT_MISSING, COEFFICIENTS)
-        return "" if sure else "No manoeuvre was found that would decide more."
+        return "No manoeuvre was found that would decide more." if study.verdict == AMBIGUOUS else ""
     # The command has a line of its own: among other words it is broken at its hyphens.
     command = f"tank2sim simulate improved.toml --manoeuvre {test.manoeuvre}"
     begin = f"{capital(test.why)}\n\nIts orders are in {NEXT_TEST_FILE}."

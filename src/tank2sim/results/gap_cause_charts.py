@@ -205,7 +205,7 @@ def rival_chart(study: GapStudy, *, title: str = "") -> ChartSpec | None:
         return None
     rows: list[ChartRecord] = [
         {
-            "name": joined(rival.effects).replace("_", " ") if rival.effects else "none (the card as it is)",
+            "name": joined(rival.effects).replace("_", " ") if rival.effects else "no effect (coefficients alone)",
             "v": plain(rival.loss),
             "text": f"{format_number(rival.loss, 3)}  ({as_percent(rival.probability)})",
         }
@@ -219,8 +219,9 @@ def rival_chart(study: GapStudy, *, title: str = "") -> ChartSpec | None:
 
 _COMPARED = (
     "A longer bar explains the data less well; the best has 0. In brackets: probability that the explanation is right "
-    "as a whole, with nothing more and nothing less missing. The probability of an effect is the sum over all "
-    "explanations that contain it."
+    "as a whole, with nothing more and nothing less missing. Each effect lowers it by its prior odds; an effect within "
+    "three standard errors of its absence makes it zero. The probability of an effect is the sum over all explanations "
+    "that contain it."
 )
 
 
@@ -262,25 +263,11 @@ def _agreement_panel(study: GapStudy, name: str, trials: Mapping[str, TrialEstim
     whole = next((entry for entry in study.effects if entry.name == effect and parameter in entry.parameters), None)
     middle = whole.parameters[parameter] if whole else None
     held = {trial.trial: trial.held_out for trial in study.trials}
-    rows: list[ChartRecord] = []
-    for trial, alone in trials.items():
-        estimate, half = alone.value, NORMAL * alone.standard_error
-        if parameter == "direction_deg" and middle is not None:
-            estimate += 360.0 * round((middle - estimate) / 360.0)
-        word = next(word for word, value in SETS.items() if value == held.get(trial, False))
-        rows.append(
-            {"name": trial_name(trial), "run": word}
-            | {"v": plain(estimate), "low": plain(estimate - half), "high": plain(estimate + half)}
-        )
+    around = middle if parameter == "direction_deg" else None
+    rows = [_row_of_trial(trial, alone, held.get(trial, False), around) for trial, alone in trials.items()]
     band = NORMAL * whole.standard_errors.get(parameter, 0.0) if whole else 0.0
-    messages = [row for row in rows if row["low"] is not None and row["high"] is not None]
-    least = min((row["high"] - row["low"] for row in messages), default=0.0)
-    informative = [row for row in messages if row["high"] - row["low"] <= UNINFORMATIVE * least] or messages
-    ends = [row[key] for row in informative for key in ("low", "high")]
-    ends += [] if middle is None else [middle - band, middle + band]
-    low, high = extent(np.array(ends, dtype=float))
-    margin = 0.05 * (high - low) or 1.0
-    across = PlotAxis(title=with_unit(words, unit), domain=(low - margin, high + margin), nice=False, ticks=5)
+    domain = _informative_range(rows, [] if middle is None else [middle - band, middle + band])
+    across = PlotAxis(title=with_unit(words, unit), domain=domain, nice=False, ticks=5)
     names = [trial_name(trial) for trial in held if trial in trials]
     side = {"labelLimit": 220} | ({} if named else {"labels": False, "ticks": False})
     shown = {"name:N": "trial", "v:Q": "estimate", "low:Q": "from", "high:Q": "to"}
@@ -295,6 +282,27 @@ def _agreement_panel(study: GapStudy, name: str, trials: Mapping[str, TrialEstim
         layers = [layer("rect", strip, edges, style="reference", opacity=0.25), together, *layers]
     title = panel_title(f"{effect.replace('_', ' ')}: {words}")
     return layered(layers, size=(230, 22 * len(names)), title=title)
+
+
+def _row_of_trial(trial: str, alone: TrialEstimate, held_out: bool, around: float | None) -> ChartRecord:
+    """A trial's estimate with its 95 % interval; a direction (deg) within half a turn of that of all trials."""
+    estimate, half = alone.value, NORMAL * alone.standard_error
+    if around is not None:
+        estimate += 360.0 * round((around - estimate) / 360.0)
+    word = next(word for word, value in SETS.items() if value == held_out)
+    ends = {"low": plain(estimate - half), "high": plain(estimate + half)}
+    return {"name": trial_name(trial), "run": word, "v": plain(estimate)} | ends
+
+
+def _informative_range(rows: Sequence[ChartRecord], also: Sequence[float]) -> tuple[float, float]:
+    """Range that holds other values and the intervals of the trials that determine the parameter, with a margin."""
+    known = [row for row in rows if row["low"] is not None and row["high"] is not None]
+    least = min((row["high"] - row["low"] for row in known), default=0.0)
+    informative = [row for row in known if row["high"] - row["low"] <= UNINFORMATIVE * least] or known
+    ends = [row[key] for row in informative for key in ("low", "high")]
+    low, high = extent(np.array([*ends, *also], dtype=float))
+    margin = 0.05 * (high - low) or 1.0
+    return low - margin, high + margin
 
 
 def _prefix(values: Array) -> tuple[str, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import PurePath
 
 from tank2sim.answer.numbers import format_column, format_number
@@ -11,7 +11,7 @@ from tank2sim.answer.parts import Cell
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.outcome.study import EffectFound, GapStudy
 from tank2sim.gap.proof.cross_check import MUCH
-from tank2sim.gap.result import AMBIGUOUS, COEFFICIENTS, MISSING, NO_EFFECT_MISSING
+from tank2sim.gap.result import AMBIGUOUS, COEFFICIENTS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY, Rival
 from tank2sim.units import in_words, to_si
 
 GOOD = 1.5
@@ -20,6 +20,9 @@ then about as large as the noise, sqrt(1.5^2 - 1) = 1.1."""
 
 AS_LIKELY_AS_NOT = 0.5
 """Probability from which an effect that is not named is mentioned (project choice)."""
+
+WORTH_A_WORD = 0.01
+"""Probability from which an explanation without a named effect is mentioned (project choice)."""
 
 MOVED = 3
 """Coefficients that are named in the verdict: the largest changes (project choice)."""
@@ -49,26 +52,56 @@ def probabilities_in_words(study: GapStudy) -> list[str]:
     """Probability of each effect, in any company, and of the explanation as a whole.
 
     The last is left out where the trials are still missed by far, or where an unnamed effect is as probable as not:
-    something more may be missing then.
+    something more may be missing then. Where nothing is named, the probability that nothing is missing.
     """
     if not study.effects:
-        return []
+        return _nothing_in_percent(study)
     each = "; ".join(f"{effect_in_words(effect.name)} {as_percent(effect.confidence)}" for effect in study.effects)
-    sentences = [f"Probability that the effect is there, alone or with another one: {each}."]
+    what = "the effect is there, alone or with another one" if len(study.effects) == 1 else "each effect is there"
+    sentences = [f"Probability that {what}: {each}."]
     more = _unnamed(study)
     if more:
         likely = ", ".join(map(effect_in_words, more))
-        sentences.append(f"These fit a little better, without the evidence that a name needs: {likely}.")
+        sentences.append(f"As likely as not in addition, though not in the most probable explanation: {likely}.")
     names = [effect.name for effect in study.effects]
     whole = next((rival for rival in study.rivals if set(rival.effects) == set(names)), None)
     after = study.set_misfit("after", held_out=False)
     if whole is not None and not more and (after is None or after <= MUCH):
-        alone = f"{effect_in_words(names[0])} alone" if len(names) == 1 else _together(names)
+        all_missing = f"{effect_in_words(names[0])} alone is" if len(names) == 1 else f"{_together(names)} are"
         sentences.append(
-            f"Probability that {alone} is all that is missing, among the explanations compared: "
+            f"Probability that {all_missing} all that is missing, among the explanations compared: "
             f"{as_percent(whole.probability)}."
         )
     return sentences
+
+
+def probability_of_none(study: GapStudy) -> float | None:
+    """Probability that nothing is missing, 0 to 1, for a verdict that says so.
+
+    None for other verdicts, and where an explanation is more probable whose name simulations withheld.
+    """
+    likeliest = max(study.rivals, key=_by_probability, default=None)
+    if study.verdict not in (NO_EFFECT_MISSING, COEFFICIENTS) or likeliest is None or likeliest.effects:
+        return None
+    return likeliest.probability
+
+
+def _nothing_in_percent(study: GapStudy) -> list[str]:
+    """How sure it is that nothing is missing, and what is most probable otherwise."""
+    probability = probability_of_none(study)
+    if probability is None:
+        return []
+    likeliest = max((rival for rival in study.rivals if rival.effects), key=_by_probability, default=None)
+    sentence = f"Probability that no tried effect is missing: {as_percent(probability)}"
+    if study.alternatives:
+        sentence += ", if the coefficients may be so far off"
+    if likeliest is not None and likeliest.probability >= WORTH_A_WORD:
+        sentence += f"; most probable otherwise: {_together(likeliest.effects)} ({as_percent(likeliest.probability)})"
+    return [f"{sentence}."]
+
+
+def _by_probability(rival: Rival) -> float:
+    return rival.probability
 
 
 def sizes_of_candidates(study: GapStudy) -> list[EffectFound]:
@@ -89,7 +122,7 @@ def sizes_of_candidates(study: GapStudy) -> list[EffectFound]:
 
 
 def _unnamed(study: GapStudy) -> list[str]:
-    """Effects that are neither named nor candidates, and that the scores find as probable as not."""
+    """Effects that are neither named nor candidates, and that are as probable as not next to different others."""
     known = {effect.name for effect in study.effects}
     known |= {name for text in study.alternatives for name in effects_of(text)}
     others = dict.fromkeys(name for rival in study.rivals for name in rival.effects if name not in known)
@@ -101,7 +134,16 @@ def _probability(study: GapStudy, name: str) -> float:
 
 
 def _together(names: Sequence[str]) -> str:
-    return " with ".join(map(effect_in_words, names)) or "no effect, with other coefficients of the card"
+    if not names:
+        return "no effect, with other coefficients of the card"
+    first, *others = map(effect_in_words, names)
+    return f"{first} with {_listed(others)}" if others else first
+
+
+def _listed(words: Iterable[str]) -> str:
+    """Words in a sentence: ``a, b and c``."""
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def as_percent(probability: float) -> str:
@@ -114,41 +156,66 @@ def as_percent(probability: float) -> str:
 
 def found_in_words(study: GapStudy) -> str:
     """The finding, in a sentence or two."""
-    verdict, effects = study.verdict, study.effects
+    if study.verdict == MISSING and study.effects:
+        return _missing_in_words(study)
+    if study.verdict == AMBIGUOUS:
+        return _ambiguous_in_words(study)
+    if study.verdict == COEFFICIENTS:
+        return " ".join([f"The coefficients of the card explain the gap: {_no_effect(study)}.", *_refitted(study)])
+    if study.verdict == NO_EFFECT_MISSING:
+        return _nothing_in_words(study)
+    return _unknown_in_words(study)
+
+
+def _missing_in_words(study: GapStudy) -> str:
+    """What the model lacks, and which sensors are at fault."""
+    sensors = [
+        effect for effect in study.effects if effect.name in EFFECTS and EFFECTS[effect.name].acts_on == "sensor"
+    ]
+    lacking = [effect for effect in study.effects if effect not in sensors]
+    sentences = []
+    if lacking:
+        names = _listed(map(_with_values, lacking))
+        sentences.append(f"The model lacks {'an effect' if len(lacking) == 1 else 'effects'}: {names}.")
+    if sensors:
+        at_fault = "A sensor is at fault" if len(sensors) == 1 else "Sensors are at fault"
+        model = "" if lacking else ", not the model"
+        sentences.append(f"{at_fault}{model}: {_listed(map(_with_values, sensors))}.")
+    known = [EFFECTS[effect.name].description for effect in (*lacking, *sensors) if effect.name in EFFECTS]
+    return " ".join([*sentences, *known, *_refitted(study)])
+
+
+def _ambiguous_in_words(study: GapStudy) -> str:
+    """The sets of effects among which the data do not decide, and the one that the improved card has."""
+    named = [[effect.name for effect in study.effects]] if study.effects else []
+    candidates = [*named, *map(effects_of, study.alternatives)]
+    names = ", or ".join(dict.fromkeys(map(_together, candidates)))
+    missing = "Something is" if all(candidates) else "Something may be"
+    sentence = f"{missing} missing, but these data do not distinguish several explanations: {names}."
+    first = [f"The improved card has {_together(named[0])}."] if named and len(candidates) > 1 else []
+    return " ".join([sentence, *first, *_refitted(study)])
+
+
+def _nothing_in_words(study: GapStudy) -> str:
+    """How well the card follows as it is, and what a coefficient that moved may be instead."""
     after = study.set_misfit("after", held_out=False)
-    if verdict == MISSING and effects:
-        names = " and ".join(_with_values(effect) for effect in effects)
-        known = [EFFECTS[effect.name] for effect in effects if effect.name in EFFECTS]
-        text = " ".join(effect.description for effect in known)
-        if len(known) == len(effects) and all(effect.acts_on == "sensor" for effect in known):
-            return f"A sensor is at fault, not the model: {names}. {text}".strip()
-        sentences = [f"The model lacks {'an effect' if len(effects) == 1 else 'effects'}: {names}.", text]
-        return " ".join([*filter(None, sentences), *_refitted(study)])
-    if verdict == AMBIGUOUS:
-        named = [[effect.name for effect in effects]] if effects else []
-        candidates = [*named, *map(effects_of, study.alternatives)]
-        names = ", or ".join(dict.fromkeys(map(_together, candidates)))
-        missing = "Something is" if all(candidates) else "Something may be"
-        sentence = f"{missing} missing, but these data do not distinguish several explanations: {names}."
-        first = [f"The improved card has {_together(named[0])}."] if named and len(candidates) > 1 else []
-        return " ".join([sentence, *first, *_refitted(study)])
-    if verdict == COEFFICIENTS:
-        explained = f"The coefficients of the card explain the gap: {_no_effect(study)}."
-        return " ".join([explained, *_refitted(study)])
-    if verdict == NO_EFFECT_MISSING:
-        if after is None:
-            return "No missing effect shows in these data."
-        remainder = "" if after <= GOOD else ", which is more than noise, but no effect explains the rest"
-        follows = f"the card as given follows the fitting trials to {noises(after)}{remainder}"
-        doubt = "" if not study.alternatives else f" With other coefficients {_no_effect(study)}."
-        return f"No missing effect shows in these data: {follows}.{doubt}"
+    if after is None:
+        return "No missing effect shows in these data."
+    remainder = "" if after <= GOOD else ", which is more than noise, but no effect explains the rest"
+    follows = f"the card as given follows the fitting trials to {noises(after)}{remainder}"
+    doubt = "" if not study.alternatives else f" With other coefficients {_no_effect(study)}."
+    return f"No missing effect shows in these data: {follows}.{doubt}"
+
+
+def _unknown_in_words(study: GapStudy) -> str:
+    """Where something acts that has no name, or the record that is in doubt first."""
     acting = study.acting[0].trial if study.acting else ""
     doubts = [one for one in study.record_doubts if trial_name(acting) == one.trial]
     if doubts:
-        found = "; ".join(f"{one.column}, {one.likely_truth}" for one in doubts)
+        found = "; ".join(f"{one.column}: {one.likely_truth}" for one in doubts)
         return (
             f"The record of {doubts[0].trial} is in doubt, before any effect of the ship is: the misfit is in it, and "
-            f"the audit finds {found}. Correct it and search again."
+            f"the audit finds in {found}. Correct it and search again."
         )
     sentence = "Something is missing that no tried effect explains: the remaining misfit has a pattern, but no name."
     return " ".join([sentence, *([f"The cause acts most in {place_of_cause(study)}."] if study.acting else [])])
@@ -179,7 +246,7 @@ def place_of_cause(study: GapStudy) -> str:
         for size, unit in ((first.force_N, "kN"), (first.moment_Nm, "kN m"))
         if size is not None
     ]
-    sizes.append(f"{first.standard_errors:.2g} standard errors")
+    sizes.append(f"{format_number(first.standard_errors, 2)} standard errors")
     words = EQUATION_WORDS.get(first.equation, first.equation)
     when = f"from {first.t_start_s:.0f} s to {first.t_end_s:.0f} s of {trial_name(first.trial)}"
     return f"{words}, {when} (rms {', '.join(sizes)})"
@@ -194,7 +261,7 @@ def _refitted(study: GapStudy) -> list[str]:
     most = sorted(study.coefficients, key=lambda entry: entry.moved, reverse=True)[:MOVED]
     moved = ", ".join(f"{entry.name} by {entry.moved:.1f}" for entry in most)
     words = f"{len(study.coefficients)} coefficients of the card were fitted{company}: "
-    words += f"most moved {moved} of their standard errors"
+    words += f"the largest changes are {moved} of their standard errors"
     if alone := study.misfit.effect_alone:
         group, misfit = ("fitting", alone.fit) if alone.holdout is None else ("held-out", alone.holdout)
         effects = "effects" if several else "effect"
@@ -218,20 +285,38 @@ def _with_values(effect: EffectFound) -> str:
 def verdict_context(study: GapStudy) -> list[str]:
     """Probabilities, other explanations and place, a paragraph each."""
     sentences = probabilities_in_words(study)
-    if study.alternatives and study.verdict == MISSING:
-        sentences.append(others_in_words(study))
-    elif study.effects and study.verdict == MISSING:
-        company = "it" if len(study.effects) == 1 else "each of them"
-        sentences.append(f"No explanation without {company} comes near.")
+    if study.effects and study.verdict == MISSING:
+        sentences.append(_likeliest_without(study))
+    if study.alternatives and study.verdict == COEFFICIENTS:
+        names = " or ".join(_together(effects_of(text)) for text in study.alternatives)
+        sentences.append(f"These trials cannot distinguish coefficients that are off from {names}.")
+    if study.verdict == OUTSIDE_LIBRARY:
+        sentences += _best_of_tried(study)
     if study.verdict != NO_EFFECT_MISSING and study.equation:
         sentences.append(f"The gap is in {_EQUATIONS.get(study.equation, study.equation)}.")
     return sentences
 
 
-def others_in_words(study: GapStudy) -> str:
-    """The explanations that these data cannot distinguish."""
-    names = "; ".join(_together(effects_of(text)) for text in study.alternatives)
-    return f"These data cannot distinguish it from: {names}."
+def _best_of_tried(study: GapStudy) -> list[str]:
+    """The explanation that would have been named if nothing else were in the trials."""
+    best = max(study.rivals, key=_by_probability, default=None)
+    if best is None or not best.effects:
+        return []
+    return [
+        f"The most probable of what was tried is {_together(best.effects)}. It leaves too much unexplained to be named."
+    ]
+
+
+def _likeliest_without(study: GapStudy) -> str:
+    """The most probable explanation that lacks an effect of the named ones, if it is worth a word."""
+    named = {effect.name for effect in study.effects}
+    without = "without it" if len(named) == 1 else "without one of them"
+    others = [rival for rival in study.rivals if not named <= {*rival.effects}]
+    likeliest = max(others, key=_by_probability, default=None)
+    if likeliest is None or likeliest.probability < WORTH_A_WORD:
+        return f"No explanation {without} has a probability of {as_percent(WORTH_A_WORD)} or more."
+    words = _together(likeliest.effects) if likeliest.effects else "nothing is missing"
+    return f"Most probable explanation {without}: {words} ({as_percent(likeliest.probability)})."
 
 
 _EQUATIONS = {

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tank2sim.cards import ManoeuvringCard, parse_card
+from tank2sim.cards.covariance import Covariance
 from tank2sim.dynamics import build
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import (
@@ -47,6 +49,12 @@ def test_the_bound_is_below_the_slowest_trial() -> None:
     assert lowered.model.low_speed_bound_mps == pytest.approx(0.95 * 2.6, rel=0.01)
     assert lowered.model.valid_speed_mps is None  # what it is valid for is stated by nobody
     assert lowered_bound_notice(card(), lowered)
+
+
+def test_a_lower_bound_leaves_the_covariance_as_it_is() -> None:
+    known = Covariance(("derivatives.Yv", "derivatives.Nr"), np.diag([1e-8, 4e-10]), None)
+    lowered = polynomial_over_trials(replace(card(), covariance=known), [slowing(2.6)])
+    assert lowered.model.low_speed_bound_mps < 2.6 and lowered.covariance is known
 
 
 @pytest.mark.parametrize("signals", [("u_mps", "v_mps"), ("x_m", "y_m")])

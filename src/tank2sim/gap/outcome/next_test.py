@@ -258,16 +258,17 @@ def _with_headings(of: Sequence[Candidate], explanations: Sequence[Explanation])
 
 def _why(best: Candidate, names: Sequence[str], each: Array, least: tuple[float, Candidate]) -> str:
     """Reason for a manoeuvre: the root of a score is a difference in standard deviations of the noise."""
-    first, *rivals = names
+    first, *rivals = ("the card alone" if name == "none" else name.replace("_", " ") for name in names)
     apart = " and ".join(f"{math.sqrt(score):.2g} from {name}" for score, name in zip(each, rivals, strict=True))
     if min(each) < DECIDES:
-        text = f"No manoeuvre considered would distinguish {first} from {' and '.join(rivals)} for sure; nearest"
+        text = f"No manoeuvre considered would distinguish {first} for sure; nearest is {best.name}."
     else:
-        text = f"The manoeuvre that would distinguish {first} from {' and '.join(rivals)} best"
+        text = f"The explanations are distinguished best by {best.name}."
+    little = math.sqrt(max(least[0], 0.0))
     text += (
-        f" is {best.name}: the prediction by {first} differs there by {apart}, in standard deviations of the noise of "
-        f"all readings together and beyond the uncertainty of the parameters; {math.sqrt(DECIDES):.2g} would "
-        f"decide. The least informative, {least[1].name}, would give {math.sqrt(max(least[0], 0.0)):.1g}."
+        f" There the prediction by {first} differs by {apart}; {math.sqrt(DECIDES):.2g} would decide. The unit is the "
+        "standard deviation of the noise of all readings together, beyond the uncertainty of the parameters. The least "
+        f"informative manoeuvre, {least[1].name}, would give {f'{little:.2g}' if little > 0.01 else 'less than 0.01'}."
     )
     if best.heading:
         text += f" Begin on heading {math.degrees(best.heading):.0f} deg (initial.psi), which orders cannot state."

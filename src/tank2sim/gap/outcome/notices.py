@@ -46,56 +46,28 @@ def gap_notices(
     waves : WaveBand, optional
         Found in the fitted trials.
     """
-    decision, proof, withheld = judged.decision, judged.proof, judged.withheld
-    named = {name for name, *_ in proof.named.estimated}
-    fitted_to_held = tuple(proof.named.by_trial) if trials[1].trials else ()
-    notices = [*trials[0].notices, *trials[1].notices, *_partly_measured(trials[0])]
-    notices += [Notice(_of_waves(waves))] if waves else []
-    notices += [Notice(judged.by_simulation)] if judged.by_simulation else []
-    notices += [Notice(_in_words(strange)) for strange in decision.strange]
-    if withheld:
-        notices.append(
-            Notice(
-                f"{withheld}: fits best from instant to instant, but simulations with it are no closer than without: "
-                "not named"
-            )
-        )
-    if fitted_to_held:
-        notices.append(
-            Notice(
-                f"{' and '.join(fitted_to_held)} of the trials held out: fitted to each of them, two numbers to a "
-                "record; all else is as the fitting trials have it"
-            )
-        )
-    if card.effects:
-        have = ", ".join(entry.name for entry in card.effects)
-        notices.append(Notice(f"{have}: kept as on the card, and not sought"))
-    remaining = misfit_of(proof.results, "after")
-    if decision.verdict != OUTSIDE_LIBRARY and remaining > MUCH:
-        notices.append(
-            Notice(
-                f"all trials together are still missed by {remaining:.3g} times the noise: gusts, waves, "
-                "coefficients that are off, or something more that is missing; the standard errors do not cover it"
-            )
-        )
-        if structure := structure_that_adds(card, decision.best.hypothesis.effects):
-            notices.append(
-                Notice(
-                    f"identify with structure {structure} fits {' and '.join(decision.best.hypothesis.effects)} to the "
-                    "trials together with the hull's derivatives, from the card as it was given"
-                )
-            )
+    named = {name for name, *_ in judged.proof.named.estimated}
+    notices = [
+        *trials[0].notices,
+        *trials[1].notices,
+        *_partly_measured(trials[0]),
+        *([Notice(_of_waves(waves))] if waves else []),
+        *([Notice(judged.by_simulation)] if judged.by_simulation else []),
+        *(Notice(_in_words(strange)) for strange in judged.decision.strange),
+        *_of_names(card, judged, held_out=bool(trials[1].trials)),
+        *(_of_what_remains(card, judged) if judged.decision.verdict != OUTSIDE_LIBRARY else []),
+    ]
     notices += [
         Notice(
             f"{name}: these trials cannot distinguish it from an error of {coefficient.name}, now "
             f"{coefficient.moved:.2g} standard errors off"
         )
-        for name, coefficient in effects_like(card, proof.coefficients, named).items()
+        for name, coefficient in effects_like(card, judged.proof.coefficients, named).items()
     ]
-    if decision.verdict in (MISSING, AMBIGUOUS):
+    if judged.decision.verdict in (MISSING, AMBIGUOUS):
         notices += [
             Notice(f"{name}: the improved card follows it worse than the given one")
-            for name in worse_trials(proof.results)
+            for name in worse_trials(judged.proof.results)
         ]
     for variable, values in agreement.items():
         if len(values) > 1 and (said := trial_consistency(values)).p < DOUBT:
@@ -103,12 +75,61 @@ def gap_notices(
     return tuple(dict.fromkeys(notices))
 
 
+def _of_names(card: ManoeuvringCard, judged: Judged, *, held_out: bool) -> list[Notice]:
+    """Of effects that are withheld, fitted to trials held out, or on the card."""
+    notices = []
+    if judged.withheld:
+        notices.append(
+            Notice(
+                f"{judged.withheld}: fits best from instant to instant, but simulations with it are no closer than "
+                "without: not named"
+            )
+        )
+    if held_out and judged.proof.named.by_trial:
+        notices.append(
+            Notice(
+                f"{' and '.join(judged.proof.named.by_trial)} of the trials held out: fitted to each of them, two "
+                "numbers to a record; all else is as the fitting trials have it"
+            )
+        )
+    if card.effects:
+        have = ", ".join(entry.name for entry in card.effects)
+        notices.append(Notice(f"{have}: kept as on the card, and not sought"))
+    return notices
+
+
+def _of_what_remains(card: ManoeuvringCard, judged: Judged) -> list[Notice]:
+    """That the trials are still missed by far, and how the named effects are fitted together with the hull."""
+    remaining = misfit_of(judged.proof.results, "after")
+    if remaining <= MUCH:
+        return []
+    notices = [
+        Notice(
+            f"all trials together are still missed by {remaining:.3g} times the noise: gusts, waves, coefficients that "
+            "are off, or something more that is missing; the standard errors do not cover it"
+        )
+    ]
+    effects = judged.decision.best.hypothesis.effects
+    if structure := structure_that_adds(card, effects):
+        notices.append(
+            Notice(
+                f"identify with structure {structure} fits {' and '.join(effects)} to the trials together with the "
+                "hull's derivatives, from the card as it was given"
+            )
+        )
+    return notices
+
+
 def of_tried_effects(tried: Sequence[str], possible: Sequence[str]) -> tuple[Notice, ...]:
     """That not all effects were tried which the card and the trials allow; empty if all were."""
     if set(possible) <= set(tried):
         return ()
+    count = f"{len(possible)} possible effects; another one may be missing"
+    left_out = [name for name in possible if name not in tried]
+    if len(left_out) < min(len(tried), SHOWN + 1):
+        return (Notice(f"not tried, as asked: {', '.join(left_out)} of {count}"),)
     shown = ", ".join(tried) if len(tried) <= SHOWN else f"{len(tried)}"
-    return (Notice(f"tried, as asked: {shown} of {len(possible)} possible effects; another one may be missing"),)
+    return (Notice(f"tried, as asked: {shown} of {count}"),)
 
 
 def _partly_measured(fitted: Measured) -> list[Notice]:

@@ -266,7 +266,8 @@ class GapStudy:
     coefficients : tuple of Refitted
         Coefficients fitted together with the effects.
     alternatives : tuple of str
-        Explanations that these data cannot distinguish: ``current + wind``.
+        Explanations that these data cannot distinguish from the named one (``current + wind``), or from coefficients
+        that explain the gap.
     where : tuple of MisfitPlace
         With the file of each trial and the column of each signal; the largest first.
     acting : tuple of ActingInterval

@@ -34,8 +34,8 @@ CLOSES = 0.9
 """Largest ratio of the misfit after to that before, as the median over all signals of all trials (project choice)."""
 
 REMAINS = 1.5
-"""Misfit in noise units from which a gap remains, is reported, and more effects are sought (project choice): the misfit
-beyond the noise is then as large as the noise, sqrt(1.5^2 - 1) = 1.1."""
+"""Misfit in noise units from which a gap remains and is reported (project choice): the misfit beyond the noise is then
+as large as the noise, sqrt(1.5^2 - 1) = 1.1."""
 
 NEAR_NOISE = 1.2
 """Misfit in noise units up to which no simulation is closer than another (project choice): many coefficients follow a
@@ -182,14 +182,22 @@ def closes_gap(passed: Sequence[Passed], limit: float = CLOSES) -> bool:
         return False
     if min(before, after) < MUCH:
         return True
-    shown = [(replay, name) for replay in passed for name in replay.noise if np.isfinite(replay.measured[name]).any()]
     changed = [
-        1.0 if before == after else after / before if np.isfinite(before) else 0.0
-        for replay, name in shown
-        if max(before := replay.misfit("before", name), after := replay.misfit("after", name)) > REMAINS
+        _ratio(replay.misfit("before", name), replay.misfit("after", name))
+        for replay in passed
+        for name in replay.noise
+        if np.isfinite(replay.measured[name]).any()
+        and max(replay.misfit("before", name), replay.misfit("after", name)) > REMAINS
         and _differs(replay, name)
     ]
     return bool(changed and np.median(changed) < limit)
+
+
+def _ratio(before: float, after: float) -> float:
+    """Misfit after to that before, which may be infinite."""
+    if before == after:
+        return 1.0
+    return after / before if np.isfinite(before) else 0.0
 
 
 def _differs(replay: Passed, name: str) -> bool:

@@ -12,6 +12,7 @@ trial found again at each step.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
@@ -20,6 +21,7 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.dynamics.ship import mass_fault
 from tank2sim.gap.proof.open_loop import InputRecord, Replayer, difference_slopes, first_state, input_record
 from tank2sim.gap.proof.replay import replayer_of
 from tank2sim.identification.trials.problem.prepare_trials import Measured
@@ -167,8 +169,12 @@ def _linearised(
     begun: _Begun,
     values: Array,
 ) -> _Linearised:
-    """A trial about its present initial state and coefficients."""
+    """A trial about its present initial state and coefficients; of infinite cost without a positive mass."""
     replayer, sigma = _replayer(card, driven_by, noise)
+    of_ship = zip(replayer.model.parameter_names, map(float, _parameters(replayer, prior, values)), strict=True)
+    if mass_fault(replayer.model, dict(of_ship)):
+        nothing, count = np.zeros((len(begun.start), len(values))), len(values)
+        return _Linearised(math.inf, np.zeros(count), np.zeros((count, count)), np.zeros(len(begun.start)), nothing)
     record, start = begun.record, begun.start
     known = ~np.isnan(record.readings)
 

@@ -11,9 +11,10 @@ from tank2sim.analysis.ensemble.draws import by_file_name
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.terms import known_term
-from tank2sim.dynamics.abkowitz import ALL_TERMS
+from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
+from tank2sim.dynamics.ship import mass_fault
 from tank2sim.gap.improve_card import changed_derivatives
 from tank2sim.gap.inference.fit import CoefficientEstimates
 from tank2sim.gap.result import Refitted
@@ -48,13 +49,13 @@ def effects_like(
     moved = np.array([(entry.value - entry.before) / entry.standard_error_before for entry in steady])
     found = {}
     for name, effect in EFFECTS.items():
-        changed = [entry for entry in steady if entry.name in effect.changes_on(card)]
-        most = max(changed, key=lambda entry: entry.moved, default=None)
-        if name in named or most is None or most.moved <= STANDARD_ERRORS or not effect.tried(card):
+        if name in named or not effect.tried(card) or not (effect.changes_on(card) or effect.reads_derivatives):
             continue
         by_effect = _changes(card, name, errors)
         explained = by_effect @ np.linalg.lstsq(by_effect, moved, rcond=None)[0]
-        if explained @ explained > EXPLAINS * (moved @ moved):
+        changed = [entry for entry, row in zip(steady, by_effect, strict=True) if np.any(row)]
+        most = max(changed, key=lambda entry: entry.moved, default=None)
+        if most and most.moved > STANDARD_ERRORS and explained @ explained > EXPLAINS * (moved @ moved):
             found[name] = most
     return found
 
@@ -83,7 +84,8 @@ def refit_coefficients(
     """The coefficients with their values before and after, and the card with them and their covariance.
 
     Data of the steering gear and the clock of the record are part of the fit and are not written: the card states what
-    the gear is, and the clock is the record's.
+    the gear is, and the clock is the record's. Added masses with which the ship would have no positive mass are not
+    believed: they remain the card's, and the other coefficients are those that are most probable with them.
 
     Parameters
     ----------
@@ -94,18 +96,47 @@ def refit_coefficients(
         Estimates of parameters of the card's model.
     """
     known = free_parameters(card, inertia=True)
-    rows = [row for row, name in enumerate(estimates.names) if name in known]
-    names = tuple(estimates.names[row] for row in rows)
+    values = _within_bounds(model, estimates, known)
+    defaults = dict(zip(model.parameter_names, map(float, model.parameter_values()), strict=True))
+    if mass_fault(model, defaults | values):
+        estimates = _with_masses_held(estimates)
+        values = _within_bounds(model, estimates, known)
+    names = tuple(values)
+    rows = [estimates.names.index(name) for name in names]
     before = np.array([known[name] for name in names])
     covariance = estimates.covariance[np.ix_(rows, rows)]
-    bounds = [(model[name].minimum, model[name].maximum) for name in names]
-    lowest = np.array([-np.inf if low is None else low for low, _ in bounds])
-    highest = np.array([np.inf if high is None else high for _, high in bounds])
-    values = np.clip(before[:, 0] + estimates.change[rows], lowest, highest)
-    estimate = Estimate("gap", names, values, covariance, np.asarray(np.linalg.pinv(covariance), dtype=np.float64))
+    estimate = Estimate(
+        "gap", names, np.array([*values.values()]), covariance, np.asarray(np.linalg.pinv(covariance), dtype=np.float64)
+    )
     short = [name.removeprefix("derivatives.") for name in names]
-    columns = zip(short, values.tolist(), estimate.standard_errors.tolist(), *before.T.tolist(), strict=True)
+    columns = zip(short, values.values(), estimate.standard_errors.tolist(), *before.T.tolist(), strict=True)
     refitted = card_with_estimate(card, estimate, "refitted by gap")
     return tuple(Refitted(*row) for row in columns), replace(
         refitted, covariance=by_file_name(refitted, names, covariance)
+    )
+
+
+def _within_bounds(
+    model: Model, estimates: CoefficientEstimates, known: Mapping[str, tuple[float, float]]
+) -> dict[str, float]:
+    """Estimates of the card's coefficients, within the bounds of the model."""
+    values = {}
+    for name, change in zip(estimates.names, map(float, estimates.change), strict=True):
+        if name in known:
+            low, high = model[name].minimum, model[name].maximum
+            values[name] = float(
+                np.clip(known[name][0] + change, -np.inf if low is None else low, np.inf if high is None else high)
+            )
+    return values
+
+
+def _with_masses_held(estimates: CoefficientEstimates) -> CoefficientEstimates:
+    """The estimates of all others where the added masses are those of the card: a conditional normal distribution."""
+    held = np.array([name.removeprefix("derivatives.") in ACCELERATION_TERMS for name in estimates.names])
+    change, covariance = estimates.change, estimates.covariance
+    gain = covariance[np.ix_(~held, held)] @ np.linalg.pinv(covariance[np.ix_(held, held)])
+    return CoefficientEstimates(
+        tuple(name for name, is_held in zip(estimates.names, held, strict=True) if not is_held),
+        change[~held] - gain @ change[held],
+        covariance[np.ix_(~held, ~held)] - gain @ covariance[np.ix_(held, ~held)],
     )

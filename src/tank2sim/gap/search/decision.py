@@ -121,22 +121,24 @@ def is_significant(fit: ExplanationFit) -> bool:
     One that only changes derivatives of the card, or its data of the steering gear, must change one of them by as
     many standard errors of the *card*: less is within the card's uncertainty.
     """
+    return all(_is_effect_significant(fit, name) for name in fit.hypothesis.effects)
+
+
+def _is_effect_significant(fit: ExplanationFit, name: str) -> bool:
+    """Whether one effect of a fit is far enough from its absence, and changes its card by enough."""
     errors = np.sqrt(np.diag(fit.covariance))
-    for name in fit.hypothesis.effects:
-        sizes = [
-            abs(value - estimate.parameter.absent) / error if error > 0 else np.inf
-            for estimate, value, error in zip(fit.hypothesis.estimated, fit.theta, errors, strict=True)
-            if estimate.effect == name and estimate.is_amplitude and estimate.run is None
-        ]
-        if sizes and max(sizes) < STANDARD_ERRORS:
-            return False
-        if name in fit.hypothesis.each and not _differs_from_zero(fit, name):
-            return False
-        if EFFECTS[name].changes_on(fit.hypothesis.card) and _change(fit, name) < STANDARD_ERRORS:
-            return False
-        if EFFECTS[name].in_place_of and _change_of_gear(fit, name) < STANDARD_ERRORS:
-            return False
-    return True
+    sizes = [
+        abs(value - estimate.parameter.absent) / error if error > 0 else np.inf
+        for estimate, value, error in zip(fit.hypothesis.estimated, fit.theta, errors, strict=True)
+        if estimate.effect == name and estimate.is_amplitude and estimate.run is None
+    ]
+    if max(sizes, default=np.inf) < STANDARD_ERRORS:
+        return False
+    if name in fit.hypothesis.each and not _differs_from_zero(fit, name):
+        return False
+    if EFFECTS[name].changes_on(fit.hypothesis.card) and _change(fit, name) < STANDARD_ERRORS:
+        return False
+    return not (EFFECTS[name].in_place_of and _change_of_gear(fit, name) < STANDARD_ERRORS)
 
 
 def _differs_from_zero(fit: ExplanationFit, name: str) -> bool:

@@ -207,17 +207,10 @@ def _let_surroundings_differ(fitting: Fitting, every: Sequence[Variant], most: i
     """Winds and currents that differ from trial to trial, alone, together, and next to the best explanation."""
     chosen = dict.fromkeys(variant.effect for variant in every)
     unknown = [name for name in chosen if EFFECTS[name].surroundings and name not in fitting.hypotheses.recorded]
-    runs = fitting.hypotheses.runs
-    if runs < 2:
+    if fitting.hypotheses.runs < 2:
         return
     best = fitting.best()
-    still = {name: _still(fitting.hypotheses(name, each=(name,))) for name in unknown}
-    sets = [{name: still[name]} for name in unknown]
-    if most > 1 and len(unknown) > 1:
-        sets.append(dict(still))
-    if most > 1:
-        others = {effect: theta for effect, theta in thetas_of(best).items() if effect not in unknown}
-        sets += [{effect: theta, name: still[name]} for effect, theta in others.items() for name in unknown]
+    sets = _sets_in_surroundings(fitting, best, unknown, most)
     starts = [best.logs, fitting.likelihood.belief.logs]
     common = [fit for fit in fitting.found.values() if set(unknown) & set(fit.hypothesis.effects)]
     fitting.fit(
@@ -242,6 +235,20 @@ def _let_surroundings_differ(fitting: Fitting, every: Sequence[Variant], most: i
                 if proposed.gain > -WORTH
             ]
         )
+
+
+def _sets_in_surroundings(
+    fitting: Fitting, best: ExplanationFit, unknown: Sequence[str], most: int
+) -> list[dict[str, Array]]:
+    """Each wind or current by trial, both together, and each with an effect of the best; still to begin with."""
+    still = {name: _still(fitting.hypotheses(name, each=(name,))) for name in unknown}
+    sets = [{name: still[name]} for name in unknown]
+    if most == 1:
+        return sets
+    if len(unknown) > 1:
+        sets.append(still)
+    others = {effect: theta for effect, theta in thetas_of(best).items() if effect not in unknown}
+    return [*sets, *({effect: theta, name: still[name]} for effect, theta in others.items() for name in unknown)]
 
 
 def _add_more(fitting: Fitting, every: Sequence[Variant], most: int) -> None:
@@ -294,22 +301,8 @@ def _polish(fitting: Fitting) -> None:
     near = [fit for fit in fitting.found.values() if fit.score < fitting.best().score + CLOSE and _at_a_bound(fit)]
     fitting.fit([Proposal(_of_typical_shape(fit), [fit.logs], ROUNDS, each=fit.hypothesis.each) for fit in near])
     best = fitting.best()
-    best_thetas = thetas_of(best)
-    each = best.hypothesis.each
-    begins = [({name: theta}, each) for name, theta in best_thetas.items() if len(best_thetas) > 1]
-    for fit in (fit for fit in fitting.found.values() if fit.score < best.score + _FAR or not fit.hypothesis.effects):
-        thetas = thetas_of(fit)
-        begins += [(thetas, fit.hypothesis.each)] if fit is not best else []
-        if len(thetas) > 1:
-            alike = {name for name in thetas if (name in fit.hypothesis.each) == (name in each)}
-            mixed = {name: best_thetas.get(name, theta) if name in alike else theta for name, theta in thetas.items()}
-            begins.append((mixed, fit.hypothesis.each))
-    fitting.fit(
-        [
-            Proposal(thetas, [best.logs], SAME_NOISE, each=tuple(name for name in differ if name in thetas))
-            for thetas, differ in begins
-        ]
-    )
+    within = [fit for fit in fitting.found.values() if fit.score < best.score + _FAR or not fit.hypothesis.effects]
+    fitting.fit(_at_the_noise_of(best, within))
     best = fitting.best()
     close = [
         fit
@@ -317,6 +310,23 @@ def _polish(fitting: Fitting) -> None:
         if fit is not converged and (fit.score < best.score + CLOSE or fit is fitting.best(len(effects)))
     ]
     fitting.fit([refit(fit, [fit.logs, best.logs], LAST_ROUNDS) for fit in close])
+
+
+def _at_the_noise_of(best: ExplanationFit, fits: Sequence[ExplanationFit]) -> list[Proposal]:
+    """Each single effect of the best, and all others from their own parameters and from those of the best."""
+    best_thetas, each = thetas_of(best), best.hypothesis.each
+    begins = [({name: theta}, each) for name, theta in best_thetas.items() if len(best_thetas) > 1]
+    for fit in fits:
+        thetas = thetas_of(fit)
+        begins += [(thetas, fit.hypothesis.each)] if fit is not best else []
+        if len(thetas) > 1:
+            alike = {name for name in thetas if (name in fit.hypothesis.each) == (name in each)}
+            mixed = {name: best_thetas.get(name, theta) if name in alike else theta for name, theta in thetas.items()}
+            begins.append((mixed, fit.hypothesis.each))
+    return [
+        Proposal(thetas, [best.logs], SAME_NOISE, each=tuple(name for name in differ if name in thetas))
+        for thetas, differ in begins
+    ]
 
 
 def _fit_nearly_alike(fitting: Fitting, chosen: Sequence[str]) -> None:

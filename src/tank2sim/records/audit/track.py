@@ -284,7 +284,8 @@ def _offset(trial: Trial, found: WeakFit) -> Finding:
     """The track is turned against heading and velocities: psi + offset is the heading in the axes of x and y."""
     offset = float(np.arctan2(found.values[1], found.values[0]))
     evidence = {"angle_deg": float(np.rad2deg(-offset)), "standard_error_deg": float(np.rad2deg(found.errors[1]))}
-    truth = f"psi reads {np.rad2deg(-offset):+.3g} deg too much (heading offset, or the log's misalignment)"
+    size = f"{np.rad2deg(abs(offset)):.3g} deg too {'much' if offset < 0 else 'little'}"
+    truth = f"psi reads {size} (heading offset, or the log's misalignment)"
     turned = changed(["psi_rad"], lambda values: values + offset, f"psi: offset {offset:.3g} rad added")
     what = "the track is turned by a constant angle against heading and velocities"
     return noted_in(trial, ["psi_rad"], what, truth, evidence, turned)

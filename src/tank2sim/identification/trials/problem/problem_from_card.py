@@ -83,10 +83,11 @@ def polynomial_over_trials(card: ManoeuvringCard, trials: Sequence[Trial]) -> Ma
 
 
 def with_polynomial_down_to(card: ManoeuvringCard, speed_mps: float) -> ManoeuvringCard:
-    """The card with its polynomial down to a speed; as it is where its own bound is as low."""
+    """The card with its polynomial down to a speed and the covariance as before; as it is where its bound is as low."""
     if card.model.kind != "abkowitz" or speed_mps >= card.model.low_speed_bound_mps:
         return card
-    return revised(card, {}, {"model.low_speed_below_mps": speed_mps}, comment="slowest speed of the trials")
+    lowered = revised(card, {}, {"model.low_speed_below_mps": speed_mps}, comment="slowest speed of the trials")
+    return replace(lowered, covariance=card.covariance)
 
 
 def lowered_bound_notice(given: ManoeuvringCard, card: ManoeuvringCard) -> tuple[Notice, ...]:
