@@ -29,7 +29,7 @@ class Verdict(StrEnum):
     FAILED = "failed"
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class KeyFigure:
     """A key figure, shown on a card at the top of the page.
 
@@ -73,7 +73,7 @@ _ROOM = 1.15
 """Room of the bar of a key figure, over the larger of figure and limit. Project choice: both ends are seen."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Column:
     """Head of a column: its title, the unit of its numbers, and their significant digits."""
 
@@ -208,8 +208,8 @@ def table(
 def _column(head: str, digits: int) -> Column:
     title, bracket, unit = head.rpartition(" (")
     if not bracket or not unit.endswith(")"):
-        return Column(title=head, digits=digits)
-    return Column(title=title, unit=unit.removesuffix(")"), digits=digits)
+        return Column(head, digits=digits)
+    return Column(title, unit.removesuffix(")"), digits=digits)
 
 
 def quantities(caption: str, values: Mapping[str, Cell], **options: Any) -> Table:
@@ -262,10 +262,10 @@ def records_table(
     words = dict(fields) if isinstance(fields, Mapping) else dict.fromkeys(fields, "")
     if not words:
         words = dict.fromkeys((field.name for field in dataclasses.fields(values[0])) if values else (), "")
-    heads = [Column(title=first)] if isinstance(records, Mapping) else []
+    heads = [Column(first)] if isinstance(records, Mapping) else []
     for name, title in words.items():
         own, unit = in_words(name)
-        heads.append(Column(title=title or own, unit=unit, digits=options.get("digits", 4)))
+        heads.append(Column(title or own, unit, digits=options.get("digits", 4)))
     rows: list[list[Cell]] = [[getattr(record, name) for name in words] for record in values]
     if isinstance(records, Mapping):
         rows = [[name, *row] for name, row in zip(records, rows, strict=True)]
@@ -312,7 +312,7 @@ def cell_text(value: object, digits: int = 5) -> str:
             return str(value)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Illustration:
     """A chart and what the reader should see in it; the chart's own title becomes the heading of its caption.
 
@@ -343,7 +343,7 @@ class Illustration:
         return text if isinstance(text, str) else ""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Section:
     """A part of an answer.
 
@@ -371,4 +371,4 @@ class Section:
 def notices_section(notices: Sequence[Notice]) -> list[Section]:
     """Return the section with the notices of a result, empty without any."""
     notes = [Notice(without_exponents(notice), notice.level) for notice in notices]
-    return [Section(heading="Notices", notes=notes)] if notes else []
+    return [Section("Notices", notes=notes)] if notes else []

@@ -101,17 +101,17 @@ class AuditResult(Result[AuditStudy]):
         trials = self.study.trials
         clean = len(trials) - len({finding.file for finding in findings})
         return [
-            KeyFigure(label="Faults", value=faults, verdict=Verdict.FAILED if faults else Verdict.PASSED),
-            KeyFigure(label="Notes", value=len(findings) - faults, note="smaller findings to look at"),
-            KeyFigure(label="Repaired when the trials are read", value=f"{repaired} of {len(findings)}"),
-            KeyFigure(label="Trials without a finding", value=f"{clean} of {len(trials)}"),
+            KeyFigure("Faults", faults, verdict=Verdict.FAILED if faults else Verdict.PASSED),
+            KeyFigure("Notes", len(findings) - faults, note="smaller findings to look at"),
+            KeyFigure("Repaired when the trials are read", f"{repaired} of {len(findings)}"),
+            KeyFigure("Trials without a finding", f"{clean} of {len(trials)}"),
         ]
 
     @property
     def sections(self) -> Sequence[Section]:
         """Findings, records with the places of findings, and the trials."""
-        first = [Section(heading="Findings", tables=[self._findings_table()])] if self.study.findings else []
-        trials = Section(heading="Trials", tables=[self._trials_table(), self._noise_table()])
+        first = [Section("Findings", tables=[self._findings_table()])] if self.study.findings else []
+        trials = Section("Trials", tables=[self._trials_table(), self._noise_table()])
         return [*first, *self._records(), trials]
 
     def _findings(self) -> list[tuple[ColumnFinding, str]]:
@@ -144,7 +144,7 @@ class AuditResult(Result[AuditStudy]):
         charts: Sequence[Illustration] = motions(_name(trial), {"measured": trial.histories}, marks=marks)
         red = "Red in the histories: where findings about single values and rows are."
         return Section(
-            heading=f"Record {_name(trial)}",
+            f"Record {_name(trial)}",
             text=red if marks else "" if mine else "Nothing wrong was found.",
             charts=[replace(chart, half=len(charts) > 1, name=f"record {_name(trial)}") for chart in charts],
         )

@@ -174,22 +174,20 @@ class CaptiveRunResult(Result[CaptiveRunStudy]):
         """The surest derivatives of a run that is alone, runs, speed, periods, faults, repeats that differ."""
         runs, faults = self.runs, sum(len(run.faults) for run in self.runs)
         figures = [
-            KeyFigure(
-                label=f"{name}, times 10⁵", value=1e5 * value, note=f"standard error {format_number(1e5 * error, 2)}"
-            )
+            KeyFigure(f"{name}, times 10⁵", 1e5 * value, note=f"standard error {format_number(1e5 * error, 2)}")
             for name, value, error in (_surest_derivatives(runs[0])[:2] if len(runs) == 1 else ())
         ]
         kinds = ", ".join(dict.fromkeys(_words(run.type) for run in runs))
         figures += [
-            KeyFigure(label="Runs", value=len(runs), note=kinds),
-            KeyFigure(label="Speed", value=runs[0].speed_mps, unit="m/s"),
-            KeyFigure(label="Periods", value=sum(run.periods for run in runs)),
-            KeyFigure(label="Faults", value=faults, verdict=Verdict.FAILED if faults else Verdict.PASSED),
+            KeyFigure("Runs", len(runs), note=kinds),
+            KeyFigure("Speed", runs[0].speed_mps, "m/s"),
+            KeyFigure("Periods", sum(run.periods for run in runs)),
+            KeyFigure("Faults", faults, verdict=Verdict.FAILED if faults else Verdict.PASSED),
         ]
         if self.repeats:
             odd = sum(row.differs for row in self.repeats)
             verdict = Verdict.CAUTION if odd else Verdict.PASSED
-            figures.append(KeyFigure(label="Coefficients in which repeats differ", value=odd, verdict=verdict))
+            figures.append(KeyFigure("Coefficients in which repeats differ", odd, verdict=verdict))
         return figures
 
     @property
@@ -201,15 +199,13 @@ class CaptiveRunResult(Result[CaptiveRunStudy]):
         cycles = []
         if swinging:
             chart = cycle_chart(swinging, title="Averaged cycle")
-            cycles = [
-                Section(heading="Averaged cycle", charts=[Illustration(chart=chart, caption=caption, name="cycle")])
-            ]
+            cycles = [Section("Averaged cycle", charts=[Illustration(chart, caption=caption, name="cycle")])]
         fourier = [_forces_table(self.runs, water=self.study.inertia_removed), *map(_coefficients_table, self.runs)]
         return [
             *cycles,
             *_derivatives_section(self.runs),
             *_repeats_section(self.repeats),
-            Section(heading="Fourier coefficients", text=_FOURIER, tables=fourier),
+            Section("Fourier coefficients", text=_FOURIER, tables=fourier),
             _over_time("Forces over time", "forces", "Points: readings; lines: harmonics and trend.", named),
             _over_time("Residual", "residual", "Record less harmonics and trend.", named),
         ]
@@ -282,7 +278,7 @@ def _derivatives_section(runs: Sequence[SingleRun]) -> list[Section]:
         return []
     caption = "Derivatives of the run alone, at its frequency and amplitude (prime, times 10⁵)"
     found = table(caption, ("run", "derivative", "value", "±"), rows)
-    return [Section(heading="Derivatives of the run alone", tables=[found])]
+    return [Section("Derivatives of the run alone", tables=[found])]
 
 
 def _repeats_section(repeats: Sequence[RepeatedCoefficient]) -> list[Section]:
@@ -297,12 +293,12 @@ def _repeats_section(repeats: Sequence[RepeatedCoefficient]) -> list[Section]:
     ]
     heads = ("force", "part", "order", "mean", "deviation", "by noise", "chance", "verdict")
     note = "Deviation: standard deviation of one run. By noise: the deviation that the noise within the runs explains."
-    return [Section(heading="Repeats", tables=[table(f"{len(repeats[0].values)} runs compared", heads, rows, note)])]
+    return [Section("Repeats", tables=[table(f"{len(repeats[0].values)} runs compared", heads, rows, note)])]
 
 
 def _over_time(heading: str, stem: str, caption: str, runs: Mapping[str, SingleRun]) -> Section:
     """Forces or residuals of each run over time."""
-    signals = [Signal(name=force, title=force, unit="N.m" if force == "N" else "N") for force in _FORCES]
+    signals = [Signal(force, force, "N.m" if force == "N" else "N") for force in _FORCES]
     charts = []
     for place, (label, run) in enumerate(runs.items(), start=1):
         title = f"{stem.capitalize()}: {label}"
@@ -311,13 +307,13 @@ def _over_time(heading: str, stem: str, caption: str, runs: Mapping[str, SingleR
             chart = history_chart(lines, signals, title=title)
         else:
             chart = history_chart([_history(run, "residual", "_residual")], signals, title=title, height_px=80)
-        charts.append(Illustration(chart=chart, caption=caption, name=f"{stem}_{place}"))
-    return Section(heading=heading, charts=charts)
+        charts.append(Illustration(chart, caption=caption, name=f"{stem}_{place}"))
+    return Section(heading, charts=charts)
 
 
 def _history(run: SingleRun, label: str, part: str, *, measured: bool = False) -> History:
     values = {force: run.history[f"{force}{part}_{unit}"] for force, unit in _KEYS.items()}
-    return History(label=label, time_s=run.history["t_s"], values=values, measured=measured)
+    return History(label, time_s=run.history["t_s"], values=values, measured=measured)
 
 
 def _labels(runs: Sequence[SingleRun]) -> list[str]:
@@ -341,13 +337,13 @@ def cycle_chart(runs: Mapping[str, SingleRun], *, title: str = "") -> ChartSpec:
             cycle = each.cycles[force]
             phase, mean, spread = np.degrees(cycle.phase_rad), cycle.mean, np.nan_to_num(cycle.deviation)
             series += [
-                PlotSeries(label=label, x=phase, y=cycle.fit),
-                PlotSeries(label=label, x=phase, y=mean, low=mean - spread, high=mean + spread, points=True),
+                PlotSeries(label, x=phase, y=cycle.fit),
+                PlotSeries(label, x=phase, y=mean, low=mean - spread, high=mean + spread, points=True),
             ]
-        plots.append(Plot(series=series, up=PlotAxis(title=up), height_px=200))
+        plots.append(Plot(series, up=PlotAxis(up), height_px=200))
     return curve_panels(
         plots,
-        PlotAxis(title="phase (deg)", domain=(0.0, 360.0), nice=False),
+        PlotAxis("phase (deg)", domain=(0.0, 360.0), nice=False),
         title=title,
         width_px=640,
         described=f"Forces over the phase of the motion of {', '.join(labels)}.",

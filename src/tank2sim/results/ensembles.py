@@ -117,7 +117,7 @@ def band_table(found: Members, figures: Mapping[str, Band]) -> Table:
 
 def figures_section(found: FigureBands | StabilityBands) -> Section:
     """Return the section with bands of figures by name."""
-    return Section(heading=ensemble_heading(found), text=MEMBERS_TEXT, tables=[band_table(found, found.figures)])
+    return Section(ensemble_heading(found), text=MEMBERS_TEXT, tables=[band_table(found, found.figures)])
 
 
 def stability_section(found: StabilityBands, criteria: Sequence[ImoCriterion]) -> Section:
@@ -127,7 +127,7 @@ def stability_section(found: StabilityBands, criteria: Sequence[ImoCriterion]) -
         rare["any of these"] = found.imo_all.tail
     text = [MEMBERS_TEXT, _CHANCES, *([_RARE] if rare else [])]
     return Section(
-        heading=ensemble_heading(found),
+        ensemble_heading(found),
         text="\n\n".join(text),
         tables=[
             _chances(found, {criterion.name for criterion in criteria if criterion.beyond_card}),
@@ -233,9 +233,9 @@ def curve_charts(curves: SteeringBands) -> list[Illustration]:
             "in the loop a ship keeps turning to the side that it comes from."
         )
     return [
-        Illustration(chart=turns_chart(turning, title="Stable turns over the ensemble"), caption=turns),
-        Illustration(chart=_bode_chart(bode, title="Bode diagram over the ensemble"), caption=shaded),
-        Illustration(chart=_step_chart(step, title="Step of the rudder over the ensemble"), caption=shaded),
+        Illustration(turns_chart(turning, title="Stable turns over the ensemble"), caption=turns),
+        Illustration(_bode_chart(bode, title="Bode diagram over the ensemble"), caption=shaded),
+        Illustration(_step_chart(step, title="Step of the rudder over the ensemble"), caption=shaded),
     ]
 
 
@@ -253,8 +253,8 @@ def turns_chart(turning: TurningBands, *, title: str = "") -> ChartSpec:
     if not apart.any():
         series = [_banded("stable turns", rudder, starboard)]
     return curve_chart(
-        Plot(series=series, up=PlotAxis(title="yaw rate (deg/s)")),
-        PlotAxis(title="rudder angle, starboard positive (deg)", nice=False, zero=True),
+        Plot(series, up=PlotAxis("yaw rate (deg/s)")),
+        PlotAxis("rudder angle, starboard positive (deg)", nice=False, zero=True),
         title=title,
         width_px=_WIDTH,
         window=["x"],
@@ -266,14 +266,10 @@ def turns_chart(turning: TurningBands, *, title: str = "") -> ChartSpec:
 def _bode_chart(bode: BodeBands, *, title: str) -> ChartSpec:
     """Magnitude and phase of the yaw rate by the rudder angle."""
     plots = [
-        Plot(
-            series=[_banded("yaw rate by rudder angle", bode.omega_radps, band)],
-            up=PlotAxis(title=name),
-            height_px=180,
-        )
+        Plot([_banded("yaw rate by rudder angle", bode.omega_radps, band)], up=PlotAxis(name), height_px=180)
         for name, band in (("magnitude (dB)", bode.magnitude_dB), ("phase (deg)", bode.phase_deg))
     ]
-    across = PlotAxis(title="angular frequency (rad/s)", log=True, nice=False, form="~g")
+    across = PlotAxis("angular frequency (rad/s)", log=True, nice=False, form="~g")
     described = "Bode diagram of yaw rate by rudder angle, with its band over an ensemble."
     return curve_panels(plots, across, title=title, width_px=_WIDTH, described=described, shown=_SHOWN)
 
@@ -282,8 +278,8 @@ def _step_chart(step: StepBands, *, title: str) -> ChartSpec:
     """Yaw rate after a step of one degree of rudder."""
     series = [_banded("yaw rate", step.time_s, step.step_per_s)]
     return curve_chart(
-        Plot(series=series, up=PlotAxis(title="yaw rate per degree of rudder (deg/s)"), height_px=240),
-        PlotAxis(title="time after the step (s)", nice=False),
+        Plot(series, up=PlotAxis("yaw rate per degree of rudder (deg/s)"), height_px=240),
+        PlotAxis("time after the step (s)", nice=False),
         title=title,
         width_px=_WIDTH,
         window=["x"],
@@ -297,4 +293,4 @@ def _banded(label: str, x: Array, band: CurveBand, shown: NDArray[np.bool_] | No
     own, low, high = (
         values if shown is None else np.where(shown, values, np.nan) for values in (band.own, band.p5, band.p95)
     )
-    return PlotSeries(label=label, x=x, y=own, low=low, high=high)
+    return PlotSeries(label, x=x, y=own, low=low, high=high)

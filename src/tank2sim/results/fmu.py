@@ -99,7 +99,7 @@ class ExportResult(Result[ExportStudy]):
         study = self.study
         values: dict[str, Cell] = {"file": study.fmu, "ssp": study.ssp, "fmi": study.fmi}
         values |= {"model_identifier": study.model_identifier, "token": study.token, "size_bytes": study.size_bytes}
-        return [Section(heading="FMU", tables=[quantities("The FMU", values, on_screen=False)])]
+        return [Section("FMU", tables=[quantities("The FMU", values, on_screen=False)])]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -156,11 +156,11 @@ class CheckResult(Result[CheckReport]):
         report = self.study
         verdict = Verdict.PASSED if report.passed else Verdict.FAILED
         largest = [
-            KeyFigure(label=kind, value=max(errors.values()), limit=report.limits[kind], note="largest relative error")
+            KeyFigure(kind, max(errors.values()), limit=report.limits[kind], note="largest relative error")
             for kind, errors in report.errors.items()
             if errors
         ]
-        return [KeyFigure(label="Check", value=str(verdict), verdict=verdict), *largest]
+        return [KeyFigure("Check", str(verdict), verdict=verdict), *largest]
 
     @property
     def sections(self) -> Sequence[Section]:
@@ -171,11 +171,11 @@ class CheckResult(Result[CheckReport]):
             first = table(f"Problems, {MOST_PROBLEMS} of {len(rows)}", ["problem"], rows[:MOST_PROBLEMS])
             listed = table("Problems", ["problem"], rows, on_screen=len(rows) <= MOST_PROBLEMS)
             tables = [listed] if listed.on_screen else [first, listed]
-            sections.append(Section(heading="Problems", tables=tables))
+            sections.append(Section("Problems", tables=tables))
         if report.conditions:
             judged: list[list[Cell]] = [[one.condition, one.met, one.found] for one in report.conditions]
             conditions = table(f"Conditions of {report.host}", ("condition", "met", "found"), judged)
-            sections.append(Section(heading=f"Conditions of {report.host}", tables=[conditions]))
+            sections.append(Section(f"Conditions of {report.host}", tables=[conditions]))
         if not report.errors:
             return sections
         rows = [[name, *(errors.get(name) for errors in report.errors.values())] for name in report.max_error]
@@ -186,6 +186,6 @@ class CheckResult(Result[CheckReport]):
             for kind, errors in report.errors.items()
             for name, error in errors.items()
         ]
-        chart = Illustration(chart=error_chart(drawn, title="Errors by output"))
+        chart = Illustration(error_chart(drawn, title="Errors by output"))
         tables = [table(caption, ("output", *report.errors), rows, digits=2)]
-        return [*sections, Section(heading="Outputs", tables=tables, charts=[chart])]
+        return [*sections, Section("Outputs", tables=tables, charts=[chart])]

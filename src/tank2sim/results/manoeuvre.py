@@ -205,7 +205,7 @@ class ManoeuvreResult(EnsembleResult[ManoeuvreStudy]):
             notes.append(f"to {_SIDE_NAMES[-1 if value < 0 else 1]}")
             value = abs(value)
         label = label[:1].upper() + label[1:]
-        return KeyFigure(label=label, value=value, unit=unit, verdict=verdict, note="; ".join(notes), limit=limit)
+        return KeyFigure(label, value, unit, verdict=verdict, note="; ".join(notes), limit=limit)
 
     def _limit(self, name: str) -> float | None:
         """The largest value that IMO MSC.137(76) allows, in the unit of the figure."""
@@ -225,9 +225,9 @@ class ManoeuvreResult(EnsembleResult[ManoeuvreStudy]):
                 "is zero at the neutral rudder; on an unstable ship they remain apart."
             )
         sections = [
-            Section(heading="The manoeuvre", text=text, charts=_manoeuvre_charts(self.study)),
-            Section(heading="Time histories", charts=_history_charts(self.study)),
-            Section(heading="Figures", tables=self._tables()),
+            Section("The manoeuvre", text=text, charts=_manoeuvre_charts(self.study)),
+            Section("Time histories", charts=_history_charts(self.study)),
+            Section("Figures", tables=self._tables()),
         ]
         return [section for section in sections if section.charts or section.tables]
 
@@ -277,13 +277,13 @@ class ManoeuvreResult(EnsembleResult[ManoeuvreStudy]):
             [place + 1, *(values[place] if place < len(values) else None for values in lists.values())]
             for place in range(longest)
         ]
-        heads = [Column(title="no.")]
+        heads = [Column("no.")]
         for name in lists:
             title, unit = in_words(name)
-            heads.append(Column(title=title, unit=unit))
+            heads.append(Column(title, unit))
         beyond = [any(entry_name(name, place) in outside for name in lists) for place in range(longest)]
         if any(beyond):
-            heads.append(Column(title="range of the card"))
+            heads.append(Column("range of the card"))
             rows = [[*row, _OUTSIDE if each else None] for row, each in zip(rows, beyond, strict=True)]
         return table("Figures by number", heads, rows)
 
@@ -342,13 +342,13 @@ def _manoeuvre_charts(study: ManoeuvreStudy) -> list[Illustration]:
     match study.kind:
         case "turn" | "difference":
             chart = turn_chart(motion, figures, bands=bands, edges_m=_track_edges(study), title=title)
-            return [Illustration(chart=chart, caption=shaded)]
+            return [Illustration(chart, caption=shaded)]
         case "zigzag":
             heading = float(study.argument.partition("/")[2])
             overshoots = {name: value for name, value in study.figures.items() if isinstance(value, list)}
             edges = _heading_edges(study)
             chart = zigzag_chart(motion, overshoots, heading, bands=bands, edges_deg=edges, title=title)
-            return [Illustration(chart=chart, caption=f"Red: the overshoots. {shaded}".strip())]
+            return [Illustration(chart, caption=f"Red: the overshoots. {shaded}".strip())]
         case "pullout":
             return [_pull_out(study, motion, title)]
         case "spiral":
@@ -359,10 +359,10 @@ def _manoeuvre_charts(study: ManoeuvreStudy) -> list[Illustration]:
                 held = f"Revolutions: {format_number(float(revolutions[-1]), 4)} rpm from the order on."
             way = way_chart(motion, stop_dimensions(motion, figures), title="Track of the stop")
             return [
-                Illustration(chart=stop_speed_chart(motion, title="Speed over distance"), caption=held),
-                Illustration(chart=way, caption=shaded),
+                Illustration(stop_speed_chart(motion, title="Speed over distance"), caption=held),
+                Illustration(way, caption=shaded),
             ]
-    return [Illustration(chart=way_chart(motion, [], title="Track"), caption=shaded)]
+    return [Illustration(way_chart(motion, [], title="Track"), caption=shaded)]
 
 
 def _history_charts(study: ManoeuvreStudy) -> list[Illustration]:
@@ -379,7 +379,7 @@ def _pull_out(study: ManoeuvreStudy, motion: Motion, title: str) -> Illustration
     if study.other_side:
         sides[-next(iter(sides))] = motion_of(study.other_side.histories)
     named = {f"from a turn to {_SIDE_NAMES[side]}": sides[side] for side in sorted(sides, reverse=True)}
-    return Illustration(chart=pull_out_chart(named, neutral, title=title))
+    return Illustration(pull_out_chart(named, neutral, title=title))
 
 
 def _spiral(study: ManoeuvreStudy, title: str) -> Illustration:
@@ -387,7 +387,7 @@ def _spiral(study: ManoeuvreStudy, title: str) -> Illustration:
     rudder, rate = (np.radians(np.asarray(figures[name], dtype=float)) for name in ("rudder_deg", "rate_degps"))
     spiral = SpiralData(label="spiral", rudder_rad=rudder, yaw_rate_radps=rate)
     loop = zero_rate_rudders(rudder, rate) if figures.get("loop_width_deg") else None
-    return Illustration(chart=spiral_chart([spiral], loop_rad=loop, title=title))
+    return Illustration(spiral_chart([spiral], loop_rad=loop, title=title))
 
 
 def _track_edges(study: ManoeuvreStudy) -> tuple[Array, Array] | None:

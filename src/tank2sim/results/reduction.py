@@ -156,23 +156,23 @@ class ReductionResult(Result[ReductionStudy]):
         estimated = [name for name, found in study.derivatives.items() if found.origin == "estimated"]
         return [
             KeyFigure(
-                label="Derivatives measured",
-                value=f"{self._measured} of {len(study.derivatives)}",
+                "Derivatives measured",
+                f"{self._measured} of {len(study.derivatives)}",
                 note=f"by {len(study.runs)} runs; {len(study.not_used)} left out",
             ),
             *(
                 KeyFigure(
-                    label=f"{_FORCES[force].capitalize()} predicted within",
-                    value=float(f"{percent:.2g}"),
-                    unit="%",
+                    f"{_FORCES[force].capitalize()} predicted within",
+                    float(f"{percent:.2g}"),
+                    "%",
                     verdict=Verdict.CAUTION if percent > _POOR_PREDICTION else Verdict.NONE,
                     note=f"of its range, in {kind}, the worst type of run",
                 )
                 for force, (percent, kind) in self._worst_predictions().items()
             ),
             KeyFigure(
-                label="Derivatives estimated",
-                value=len(estimated),
+                "Derivatives estimated",
+                len(estimated),
                 verdict=Verdict.CAUTION if estimated else Verdict.NONE,
                 note=", ".join(estimated) or "none",
             ),
@@ -202,11 +202,11 @@ class ReductionResult(Result[ReductionStudy]):
         """Derivatives, forces against motion, predicted runs, terms left out, the budget."""
         title = "Certainty of the derivatives"
         certainty = Illustration(
-            chart=derivative_certainty_chart(self.study.derivatives, title=title), caption=_CERTAINTY, name="certainty"
+            derivative_certainty_chart(self.study.derivatives, title=title), caption=_CERTAINTY, name="certainty"
         )
         return [
             Section(
-                heading="Derivatives",
+                "Derivatives",
                 text="One weighted regression over the whole campaign; in the table, next to it the tests one after "
                 "the other.",
                 tables=[self._derivatives()],
@@ -238,14 +238,9 @@ class ReductionResult(Result[ReductionStudy]):
             words = _FORCES.get(stem.rpartition("_")[2])
             heading = f"{words.capitalize()} against motion" if words else loops
             half = isinstance(plot, ForcePlot)
-            groups.setdefault(heading, []).append(Illustration(chart=_plot_chart(plot), half=half, name=stem))
+            groups.setdefault(heading, []).append(Illustration(_plot_chart(plot), half=half, name=stem))
         return [
-            Section(
-                heading=heading,
-                text="" if heading == loops else _AGAINST_MOTION,
-                charts=charts,
-                folded=heading == loops,
-            )
+            Section(heading, text="" if heading == loops else _AGAINST_MOTION, charts=charts, folded=heading == loops)
             for heading, charts in groups.items()
         ]
 
@@ -264,9 +259,9 @@ class ReductionResult(Result[ReductionStudy]):
         caption = "Leave-one-out: root mean square error of each run predicted from the others, % of the force's range"
         note = f"Not excited by any run: {', '.join(excited)}"
         return Section(
-            heading="Each run predicted from the others",
+            "Each run predicted from the others",
             tables=[table(caption, heads, rows, note, digits=2)],
-            charts=[Illustration(chart=chart, name="residuals")],
+            charts=[Illustration(chart, name="residuals")],
         )
 
     def _left_out(self) -> list[Section]:
@@ -278,7 +273,7 @@ class ReductionResult(Result[ReductionStudy]):
         if not rows:
             return []
         found = table("Terms that the runs excite and that were left out", ("term", "reason", "why"), rows)
-        return [Section(heading="Which terms, and why", tables=[found], folded=True)]
+        return [Section("Which terms, and why", tables=[found], folded=True)]
 
     def _budget(self) -> Section:
         budget = self.study.uncertainty_budget
@@ -294,9 +289,9 @@ class ReductionResult(Result[ReductionStudy]):
             for name, row in budget.derivatives.items()
         ]
         columns = [
-            *(Column(title="derivative"), Column(title="value")),
-            *(Column(title=source, unit="%", digits=3) for source in sources),
-            *(Column(title="combined", digits=3), Column(title="expanded, k = 2", digits=3)),
+            *(Column("derivative"), Column("value")),
+            *(Column(source, "%", digits=3) for source in sources),
+            *(Column("combined", digits=3), Column("expanded, k = 2", digits=3)),
         ]
         notes = []
         if budget.not_stated:
@@ -306,7 +301,7 @@ class ReductionResult(Result[ReductionStudy]):
             notes.append(f"By Schuster's formula the walls raise the speed past the model by {percent:.2g} %.")
         caption = "Shares of the variance; values and uncertainties prime, times 10⁵"
         return Section(
-            heading="Uncertainty budget",
+            "Uncertainty budget",
             text="After ITTC 7.5-02-06-04: the combined uncertainty is the standard error of the result.",
             tables=[
                 table(caption, columns, rows, on_screen=False),

@@ -182,26 +182,26 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
         straight, prime = study.stability_criterion, study.nomoto.prime
         figures = [
             KeyFigure(
-                label="Straight course",
-                value="stable" if straight.stable else "unstable",
+                "Straight course",
+                "stable" if straight.stable else "unstable",
                 verdict=Verdict.PASSED if straight.stable else Verdict.CAUTION,
                 note=f"C′ = {format_number(straight.C_prime, 3)}",
             ),
             self._margin_figure(),
-            KeyFigure(label="Nomoto K′", value=prime.K_prime, note=f"T′ = {format_number(prime.T_prime, 3)}"),
+            KeyFigure("Nomoto K′", prime.K_prime, note=f"T′ = {format_number(prime.T_prime, 3)}"),
         ]
         if study.steady_turning and (loop := study.steady_turning.loop):
             note = "of rudder, between the folds"
-            figures.append(KeyFigure(label="Hysteresis loop", value=loop.width_deg, unit="deg", note=note))
+            figures.append(KeyFigure("Hysteresis loop", loop.width_deg, "deg", note=note))
         return [*figures, self._criteria_figure()]
 
     def _margin_figure(self) -> KeyFigure:
         straight, margins = self.study.stability_criterion, self.study.margins
         if not straight.C_prime_decides:
             note = f"a mode grows at {straight.growth_per_s:.3g} 1/s that C′ does not show"
-            return KeyFigure(label="Margin", value="none", verdict=Verdict.CAUTION, note=note)
+            return KeyFigure("Margin", "none", verdict=Verdict.CAUTION, note=note)
         note = f"levers {format_number(margins.lever_margin_lengths, 3)} L apart"
-        return KeyFigure(label="Margin", value=margins.margin_percent, unit="%", note=note)
+        return KeyFigure("Margin", margins.margin_percent, "%", note=note)
 
     def _criteria_figure(self) -> KeyFigure:
         criteria = self.study.imo
@@ -212,7 +212,7 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
         notes = [f"{unknown} open"] if unknown else []
         notes += [f"{beyond} beyond the card's validity"] if beyond else []
         value = f"{met.count(True)} of {len(met)}"
-        return KeyFigure(label="IMO criteria met", value=value, verdict=verdict, note=", ".join(notes))
+        return KeyFigure("IMO criteria met", value, verdict=verdict, note=", ".join(notes))
 
     @property
     def sections(self) -> Sequence[Section]:
@@ -236,10 +236,10 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
             tables.append(records_table("Folds, where the ship leaves its branch", turning.folds, on_screen=False))
         chart = steering_diagram(turning, spirals, title="Steady turns against the rudder")
         return Section(
-            heading="Steady turning",
+            "Steady turning",
             text=f"{_TURNING}\n\n{_SPIRALS}" if spirals.direct or spirals.reverse else _TURNING,
             tables=tables,
-            charts=[Illustration(chart=chart)],
+            charts=[Illustration(chart)],
         )
 
     def _straight_line(self) -> Section:
@@ -257,7 +257,7 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
             ["prime", *vars(nomoto.prime).values()],
         ]
         return Section(
-            heading="Straight-line stability",
+            "Straight-line stability",
             text=_CRITERION,
             tables=[
                 table("Margin of stability", ("quantity", "value", "unit"), levers, on_screen=False),
@@ -277,18 +277,18 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
         changed = ", ".join(f"{name} {change:+.3g} %" for name, change in changes)
         charts = []
         if margins.derivatives:
-            charts.append(Illustration(chart=influence_chart(margins, title="Influence on C′")))
+            charts.append(Illustration(influence_chart(margins, title="Influence on C′")))
         if margins.speed:
             chart = criterion_by_speed_chart(margins.speed, title="Speed")
-            charts.append(Illustration(chart=chart, caption="Over the card's range of speeds."))
+            charts.append(Illustration(chart, caption="Over the card's range of speeds."))
         charts.append(
             Illustration(
-                chart=trim_chart(trim, title="Trim (estimate)"),
+                trim_chart(trim, title="Trim (estimate)"),
                 caption=f"After Inoue, 1 % of length of trim by the stern changes {changed}.",
             )
         )
         return Section(
-            heading="Influences on the margin",
+            "Influences on the margin",
             text=f"Derivatives are prime, mass in kg and x_G in m. A coefficient is neutral at the value for which "
             f"C′ = 0, all else unchanged. {_TRIM}",
             tables=[table("Influences on C', strongest first", heads, rows)],
@@ -299,23 +299,21 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
     def _response(self) -> Section:
         heading, responses = "Response to the rudder", self.study.responses
         if not responses:
-            return Section(heading=heading, text="The yaw rate does not answer to the rudder.")
+            return Section(heading, text="The yaw rate does not answer to the rudder.")
         # Poles of the gear lie far out and are left out.
         systems = [
-            PolesZeros(label=one.label, poles=one.poles.tolist(), zeros=one.zeros.tolist())
+            PolesZeros(one.label, poles=one.poles.tolist(), zeros=one.zeros.tolist())
             for one in responses
             if one.label in (responses[0].label, FIRST_ORDER)
         ]
-        curves = [
-            FrequencyResponse(label=one.label, omega_radps=one.omega_radps, response=one.response) for one in responses
-        ]
+        curves = [FrequencyResponse(one.label, omega_radps=one.omega_radps, response=one.response) for one in responses]
         charts = [
             pole_zero_chart(systems, title="Poles and zeros"),
             bode_chart(curves, title="Bode diagram"),
             step_chart(responses, title="Step of the rudder"),
         ]
-        drawn = [Illustration(chart=chart) for chart in charts]
-        return Section(heading=heading, text=_RESPONSE, charts=drawn, folded=True)
+        drawn = [Illustration(chart) for chart in charts]
+        return Section(heading, text=_RESPONSE, charts=drawn, folded=True)
 
     def _characteristic(self) -> Section:
         found = self.study.characteristic
@@ -328,10 +326,10 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
         caption = "Coefficients by powers of the yaw rate, rad and s: Bech's of δ, Norrbin's of K δ"
         chart = characteristic_chart(found, title="Rudder that holds a yaw rate")
         return Section(
-            heading="Nonlinear steering characteristic",
+            "Nonlinear steering characteristic",
             text=_CHARACTERISTIC,
             tables=[table(caption, ("cubic", "r⁰", "r¹", "r²", "r³", *errors), rows, on_screen=False)],
-            charts=[Illustration(chart=chart)],
+            charts=[Illustration(chart)],
             folded=True,
         )
 
@@ -412,14 +410,14 @@ class CraftStabilityResult(ResultOnCourse[CraftStabilityStudy]):
         run = self.study.straight_run
         figures = [
             KeyFigure(
-                label="Straight course",
-                value="stable" if run.stable else "unstable",
+                "Straight course",
+                "stable" if run.stable else "unstable",
                 verdict=Verdict.PASSED if run.stable else Verdict.CAUTION,
             )
         ]
         if run.surge_time_constant_s is not None:
-            figures.append(KeyFigure(label="Surge time constant", value=run.surge_time_constant_s, unit="s"))
-        figures.append(KeyFigure(label="Highest speed", value=self.study.highest_speed_mps, unit="m/s"))
+            figures.append(KeyFigure("Surge time constant", run.surge_time_constant_s, "s"))
+        figures.append(KeyFigure("Highest speed", self.study.highest_speed_mps, "m/s"))
         return figures
 
     @property
@@ -441,13 +439,13 @@ class CraftStabilityResult(ResultOnCourse[CraftStabilityStudy]):
         turns = records_table(caption, study.difference_turns, fields=turn | {"difference_rpm": "port less starboard"})
         return [
             Section(
-                heading="Straight course",
+                "Straight course",
                 tables=[
                     _eigenvalues(run.eigenvalues),
                     records_table("Straight runs by speed", runs, fields=surge),
                     nomoto,
                 ],
             ),
-            Section(heading="Steady turning", tables=[turns]),
+            Section("Steady turning", tables=[turns]),
             *([figures_section(study.ensemble)] if study.ensemble else []),
         ]

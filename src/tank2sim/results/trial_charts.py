@@ -136,8 +136,8 @@ def place_over_time(
     times: tuple[float, float], ends: tuple[float, float], up: str, field: str, *, labelled: bool
 ) -> ChartSpec:
     """Return the axes of a small panel over time; the ends are given, so that they stay when a line is taken away."""
-    across = PlotAxis(title="time (s)", domain=times, nice=False, ticks=4 if labelled else None, hidden=not labelled)
-    size = PlotAxis(title=up, domain=ends, above=True, ticks=3)
+    across = PlotAxis("time (s)", domain=times, nice=False, ticks=4 if labelled else None, hidden=not labelled)
+    size = PlotAxis(up, domain=ends, above=True, ticks=3)
     return {"x": across.channel("t"), "y": size.channel(field)}
 
 
@@ -259,8 +259,7 @@ def _figure_panels(rows: list[ChartRecord], words: str, unit: str, error_unit: s
         "error:Q": f"error ({error_unit})",
     }
     across, up = (
-        PlotAxis(title=f"{kind} {words} ({unit})", domain=domain, nice=False, ticks=5)
-        for kind in ("measured", "predicted")
+        PlotAxis(f"{kind} {words} ({unit})", domain=domain, nice=False, ticks=5) for kind in ("measured", "predicted")
     )
     x, colour = across.channel("measured"), {"color": look.colour}
     equal = layer(
@@ -276,11 +275,10 @@ def _figure_panels(rows: list[ChartRecord], words: str, unit: str, error_unit: s
     points = layer("point", reached, marks, filled=False, size=46)
     names = list(dict.fromkeys(row["name"] for row in rows))
     errors = [row | {"v": row["error"], "low": row["least"], "high": row["most"]} for row in reached]
-    error_axis = PlotAxis(title=f"predicted less measured ({error_unit})", padding=10, ticks=6, zero=True)
+    error_axis = PlotAxis(f"predicted less measured ({error_unit})", padding=10, ticks=6, zero=True)
     side = {"labelLimit": 300}
     lines = row_layers(
-        RowPlot(rows=errors, across=error_axis, look=look, names=names, side=side, rules=[Rule(at=[0.0])], shown=shown),
-        size=46,
+        RowPlot(errors, across=error_axis, look=look, names=names, side=side, rules=[Rule([0.0])], shown=shown), size=46
     )
     return {
         "hconcat": [

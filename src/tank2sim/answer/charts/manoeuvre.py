@@ -118,7 +118,7 @@ def along_course(columns: Mapping[str, Any], points_m: Array) -> Array:
     return np.column_stack([north * cos + east * sin, east * cos - north * sin])
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Dimension:
     """A figure drawn on a track: a line from `begin` to `end`, each (to starboard, ahead) in m, with its words.
 
@@ -146,7 +146,7 @@ def turn_dimensions(motion: Motion, figures: Mapping[str, float | None], bands: 
         band = bands.get(f"{name.replace(' ', '_')}_m")
         low, high = (point(band.p5), point(band.p95)) if band else (None, None)
         text = _sized(name, size_m, motion.length_m)
-        return Dimension(text=text, begin=point(0.0), end=point(size_m), low=low, high=high)
+        return Dimension(text, point(0.0), point(size_m), low=low, high=high)
 
     found: list[Dimension] = []
     if advance is not None and transfer is not None:
@@ -254,8 +254,8 @@ def zigzag_chart(
     angles = [motion.heading_deg, motion.rudder_deg, np.array([-heading_deg, heading_deg]), vector(beyond), *edges[1:]]
     times = np.concatenate([motion.time_s, *edges[:1]])
     frame = free_frame(times, np.concatenate(angles), width_px=680, height_px=340, margins_px=(0.0, 22.0))
-    across = PlotAxis(title="time (s)", domain=frame.across, nice=False)
-    up = PlotAxis(title="heading and rudder, + to starboard (deg)", domain=frame.up, nice=False)
+    across = PlotAxis("time (s)", domain=frame.across, nice=False)
+    up = PlotAxis("heading and rudder, + to starboard (deg)", domain=frame.up, nice=False)
     place, over = {"x": across.channel("x"), "y": up.channel("v")}, []
     if edges:
         area = records("heading", dict(zip(("x", "low", "high"), edges, strict=True)))
@@ -272,13 +272,13 @@ def zigzag_chart(
         drawn = [(motion.time_s, motion.heading_deg), (motion.time_s, motion.rudder_deg)]
         over += label_layers(labels, frame, place, drawn)
     series = [
-        PlotSeries(label="heading", x=motion.time_s, y=motion.heading_deg),
-        PlotSeries(label="rudder", x=motion.time_s, y=motion.rudder_deg),
+        PlotSeries("heading", x=motion.time_s, y=motion.heading_deg),
+        PlotSeries("rudder", x=motion.time_s, y=motion.rudder_deg),
     ]
-    rules = [Rule(at=[heading_deg, -heading_deg], style="dimension")]
+    rules = [Rule([heading_deg, -heading_deg], style="dimension")]
     sizes = ", ".join(str(peak["text"]) for peak in peaks)
     return curve_chart(
-        Plot(series=series, up=up, height_px=frame.height_px, rules=rules, over=over),
+        Plot(series, up=up, height_px=frame.height_px, rules=rules, over=over),
         across,
         title=title,
         width_px=frame.width_px,
@@ -310,19 +310,19 @@ def pull_out_chart(sides: Mapping[str, Motion], neutral_deg: float, *, title: st
     `sides`: label to motion, of the pull-out from each side.
     """
     series = [
-        PlotSeries(label=label, x=motion.time_s - pull_out_time(motion, neutral_deg), y=motion.rate_degps)
+        PlotSeries(label, x=motion.time_s - pull_out_time(motion, neutral_deg), y=motion.rate_degps)
         for label, motion in sides.items()
     ]
     longest = max(float(np.max(one.x)) for one in series)
     across = PlotAxis(
-        title=f"time from the order of the neutral rudder, {format_number(neutral_deg, _ROUND)}° (s)",
+        f"time from the order of the neutral rudder, {format_number(neutral_deg, _ROUND)}° (s)",
         domain=(-0.1 * longest, longest),
         nice=False,
     )
-    up = PlotAxis(title="yaw rate, + to starboard (deg/s)", zero=True)
-    rules = [Rule(at=[0.0]), Rule(at=[0.0], upright=True, style="dimension")]
+    up = PlotAxis("yaw rate, + to starboard (deg/s)", zero=True)
+    rules = [Rule([0.0]), Rule([0.0], upright=True, style="dimension")]
     return curve_chart(
-        Plot(series=series, up=up, height_px=320, rules=rules),
+        Plot(series, up=up, height_px=320, rules=rules),
         across,
         title=title,
         width_px=680,
@@ -346,13 +346,13 @@ def stop_speed_chart(motion: Motion, *, title: str = "") -> ChartSpec:
         panels["revolutions (rpm)"] = motion.revolutions_rpm
     plots = [
         Plot(
-            series=[PlotSeries(label="run", x=motion.way_m, y=values, closed=True, more={"t": motion.time_s})],
-            up=PlotAxis(title=name, zero=True),
+            [PlotSeries("run", x=motion.way_m, y=values, closed=True, more={"t": motion.time_s})],
+            up=PlotAxis(name, zero=True),
             height_px=200 if not place else 110,
         )
         for place, (name, values) in enumerate(panels.items())
     ]
-    across = PlotAxis(title="distance along the track (m)", nice=False)
+    across = PlotAxis("distance along the track (m)", nice=False)
     described = "Speed over the distance along the track of the stop."
     shown = {"t:Q": "time (s)"}
     return curve_panels(plots, across, title=title, width_px=640, described=described, shown=shown)
@@ -366,10 +366,7 @@ def stop_dimensions(motion: Motion, figures: Mapping[str, float | None]) -> list
     head_words, side_words = (
         _sized(name, abs(size), motion.length_m) for name, size in (("head reach", head), ("side reach", side))
     )
-    return [
-        Dimension(text=head_words, begin=(0.0, 0.0), end=(0.0, head)),
-        Dimension(text=side_words, begin=(0.0, head), end=(side, head)),
-    ]
+    return [Dimension(head_words, (0.0, 0.0), (0.0, head)), Dimension(side_words, (0.0, head), (side, head))]
 
 
 def hull_outline(length_m: float, beam_m: float) -> tuple[Array, Array]:
@@ -413,10 +410,7 @@ def _polygon(edges: tuple[Array, Array]) -> Array:
 
 
 def _dimension_layers(
-    dimensions: Sequence[Dimension],
-    place: Mapping[str, ChartSpec],
-    frame: Frame,
-    lines: Sequence[tuple[Array, Array]],
+    dimensions: Sequence[Dimension], place: Mapping[str, ChartSpec], frame: Frame, lines: Sequence[tuple[Array, Array]]
 ) -> list[ChartSpec]:
     """Lines from end to end of each figure, bars of an ensemble, and their words."""
     found = []

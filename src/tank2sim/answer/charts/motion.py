@@ -24,15 +24,7 @@ from tank2sim.answer.charts.parts import (
     vector,
     with_unit,
 )
-from tank2sim.answer.charts.vega import (
-    ChartRecord,
-    ChartSpec,
-    PlotAxis,
-    Rule,
-    layer,
-    layered,
-    tooltips,
-)
+from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, Rule, layer, layered, tooltips
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Illustration
 from tank2sim.arrays import Array
@@ -76,7 +68,7 @@ _TRACK = ("x_m", "y_m")
 _ORDER, _ANGLE = "delta_order", "delta"
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class TrackData:
     """The path of one run: x north and y east in m, in the order of time; `time_s` (s) is for the tooltip alone."""
 
@@ -87,7 +79,7 @@ class TrackData:
     measured: bool = False
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Signal:
     """What one panel of a time history shows.
 
@@ -111,7 +103,7 @@ class HistoryBand:
     high: ArrayLike
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class History:
     """Signals of one run over time: `time_s` (n,) in s, `values` by name of signal, (n,) each, in the signal's unit.
 
@@ -204,7 +196,7 @@ def history_chart(
     `width_px`, `height_px`: size of one panel; `marks`: places to tint.
     """
     span = np.concatenate([vector(run.time_s) for run in runs])
-    across = PlotAxis(title="time (s)", domain=(float(np.nanmin(span)), float(np.nanmax(span))), nice=False)
+    across = PlotAxis("time (s)", domain=(float(np.nanmin(span)), float(np.nanmax(span))), nice=False)
     look = series_look([run.label for run in runs], as_points={run.label for run in runs if run.measured})
     plots = [_signal_plot(runs, signal, height_px, across, marks) for signal in signals]
     names = ", ".join(signal.title for signal in signals)
@@ -223,18 +215,18 @@ def spiral_chart(
     degree = shown_unit("rad")[1]
     drawn = [(degree * vector(one.rudder_rad), degree * vector(one.yaw_rate_radps)) for one in spirals]
     series = [
-        PlotSeries(label=spiral.label, x=rudder, y=rate, points=points, closed=True)
+        PlotSeries(spiral.label, x=rudder, y=rate, points=points, closed=True)
         for points in (False, True)
         for spiral, (rudder, rate) in zip(spirals, drawn, strict=True)
     ]
     left, up = (np.concatenate([[0.0], *(line[axis] for line in drawn)]) for axis in (0, 1))
     frame = free_frame(left, up, width_px=620, height_px=400, margins_px=(24.0, 24.0))
-    across = PlotAxis(title="rudder angle, starboard positive (deg)", domain=frame.across, nice=False)
-    rate = PlotAxis(title="yaw rate, starboard positive (deg/s)", domain=frame.up, nice=False)
+    across = PlotAxis("rudder angle, starboard positive (deg)", domain=frame.across, nice=False)
+    rate = PlotAxis("yaw rate, starboard positive (deg/s)", domain=frame.up, nice=False)
     over = _loop_layers(degree * vector(loop_rad), across, rate, frame, drawn) if loop_rad else []
-    rules = [Rule(at=[0.0], upright=True), Rule(at=[0.0])]
+    rules = [Rule([0.0], upright=True), Rule([0.0])]
     return curve_chart(
-        Plot(series=series, up=rate, height_px=frame.height_px, rules=rules, over=over),
+        Plot(series, up=rate, height_px=frame.height_px, rules=rules, over=over),
         across,
         title=title,
         width_px=frame.width_px,
@@ -281,12 +273,12 @@ def _signal_plot(
         raise ValueError(f"no run has the signal {signal.name}")
     unit, factor = shown_unit(signal.unit, signal.display_unit)
     series, over = [], []
-    x, up = across.channel("x"), PlotAxis(title=with_unit(signal.title, unit))
+    x, up = across.channel("x"), PlotAxis(with_unit(signal.title, unit))
     for run in runs:
         if signal.name in run.values:
             time, value = vector(run.time_s), factor * vector(run.values[signal.name])
             kept = thin_points([value], POINT_SAMPLES) if run.measured else slice(None)
-            series.append(PlotSeries(label=run.label, x=time[kept], y=value[kept], points=run.measured))
+            series.append(PlotSeries(run.label, x=time[kept], y=value[kept], points=run.measured))
         for band in run.bands:
             if band.signal == signal.name:
                 edges = {"low": factor * vector(band.low), "high": factor * vector(band.high)}
@@ -299,7 +291,7 @@ def _signal_plot(
         place = {"x": x, "tooltip": tooltips({"text:N": "found", "x:Q": "from (s)"})}
         over.append(layer("rect", spans, {**place, "x2": "end"}, style="region", clip=True))
         over.append(layer("rule", spans, place, style="limit", clip=True, strokeWidth=1.2))
-    return Plot(series=series, up=up, height_px=height_px, over=over)
+    return Plot(series, up=up, height_px=height_px, over=over)
 
 
 def motions(
@@ -313,10 +305,10 @@ def motions(
     tables = {label: _in_si(columns) for label, columns in runs.items()}
     drawn = []
     if tracks := [_track(label, table, label in measured) for label, table in tables.items() if _moves(table)]:
-        drawn.append(Illustration(chart=track_chart(tracks, title=f"Track: {title}")))
+        drawn.append(Illustration(track_chart(tracks, title=f"Track: {title}")))
     height = 110 if len(_signals(runs)) <= 6 else 80
     if chart := columns_chart(runs, f"Histories: {title}", measured=measured, height_px=height, marks=marks):
-        drawn.append(Illustration(chart=chart))
+        drawn.append(Illustration(chart))
     return drawn
 
 
@@ -333,7 +325,7 @@ def columns_chart(
         return None
     tables = {label: _in_si(columns) for label, columns in runs.items()}
     histories = [
-        History(label=label, time_s=table["t_s"], values=_by_stem(table), measured=label in measured)
+        History(label, time_s=table["t_s"], values=_by_stem(table), measured=label in measured)
         for label, table in tables.items()
     ]
     return history_chart(histories, signals, title=title, height_px=height_px, marks=marks)
@@ -348,12 +340,12 @@ def varying_histories(columns: _Columns, bands: Mapping[str, BandOverTime], band
     if not shown:
         return None
     shaded = [_band(name, band, band_t_s) for name, band in bands.items() if name not in _TRACK]
-    run = History(label="simulated", time_s=_in_si({"t_s": columns["t_s"]})["t_s"], values=table, bands=shaded)
+    run = History("simulated", time_s=_in_si({"t_s": columns["t_s"]})["t_s"], values=table, bands=shaded)
     held = ", ".join(f"{signal.title} {_held(signal, table[signal.name][0])}" for signal in constant)
     said = ["Shaded: nine of ten ships at each time."] if shaded else []
     said += [f"Constant: {held}."] if held else []
     chart = history_chart([run], shown, title="Time histories", height_px=110)
-    return Illustration(chart=chart, caption=" ".join(said))
+    return Illustration(chart, caption=" ".join(said))
 
 
 def _band(name: str, band: BandOverTime, time_s: Array) -> HistoryBand:
@@ -393,7 +385,7 @@ def _signals(runs: Mapping[str, _Columns]) -> list[Signal]:
         known = _UNITS.get(unit, "1")
         words, written = in_words(name)
         title = _TITLES.get(stem_of(name)) or (words if unit in _UNITS or not written else f"{words} ({written})")
-        found.append(Signal(name=stem_of(name), title=title, unit=known, display_unit=display))
+        found.append(Signal(stem_of(name), title, known, display_unit=display))
     order = list(_TITLES)
     return sorted(found, key=lambda signal: order.index(signal.name) if signal.name in order else len(order))
 
@@ -403,4 +395,4 @@ def _moves(table: Mapping[str, Array]) -> bool:
 
 
 def _track(label: str, table: Mapping[str, Array], measured: bool) -> TrackData:
-    return TrackData(label=label, x_m=table["x_m"], y_m=table["y_m"], time_s=table["t_s"], measured=measured)
+    return TrackData(label, x_m=table["x_m"], y_m=table["y_m"], time_s=table["t_s"], measured=measured)

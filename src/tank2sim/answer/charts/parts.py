@@ -159,7 +159,7 @@ class Frame:
 
         def axis(domain: tuple[float, float], size_px: int, field: str, title: str) -> ChartSpec:
             ticks = max(2, round(size_px / 70))
-            return PlotAxis(title=title, domain=domain, nice=False, ticks=ticks).channel(field)
+            return PlotAxis(title, domain=domain, nice=False, ticks=ticks).channel(field)
 
         return {"x": axis(self.across, self.width_px, *across), "y": axis(self.up, self.height_px, *up)}
 
