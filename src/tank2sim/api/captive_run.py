@@ -13,7 +13,7 @@ from tank2sim.errors import ArgumentError, InputError
 from tank2sim.files import TABLE
 
 if TYPE_CHECKING:
-    from tank2sim.records.campaign_form import CampaignFile, RunType, TankTest
+    from tank2sim.records.campaign_form import CampaignFile, RunSheet, RunType, TankTest
     from tank2sim.records.captive_record import CaptiveRun
     from tank2sim.results.captive_run import CaptiveRunResult
 
@@ -97,8 +97,6 @@ def reduce_runs(
     Traceback (most recent call last):
     tank2sim.errors.ArgumentError: type: is 'sway'; did you mean pure_sway?
     """
-    import numpy as np
-
     from tank2sim.identification.captive.single_runs import study_runs
     from tank2sim.records.campaign_form import TankTest
     from tank2sim.records.campaigns import Campaign, copied_runs, read_campaign_form
@@ -124,22 +122,20 @@ def reduce_runs(
     copies, mirrored = copied_runs(read)
     if copies:
         raise next(iter(copies.values()))
-    if form is None and speed_mps is None:
-        for path, run in zip(paths, read, strict=True):
-            if np.ptp(run.speed_mps) == 0.0 and run.speed_mps[0] == 1.0:
-                raise ArgumentError("speed_mps", str(path), "states no speed", "give the speed, or a campaign")
-    known_campaign = None
-    if form is not None:
-        known_campaign = Campaign(
-            path=Path(str(campaign)),
-            model=form.model,
-            test=form.test,
-            tank=form.tank,
-            uncertainty=form.uncertainty,
-            full_scale=form.full_scale,
-            runs=tuple(read),
-        )
-    return CaptiveRunResult(*study_runs(read, known_campaign, mirrored))
+    if form is None:
+        if speed_mps is None:
+            _refuse_unknown_speed(paths, read)
+        return CaptiveRunResult(*study_runs(read, None, mirrored))
+    sections = {name: getattr(form, name) for name in ("model", "test", "tank", "uncertainty", "full_scale")}
+    known = Campaign(path=Path(str(campaign)), runs=tuple(read), **sections)
+    return CaptiveRunResult(*study_runs(read, known, mirrored))
+
+
+def _refuse_unknown_speed(paths: Sequence[Path], runs: Sequence[CaptiveRun]) -> None:
+    """Refuse runs with the speed of 1 m/s, which is put in for an unknown one."""
+    for path, run in zip(paths, runs, strict=True):
+        if (run.speed_mps == 1.0).all():
+            raise ArgumentError("speed_mps", str(path), "states no speed", "give the speed, or a campaign")
 
 
 def _read(
@@ -152,7 +148,7 @@ def _read(
 ) -> CaptiveRun:
     import numpy as np
 
-    from tank2sim.records.campaign_form import RUN_TYPES, FilesSection, RunSheet
+    from tank2sim.records.campaign_form import FilesSection, RunSheet
     from tank2sim.records.captive_record import read_captive_run
 
     sheet = None
@@ -161,17 +157,8 @@ def _read(
         sheet = next((sheet for sheet in form.runs if (campaign.parent / sheet.file).resolve() == place), None)
     columns = {**(form.columns if form else {}), **(sheet.columns if sheet else {})}
     files = form.files if form else FilesSection()
-    if type_name is None and sheet is None:
-        remedy = f"give one of: {', '.join(get_args(RunName))}"
-        raise ArgumentError("type", str(path), "is not stated", remedy)
-    kinds: list[RunType]
-    if type_name == "combined":
-        kinds = ["yaw_with_drift", "drift_and_rudder"]
-    elif type_name in SHORT_TYPES:
-        kinds = [SHORT_TYPES[type_name]]
-    else:
-        kinds = [kind for kind in RUN_TYPES if kind == type_name] or [sheet.type for sheet in (sheet,) if sheet]
     stated = sheet.model_dump(exclude={"type", "file", "columns"}) if sheet else {}
+    kinds = _kinds(path, type_name, sheet)
     for kind in kinds:
         described = RunSheet(file=path.name, type=kind, **{**stated, **angles})
         try:
@@ -180,6 +167,19 @@ def _read(
             if kind == kinds[-1]:
                 raise
             continue
-        if len(kinds) == 1 or kind == kinds[-1] or float(np.ptp(run.r_radps)) > _STEADY_YAW_RADPS:
+        if kind == kinds[-1] or float(np.ptp(run.r_radps)) > _STEADY_YAW_RADPS:
             return run
     raise AssertionError("every type was tried")
+
+
+def _kinds(path: Path, type_name: str | None, sheet: RunSheet | None) -> list[RunType]:
+    """Types of run to try: the one that is asked for, else that of the campaign."""
+    from tank2sim.records.campaign_form import RUN_TYPES
+
+    if type_name is None and sheet is None:
+        raise ArgumentError("type", str(path), "is not stated", f"give one of: {', '.join(get_args(RunName))}")
+    if type_name == "combined":
+        return ["yaw_with_drift", "drift_and_rudder"]
+    if type_name in SHORT_TYPES:
+        return [SHORT_TYPES[type_name]]
+    return [kind for kind in RUN_TYPES if kind == type_name] or [sheet.type for sheet in (sheet,) if sheet]

@@ -242,12 +242,7 @@ def find_influence(
 
 
 def default_figures(card: SteeredCard) -> list[InfluenceFigure]:
-    """Figures where none is given: of a ship usual ones, of a craft its top speed, turn and spin in standard trials.
-
-    Parameters
-    ----------
-    card : SteeredCard
-    """
+    """Figures where none is given: of a ship usual ones, of a craft its top speed, turn and spin in standard trials."""
     from tank2sim.analysis.influence.figures import parse_figure
     from tank2sim.analysis.validation.standard_trials import craft_trials
     from tank2sim.cards import SteeredBy
@@ -270,19 +265,14 @@ def _listed(texts: str | Sequence[str]) -> list[str]:
 
 def _reported(found: CardInfluence, notices: Sequence[Notice] = ()) -> InfluenceStudy:
     """The study, with further notices."""
-    from tank2sim.native.compiler import find_compiler
-    from tank2sim.simulation.integrator import NO_COMPILER
+    from tank2sim.simulation.integrator import compiler_notices
 
-    compiler = () if find_compiler() else (NO_COMPILER,)
-    return replace(found.reported(), notices=tuple(dict.fromkeys([*found.notices, *notices, *compiler])))
+    return replace(found.reported(), notices=tuple(dict.fromkeys([*found.notices, *notices, *compiler_notices()])))
 
 
 def _bands(ship: Vessel, study: Study, ensemble: EnsembleOptions) -> FigureBands | None:
-    from tank2sim.analysis.ensemble.results import EnsembleRequest, named_bands
+    from tank2sim.analysis.ensemble.results import named_bands
     from tank2sim.api.ensemble import FEW_IN_LANES
 
-    if not ensemble.members:
-        return None
     names = [figure.text for figure in study.figures]
-    with ensemble.computing(FEW_IN_LANES) as computing:
-        return named_bands(ship.steered(), names, EnsembleRequest(ensemble.members, ensemble.seed), computing)
+    return ensemble.drawn(lambda *request: named_bands(ship.steered(), names, *request), FEW_IN_LANES)

@@ -54,13 +54,7 @@ def make_report(result: Mapping[str, object] | str | Path) -> Result[Any]:
 
 
 def read_values(path: Path) -> Any:
-    """The JSON of a file.
-
-    Raises
-    ------
-    InputError
-        The file cannot be read, or is not JSON that a page can show.
-    """
+    """The JSON of a file. Raises InputError: it cannot be read, or is not JSON that a page can show."""
     from tank2sim.files import parsed_json, read_text
 
     return parsed_json(read_text(path), path, _REMEDY)
