@@ -14,7 +14,6 @@ from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart
 from tank2sim.answer.charts.motion import (
     History,
     Signal,
-    SpiralData,
     TrackData,
     history_chart,
     spiral_chart,
@@ -52,7 +51,7 @@ def every_chart():
         "error": error_chart(
             [OutputError(kind="FMI 2 CS", output="motion.x", error=1e-12, limit=1e-9)], title="Errors"
         ),
-        "spiral": spiral_chart([SpiralData(label="direct", rudder_rad=[0.1, -0.1], yaw_rate_radps=[0.01, -0.01])]),
+        "spiral": spiral_chart([5.0, -5.0], [0.5, -0.5]),
     }
 
 

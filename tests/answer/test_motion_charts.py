@@ -5,7 +5,6 @@ from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart
 from tank2sim.answer.charts.motion import (
     History,
     Signal,
-    SpiralData,
     TrackData,
     history_chart,
     spiral_chart,
@@ -191,9 +190,7 @@ def test_a_tow_shows_what_was_measured_as_points_and_the_model_as_a_line():
 
 
 def test_a_spiral_is_joined_in_its_order_and_shown_in_degrees():
-    rudder = np.radians([20, 0, -20, 0, 20])
-    spiral = SpiralData(label="direct", rudder_rad=rudder, yaw_rate_radps=np.radians([0.5, 0.2, -0.5, -0.2, 0.5]))
-    specification = chart_specification(spiral_chart([spiral]))
+    specification = chart_specification(spiral_chart([20, 0, -20, 0, 20], [0.5, 0.2, -0.5, -0.2, 0.5]))
     line = next(layer for layer in specification["layer"] if layer["mark"]["type"] == "line")
     drawn = sorted(rows(specification, line), key=lambda row: row[line["encoding"]["order"]["field"]])
     assert [row[line["encoding"]["x"]["field"]] for row in drawn] == pytest.approx([20, 0, -20, 0, 20])

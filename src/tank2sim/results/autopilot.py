@@ -224,10 +224,7 @@ class AutopilotResult(ResultWithController[AutopilotStudy]):
     Parameters are those of :class:`ResultWithController`, with the study :class:`.AutopilotStudy`.
     """
 
-    @property
-    def title(self) -> str:
-        """The ship."""
-        return f"{self.study.ship}: heading autopilot"
+    subject: ClassVar[str] = "heading autopilot"
 
     @property
     def margins(self) -> pd.DataFrame:
@@ -435,10 +432,7 @@ class CraftAutopilotResult(ResultWithController[CraftAutopilotStudy]):
     Parameters are those of :class:`ResultWithController`, with the study :class:`.CraftAutopilotStudy`.
     """
 
-    @property
-    def title(self) -> str:
-        """The craft."""
-        return f"{self.study.ship}: autopilot of heading and speed"
+    subject: ClassVar[str] = "autopilot of heading and speed"
 
     @property
     def headline(self) -> tuple[str, ...]:

@@ -32,6 +32,7 @@ class CraftIdentificationResult(Result[CraftIdentificationStudy]):
     fit: CraftFit | None = None
     predictions: tuple[FreePrediction, ...] = ()
     command: ClassVar[str] = "identify"
+    subject: ClassVar[str] = "coefficients from trials"
 
     @property
     def determination(self) -> dict[str, float] | None:
@@ -42,11 +43,6 @@ class CraftIdentificationResult(Result[CraftIdentificationStudy]):
     def next_trials(self) -> tuple[CandidateTrial, ...]:
         """Manoeuvres of five minutes; the first would determine most of the coefficients that these trials do not."""
         return self.study.next_trials
-
-    @property
-    def title(self) -> str:
-        """The craft."""
-        return f"{self.study.ship}: coefficients from trials"
 
     @property
     def subtitle(self) -> str:

@@ -58,6 +58,7 @@ class ExportResult(Result[ExportStudy]):
     files: Mapping[Path, str | bytes] = field(default_factory=dict)
     card: Card | None = None
     command: ClassVar[str] = "export"
+    subject: ClassVar[str] = "FMU"
 
     def c_files(self, folder: Path) -> dict[Path, str | bytes]:
         """The ship in plain C99 in a folder: ``ship.h``, ``ship.c``, ``self_test.c`` and a README."""
@@ -78,11 +79,6 @@ class ExportResult(Result[ExportStudy]):
     def ssp(self) -> Path | None:
         """The SSP package, if one was made."""
         return Path(self.study.ssp) if self.study.ssp else None
-
-    @property
-    def title(self) -> str:
-        """The ship."""
-        return f"{self.study.ship}: FMU"
 
     @property
     def headline(self) -> tuple[str, ...]:

@@ -126,6 +126,7 @@ class IdentificationResult(Result[IdentificationStudy]):
     card: Card | None = None
     identification: Identification | None = None
     command: ClassVar[str] = "identify"
+    subject: ClassVar[str] = "coefficients from trials"
 
     @property
     def estimates(self) -> pd.DataFrame:
@@ -160,11 +161,6 @@ class IdentificationResult(Result[IdentificationStudy]):
 
         samples = self.identification.posterior if self.identification else None
         return None if samples is None else pd.DataFrame(samples.flat, columns=list(samples.free))
-
-    @property
-    def title(self) -> str:
-        """The ship."""
-        return f"{self.study.ship}: coefficients from trials"
 
     @property
     def subtitle(self) -> str:

@@ -65,11 +65,7 @@ class InfluenceResult(EnsembleResult[InfluenceStudy]):
     study: InfluenceStudy
     ship: Any = None
     command: ClassVar[str] = "influence"
-
-    @property
-    def title(self) -> str:
-        """The ship."""
-        return f"{self.study.ship}: influence coefficients"
+    subject: ClassVar[str] = "influence coefficients"
 
     @property
     def subtitle(self) -> str:

@@ -23,7 +23,7 @@ from tank2sim.answer.charts.manoeuvre import (
     way_chart,
     zigzag_chart,
 )
-from tank2sim.answer.charts.motion import SpiralData, spiral_chart, varying_histories
+from tank2sim.answer.charts.motion import spiral_chart, varying_histories
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
 from tank2sim.arrays import Array
@@ -384,10 +384,9 @@ def _pull_out(study: ManoeuvreStudy, motion: Motion, title: str) -> Illustration
 
 def _spiral(study: ManoeuvreStudy, title: str) -> Illustration:
     figures = study.figures
-    rudder, rate = (np.radians(np.asarray(figures[name], dtype=float)) for name in ("rudder_deg", "rate_degps"))
-    spiral = SpiralData(label="spiral", rudder_rad=rudder, yaw_rate_radps=rate)
+    rudder, rate = (np.asarray(figures[name], dtype=float) for name in ("rudder_deg", "rate_degps"))
     loop = zero_rate_rudders(rudder, rate) if figures.get("loop_width_deg") else None
-    return Illustration(spiral_chart([spiral], loop_rad=loop, title=title))
+    return Illustration(spiral_chart(rudder, rate, loop_deg=loop, title=title))
 
 
 def _track_edges(study: ManoeuvreStudy) -> tuple[Array, Array] | None:

@@ -196,11 +196,8 @@ class MmgReductionResult(Result[MmgStudy]):
         return table("Shares of the variance", columns, rows, on_screen=False)
 
 
-def computed_chart(name: str, readings: ChannelReadings, *, size_px: int = 300) -> ChartSpec:
-    """Computed over measured readings of one channel, with the line on which both are the same.
-
-    `name`: name of the channel; `size_px`: width and height.
-    """
+def computed_chart(name: str, readings: ChannelReadings) -> ChartSpec:
+    """Computed over measured readings of one channel (by its name), with the line on which both are the same."""
     unit = readings.unit.replace(".", " ")
     ends = [float(readings.measured.min()), float(readings.measured.max())]
     equal = PlotSeries("equal", x=ends, y=ends)
@@ -213,7 +210,7 @@ def computed_chart(name: str, readings: ChannelReadings, *, size_px: int = 300) 
             layer("line", equal.rows, place, opacity=0.5),
             layer("circle", both.rows, {**place, "tooltip": shown}, size=36, opacity=0.7),
         ],
-        size=(size_px, size_px),
+        size=(300, 300),
         title=_CHANNELS[name].capitalize(),
         description=f"Computed and measured {_CHANNELS[name]}.",
     )

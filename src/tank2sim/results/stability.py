@@ -89,11 +89,6 @@ class ResultOnCourse(EnsembleResult[_S]):
     ship: Any = None
     command: ClassVar[str] = "stability"
 
-    @property
-    def title(self) -> str:
-        """The ship."""
-        return self.study.ship
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StabilityResult(ResultOnCourse[StabilityStudy]):

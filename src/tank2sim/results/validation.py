@@ -169,6 +169,7 @@ class ValidationResult(Result[ValidationStudy]):
     card: SteeredCard | None = None
     paths: tuple[Path, ...] = ()
     command: ClassVar[str] = "validate"
+    subject: ClassVar[str] = "validation"
 
     @property
     def verdict(self) -> str:
@@ -187,11 +188,6 @@ class ValidationResult(Result[ValidationStudy]):
         """Figures of standard trials, a row each: value, numerical uncertainty U_num, deviation by the inputs."""
         frame = records_frame(self.study.verification, ("trial", "name", "value", "U_num", "deviation"))
         return frame.rename(columns={"name": "figure", "U_num": "numerical"})
-
-    @property
-    def title(self) -> str:
-        """The ship."""
-        return f"{self.study.ship}: validation"
 
     @property
     def subtitle(self) -> str:

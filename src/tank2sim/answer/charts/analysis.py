@@ -74,21 +74,17 @@ class OutputError:
         return self.error <= self.limit
 
 
-def bode_chart(
-    responses: Sequence[FrequencyResponse], *, title: str = "", width_px: int = 720, height_px: int = 200
-) -> ChartSpec:
-    """Magnitude (dB) and phase (deg, unwrapped) against angular frequency (rad/s, logarithmic); sizes of one panel."""
-    magnitudes = [PlotSeries(one.label, x=one.omega_radps, y=one.decibel) for one in responses]
+def bode_chart(responses: Sequence[FrequencyResponse], *, title: str = "") -> ChartSpec:
+    """Magnitude (dB) and phase (deg, unwrapped) against angular frequency (rad/s, logarithmic)."""
     phases = [np.rad2deg(np.unwrap(np.angle(np.asarray(one.response, dtype=complex)))) for one in responses]
-    turned = [PlotSeries(one.label, x=one.omega_radps, y=phase) for one, phase in zip(responses, phases, strict=True)]
-    ticks = _phase_ticks(np.concatenate(phases))
-    plots = [
-        Plot(magnitudes, up=PlotAxis("magnitude (dB)"), height_px=height_px),
-        Plot(turned, up=PlotAxis("phase (deg)", ticks=ticks), height_px=height_px),
-    ]
+    phase_axis = PlotAxis("phase (deg)", ticks=_phase_ticks(np.concatenate(phases)))
+    plots = []
+    for up, curves in ((PlotAxis("magnitude (dB)"), [one.decibel for one in responses]), (phase_axis, phases)):
+        series = [PlotSeries(one.label, x=one.omega_radps, y=y) for one, y in zip(responses, curves, strict=True)]
+        plots.append(Plot(series, up=up, height_px=200))
     names = ", ".join(response.label for response in responses)
     described = f"Bode diagram of {names}: magnitude and phase."
-    return curve_panels(plots, _FREQUENCY, title=title, width_px=width_px, described=described, shown=_SHOWN)
+    return curve_panels(plots, _FREQUENCY, title=title, described=described, shown=_SHOWN)
 
 
 def sensitivity_chart(responses: Sequence[FrequencyResponse], *, title: str = "") -> ChartSpec:
@@ -103,9 +99,7 @@ def sensitivity_chart(responses: Sequence[FrequencyResponse], *, title: str = ""
     return curve_chart(plot, _FREQUENCY, title=title, window=["x"], described=described, shown=shown_as)
 
 
-def nyquist_chart(
-    loops: Sequence[FrequencyResponse], sensitivity_peak: float, *, title: str = "", size_px: int = 460
-) -> ChartSpec:
+def nyquist_chart(loops: Sequence[FrequencyResponse], sensitivity_peak: float, *, title: str = "") -> ChartSpec:
     """Nyquist curves near the critical point (cross), with the circle of radius 1/Ms that the first one touches.
 
     `loops`: loop transfer L; 1 + L is what feedback divides by; `sensitivity_peak`: Ms of the first.
@@ -127,23 +121,21 @@ def nyquist_chart(
     ]
     rules = [Rule([0.0], upright=True), Rule([0.0])]
     return curve_chart(
-        Plot(series, up=up, height_px=size_px, rules=rules, over=over),
+        Plot(series, up=up, height_px=460, rules=rules, over=over),
         across,
         title=title,
-        width_px=size_px,
+        width_px=460,
         described=f"Nyquist curves of {', '.join(loop.label for loop in loops)} near -1.",
         usermeta={"equal_scales": True},
         shown={"run:N": "loop", "w:Q": "frequency (rad/s)", "x:Q": "real part", "v:Q": "imaginary part"},
     )
 
 
-def pole_zero_chart(
-    systems: Sequence[PolesZeros], *, title: str = "", width_px: int = 560, height_px: int = 420
-) -> ChartSpec:
+def pole_zero_chart(systems: Sequence[PolesZeros], *, title: str = "") -> ChartSpec:
     """Poles (crosses) and zeros (circles) in the complex plane, both axes in one scale, the unstable half tinted."""
     rows = [row for system in systems for row in _pole_zero_rows(system)]
     real, imaginary = (np.array([row[key] for row in rows] + [0.0]) for key in ("re", "im"))
-    frame = equal_frame(real, np.concatenate([imaginary, -imaginary]), width_px=width_px, height_px=height_px)
+    frame = equal_frame(real, np.concatenate([imaginary, -imaginary]), width_px=560, height_px=420)
     place = frame.axes(across=("re", "real part (1/s)"), up=("im", "imaginary part (1/s)"))
     names = [system.label for system in systems]
     kinds = {"scale": {"domain": ["pole", "zero"], "range": [CROSS, "circle"]}, "legend": {}}
@@ -165,7 +157,7 @@ def pole_zero_chart(
     )
 
 
-def error_chart(errors: Sequence[OutputError], *, title: str = "", width_px: int = 720) -> ChartSpec:
+def error_chart(errors: Sequence[OutputError], *, title: str = "") -> ChartSpec:
     """Largest error of every output on a logarithmic scale next to its limit, one panel a kind of check.
 
     An error of exactly 0 (or one that is not finite) has no place on a logarithmic scale: it is drawn at the left
@@ -201,7 +193,7 @@ def error_chart(errors: Sequence[OutputError], *, title: str = "", width_px: int
         "facet": channel("kind:N", sort=kinds, header={"title": None, "labelAnchor": "start"}),
         "columns": len(kinds),
         "spacing": 20,
-        "spec": {"layer": panel, "width": max(110, width_px // len(kinds) - 20), "height": {"step": 19}},
+        "spec": {"layer": panel, "width": max(110, 720 // len(kinds) - 20), "height": {"step": 19}},
         "title": title,
         "description": f"Largest error of {len(outputs)} outputs in {', '.join(kinds)}. {over}",
     }

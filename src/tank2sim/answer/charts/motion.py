@@ -127,28 +127,17 @@ class TimeMark:
     text: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class SpiralData:
-    """Steady yaw rate (rad/s) against rudder angle (rad, positive to starboard), in the order they were run."""
-
-    label: str
-    rudder_rad: ArrayLike
-    yaw_rate_radps: ArrayLike
-
-
-def track_chart(
-    tracks: Sequence[TrackData], *, title: str = "", width_px: int = 720, height_px: int = 540
-) -> ChartSpec:
+def track_chart(tracks: Sequence[TrackData], *, title: str = "", height_px: int = 540) -> ChartSpec:
     """Tracks over each other, x north up and y east to the right, both axes in one scale (also when zoomed).
 
-    `tracks`: measured ones are drawn as open points, the others as lines. The start is marked. `title`: title of the
-    chart; `width_px`, `height_px`: size of the plot at most; it takes the shape of the tracks.
+    `tracks`: measured ones are drawn as open points, the others as lines; the start is marked; `height_px`: of the plot
+    at most; it takes the shape of the tracks.
     """
     paths = [(track, vector(track.x_m), vector(track.y_m)) for track in tracks]
     frame = equal_frame(
         np.concatenate([y for _, _, y in paths]),
         np.concatenate([x for _, x, _ in paths]),
-        width_px=width_px,
+        width_px=720,
         height_px=height_px,
     )
     place = frame.axes(across=("y", "east y (m)"), up=("x", "north x (m)"))
@@ -186,14 +175,13 @@ def history_chart(
     signals: Sequence[Signal],
     *,
     title: str = "",
-    width_px: int = 720,
     height_px: int = 120,
     marks: Sequence[TimeMark] = (),
 ) -> ChartSpec:
     """Signals over each other with one time axis, the runs overlaid in each; angles in degrees.
 
     `runs`: measured ones are drawn as open points, the others as lines; `signals`: the panels from top to bottom;
-    `width_px`, `height_px`: size of one panel; `marks`: places to tint.
+    `height_px`: of one panel; `marks`: places to tint.
     """
     span = np.concatenate([vector(run.time_s) for run in runs])
     across = PlotAxis("time (s)", domain=(float(np.nanmin(span)), float(np.nanmax(span))), nice=False)
@@ -202,35 +190,30 @@ def history_chart(
     names = ", ".join(signal.title for signal in signals)
     described = f"Time histories of {names}, of {_listed(runs)}."
     shown = {"run:N": "run"}
-    return curve_panels(plots, across, title=title, width_px=width_px, described=described, look=look, shown=shown)
+    return curve_panels(plots, across, title=title, described=described, look=look, shown=shown)
 
 
 def spiral_chart(
-    spirals: Sequence[SpiralData], *, loop_rad: tuple[float, float] | None = None, title: str = ""
+    rudder_deg: ArrayLike, rate_degps: ArrayLike, *, loop_deg: tuple[float, float] | None = None, title: str = ""
 ) -> ChartSpec:
-    """Yaw rate against rudder angle, in degrees, the points joined in the order they were run.
+    """Steady yaw rate against rudder angle (n,), positive to starboard, joined in the order they were run.
 
-    `loop_rad`: rudder angles between which the ship has two steady turns, rad: the width of the loop is marked.
+    `loop_deg`: rudder angles between which the ship has two steady turns: the width of the loop is marked.
     """
-    degree = shown_unit("rad")[1]
-    drawn = [(degree * vector(one.rudder_rad), degree * vector(one.yaw_rate_radps)) for one in spirals]
-    series = [
-        PlotSeries(spiral.label, x=rudder, y=rate, points=points, closed=True)
-        for points in (False, True)
-        for spiral, (rudder, rate) in zip(spirals, drawn, strict=True)
-    ]
-    left, up = (np.concatenate([[0.0], *(line[axis] for line in drawn)]) for axis in (0, 1))
-    frame = free_frame(left, up, width_px=620, height_px=400, margins_px=(24.0, 24.0))
+    rudder, rate = vector(rudder_deg), vector(rate_degps)
+    series = [PlotSeries("spiral", x=rudder, y=rate, points=points, closed=True) for points in (False, True)]
+    ends = np.append(rudder, 0.0), np.append(rate, 0.0)
+    frame = free_frame(*ends, width_px=620, height_px=400, margins_px=(24.0, 24.0))
     across = PlotAxis("rudder angle, starboard positive (deg)", domain=frame.across, nice=False)
-    rate = PlotAxis("yaw rate, starboard positive (deg/s)", domain=frame.up, nice=False)
-    over = _loop_layers(degree * vector(loop_rad), across, rate, frame, drawn) if loop_rad else []
+    up = PlotAxis("yaw rate, starboard positive (deg/s)", domain=frame.up, nice=False)
+    over = _loop_layers(loop_deg, across, up, frame, (rudder, rate)) if loop_deg else []
     rules = [Rule([0.0], upright=True), Rule([0.0])]
     return curve_chart(
-        Plot(series, up=rate, height_px=frame.height_px, rules=rules, over=over),
+        Plot(series, up=up, height_px=frame.height_px, rules=rules, over=over),
         across,
         title=title,
         width_px=frame.width_px,
-        described=f"Steady yaw rate against rudder angle of {_listed(spirals)}.",
+        described="Steady yaw rate against rudder angle of spiral.",
         shown={"run:N": "run"},
     )
 
@@ -240,10 +223,10 @@ _HOVER_SAMPLES = 90
 
 
 def _loop_layers(
-    rudders: Array, across: PlotAxis, up: PlotAxis, frame: Frame, lines: Sequence[tuple[Array, Array]]
+    loop_deg: tuple[float, float], across: PlotAxis, up: PlotAxis, frame: Frame, line: tuple[Array, Array]
 ) -> list[ChartSpec]:
-    """The width of a loop along the line of zero yaw rate, in deg."""
-    low, high = sorted(rudders.tolist())
+    """The width of a loop along the line of zero yaw rate."""
+    low, high = sorted(map(float, loop_deg))
     text = f"loop {format_number(high - low, 3)}°"
     place = {"x": across.channel("x"), "y": up.channel("v")}
     row = {"x": plain(low), "to": plain(high), "v": 0.0, "text": text}
@@ -251,11 +234,11 @@ def _loop_layers(
     zero = [(vector(frame.across), np.zeros(2)), (np.zeros(2), vector(frame.up))]
     return [
         layer("rule", [row], {**place, "x2": "to"}, style="overshoot", clip=True),
-        *label_layers([label], frame, place, [*lines, *zero]),
+        *label_layers([label], frame, place, [line, *zero]),
     ]
 
 
-def _listed(series: Sequence[TrackData] | Sequence[History] | Sequence[SpiralData]) -> str:
+def _listed(series: Sequence[TrackData] | Sequence[History]) -> str:
     return ", ".join(each.label for each in series)
 
 

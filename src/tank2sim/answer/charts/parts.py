@@ -80,12 +80,6 @@ def with_unit(title: str, unit: str) -> str:
     return f"{title} ({unit})" if unit else title
 
 
-def check_labels(labels: Sequence[str]) -> None:
-    """Raise ValueError if two series have the same label: they would be drawn as one line."""
-    if len(set(labels)) != len(labels):
-        raise ValueError(f"two series have one label: {labels}")
-
-
 @dataclass(frozen=True)
 class SeriesLook:
     """Encodings that distinguish the series of a chart; together they make one legend."""
@@ -104,9 +98,11 @@ class SeriesLook:
 def series_look(labels: Sequence[str], as_points: Collection[str] = ()) -> SeriesLook:
     """Colour, dash and shape of each series; :data:`USUAL_MARKS` have their own, others take theirs in order.
 
-    Those in `as_points` appear in the legend by the shape of their points, the others by a stroke of their line.
+    Those in `as_points` appear in the legend by the shape of their points, the others by a stroke of their line. Raises
+    ValueError: two series have the same label, and would be drawn as one line.
     """
-    check_labels(labels)
+    if len(set(labels)) != len(labels):
+        raise ValueError(f"two series have one label: {labels}")
     places = _places(labels)
     shown = [places.get(place, " " * (place + 1)) for place in range(max(places, default=-1) + 1)]
     points = [label for label in labels if label in as_points]
