@@ -221,6 +221,14 @@ def records_table(
     return table(caption, heads, rows, **options)
 
 
+def data_frame(rows: Any, columns: Sequence[str] | None = None, *, index: str = "") -> pd.DataFrame:
+    """Return a data frame of rows, or of columns by name; the column `index` becomes its index."""
+    import pandas as pd
+
+    found = pd.DataFrame(rows, columns=columns)
+    return found.set_index(index) if index else found
+
+
 def records_frame(
     records: Mapping[str, Any] | Iterable[Any], fields: Iterable[str], *, index: str = ""
 ) -> pd.DataFrame:

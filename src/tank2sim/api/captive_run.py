@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from tank2sim.api.verbs import Output, verb
 from tank2sim.arguments import AngleArgument, SpeedArgument
@@ -102,23 +102,16 @@ def reduce_runs(
     from tank2sim.records.campaigns import Campaign, copied_runs, read_campaign_form
     from tank2sim.results.captive_run import CaptiveRunResult
 
-    paths = [Path(runs)] if isinstance(runs, str | Path) else [Path(file) for file in runs]
-    if not paths:
-        raise ArgumentError("runs", "", "has no file", "give at least one run")
+    paths = _files(runs)
     form = read_campaign_form(campaign) if campaign is not None else None
-    if form is not None and (given := "force_convention" if force_convention else "speed_mps" if speed_mps else ""):
-        raise ArgumentError(given, "", f"is stated by {campaign}", "leave it out")
-    angles = {
-        name: math.radians(angle)
-        for name, angle in (("drift_rad", drift_deg), ("rudder_rad", rudder_deg))
-        if angle is not None
-    }
-    if type == "straight":
-        angles = {"drift_rad": 0.0, "rudder_rad": 0.0} | angles
-    test = form.test if form else TankTest(speed_mps=speed_mps or 1.0, force_convention=force_convention or "on_gauge")
-    if again := next((path for place, path in enumerate(paths) if path in paths[:place]), None):
-        raise InputError(again, "", "is given twice", "give each run once")
-    read = [_read(path, type, form, Path(campaign) if campaign else None, test, angles) for path in paths]
+    for name, stated in (("force_convention", force_convention), ("speed_mps", speed_mps)):
+        if form is not None and stated:
+            raise ArgumentError(name, "", f"is stated by {campaign}", "leave it out")
+    straight = 0.0 if type == "straight" else None
+    angles = {"drift_rad": straight if drift_deg is None else math.radians(drift_deg)}
+    angles |= {"rudder_rad": straight if rudder_deg is None else math.radians(rudder_deg)}
+    test = TankTest(speed_mps=speed_mps or 1.0, force_convention=force_convention or "on_gauge")
+    read = [_read(path, type, form, campaign, test, angles) for path in paths]
     copies, mirrored = copied_runs(read)
     if copies:
         raise next(iter(copies.values()))
@@ -129,6 +122,15 @@ def reduce_runs(
     sections = {name: getattr(form, name) for name in ("model", "test", "tank", "uncertainty", "full_scale")}
     known = Campaign(path=Path(str(campaign)), runs=tuple(read), **sections)
     return CaptiveRunResult(*study_runs(read, known, mirrored))
+
+
+def _files(runs: str | Path | Sequence[str | Path]) -> list[Path]:
+    paths = [Path(file) for file in ([runs] if isinstance(runs, str | Path) else runs)]
+    if not paths:
+        raise ArgumentError("runs", "", "has no file", "give at least one run")
+    if again := next((path for place, path in enumerate(paths) if path in paths[:place]), None):
+        raise InputError(again, "", "is given twice", "give each run once")
+    return paths
 
 
 def _refuse_unknown_speed(paths: Sequence[Path], runs: Sequence[CaptiveRun]) -> None:
@@ -142,25 +144,28 @@ def _read(
     path: Path,
     type_name: str | None,
     form: CampaignFile | None,
-    campaign: Path | None,
+    campaign: str | Path | None,
     test: TankTest,
-    angles: Mapping[str, float],
+    angles: Mapping[str, float | None],
 ) -> CaptiveRun:
+    """A run by its form; without one by `test`, and `angles` (rad) that are known."""
     import numpy as np
 
     from tank2sim.records.campaign_form import FilesSection, RunSheet
     from tank2sim.records.captive_record import read_captive_run
 
-    sheet = None
-    if form is not None and campaign is not None:
-        place = path.resolve()
-        sheet = next((sheet for sheet in form.runs if (campaign.parent / sheet.file).resolve() == place), None)
-    columns = {**(form.columns if form else {}), **(sheet.columns if sheet else {})}
-    files = form.files if form else FilesSection()
-    stated = sheet.model_dump(exclude={"type", "file", "columns"}) if sheet else {}
+    sheet, columns, files = None, {}, FilesSection()
+    if form is not None:
+        folder, place = Path(str(campaign)).parent, path.resolve()
+        sheet = next((sheet for sheet in form.runs if (folder / sheet.file).resolve() == place), None)
+        test, columns, files = form.test, dict(form.columns), form.files
+    stated: dict[str, Any] = {name: angle for name, angle in angles.items() if angle is not None}
+    if sheet:
+        columns |= sheet.columns
+        stated = sheet.model_dump(exclude={"type", "file", "columns"}) | stated
     kinds = _kinds(path, type_name, sheet)
     for kind in kinds:
-        described = RunSheet(file=path.name, type=kind, **{**stated, **angles})
+        described = RunSheet(file=path.name, type=kind, **stated)
         try:
             run = read_captive_run(path, described, test, columns, files)
         except InputError:

@@ -88,6 +88,12 @@ def _read_bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
     return found
 
 
+def _refuse_empty(bounds: Mapping[str, tuple[float, float]]) -> None:
+    for name, (low, high) in bounds.items():
+        if not low < high:
+            raise ArgumentError("bounds", name, "leaves no room", "give LOW..HIGH with LOW below HIGH")
+
+
 @verb(
     "the card changed until figures have given values",
     Output("-o", CARD, "Write the tuned card.", lambda result, path: result.card.files(path), "CARD.toml"),
@@ -155,13 +161,13 @@ def tune_ship(
     from tank2sim.results.influence import TuningResult
 
     ensemble = EnsembleOptions(members, seed, executor)
+    bounds = bounds or {}
     if not targets:
         raise ArgumentError("targets", "", "has no target", "give FIGURE=VALUE, as steady_radius_m@20=424")
-    if wrong := next((name for name, (low, high) in (bounds or {}).items() if not low < high), ""):
-        raise ArgumentError("bounds", wrong, "leaves no room", "give LOW..HIGH with LOW below HIGH")
+    _refuse_empty(bounds)
     parsed = [parse_target(text) for text in _listed(targets)]
     asked = [*(parse_figure(text) for text in _listed(figures)), *(target.figure for target in parsed)]
-    means = Means(by=by, within=within, hold=hold, bounds=bounds or {}, agreed=joint_variation or {})
+    means = Means(by=by, within=within, hold=hold, bounds=bounds, agreed=joint_variation or {})
     card = ship.steered()
     study = Study(card, list(dict.fromkeys(asked)))
     tuned = tune(study, parsed, means)

@@ -84,10 +84,12 @@ def simulate_manoeuvre(
     from tank2sim.simulation.manoeuvres import PullOut, parse_manoeuvre
     from tank2sim.simulation.run import simulate
 
-    if not isinstance(manoeuvre, str) and not hasattr(manoeuvre, "words"):
+    if isinstance(manoeuvre, str):
+        words, parsed = manoeuvre, parse_manoeuvre(manoeuvre)
+    elif hasattr(manoeuvre, "words"):
+        words, parsed = manoeuvre.words, manoeuvre
+    else:
         raise ArgumentError("manoeuvre", "", f"is of the type {type(manoeuvre).__name__}", "give a text, as 'turn:35'")
-    parsed = parse_manoeuvre(manoeuvre) if isinstance(manoeuvre, str) else manoeuvre
-    words = manoeuvre if isinstance(manoeuvre, str) else manoeuvre.words
     ensemble = EnsembleOptions(members, seed, executor)
     if external and members:
         raise ArgumentError("external", "", "cannot act on an ensemble", "leave out either the members or the force")

@@ -8,7 +8,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from tank2sim.answer.charts.motion import TimeMark, motions, stem_of
-from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, data_frame, table
 from tank2sim.answer.result import Result
 from tank2sim.notices import Notice
 from tank2sim.records.audit import AuditedTrial, AuditStudy
@@ -40,10 +40,8 @@ class AuditResult(Result[AuditStudy]):
     @property
     def findings(self) -> pd.DataFrame:
         """Findings, a row each: file, columns, kind (``fault`` or ``note``), what, likely truth."""
-        import pandas as pd
-
         rows = [(one.file, names, one.kind, one.what, one.likely_truth) for one, names in self._findings()]
-        return pd.DataFrame(rows, columns=["file", "column", "kind", "what", "likely_truth"])
+        return data_frame(rows, columns=["file", "column", "kind", "what", "likely_truth"])
 
     @property
     def passed(self) -> bool:
@@ -56,14 +54,12 @@ class AuditResult(Result[AuditStudy]):
 
         ``stated`` is true where the file states it; elsewhere the white part is estimated from the record.
         """
-        import pandas as pd
-
         rows = [
             asdict(noise) | {"file": trial.file, "sigma": from_si(noise.column, noise.sigma)}
             for trial in self.study.trials
             for noise in trial.noise.values()
         ]
-        return pd.DataFrame(rows, columns=["file", "column", "sigma", "stated"])
+        return data_frame(rows, columns=["file", "column", "sigma", "stated"])
 
     @property
     def title(self) -> str:

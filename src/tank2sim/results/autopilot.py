@@ -27,7 +27,17 @@ from tank2sim.answer.charts.analysis import (
 from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart
 from tank2sim.answer.charts.motion import History, Signal, TrackData, history_chart, track_chart
 from tank2sim.answer.charts.vega import PlotAxis, Rule
-from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Verdict, quantities, records_table, table
+from tank2sim.answer.parts import (
+    Cell,
+    Illustration,
+    KeyFigure,
+    Section,
+    Verdict,
+    data_frame,
+    quantities,
+    records_table,
+    table,
+)
 from tank2sim.answer.result import Result
 from tank2sim.arrays import Columns
 from tank2sim.errors import InputError
@@ -79,10 +89,8 @@ class ResultWithController(Result[_S]):
     @property
     def runs(self) -> dict[str, pd.DataFrame]:
         """The motions by name, one row a step, with the columns of a trial file: ``t_s``, ``psi_deg``, ``x_m``, ..."""
-        import pandas as pd
-
         motions = self.piloted.runs if self.piloted else {}
-        return {name: pd.DataFrame(trial_columns(run)) for name, run in motions.items()}
+        return {name: data_frame(trial_columns(run)) for name, run in motions.items()}
 
     def make_fmu(
         self,
@@ -212,9 +220,7 @@ class ResultWithController(Result[_S]):
     @property
     def cross_track(self) -> pd.DataFrame:
         """Figures of the track by guidance, m and s; empty without a track."""
-        import pandas as pd
-
-        return pd.DataFrame({name: asdict(one) for name, one in self.study.track.items()}).T
+        return data_frame({name: asdict(one) for name, one in self.study.track.items()}).T
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -229,16 +235,12 @@ class AutopilotResult(ResultWithController[AutopilotStudy]):
     @property
     def margins(self) -> pd.DataFrame:
         """Margins by speed (m/s), the first at the speed of the design; infinite ones have no limit."""
-        import pandas as pd
-
-        return pd.DataFrame([asdict(one) for one in self.study.margins]).drop(columns="poles").set_index("speed_mps")
+        return data_frame([asdict(one) for one in self.study.margins], index="speed_mps").drop(columns="poles")
 
     @property
     def course_changes(self) -> pd.DataFrame:
         """Figures of the changes of course by name: rise and settling time (s), overshoot and largest rudder (deg)."""
-        import pandas as pd
-
-        return pd.DataFrame({name: asdict(one) for name, one in self.study.closed_loop.course_changes.items()}).T
+        return data_frame({name: asdict(one) for name, one in self.study.closed_loop.course_changes.items()}).T
 
     @property
     def course_keeping(self) -> dict[str, float]:

@@ -16,7 +16,7 @@ from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_panels
 from tank2sim.answer.charts.motion import History, Signal, history_chart
 from tank2sim.answer.charts.vega import ChartSpec, PlotAxis
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, data_frame, table
 from tank2sim.answer.result import Result
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
@@ -74,9 +74,7 @@ class CaptiveRunResult(Result[CaptiveRunStudy]):
     @property
     def coefficients(self) -> pd.DataFrame:
         """A row each Fourier coefficient: run, signal, unit, order, cosine, sine, amplitude, phase (deg), errors."""
-        import pandas as pd
-
-        return pd.DataFrame(self._rows(), columns=_HEADS)
+        return data_frame(self._rows(), columns=_HEADS)
 
     def cycle(self, run: int = 0) -> pd.DataFrame:
         """Averaged cycle of a run: ``phase_deg``, and mean, standard deviation and fit of each force (N, N m).
@@ -91,8 +89,6 @@ class CaptiveRunResult(Result[CaptiveRunStudy]):
         InputError
             The run does not oscillate.
         """
-        import pandas as pd
-
         found = self.runs[run]
         if not found.cycles:
             raise InputError(found.name, "", "does not oscillate: it has no cycle", "take a run that does")
@@ -100,7 +96,7 @@ class CaptiveRunResult(Result[CaptiveRunStudy]):
         for force, cycle in found.cycles.items():
             named = {"mean": cycle.mean, "deviation": cycle.deviation, "fit": cycle.fit}
             columns |= {f"{force}_{name}": values for name, values in named.items()}
-        return pd.DataFrame(columns)
+        return data_frame(columns)
 
     def cycle_csv(self, run: int = 0) -> str:
         """The averaged cycle of a run as CSV, columns as :meth:`cycle` has them.

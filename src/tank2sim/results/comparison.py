@@ -13,7 +13,7 @@ from tank2sim.answer.charts.parts import plain, series_look, with_unit
 from tank2sim.answer.charts.rows import RowPlot, names_of, row_chart, row_layers
 from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, Rule, layered, stacked
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, data_frame, table
 from tank2sim.answer.result import Result
 from tank2sim.units import in_words
 
@@ -73,9 +73,7 @@ class ComparisonResult(Result[CardComparison]):
     @property
     def summary(self) -> pd.DataFrame:
         """By card but the reference (index): coefficients compared, the same number, beyond 2 standard errors, rms."""
-        import pandas as pd
-
-        return pd.DataFrame([asdict(summary) for summary in self.study.summary]).set_index("card")
+        return data_frame([asdict(summary) for summary in self.study.summary], index="card")
 
     @property
     def coefficients(self) -> pd.DataFrame:
@@ -86,8 +84,6 @@ class ComparisonResult(Result[CardComparison]):
         ``difference_percent`` is in per cent of the reference's size, ``standard_errors`` the difference over the root
         of both variances; missing where they cannot be compared.
         """
-        import pandas as pd
-
         rows = [
             (label, row.name, row.cards[0].value, row.cards[place].value, apart.percent, apart.standard_errors)
             for place, label in self._others()
@@ -95,14 +91,12 @@ class ComparisonResult(Result[CardComparison]):
             for apart in [row.differences[place - 1]]
         ]
         columns = ["card", "coefficient", "reference", "value", "difference_percent", "standard_errors"]
-        return pd.DataFrame(rows, columns=columns)
+        return data_frame(rows, columns=columns)
 
     @property
     def figures(self) -> pd.DataFrame:
         """Figures of the standard trials, a row each with its card: value, standard deviation, difference from the
         reference, the same in standard errors; in the unit of the figure's name."""
-        import pandas as pd
-
         rows = [
             (trial.name, name, label, value, deviation, apart, errors)
             for trial in self.study.trials
@@ -117,7 +111,7 @@ class ComparisonResult(Result[CardComparison]):
             )
         ]
         columns = ["trial", "figure", "card", "value", "standard_deviation", "difference", "standard_errors"]
-        return pd.DataFrame(rows, columns=columns)
+        return data_frame(rows, columns=columns)
 
     @property
     def title(self) -> str:

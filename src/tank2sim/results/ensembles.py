@@ -15,7 +15,7 @@ from tank2sim.analysis.ensemble.tails import Tail
 from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_panels
 from tank2sim.answer.charts.vega import ChartSpec, PlotAxis
-from tank2sim.answer.parts import Cell, Illustration, Section, Table, table
+from tank2sim.answer.parts import Cell, Illustration, Section, Table, data_frame, table
 from tank2sim.answer.result import Result
 from tank2sim.arrays import Array
 from tank2sim.errors import ArgumentError
@@ -87,8 +87,6 @@ class EnsembleResult(Result[_S]):
             The result has no ensemble, was read from its JSON, which has only the bands, or the frame does not fit
             into the memory.
         """
-        import pandas as pd
-
         found: Members | None = self.study.ensemble
         if found is None:
             raise ArgumentError("members", "", "is 0: this result has no ensemble", "give members=100 or more")
@@ -98,7 +96,7 @@ class EnsembleResult(Result[_S]):
         columns = len(found.drawn.draws.names) + len(found.drawn.figures)
         refuse_beyond_memory("members", found.members, 2 * 8 * columns)
         values = {**found.drawn.coefficients(), **found.drawn.figures, "usable": found.drawn.usable}
-        return pd.DataFrame(values).rename_axis("member")
+        return data_frame(values).rename_axis("member")
 
 
 def band_table(found: Members, figures: Mapping[str, Band]) -> Table:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from tank2sim.answer.charts.analysis import OutputError, error_chart
-from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Verdict, quantities, table
+from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Verdict, quantities, records_table, table
 from tank2sim.answer.result import Result
 from tank2sim.cards.card import Card
 from tank2sim.escaping import c_comment
@@ -161,20 +161,16 @@ class CheckResult(Result[CheckReport]):
     @property
     def sections(self) -> Sequence[Section]:
         """Problems, and the largest error of each output, relative to its range."""
-        report, sections = self.study, []
-        if self.problems:
-            rows: list[list[Cell]] = [[problem] for problem in self.problems]
-            first = table(f"Problems, {MOST_PROBLEMS} of {len(rows)}", ["problem"], rows[:MOST_PROBLEMS])
-            listed = table("Problems", ["problem"], rows, on_screen=len(rows) <= MOST_PROBLEMS)
-            tables = [listed] if listed.on_screen else [first, listed]
-            sections.append(Section("Problems", tables=tables))
+        report, sections = self.study, self._problems()
         if report.conditions:
-            judged: list[list[Cell]] = [[one.condition, one.met, one.found] for one in report.conditions]
-            conditions = table(f"Conditions of {report.host}", ("condition", "met", "found"), judged)
-            sections.append(Section(f"Conditions of {report.host}", tables=[conditions]))
+            caption = f"Conditions of {report.host}"
+            judged = records_table(caption, report.conditions, fields=("condition", "met", "found"))
+            sections.append(Section(caption, tables=[judged]))
         if not report.errors:
             return sections
-        rows = [[name, *(errors.get(name) for errors in report.errors.values())] for name in report.max_error]
+        rows: list[list[Cell]] = [
+            [name, *(errors.get(name) for errors in report.errors.values())] for name in report.max_error
+        ]
         rows.append(["limit", *(report.limits[kind] for kind in report.errors)])
         caption = f"Largest errors in {report.duration_s:g} s, relative to each output's range"
         drawn = [
@@ -185,3 +181,9 @@ class CheckResult(Result[CheckReport]):
         chart = Illustration(error_chart(drawn, title="Errors by output"))
         tables = [table(caption, ("output", *report.errors), rows, digits=2)]
         return [*sections, Section("Outputs", tables=tables, charts=[chart])]
+
+    def _problems(self) -> list[Section]:
+        rows: list[list[Cell]] = [[problem] for problem in self.problems]
+        first = table(f"Problems, {MOST_PROBLEMS} of {len(rows)}", ["problem"], rows[:MOST_PROBLEMS])
+        listed = table("Problems", ["problem"], rows, on_screen=len(rows) <= MOST_PROBLEMS)
+        return [Section("Problems", tables=[listed] if listed.on_screen else [first, listed])] if rows else []

@@ -23,7 +23,7 @@ from tank2sim.answer.charts.vega import (
     layered,
     tooltips,
 )
-from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, data_frame, table
 from tank2sim.answer.result import Result
 from tank2sim.arrays import Array
 from tank2sim.cards import Card
@@ -144,23 +144,19 @@ class IdentificationResult(Result[IdentificationStudy]):
 
         A figure of a held-out trial was expected in the interval (``low_95``, ``high_95``).
         """
-        import pandas as pd
-
         rows = [
             (one.trial, word, one.figure, one.measured, one.before, one.predicted, *(one.interval_95 or (None, None)))
             for word, key in SET_KEYS.items()
             for one in self.study.figures[key]
         ]
         columns = ["trial", "set", "figure", "measured", "before", "now", "low_95", "high_95"]
-        return pd.DataFrame(rows, columns=columns)
+        return data_frame(rows, columns=columns)
 
     @property
     def samples(self) -> pd.DataFrame | None:
         """Draws of the posterior, a column for each parameter in the units of `estimates`; None without sampling."""
-        import pandas as pd
-
         samples = self.identification.posterior if self.identification else None
-        return None if samples is None else pd.DataFrame(samples.flat, columns=list(samples.free))
+        return None if samples is None else data_frame(samples.flat, columns=list(samples.free))
 
     @property
     def subtitle(self) -> str:

@@ -25,7 +25,7 @@ from tank2sim.answer.charts.manoeuvre import (
 )
 from tank2sim.answer.charts.motion import spiral_chart, varying_histories
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, data_frame, table
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
@@ -130,9 +130,7 @@ class ManoeuvreResult(EnsembleResult[ManoeuvreStudy]):
 
         Of a result that was read from its JSON only some steps are known.
         """
-        import pandas as pd
-
-        return pd.DataFrame(trial_columns(self.run.trajectory) if self.run else self.study.histories)
+        return data_frame(trial_columns(self.run.trajectory) if self.run else self.study.histories)
 
     def to_csv(self, path: str | Path | None = None) -> str:
         """The motion as text of a trial CSV, also written to `path`: readable wherever a measured trial is.
@@ -154,19 +152,11 @@ class ManoeuvreResult(EnsembleResult[ManoeuvreStudy]):
     @property
     def headline(self) -> tuple[str, ...]:
         """The limits of IMO, or the behaviour that a pull-out or a spiral shows, or the first figures."""
-        study, figures = self.study, self.key_figures
+        study = self.study
         if study.kind == "pullout" and study.other_side:
             return (_pull_outs(study.figures, study.other_side.figures),)
-        judged = [figure for figure in figures if figure.limit is not None]
-        if failed := [figure.label.lower() for figure in judged if figure.verdict is Verdict.FAILED]:
-            return (f"These figures exceed their limits of IMO MSC.137(76): {', '.join(failed)}.",)
-        if any(figure.verdict is Verdict.CAUTION for figure in judged):
-            return (
-                "The run leaves the card's valid range: figures outside it are not judged against IMO MSC.137(76).",
-            )
-        if judged:
-            names = ", ".join(figure.label.lower() for figure in judged)
-            return (f"These figures are within the limits of IMO MSC.137(76): {names}.",)
+        if judged := [figure for figure in self.key_figures if figure.limit is not None]:
+            return (_judged(judged),)
         width = study.figures.get("loop_width_deg")
         if study.kind == "spiral" and isinstance(width, float):
             if width > 0:
@@ -176,7 +166,8 @@ class ManoeuvreResult(EnsembleResult[ManoeuvreStudy]):
                 )
             return ("The curve has no loop: at each rudder angle the ship has one steady turn.",)
         shown = [
-            f"{each.label.lower()} {format_number(float(each.value), 3)} {each.unit}".strip() for each in figures[:3]
+            f"{each.label.lower()} {format_number(float(each.value), 3)} {each.unit}".strip()
+            for each in self.key_figures[:3]
         ]
         return (f"{self.title}: {', '.join(shown)}.",) if shown else ()
 
@@ -286,6 +277,17 @@ class ManoeuvreResult(EnsembleResult[ManoeuvreStudy]):
             heads.append(Column("range of the card"))
             rows = [[*row, _OUTSIDE if each else None] for row, each in zip(rows, beyond, strict=True)]
         return table("Figures by number", heads, rows)
+
+
+def _judged(judged: Sequence[KeyFigure]) -> str:
+    """Whether figures with a limit of IMO MSC.137(76) keep it."""
+    failed = [figure.label.lower() for figure in judged if figure.verdict is Verdict.FAILED]
+    if failed:
+        return f"These figures exceed their limits of IMO MSC.137(76): {', '.join(failed)}."
+    if any(figure.verdict is Verdict.CAUTION for figure in judged):
+        return "The run leaves the card's valid range: figures outside it are not judged against IMO MSC.137(76)."
+    names = ", ".join(figure.label.lower() for figure in judged)
+    return f"These figures are within the limits of IMO MSC.137(76): {names}."
 
 
 def _in_lengths(name: str) -> str:

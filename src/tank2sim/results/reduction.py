@@ -9,7 +9,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from tank2sim.answer.charts.vega import ChartSpec
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, records_frame, table
+from tank2sim.answer.parts import (
+    Cell,
+    Column,
+    Illustration,
+    KeyFigure,
+    Section,
+    Table,
+    Verdict,
+    data_frame,
+    records_frame,
+    table,
+)
 from tank2sim.answer.result import Result
 from tank2sim.cards import Card, parse_card
 from tank2sim.cards.covariance import Covariance
@@ -100,13 +111,11 @@ class ReductionResult(Result[ReductionStudy]):
     def budget(self) -> pd.DataFrame:
         """Uncertainty budget by derivative (ITTC 7.5-02-06-04): share of the variance of each source; prime
         ``combined`` and ``expanded`` (k = 2) uncertainty."""
-        import pandas as pd
-
         rows = [
             {"name": row.name, "value": row.value, "combined": row.combined, "expanded": row.expanded, **row.shares}
             for row in self.study.uncertainty_budget.derivatives.values()
         ]
-        return pd.DataFrame(rows).set_index("name")
+        return data_frame(rows, index="name")
 
     @property
     def title(self) -> str:

@@ -116,7 +116,7 @@ def _histories(trial: TrialMotions, signals: Mapping[str, str]) -> ChartSpec:
     fields = {name: f"s{place}" for place, name in enumerate(signals)}
     rows: list[ChartRecord] = []
     for label, columns in series.items():
-        shown = {name: columns[name] for name in names if name in columns}
+        shown = _chosen(columns, names)
         kept = _thinned(label, list(shown.values()))
         values = {fields[name]: column[kept] for name, column in shown.items()}
         rows += records(label, {"t": columns["t_s"][kept], **values})
@@ -295,17 +295,18 @@ def _series(trial: TrialMotions, names: Sequence[str]) -> dict[str, dict[str, Ar
 
     Of what was measured the part that was simulated: after a turn, a model or ship may have sailed on for long.
     """
-    series = {
-        label: {name: columns[name] for name in ("t_s", *names) if name in columns}
-        for label, columns in ((label, getattr(trial, name)) for label, name in SERIES.items())
-        if not set(names).isdisjoint(columns)
-    }
+    every = {label: _chosen(getattr(trial, name), ("t_s", *names)) for label, name in SERIES.items()}
+    series = {label: columns for label, columns in every.items() if set(columns) - {"t_s"}}
     times = [columns["t_s"] for label, columns in series.items() if label != MEASURED]
     if times and MEASURED in series:
-        time = series[MEASURED]["t_s"]
-        inside = (time >= min(model[0] for model in times)) & (time <= max(model[-1] for model in times))
+        time, simulated = series[MEASURED]["t_s"], np.concatenate(times)
+        inside = (time >= simulated.min()) & (time <= simulated.max())
         series[MEASURED] = {name: values[inside] for name, values in series[MEASURED].items()}
     return series
+
+
+def _chosen(columns: Mapping[str, Array], names: Iterable[str]) -> dict[str, Array]:
+    return {name: columns[name] for name in names if name in columns}
 
 
 def _thinned(label: str, columns: Sequence[Array]) -> Indices:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -78,6 +79,15 @@ class TrackData:
     time_s: ArrayLike | None = None
     measured: bool = False
 
+    @property
+    def rows(self) -> list[ChartRecord]:
+        """Rows of the chart: ``x``, ``y`` and ``t``, thinned."""
+        columns = {"x": vector(self.x_m), "y": vector(self.y_m)}
+        thinned = thin_points if self.measured else thin_line
+        kept = thinned(list(columns.values()), POINT_SAMPLES if self.measured else LINE_SAMPLES)
+        columns |= {} if self.time_s is None else {"t": vector(self.time_s)}
+        return records(self.label, {name: values[kept] for name, values in columns.items()})
+
 
 @dataclass(frozen=True)
 class Signal:
@@ -133,32 +143,27 @@ def track_chart(tracks: Sequence[TrackData], *, title: str = "", height_px: int 
     `tracks`: measured ones are drawn as open points, the others as lines; the start is marked; `height_px`: of the plot
     at most; it takes the shape of the tracks.
     """
-    paths = [(track, vector(track.x_m), vector(track.y_m)) for track in tracks]
     frame = equal_frame(
-        np.concatenate([y for _, _, y in paths]),
-        np.concatenate([x for _, x, _ in paths]),
+        np.concatenate([vector(track.y_m) for track in tracks]),
+        np.concatenate([vector(track.x_m) for track in tracks]),
         width_px=720,
         height_px=height_px,
     )
     place = frame.axes(across=("y", "east y (m)"), up=("x", "north x (m)"))
     look = series_look([track.label for track in tracks], as_points={track.label for track in tracks if track.measured})
-    rows = {track.label: _track_rows(track, x, y) for track, x, y in paths}
-    lines, points = (
-        [row for track in tracks if track.measured == measured for row in rows[track.label]]
-        for measured in (False, True)
-    )
+    lines, points = ([track.rows for track in tracks if track.measured == kind] for kind in (False, True))
     timed = {"t:Q": "time (s)"} if all(track.time_s is not None for track in tracks) else {}
     said = {"tooltip": tooltips({"run:N": "run", **timed, "x:Q": "north (m)", "y:Q": "east (m)"})}
     marks = place | {"color": look.colour}
     layers = []
     if lines:
-        layers.append(layer("line", lines, {**marks, "strokeDash": look.dash, "order": "i:Q"}, clip=True))
+        layers.append(layer("line", list(chain(*lines)), {**marks, "strokeDash": look.dash, "order": "i:Q"}, clip=True))
     if points:
-        layers.append(layer("point", points, {**marks, "shape": look.shape, **said}, clip=True))
+        layers.append(layer("point", list(chain(*points)), {**marks, "shape": look.shape, **said}, clip=True))
     if lines:
-        hover = [row for track in tracks if not track.measured for row in every(rows[track.label], _HOVER_SAMPLES)]
+        hover = [row for rows in lines for row in every(rows, _HOVER_SAMPLES)]
         layers.append(layer("point", hover, {**place, **said}, clip=True, opacity=0, filled=True, size=110))
-    starts = [rows[track.label][0] for track in tracks if not (lines and track.measured)]
+    starts = [rows[0] for rows in lines or points]
     layers.append(layer("point", starts, place, style="start", shape="diamond", tooltip="start", clip=True))
     return layered(
         layers,
@@ -240,12 +245,6 @@ def _loop_layers(
 
 def _listed(series: Sequence[TrackData] | Sequence[History]) -> str:
     return ", ".join(each.label for each in series)
-
-
-def _track_rows(track: TrackData, x: Array, y: Array) -> list[ChartRecord]:
-    kept = thin_points([x, y], POINT_SAMPLES) if track.measured else thin_line([x, y], LINE_SAMPLES)
-    time = {} if track.time_s is None else {"t": vector(track.time_s)[kept]}
-    return records(track.label, {"x": x[kept], "y": y[kept]} | time)
 
 
 def _signal_plot(
