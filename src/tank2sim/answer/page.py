@@ -56,9 +56,8 @@ def render_page(page: Page) -> str:
     numbers = {"chart": itertools.count(1), "table": itertools.count(1)}
     cautions = foremost(_messages(page))
     sections = [_section(section, numbers) for section in page.sections]
-    # What is left of a section whose notices are at the top of the page.
-    parts = ("notes", "tables", "charts")
-    sections = [section for section in sections if any(section[part] for part in parts) or section["content"].text]
+    # A section whose notices are at the top of the page may have nothing left.
+    sections = [one for one in sections if one["notes"] or one["tables"] or one["charts"] or one["content"].text]
     specifications = [chart["specification"] for section in sections for chart in section["charts"]]
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("tank2sim", "answer"), autoescape=True, undefined=jinja2.StrictUndefined

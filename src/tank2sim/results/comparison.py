@@ -13,7 +13,18 @@ from tank2sim.answer.charts.parts import plain, series_look, with_unit
 from tank2sim.answer.charts.rows import RowPlot, names_of, row_chart, row_layers
 from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, Rule, layered, stacked
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, data_frame, table
+from tank2sim.answer.parts import (
+    Cell,
+    Column,
+    Illustration,
+    KeyFigure,
+    Section,
+    Table,
+    Verdict,
+    data_frame,
+    records_table,
+    table,
+)
 from tank2sim.answer.result import Result
 from tank2sim.units import in_words
 
@@ -165,8 +176,8 @@ class ComparisonResult(Result[CardComparison]):
     @property
     def sections(self) -> Sequence[Section]:
         """Tracks, figures, coefficients and cards."""
-        rows = [[card.label, card.ship, card.source] for card in self.study.cards]
-        cards = table("Cards, the reference first", ("card", "ship", "source"), rows, on_screen=False)
+        fields = {"label": "card", "ship": "", "source": ""}
+        cards = records_table("Cards, the reference first", self.study.cards, fields=fields, on_screen=False)
         return [*self._tracks(), *self._figures(), self._coefficients(), Section("Cards", tables=[cards])]
 
     def _others(self) -> list[tuple[int, str]]:

@@ -22,6 +22,7 @@ from tank2sim.errors import ArgumentError
 from tank2sim.memory import refuse_beyond_memory
 from tank2sim.notices import Notice
 from tank2sim.results.imo import BEYOND_THE_CARD
+from tank2sim.results.stability_charts import steering_curves
 from tank2sim.simulation.bands import Band
 from tank2sim.units import in_words
 
@@ -137,9 +138,11 @@ def stability_section(found: StabilityBands, criteria: Sequence[ImoCriterion]) -
     )
 
 
-def chance_sentences(found: StabilityBands) -> list[str]:
+def chance_sentences(found: StabilityBands | None) -> list[str]:
     """Return sentences on the probabilities of stability and of meeting all criteria together."""
-    sentences = []
+    sentences: list[str] = []
+    if found is None:
+        return sentences
     if found.probability_stable is not None and found.probability_stable_interval_95:
         interval = _interval(found.probability_stable_interval_95)
         probability = f"probability {found.probability_stable:.3g} (95 % interval {interval})"
@@ -274,14 +277,13 @@ def _bode_chart(bode: BodeBands, *, title: str) -> ChartSpec:
 
 def _step_chart(step: StepBands, *, title: str) -> ChartSpec:
     """Yaw rate after a step of one degree of rudder."""
-    series = [_banded("yaw rate", step.time_s, step.step_per_s)]
-    return curve_chart(
-        Plot(series, up=PlotAxis("yaw rate per degree of rudder (deg/s)"), height_px=240),
-        PlotAxis("time after the step (s)", nice=False),
+    return steering_curves(
+        [_banded("yaw rate", step.time_s, step.step_per_s)],
+        ("time after the step (s)", "yaw rate per degree of rudder (deg/s)"),
         title=title,
-        width_px=_WIDTH,
-        window=["x"],
         described="Yaw rate after a step of the rudder, with its band over an ensemble.",
+        height=240,
+        zero=False,
         shown=_SHOWN,
     )
 

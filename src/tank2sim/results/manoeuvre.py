@@ -63,6 +63,11 @@ _MEET = 0.05
 have met. Project choice: what is left of a stable ship's after three of its time constants."""
 
 _OUTSIDE = "outside"
+_NO_LOOP = ("The curve has no loop: at each rudder angle the ship has one steady turn.",)
+_LOOP = (
+    "Within the loop the ship keeps turning to its side: it is unstable on a straight course.",
+    "Its width is read between the rudder angles of the spiral; the command stability is exact.",
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -159,12 +164,7 @@ class ManoeuvreResult(EnsembleResult[ManoeuvreStudy]):
             return (_judged(judged),)
         width = study.figures.get("loop_width_deg")
         if study.kind == "spiral" and isinstance(width, float):
-            if width > 0:
-                return (
-                    "Within the loop the ship keeps turning to its side: it is unstable on a straight course.",
-                    "Its width is read between the rudder angles of the spiral; the command stability is exact.",
-                )
-            return ("The curve has no loop: at each rudder angle the ship has one steady turn.",)
+            return _LOOP if width > 0 else _NO_LOOP
         shown = [
             f"{each.label.lower()} {format_number(float(each.value), 3)} {each.unit}".strip()
             for each in self.key_figures[:3]

@@ -19,6 +19,7 @@ from tank2sim.answer.parts import (
     Verdict,
     data_frame,
     records_frame,
+    records_table,
     table,
 )
 from tank2sim.answer.result import Result
@@ -274,15 +275,10 @@ class ReductionResult(Result[ReductionStudy]):
         )
 
     def _left_out(self) -> list[Section]:
-        rows: list[list[Cell]] = [
-            [choice.name, choice.reason, choice.explanation]
-            for choice in self.study.choices
-            if choice.reason in _LEFT_OUT
-        ]
-        if not rows:
-            return []
-        found = table("Terms that the runs excite and that were left out", ("term", "reason", "why"), rows)
-        return [Section("Which terms, and why", tables=[found], folded=True)]
+        choices = [choice for choice in self.study.choices if choice.reason in _LEFT_OUT]
+        fields = {"name": "term", "reason": "", "explanation": "why"}
+        found = records_table("Terms that the runs excite and that were left out", choices, fields=fields)
+        return [Section("Which terms, and why", tables=[found], folded=True)] if choices else []
 
     def _budget(self) -> Section:
         budget = self.study.uncertainty_budget

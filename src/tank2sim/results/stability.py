@@ -134,8 +134,7 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
             f"{self.study.ship} at {point.speed_mps:.4g} m/s (drift {point.drift_deg:.3g} deg, rudder "
             f"{point.rudder_deg:.3g} deg) is {verdict} on a straight course: {self._margin()}."
         )
-        chances = chance_sentences(self.study.ensemble) if self.study.ensemble else []
-        return (course, *self._turns(), *self._criteria(), *chances)
+        return (course, *self._turns(), *self._criteria(), *chance_sentences(self.study.ensemble))
 
     def _margin(self) -> str:
         found, margin = self.study.stability_criterion, self.study.margins
@@ -387,7 +386,7 @@ class CraftStabilityResult(ResultOnCourse[CraftStabilityStudy]):
                 f"Steady turns: up to {last.yaw_rate_degps:.3g} deg/s, {last.diameter_m:.3g} m wide, at "
                 f"{last.difference_rpm:.4g} rpm of difference."
             )
-        return (*lines, *(chance_sentences(study.ensemble) if study.ensemble else []))
+        return (*lines, *chance_sentences(study.ensemble))
 
     def _left_alone(self) -> str:
         """Motion of an unstable craft without a difference of revolutions."""

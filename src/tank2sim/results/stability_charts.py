@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -82,27 +83,19 @@ def _branches(turning: TurningDiagram, values: Array) -> list[PlotSeries]:
     ]
 
 
-def _curves(
-    series: Sequence[PlotSeries],
-    axes: tuple[str, str],
-    *,
-    title: str,
-    described: str,
-    height: int = 260,
-    zero: bool = True,
+def steering_curves(
+    series: Sequence[PlotSeries], axes: tuple[str, str], *, height: int = 260, zero: bool = True, **options: Any
 ) -> ChartSpec:
-    """Lines, with a line at zero below them; the titles of the axes are those across and up."""
-    rules = [Rule([0.0])] if zero else []
-    plot = Plot(series, up=PlotAxis(axes[1]), height_px=height, rules=rules)
-    axis = PlotAxis(axes[0], nice=False)
-    return curve_chart(plot, axis, title=title, width_px=_WIDTH, window=["x"], described=described)
+    """Lines, with a line at zero below them if `zero`; `axes`: titles across and up; **options: of `curve_chart`."""
+    plot = Plot(series, up=PlotAxis(axes[1]), height_px=height, rules=[Rule([0.0])] if zero else [])
+    return curve_chart(plot, PlotAxis(axes[0], nice=False), width_px=_WIDTH, window=["x"], **options)
 
 
 def step_chart(responses: Sequence[SteeringResponse], *, title: str = "") -> ChartSpec:
     """Yaw rate after a step of one degree of rudder (or of its order), deg/s."""
     series = [PlotSeries(one.label, x=one.time_s, y=one.step_per_s) for one in responses]
     up, described = "yaw rate per degree of rudder (deg/s)", "Yaw rate over time after a step of the rudder."
-    return _curves(series, ("time after the step (s)", up), title=title, described=described, zero=False)
+    return steering_curves(series, ("time after the step (s)", up), title=title, described=described, zero=False)
 
 
 def influence_chart(margins: Margin, *, title: str = "") -> ChartSpec:
@@ -130,7 +123,7 @@ def criterion_by_speed_chart(speed: CriterionBySpeed, *, title: str = "") -> Cha
     """C' over speed."""
     series = [PlotSeries("C′", x=speed.speed_mps, y=1e5 * speed.C_prime)]
     described = "Stability criterion over speed."
-    return _curves(series, ("speed (m/s)", "C′ · 10⁵"), title=title, described=described, height=200)
+    return steering_curves(series, ("speed (m/s)", "C′ · 10⁵"), title=title, described=described, height=200)
 
 
 def _short(criterion: str) -> str:
@@ -184,7 +177,7 @@ def trim_chart(trim: TrimEffect, *, title: str = "") -> ChartSpec:
         values[f"7.5 % of {name}"] = base + per_cent * (reading.more - reading.less) / 2
     series = [PlotSeries(label, x=per_cent, y=1e5 * value) for label, value in values.items()]
     across, described = "trim by the stern (% of length)", "Stability criterion over trim, estimated."
-    return _curves(series, (across, "C′ · 10⁵"), title=title, described=described, height=220)
+    return steering_curves(series, (across, "C′ · 10⁵"), title=title, described=described, height=220)
 
 
 def characteristic_chart(found: SteeringCharacteristic, *, title: str = "") -> ChartSpec:
@@ -203,4 +196,4 @@ def characteristic_chart(found: SteeringCharacteristic, *, title: str = "") -> C
     }
     series = [PlotSeries(label, x=rate, y=value) for label, value in values.items()]
     across, described = "yaw rate, starboard positive (deg/s)", "Rudder angle against steady yaw rate."
-    return _curves(series, (across, "rudder angle (deg)"), title=title, described=described)
+    return steering_curves(series, (across, "rudder angle (deg)"), title=title, described=described)

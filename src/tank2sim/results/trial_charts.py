@@ -76,30 +76,32 @@ def track_grid(trials: Sequence[TrialMotions], *, title: str = "") -> ChartSpec 
     The scale fits the measurement and the card found: the card before may leave the panel. None where no trial has a
     track.
     """
-    panels, names = [], []
-    for trial in trials:
-        series = {label: columns for label, columns in _series(trial, _TRACK).items() if set(_TRACK) <= set(columns)}
-        if not series:
-            continue
-        shown = [columns for label, columns in series.items() if label != BEFORE] or list(series.values())
-        north, east = (np.concatenate([columns[name] for columns in shown]) for name in _TRACK)
-        frame = equal_frame(east, north, width_px=205, height_px=260)
-        place = frame.axes(across=("y", "east y (m)"), up=("x", "north x (m)"))
-        ticks = max(2, frame.width_px // 70)
-        place["x"]["axis"] = {"tickCount": ticks, "labelOverlap": "greedy", "labelSeparation": 6}
-        rows: list[ChartRecord] = []
-        for label, columns in series.items():
-            kept = _thinned(label, [columns["x_m"], columns["y_m"]])
-            rows += records(label, {"x": columns["x_m"][kept], "y": columns["y_m"][kept]})
-        marks = _marks(place | {"tooltip": tooltips({"x:Q": "north (m)", "y:Q": "east (m)"})})
-        size = frame.width_px, frame.height_px
-        panels.append(layered(marks, size=size, data={"values": rows}, title=panel_title(trial.trial)))
-        names.append(trial.trial)
-    if not panels:
+    drawn = {trial.trial: panel for trial in trials if (panel := _track_panel(trial))}
+    if not drawn:
         return None
-    text = f"Tracks of {', '.join(names)}, measured and simulated; north is up."
+    text = f"Tracks of {', '.join(drawn)}, measured and simulated; north is up."
+    panels = list(drawn.values())
     slender = all(panel["width"] <= 110 for panel in panels)
     return panel_grid(panels, title, text, columns=PANELS_PER_ROW + slender) | {"usermeta": {"equal_scales": True}}
+
+
+def _track_panel(trial: TrialMotions) -> ChartSpec | None:
+    series = {label: columns for label, columns in _series(trial, _TRACK).items() if set(_TRACK) <= set(columns)}
+    if not series:
+        return None
+    shown = [columns for label, columns in series.items() if label != BEFORE] or list(series.values())
+    north, east = (np.concatenate([columns[name] for columns in shown]) for name in _TRACK)
+    frame = equal_frame(east, north, width_px=205, height_px=260)
+    place = frame.axes(across=("y", "east y (m)"), up=("x", "north x (m)"))
+    ticks = max(2, frame.width_px // 70)
+    place["x"]["axis"] = {"tickCount": ticks, "labelOverlap": "greedy", "labelSeparation": 6}
+    rows: list[ChartRecord] = []
+    for label, columns in series.items():
+        kept = _thinned(label, [columns["x_m"], columns["y_m"]])
+        rows += records(label, {"x": columns["x_m"][kept], "y": columns["y_m"][kept]})
+    marks = _marks(place | {"tooltip": tooltips({"x:Q": "north (m)", "y:Q": "east (m)"})})
+    size = frame.width_px, frame.height_px
+    return layered(marks, size=size, data={"values": rows}, title=panel_title(trial.trial))
 
 
 def history_grid(

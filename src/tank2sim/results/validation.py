@@ -215,22 +215,7 @@ class ValidationResult(Result[ValidationStudy]):
     @property
     def key_figures(self) -> Sequence[KeyFigure]:
         """Figures validated, median error and level, and the numerical uncertainty."""
-        figures, counts = self.study.figures, self.study.counts
-        if figures:
-            validated = counts[ComparisonOutcome.VALIDATED.value]
-            incomplete = Verdict.FAILED if counts[ComparisonOutcome.REFUTED.value] else Verdict.CAUTION
-            verdict = Verdict.PASSED if validated == len(figures) else incomplete
-            shown = [KeyFigure("Figures validated", f"{validated} of {len(figures)}", verdict=verdict)]
-        elif found := self.study.predictions:
-            shown = [KeyFigure(f"R^2 of {name}", round(one, 3)) for name, one in found.determination.items()]
-            ends = {"position": (found.end_distance_m, "m"), "heading": (found.end_heading_deg, "deg")}
-            note = f"rms, after up to {PREDICTED_S:g} s"
-            for name, (value, unit) in ends.items():
-                if value is not None:
-                    shown.append(KeyFigure(f"Error of {name}", value, unit, note=note))
-        else:
-            note = "no trial to compare with"
-            shown = [KeyFigure("Validation", "none", verdict=Verdict.CAUTION, note=note)]
+        figures, shown = self.study.figures, self._outcomes()
         errors = [100 * abs(one.error / one.measured) for one in figures if one.error is not None and one.measured]
         levels = [one.level_percent for one in figures if one.level_percent is not None]
         for label, values in (("Median error |E|", errors), ("Median level U_val", levels)):
@@ -239,6 +224,24 @@ class ValidationResult(Result[ValidationStudy]):
         if self._numerical_percent:
             value = max(self._numerical_percent)
             shown.append(KeyFigure("Largest numerical uncertainty", value, "%"))
+        return shown
+
+    def _outcomes(self) -> list[KeyFigure]:
+        """Figures validated, or the errors of predictions."""
+        count, counts = len(self.study.figures), self.study.counts
+        if count:
+            validated = counts[ComparisonOutcome.VALIDATED.value]
+            incomplete = Verdict.FAILED if counts[ComparisonOutcome.REFUTED.value] else Verdict.CAUTION
+            verdict = Verdict.PASSED if validated == count else incomplete
+            return [KeyFigure("Figures validated", f"{validated} of {count}", verdict=verdict)]
+        if (found := self.study.predictions) is None:
+            return [KeyFigure("Validation", "none", verdict=Verdict.CAUTION, note="no trial to compare with")]
+        shown = [KeyFigure(f"R^2 of {name}", round(one, 3)) for name, one in found.determination.items()]
+        ends = {"position": (found.end_distance_m, "m"), "heading": (found.end_heading_deg, "deg")}
+        for name, (value, unit) in ends.items():
+            if value is not None:
+                note = f"rms, after up to {PREDICTED_S:g} s"
+                shown.append(KeyFigure(f"Error of {name}", value, unit, note=note))
         return shown
 
     @property

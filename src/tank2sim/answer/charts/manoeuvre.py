@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_panels
 from tank2sim.answer.charts.labels import label_layers, spots_about, spots_along
@@ -192,20 +191,12 @@ def way_chart(
     """
     polygon = _polygon(edges_m) if edges_m is not None else np.empty((0, 2))
     step, outlines = hull_rows(hulls_until or motion)
-    ends = [point for dimension in dimensions for point in (dimension.begin, dimension.end)]
-    across: list[ArrayLike] = [
-        motion.starboard_m,
-        polygon[:, 1],
-        [row["y"] for row in outlines],
-        [point[0] for point in ends],
-    ]
-    up: list[ArrayLike] = [motion.ahead_m, polygon[:, 0], [row["x"] for row in outlines], [point[1] for point in ends]]
-    frame = equal_frame(
-        np.concatenate([vector(part) for part in across]),
-        np.concatenate([vector(part) for part in up]),
-        width_px=640,
-        height_px=540,
-    )
+    ends = [point[::-1] for dimension in dimensions for point in (dimension.begin, dimension.end)]
+    corners = [(row["x"], row["y"]) for row in outlines]
+    further = [np.asarray(points, dtype=float).reshape(-1, 2) for points in (corners, ends)]
+    track = np.column_stack([motion.ahead_m, motion.starboard_m])
+    up, across = np.concatenate([track, polygon, *further]).T
+    frame = equal_frame(across, up, width_px=640, height_px=540)
     place = frame.axes(across=("y", "to starboard (m)"), up=("x", "ahead (m)"))
     kept = thin_line([motion.ahead_m, motion.starboard_m], LINE_SAMPLES)
     rows = records("track", {"x": motion.ahead_m[kept], "y": motion.starboard_m[kept], "t": motion.time_s[kept]})
@@ -213,8 +204,8 @@ def way_chart(
     layers = [layer("line", rows, {**place, "color": _ONE, "order": "i:Q"}, clip=True)]
     closed = {"interpolate": "linear-closed", "clip": True}
     if len(polygon):
-        corners = records("band", {"x": polygon[:, 0], "y": polygon[:, 1]})
-        layers.append(layer("line", corners, {**place, "order": "i:Q"}, style="band", strokeWidth=0, **closed))
+        edge = records("band", {"x": polygon[:, 0], "y": polygon[:, 1]})
+        layers.append(layer("line", edge, {**place, "order": "i:Q"}, style="band", strokeWidth=0, **closed))
     if outlines:
         layers.append(layer("line", outlines, {**place, "order": "i:Q", "detail": "hull:N"}, style="hull", **closed))
     lines = [(motion.starboard_m, motion.ahead_m), *_outline_lines(outlines)]

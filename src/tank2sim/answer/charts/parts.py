@@ -122,9 +122,9 @@ def series_look(labels: Sequence[str], as_points: Collection[str] = ()) -> Serie
 
 def _places(labels: Sequence[str]) -> dict[int, str]:
     """Place of each series among colours and dashes, to its label."""
-    usual = [USUAL_MARKS.get(label) for label in labels]
-    known = {place: label for place, label in zip(usual, labels, strict=True) if place is not None}
-    if len(known) < sum(place is not None for place in usual) or len(labels) == 1:
+    usual = [label for label in labels if label in USUAL_MARKS]
+    known = {USUAL_MARKS[label]: label for label in usual}
+    if len(known) < len(usual) or len(labels) == 1:
         return dict(enumerate(labels))
     left = iter(place for place in range(len(labels) + len(known) + len(USUAL_MARKS)) if place not in known)
     return known | {next(left): label for label in labels if label not in known.values()}
