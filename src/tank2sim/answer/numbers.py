@@ -54,8 +54,8 @@ def format_column(values: Sequence[float], digits: int = 4) -> list[str]:
     The largest gets `digits` significant digits. A column whose numbers are too far apart for that (some would be
     shown as 0), or too large or small, shows each number for itself as :func:`format_number` does.
     """
-    finite = [float(value) for value in values if math.isfinite(value)]
-    sizes = sorted(abs(value) for value in finite if value != 0) or [0.0]
+    finite = list(map(float, filter(math.isfinite, values)))
+    sizes = sorted(filter(None, map(abs, finite))) or [0.0]
     decimals = _decimals(sizes[-1], digits)
     apart = not _SMALL <= sizes[-1] < _LARGE or sizes[0] < 10.0**-decimals
     if apart or all(isinstance(value, Integral) for value in values):

@@ -57,7 +57,7 @@ def render_page(page: Page) -> str:
     cautions = foremost(_messages(page))
     sections = [_section(section, numbers) for section in page.sections]
     # A section whose notices are at the top of the page may have nothing left.
-    sections = [one for one in sections if one["notes"] or one["tables"] or one["charts"] or one["content"].text]
+    sections = list(filter(_has_content, sections))
     specifications = [chart["specification"] for section in sections for chart in section["charts"]]
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("tank2sim", "answer"), autoescape=True, undefined=jinja2.StrictUndefined
@@ -77,6 +77,10 @@ def render_page(page: Page) -> str:
         library=Markup(_vega()) if specifications else None,
         drawings=json_in_html({"light": LIGHT, "dark": DARK, "locale": LOCALE, "charts": specifications}),
     )
+
+
+def _has_content(section: Mapping[str, Any]) -> bool:
+    return bool(section["notes"] or section["tables"] or section["charts"] or section["content"].text)
 
 
 def _messages(page: Page) -> Iterable[object]:

@@ -103,13 +103,12 @@ def reduce_runs(
     from tank2sim.results.captive_run import CaptiveRunResult
 
     paths = _files(runs)
-    form = read_campaign_form(campaign) if campaign is not None else None
-    for name, stated in (("force_convention", force_convention), ("speed_mps", speed_mps)):
-        if form is not None and stated:
-            raise ArgumentError(name, "", f"is stated by {campaign}", "leave it out")
-    straight = 0.0 if type == "straight" else None
-    angles = {"drift_rad": straight if drift_deg is None else math.radians(drift_deg)}
-    angles |= {"rudder_rad": straight if rudder_deg is None else math.radians(rudder_deg)}
+    form = None
+    if campaign is not None:
+        form = read_campaign_form(campaign)
+        if given := "force_convention" if force_convention else "speed_mps" if speed_mps else "":
+            raise ArgumentError(given, "", f"is stated by {campaign}", "leave it out")
+    angles = _angles(type, {"drift_rad": drift_deg, "rudder_rad": rudder_deg})
     test = TankTest(speed_mps=speed_mps or 1.0, force_convention=force_convention or "on_gauge")
     read = [_read(path, type, form, campaign, test, angles) for path in paths]
     copies, mirrored = copied_runs(read)
@@ -122,6 +121,12 @@ def reduce_runs(
     sections = {name: getattr(form, name) for name in ("model", "test", "tank", "uncertainty", "full_scale")}
     known = Campaign(path=Path(str(campaign)), runs=tuple(read), **sections)
     return CaptiveRunResult(*study_runs(read, known, mirrored))
+
+
+def _angles(type_name: str | None, stated_deg: Mapping[str, float | None]) -> dict[str, float]:
+    """Angles (rad) of those stated (deg), by the names of the result; of a straight run the others are 0."""
+    straight = dict.fromkeys(stated_deg, 0.0) if type_name == "straight" else {}
+    return straight | {name: math.radians(angle) for name, angle in stated_deg.items() if angle is not None}
 
 
 def _files(runs: str | Path | Sequence[str | Path]) -> list[Path]:
@@ -146,7 +151,7 @@ def _read(
     form: CampaignFile | None,
     campaign: str | Path | None,
     test: TankTest,
-    angles: Mapping[str, float | None],
+    angles: Mapping[str, float],
 ) -> CaptiveRun:
     """A run by its form; without one by `test`, and `angles` (rad) that are known."""
     import numpy as np
@@ -159,7 +164,7 @@ def _read(
         folder, place = Path(str(campaign)).parent, path.resolve()
         sheet = next((sheet for sheet in form.runs if (folder / sheet.file).resolve() == place), None)
         test, columns, files = form.test, dict(form.columns), form.files
-    stated: dict[str, Any] = {name: angle for name, angle in angles.items() if angle is not None}
+    stated: dict[str, Any] = dict(angles)
     if sheet:
         columns |= sheet.columns
         stated = sheet.model_dump(exclude={"type", "file", "columns"}) | stated

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -39,7 +40,7 @@ from tank2sim.units import in_words
 if TYPE_CHECKING:
     import pandas as pd
 
-_SIDE_NAMES = {1: "starboard", -1: "port"}
+_SIDE_NAMES: Mapping[float, str] = {1: "starboard", -1: "port"}
 
 
 _FIRST: Mapping[str, tuple[str, ...]] = {
@@ -163,7 +164,7 @@ class ManoeuvreResult(EnsembleResult[ManoeuvreStudy]):
         if judged := [figure for figure in self.key_figures if figure.limit is not None]:
             return (_judged(judged),)
         width = study.figures.get("loop_width_deg")
-        if study.kind == "spiral" and isinstance(width, float):
+        if isinstance(width, float):
             return _LOOP if width > 0 else _NO_LOOP
         shown = [
             f"{each.label.lower()} {format_number(float(each.value), 3)} {each.unit}".strip()
@@ -193,7 +194,7 @@ class ManoeuvreResult(EnsembleResult[ManoeuvreStudy]):
         elif limit is not None:
             verdict = Verdict.PASSED if value <= limit else Verdict.FAILED
         if name == "side_reach_m":
-            notes.append(f"to {_SIDE_NAMES[-1 if value < 0 else 1]}")
+            notes.append(f"to {_SIDE_NAMES[math.copysign(1, value)]}")
             value = abs(value)
         label = label[:1].upper() + label[1:]
         return KeyFigure(label, value, unit, verdict=verdict, note="; ".join(notes), limit=limit)
@@ -241,13 +242,14 @@ class ManoeuvreResult(EnsembleResult[ManoeuvreStudy]):
 
     def _figure_table(self, figures: Mapping[str, float], missing: Sequence[str]) -> Table:
         """One row a figure, its size in ship lengths and its limit next to it; empty columns are left out."""
+        outside = dict.fromkeys(self.study.outside_card_range, _OUTSIDE)
         rows: list[list[Cell]] = [
             [
                 *in_words(name),
                 value,
                 self.figures.get(_in_lengths(name)),
                 self._limit(name),
-                _OUTSIDE if name in self.study.outside_card_range else None,
+                outside.get(name),
             ]
             for name, value in figures.items()
         ]
@@ -356,15 +358,16 @@ def _manoeuvre_charts(study: ManoeuvreStudy) -> list[Illustration]:
         case "spiral":
             return [_spiral(study, title)]
         case "stop":
-            revolutions, held = motion.revolutions_rpm, ""
-            if revolutions is not None and np.ptp(revolutions) == 0:
-                held = f"Revolutions: {format_number(float(revolutions[-1]), 4)} rpm from the order on."
             way = way_chart(motion, stop_dimensions(motion, figures), title="Track of the stop")
-            return [
-                Illustration(stop_speed_chart(motion, title="Speed over distance"), caption=held),
-                Illustration(way, caption=shaded),
-            ]
+            return [_stop_speed(motion), Illustration(way, caption=shaded)]
     return [Illustration(way_chart(motion, [], title="Track"), caption=shaded)]
+
+
+def _stop_speed(motion: Motion) -> Illustration:
+    revolutions, held = motion.revolutions_rpm, ""
+    if revolutions is not None and np.ptp(revolutions) == 0:
+        held = f"Revolutions: {format_number(float(revolutions[-1]), 4)} rpm from the order on."
+    return Illustration(stop_speed_chart(motion, title="Speed over distance"), caption=held)
 
 
 def _history_charts(study: ManoeuvreStudy) -> list[Illustration]:

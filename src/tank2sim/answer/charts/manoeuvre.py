@@ -189,13 +189,12 @@ def way_chart(
     `hulls_until`: the part of the motion with outlines of the ship; by default all of it; `edges_m`, `title`: as of
     :func:`turn_chart`.
     """
-    polygon = _polygon(edges_m) if edges_m is not None else np.empty((0, 2))
+    polygon = _polygon(edges_m)
     step, outlines = hull_rows(hulls_until or motion)
     ends = [point[::-1] for dimension in dimensions for point in (dimension.begin, dimension.end)]
-    corners = [(row["x"], row["y"]) for row in outlines]
-    further = [np.asarray(points, dtype=float).reshape(-1, 2) for points in (corners, ends)]
+    shown = [*ends, *((row["x"], row["y"]) for row in outlines)]
     track = np.column_stack([motion.ahead_m, motion.starboard_m])
-    up, across = np.concatenate([track, polygon, *further]).T
+    up, across = np.concatenate([track, polygon, np.array(shown, dtype=float).reshape(-1, 2)]).T
     frame = equal_frame(across, up, width_px=640, height_px=540)
     place = frame.axes(across=("y", "to starboard (m)"), up=("x", "ahead (m)"))
     kept = thin_line([motion.ahead_m, motion.starboard_m], LINE_SAMPLES)
@@ -394,7 +393,9 @@ def _sized(name: str, size_m: float, length_m: float | None) -> str:
     return f"{name} {format_number(size_m, _ROUND)} m{lengths}"
 
 
-def _polygon(edges: tuple[Array, Array]) -> Array:
+def _polygon(edges: tuple[Array, Array] | None) -> Array:
+    if edges is None:
+        return np.empty((0, 2))
     low, high = (np.asarray(edge, dtype=float).reshape(-1, 2) for edge in edges)
     known = np.isfinite(low).all(axis=1) & np.isfinite(high).all(axis=1)
     return np.concatenate([low[known], high[known][::-1]])

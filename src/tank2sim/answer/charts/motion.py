@@ -268,12 +268,16 @@ def _signal_plot(
                 over.append(
                     layer("area", rows, {"x": x, "y": up.channel("low"), "y2": "high"}, style="band", clip=True)
                 )
-    spans = [{"x": mark.begin_s, "end": mark.end_s, "text": mark.text} for mark in marks if mark.signal == signal.name]
-    if spans:  # each with a line where it begins, for the shortest are no wider than that
-        place = {"x": x, "tooltip": tooltips({"text:N": "found", "x:Q": "from (s)"})}
-        over.append(layer("rect", spans, {**place, "x2": "end"}, style="region", clip=True))
-        over.append(layer("rule", spans, place, style="limit", clip=True, strokeWidth=1.2))
+    over += _mark_layers([mark for mark in marks if mark.signal == signal.name], x)
     return Plot(series, up=up, height_px=height_px, over=over)
+
+
+def _mark_layers(marks: Sequence[TimeMark], x: ChartSpec) -> list[ChartSpec]:
+    """Tinted spans, each with a line where it begins, for the shortest are no wider than that."""
+    spans = [{"x": mark.begin_s, "end": mark.end_s, "text": mark.text} for mark in marks]
+    place = {"x": x, "tooltip": tooltips({"text:N": "found", "x:Q": "from (s)"})}
+    region = layer("rect", spans, {**place, "x2": "end"}, style="region", clip=True)
+    return [region, layer("rule", spans, place, style="limit", clip=True, strokeWidth=1.2)] if spans else []
 
 
 def motions(

@@ -108,11 +108,11 @@ def series_look(labels: Sequence[str], as_points: Collection[str] = ()) -> Serie
     points = [label for label in labels if label in as_points]
     dashes = [[1, 0] if label in as_points else list(DASHES[place % len(DASHES)]) for place, label in enumerate(shown)]
     shapes = [SHAPES[points.index(label) % len(SHAPES)] if label in points else STROKE for label in shown]
-    legend: ChartSpec | None = None
-    if len(labels) > 1:
-        legend = {"title": None} | ({} if list(labels) == shown else {"values": list(labels)})
-        # Where a chart has lines alone no shape enters the legend, and its symbol is to be reported.
-        legend |= {} if as_points else {"symbolType": STROKE}
+    legend: ChartSpec | None = None if len(labels) < 2 else {"title": None}
+    if legend and list(labels) != shown:
+        legend["values"] = list(labels)
+    if legend and not as_points:  # lines alone enter no shape in the legend: its symbol is stated
+        legend["symbolType"] = STROKE
 
     def encoding(**scale: Any) -> ChartSpec:
         return {"field": "run", "type": "nominal", "scale": {"domain": shown, **scale}, "legend": legend}
