@@ -196,8 +196,7 @@ class ResultWithController(Result[_S]):
             f"{weather['wind_from_deg']:.0f} deg, and waves of {weather['wave_radps']:.3g} rad/s that alone would "
             f"yaw the ship by {weather['wave_yaw_deg']:.3g} deg (standard deviation); seed {weather['seed']:.0f}."
         )
-        tables = [quantities(caption, figures)]
-        return Section("Course keeping", text=text, tables=tables, charts=[chart])
+        return Section("Course keeping", text=text, tables=[quantities(caption, figures)], charts=[chart])
 
     def _fmu_line(self) -> tuple[str, ...]:
         """The FMU in a line, if there is one."""
@@ -484,8 +483,7 @@ class CraftAutopilotResult(ResultWithController[CraftAutopilotStudy]):
         ]
 
     def _drawn(self, name: str, signals: Sequence[Signal], title: str) -> Illustration:
-        drawn = [_history(name, self.study.histories[name], signals)]
-        return Illustration(history_chart(drawn, signals, title=title))
+        return Illustration(history_chart([_history(name, self.study.histories[name], signals)], signals, title=title))
 
     @property
     def _revolutions(self) -> list[Signal]:

@@ -273,8 +273,7 @@ def _derivatives_section(runs: Sequence[SingleRun]) -> list[Section]:
     if not rows:
         return []
     caption = "Derivatives of the run alone, at its frequency and amplitude (prime, times 10⁵)"
-    found = table(caption, ("run", "derivative", "value", "±"), rows)
-    return [Section("Derivatives of the run alone", tables=[found])]
+    return [Section("Derivatives of the run alone", tables=[table(caption, ("run", "derivative", "value", "±"), rows)])]
 
 
 def _repeats_section(repeats: Sequence[RepeatedCoefficient]) -> list[Section]:

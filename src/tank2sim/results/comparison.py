@@ -256,8 +256,7 @@ class ComparisonResult(Result[CardComparison]):
         charts = []
         if any(summary.compared for summary in study.summary):
             caption = f"Lines at {BEYOND_STANDARD_ERRORS:g} standard errors."
-            chart = _errors_chart(study.rows, self.labels)
-            charts.append(Illustration(chart, caption=caption, name="coefficients"))
+            charts.append(Illustration(_errors_chart(study.rows, self.labels), caption=caption, name="coefficients"))
         return Section("Coefficients", text="\n\n".join(texts), tables=tables, charts=charts)
 
     def _farthest(self, place: int, label: str) -> Table:

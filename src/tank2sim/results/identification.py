@@ -149,8 +149,7 @@ class IdentificationResult(Result[IdentificationStudy]):
             for word, key in SET_KEYS.items()
             for one in self.study.figures[key]
         ]
-        columns = ["trial", "set", "figure", "measured", "before", "now", "low_95", "high_95"]
-        return data_frame(rows, columns=columns)
+        return data_frame(rows, columns=["trial", "set", "figure", "measured", "before", "now", "low_95", "high_95"])
 
     @property
     def samples(self) -> pd.DataFrame | None:

@@ -160,8 +160,7 @@ class InfluenceResult(EnsembleResult[InfluenceStudy]):
         for text, figure in self.study.figures.items():
             target, verdict = targets.get(text, (None, None))
             wanted = f"{target.relation} {target.wanted:g}" if target else None
-            row: list[Cell] = [figure_label(text), wanted, figure.value, tuned.figures.get(text), _unit(text), verdict]
-            rows.append(row)
+            rows.append([figure_label(text), wanted, figure.value, tuned.figures.get(text), _unit(text), verdict])
         notes = [] if tuned.reached else ["The nearest figures are shown, in least squares of relative misses."]
         moves: list[list[Cell]] = [
             [move.name, move.before, move.after, move.standard_errors] for move in tuned.parameters.values()
@@ -402,10 +401,9 @@ def _bars(result: InfluenceStudy, row: int) -> ChartSpec:
         for run, sizes in values.items()
     }
     look = series_look([EXACT, DIFFERENCE], as_points=[EXACT, DIFFERENCE])
-    across = PlotAxis("K (%)", zero=True, ticks=4)
     exact = RowPlot(
         both[EXACT],
-        across=across,
+        across=PlotAxis("K (%)", zero=True, ticks=4),
         shown={"name:N": "parameter", "exact:Q": f"K, {EXACT} (%)", "step:Q": f"K, {DIFFERENCE} (%)"},
         look=look,
         side={"labelLimit": 170},
@@ -433,20 +431,19 @@ def variance_chart(result: InfluenceStudy) -> ChartSpec:
         for row in range(len(figures))
         for place in order
     ]
-    cells = Matrix(
-        colour="share",
-        rows=figures,
-        columns=names,
-        names=("figure", "name"),
-        scale={"domain": [0, max(10.0, float(shares.max(initial=0.0)))], "scheme": "blues"},
-        legend={"title": "share of the variance (%)"},
-        side={"labelLimit": 200, "ticks": False},
-        foot={"labelAngle": -90, "ticks": False},
-        shown={"figure:N": "figure", "name:N": "parameter", "share:Q": ("share (%)", ".1f")},
-        written=False,
-    ).layers
     return layered(
-        cells,
+        Matrix(
+            colour="share",
+            rows=figures,
+            columns=names,
+            names=("figure", "name"),
+            scale={"domain": [0, max(10.0, float(shares.max(initial=0.0)))], "scheme": "blues"},
+            legend={"title": "share of the variance (%)"},
+            side={"labelLimit": 200, "ticks": False},
+            foot={"labelAngle": -90, "ticks": False},
+            shown={"figure:N": "figure", "name:N": "parameter", "share:Q": ("share (%)", ".1f")},
+            written=False,
+        ).layers,
         size=(_WIDTH, 28 * len(figures)),
         data={"values": rows},
         title="Standard errors behind those of the figures",

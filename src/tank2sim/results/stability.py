@@ -228,12 +228,11 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
         tables = [records_table("Steady turns", turning.turns, on_screen=False)]
         if turning.folds:
             tables.append(records_table("Folds, where the ship leaves its branch", turning.folds, on_screen=False))
-        chart = steering_diagram(turning, spirals, title="Steady turns against the rudder")
         return Section(
             "Steady turning",
             text=f"{_TURNING}\n\n{_SPIRALS}" if spirals.direct or spirals.reverse else _TURNING,
             tables=tables,
-            charts=[Illustration(chart)],
+            charts=[Illustration(steering_diagram(turning, spirals, title="Steady turns against the rudder"))],
         )
 
     def _straight_line(self) -> Section:
@@ -246,17 +245,17 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
             ["margin" if straight.C_prime_decides else "margin of C′ alone", margins.margin_percent, "%"],
         ]
         slow = f", in slow motions ({', '.join(states)} at rest)" if states else ""
-        models: list[list[Cell]] = [
-            ["1/s and s", *vars(nomoto.dimensional).values()],
-            ["prime", *vars(nomoto.prime).values()],
-        ]
         return Section(
             "Straight-line stability",
             text=_CRITERION,
             tables=[
                 table("Margin of stability", ("quantity", "value", "unit"), levers, on_screen=False),
                 _eigenvalues(self.study.eigenvalues, "".join(f", {name}" for name in states)),
-                table(f"Nomoto's coefficients{slow}", ("units", "K", "T", "T1", "T2", "T3"), models),
+                table(
+                    f"Nomoto's coefficients{slow}",
+                    ("units", "K", "T", "T1", "T2", "T3"),
+                    [["1/s and s", *vars(nomoto.dimensional).values()], ["prime", *vars(nomoto.prime).values()]],
+                ),
             ],
         )
 
@@ -306,8 +305,7 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
             bode_chart(curves, title="Bode diagram"),
             step_chart(responses, title="Step of the rudder"),
         ]
-        drawn = [Illustration(chart) for chart in charts]
-        return Section(heading, text=_RESPONSE, charts=drawn, folded=True)
+        return Section(heading, text=_RESPONSE, charts=[Illustration(chart) for chart in charts], folded=True)
 
     def _characteristic(self) -> Section:
         found = self.study.characteristic
@@ -318,12 +316,11 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
         ]
         errors = ("rms error (deg)", "largest error (deg)", "error beyond the fit (deg)")
         caption = "Coefficients by powers of the yaw rate, rad and s: Bech's of δ, Norrbin's of K δ"
-        chart = characteristic_chart(found, title="Rudder that holds a yaw rate")
         return Section(
             "Nonlinear steering characteristic",
             text=_CHARACTERISTIC,
             tables=[table(caption, ("cubic", "r⁰", "r¹", "r²", "r³", *errors), rows, on_screen=False)],
-            charts=[Illustration(chart)],
+            charts=[Illustration(characteristic_chart(found, title="Rudder that holds a yaw rate"))],
             folded=True,
         )
 
@@ -420,13 +417,10 @@ class CraftStabilityResult(ResultOnCourse[CraftStabilityStudy]):
         study, run = self.study, self.study.straight_run
         runs = sorted((run, *study.speeds), key=lambda one: one.speed_mps)
         surge = {"speed_mps": "", "revolutions_rpm": "", "stable": "", "surge_time_constant_s": ""}
-        steering: list[list[Cell]] = [
-            [one.speed_mps, one.K * _DEGPS_PER_100_RPM, one.T_s, one.T1_s, one.T2_s, one.T3_s] for one in runs
-        ]
         nomoto = table(
             "Nomoto's coefficients; K: yaw rate for 100 rpm of port less starboard",
             ("speed (m/s)", "K (deg/s)", "T (s)", "T1 (s)", "T2 (s)", "T3 (s)"),
-            steering,
+            [[one.speed_mps, one.K * _DEGPS_PER_100_RPM, one.T_s, one.T1_s, one.T2_s, one.T3_s] for one in runs],
         )
         caption = f"Steady turns about {run.revolutions_rpm:.4g} rpm, positive to starboard"
         turn = dict.fromkeys(("difference_rpm", "yaw_rate_degps", "speed_mps", "drift_deg", "diameter_m"), "")

@@ -340,8 +340,7 @@ class ValidationResult(Result[ValidationStudy]):
     def _documentation(self) -> Section:
         rows = list(self.study.documentation.items())
         caption = "Documentation asked for by ITTC 7.5-02-06-03"
-        tables = [table(caption, ("item", "statement"), rows, on_screen=False)]
-        return Section("The simulation model", tables=tables)
+        return Section("The simulation model", tables=[table(caption, ("item", "statement"), rows, on_screen=False)])
 
     def _coefficients(self) -> Section:
         prime = self.study.steered_by is SteeredBy.RUDDER

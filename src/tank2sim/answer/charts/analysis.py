@@ -119,9 +119,8 @@ def nyquist_chart(loops: Sequence[FrequencyResponse], sensitivity_peak: float, *
         layer("line", circle, {**place, "order": "i:Q"}, style="limit", clip=True, strokeWidth=1.2),
         layer("point", [{"x": -1.0, "v": 0.0}], place, style="limit", shape=CROSS, size=90, strokeWidth=2, clip=True),
     ]
-    rules = [Rule([0.0], upright=True), Rule([0.0])]
     return curve_chart(
-        Plot(series, up=up, height_px=460, rules=rules, over=over),
+        Plot(series, up=up, height_px=460, rules=[Rule([0.0], upright=True), Rule([0.0])], over=over),
         across,
         title=title,
         width_px=460,

@@ -172,8 +172,7 @@ def turn_chart(
     """
     turned = np.abs(motion.heading_deg) <= _FULL_TURN
     dimensions = turn_dimensions(motion, figures, bands or {})
-    shown = motion.until(float(motion.time_s[turned][-1]))
-    return way_chart(motion, dimensions, shown, edges_m=edges_m, title=title)
+    return way_chart(motion, dimensions, motion.until(float(motion.time_s[turned][-1])), edges_m=edges_m, title=title)
 
 
 def way_chart(
@@ -304,16 +303,14 @@ def pull_out_chart(sides: Mapping[str, Motion], neutral_deg: float, *, title: st
         for label, motion in sides.items()
     ]
     longest = max(float(np.max(one.x)) for one in series)
-    across = PlotAxis(
-        f"time from the order of the neutral rudder, {format_number(neutral_deg, _ROUND)}° (s)",
-        domain=(-0.1 * longest, longest),
-        nice=False,
-    )
-    up = PlotAxis("yaw rate, + to starboard (deg/s)", zero=True)
     rules = [Rule([0.0]), Rule([0.0], upright=True, style="dimension")]
     return curve_chart(
-        Plot(series, up=up, height_px=320, rules=rules),
-        across,
+        Plot(series, up=PlotAxis("yaw rate, + to starboard (deg/s)", zero=True), height_px=320, rules=rules),
+        PlotAxis(
+            f"time from the order of the neutral rudder, {format_number(neutral_deg, _ROUND)}° (s)",
+            domain=(-0.1 * longest, longest),
+            nice=False,
+        ),
         title=title,
         width_px=680,
         window=["x"],
@@ -344,8 +341,7 @@ def stop_speed_chart(motion: Motion, *, title: str = "") -> ChartSpec:
     ]
     across = PlotAxis("distance along the track (m)", nice=False)
     described = "Speed over the distance along the track of the stop."
-    shown = {"t:Q": "time (s)"}
-    return curve_panels(plots, across, title=title, width_px=640, described=described, shown=shown)
+    return curve_panels(plots, across, title=title, width_px=640, described=described, shown={"t:Q": "time (s)"})
 
 
 def stop_dimensions(motion: Motion, figures: Mapping[str, float | None]) -> list[Dimension]:

@@ -194,8 +194,7 @@ def history_chart(
     plots = [_signal_plot(runs, signal, height_px, across, marks) for signal in signals]
     names = ", ".join(signal.title for signal in signals)
     described = f"Time histories of {names}, of {_listed(runs)}."
-    shown = {"run:N": "run"}
-    return curve_panels(plots, across, title=title, described=described, look=look, shown=shown)
+    return curve_panels(plots, across, title=title, described=described, look=look, shown={"run:N": "run"})
 
 
 def spiral_chart(
@@ -212,9 +211,8 @@ def spiral_chart(
     across = PlotAxis("rudder angle, starboard positive (deg)", domain=frame.across, nice=False)
     up = PlotAxis("yaw rate, starboard positive (deg/s)", domain=frame.up, nice=False)
     over = _loop_layers(loop_deg, across, up, frame, (rudder, rate)) if loop_deg else []
-    rules = [Rule([0.0], upright=True), Rule([0.0])]
     return curve_chart(
-        Plot(series, up=up, height_px=frame.height_px, rules=rules, over=over),
+        Plot(series, up=up, height_px=frame.height_px, rules=[Rule([0.0], upright=True), Rule([0.0])], over=over),
         across,
         title=title,
         width_px=frame.width_px,
@@ -330,8 +328,7 @@ def varying_histories(columns: _Columns, bands: Mapping[str, BandOverTime], band
     held = ", ".join(f"{signal.title} {_held(signal, table[signal.name][0])}" for signal in constant)
     said = ["Shaded: nine of ten ships at each time."] if shaded else []
     said += [f"Constant: {held}."] if held else []
-    chart = history_chart([run], shown, title="Time histories", height_px=110)
-    return Illustration(chart, caption=" ".join(said))
+    return Illustration(history_chart([run], shown, title="Time histories", height_px=110), caption=" ".join(said))
 
 
 def _band(name: str, band: BandOverTime, time_s: Array) -> HistoryBand:
