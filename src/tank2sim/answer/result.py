@@ -37,6 +37,9 @@ class Result(ABC, Generic[_S]):
     subject: ClassVar[str] = ""
     """What was done, after the name of the ship in the title."""
 
+    procedure: ClassVar[str] = ""
+    """How it was done, where that is always the same: the line under the title."""
+
     study: _S
     """Numbers with units in the names of their fields."""
 
@@ -49,7 +52,7 @@ class Result(ABC, Generic[_S]):
     @property
     def subtitle(self) -> str:
         """A line under the title."""
-        return ""
+        return self.procedure
 
     @property
     @abstractmethod

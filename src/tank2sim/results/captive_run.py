@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -60,6 +58,7 @@ class CaptiveRunResult(Result[CaptiveRunStudy]):
     study: CaptiveRunStudy
     reduced: tuple[ReducedRun, ...] = ()
     command: ClassVar[str] = "run"
+    procedure: ClassVar[str] = "Captive run, reduced by itself"
 
     @property
     def runs(self) -> tuple[SingleRun, ...]:
@@ -74,7 +73,8 @@ class CaptiveRunResult(Result[CaptiveRunStudy]):
     @property
     def coefficients(self) -> pd.DataFrame:
         """A row each Fourier coefficient: run, signal, unit, order, cosine, sine, amplitude, phase (deg), errors."""
-        return data_frame(self._rows(), columns=_HEADS)
+        rows = [[run.name, *_coefficient_cells(each)] for run in self.runs for each in run.coefficients]
+        return data_frame(rows, columns=_HEADS)
 
     def cycle(self, run: int = 0) -> pd.DataFrame:
         """Averaged cycle of a run: ``phase_deg``, and mean, standard deviation and fit of each force (N, N m).
@@ -99,18 +99,7 @@ class CaptiveRunResult(Result[CaptiveRunStudy]):
         return data_frame(columns)
 
     def cycle_csv(self, run: int = 0) -> str:
-        """The averaged cycle of a run as CSV, columns as :meth:`cycle` has them.
-
-        Parameters
-        ----------
-        run : int
-            Place of the run.
-
-        Raises
-        ------
-        InputError
-            The run does not oscillate.
-        """
+        """The averaged cycle of a run (by its place) as CSV: columns, and errors, as of :meth:`cycle`."""
         text: str = self.cycle(run).to_csv(index=False, float_format="%.9g", lineterminator="\n")
         return text
 
@@ -122,26 +111,15 @@ class CaptiveRunResult(Result[CaptiveRunStudy]):
         InputError
             The file cannot be written.
         """
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(_HEADS)
-        writer.writerows([f"{cell:.9g}" if isinstance(cell, float) else cell for cell in row] for row in self._rows())
+        text: str = self.coefficients.to_csv(index=False, na_rep="nan", float_format="%.9g", lineterminator="\n")
         if path is not None:
-            write_together({Path(path): text.getvalue()}, inputs=[])
-        return text.getvalue()
-
-    def _rows(self) -> list[list[Cell]]:
-        return [[run.name, *_coefficient_cells(each)] for run in self.runs for each in run.coefficients]
+            write_together({Path(path): text}, inputs=[])
+        return text
 
     @property
     def title(self) -> str:
         """The runs."""
         return f"Run: {', '.join(run.name.rpartition('/')[2] for run in self.runs)}"
-
-    @property
-    def subtitle(self) -> str:
-        """What was done."""
-        return "Captive run, reduced by itself"
 
     @property
     def headline(self) -> tuple[str, ...]:

@@ -74,6 +74,7 @@ class ReductionResult(Result[ReductionStudy]):
     reduction: Reduction | None = None
     contents: Contents | None = None
     command: ClassVar[str] = "reduce"
+    procedure: ClassVar[str] = "Captive model tests, reduced"
 
     @property
     def inputs(self) -> tuple[Path, ...]:
@@ -122,11 +123,6 @@ class ReductionResult(Result[ReductionStudy]):
     def title(self) -> str:
         """The model."""
         return str(self.study.model["name"])
-
-    @property
-    def subtitle(self) -> str:
-        """What was done."""
-        return "Captive model tests, reduced"
 
     @property
     def headline(self) -> tuple[str, ...]:

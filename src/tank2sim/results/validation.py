@@ -169,6 +169,7 @@ class ValidationResult(Result[ValidationStudy]):
     card: SteeredCard | None = None
     paths: tuple[Path, ...] = ()
     command: ClassVar[str] = "validate"
+    procedure: ClassVar[str] = "Validation of the manoeuvring simulation model, in the manner of ITTC 7.5-02-06-03"
     subject: ClassVar[str] = "validation"
 
     @property
@@ -188,11 +189,6 @@ class ValidationResult(Result[ValidationStudy]):
         """Figures of standard trials, a row each: value, numerical uncertainty U_num, deviation by the inputs."""
         frame = records_frame(self.study.verification, ("trial", "name", "value", "U_num", "deviation"))
         return frame.rename(columns={"name": "figure", "U_num": "numerical"})
-
-    @property
-    def subtitle(self) -> str:
-        """The procedure."""
-        return "Validation of the manoeuvring simulation model, in the manner of ITTC 7.5-02-06-03"
 
     @property
     def headline(self) -> tuple[str, ...]:
