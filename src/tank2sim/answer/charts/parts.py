@@ -108,16 +108,20 @@ def series_look(labels: Sequence[str], as_points: Collection[str] = ()) -> Serie
     points = [label for label in labels if label in as_points]
     dashes = [[1, 0] if label in as_points else list(DASHES[place % len(DASHES)]) for place, label in enumerate(shown)]
     shapes = [SHAPES[points.index(label) % len(SHAPES)] if label in points else STROKE for label in shown]
-    legend: ChartSpec | None = None if len(labels) < 2 else {"title": None}
-    if legend and list(labels) != shown:
-        legend["values"] = list(labels)
-    if legend and not as_points:  # lines alone enter no shape in the legend: its symbol is stated
-        legend["symbolType"] = STROKE
+    legend = _legend(labels, shown, lines_alone=not as_points)
 
     def encoding(**scale: Any) -> ChartSpec:
         return {"field": "run", "type": "nominal", "scale": {"domain": shown, **scale}, "legend": legend}
 
     return SeriesLook(encoding(), encoding(range=dashes), encoding(range=shapes))
+
+
+def _legend(labels: Sequence[str], shown: Sequence[str], *, lines_alone: bool) -> ChartSpec | None:
+    if len(labels) < 2:
+        return None
+    legend: ChartSpec = {"title": None} | ({} if list(labels) == shown else {"values": list(labels)})
+    # Where a chart has lines alone no shape enters the legend, and its symbol is stated.
+    return legend | ({"symbolType": STROKE} if lines_alone else {})
 
 
 def _places(labels: Sequence[str]) -> dict[int, str]:
