@@ -4,7 +4,6 @@ from .answer.parts import Table as Table
 from .answer.result import Result as Result
 from .api.audit import audit as audit
 from .api.captive_run import reduce_runs as reduce_runs
-from .api.comparison import compare as compare
 from .api.fmu import check_fmu as check_fmu
 from .api.gap import find_gap as find_gap
 from .api.identification import identify as identify
@@ -14,6 +13,7 @@ from .api.report import make_report as make_report
 from .api.results import json_schema as json_schema
 from .api.trial import TrialRecord as TrialRecord
 from .api.trial import read_trial as read_trial
+from .api.validation import compare as compare
 from .api.validation import validate as validate
 from .apps.ardupilot.command import serve as serve
 from .apps.ardupilot.result import ServeResult as ServeResult

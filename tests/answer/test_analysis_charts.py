@@ -20,7 +20,7 @@ def rows(specification, layer):
 
 def bode_of(response):
     omega = np.logspace(-2, 2, 401)
-    system = FrequencyResponse(label="system", omega_radps=omega, response=response(1j * omega))
+    system = FrequencyResponse("system", omega_radps=omega, response=response(1j * omega))
     specification = chart_specification(bode_chart([system]))
     panels = [panel["layer"][0] for panel in specification["vconcat"]]
     at = [{round(row["x"], 6): row["v"] for row in rows(specification, panel)} for panel in panels]
@@ -58,9 +58,7 @@ def test_bode_axes_name_their_units_and_the_frequency_is_logarithmic():
 
 
 def test_a_pole_tells_its_natural_frequency_and_damping():
-    specification = chart_specification(
-        pole_zero_chart([PolesZeros(label="yaw", poles=[-3 + 4j, -3 - 4j], zeros=[-2])])
-    )
+    specification = chart_specification(pole_zero_chart([PolesZeros("yaw", poles=[-3 + 4j, -3 - 4j], zeros=[-2])]))
     upper, _, zero = rows(specification, specification["layer"][-1])
     assert (upper["kind"], upper["re"], upper["im"], upper["wn"], upper["zeta"]) == ("pole", -3, 4, 5, 0.6)
     assert (zero["kind"], zero["re"]) == ("zero", -2)
@@ -68,7 +66,7 @@ def test_a_pole_tells_its_natural_frequency_and_damping():
 
 @pytest.mark.parametrize("poles", [[-0.1, -0.01], [0.02], [-0.05 + 2j, -0.05 - 2j], [0.0]])
 def test_the_complex_plane_has_one_scale_and_shows_the_border_of_stability(poles):
-    specification = chart_specification(pole_zero_chart([PolesZeros(label="yaw", poles=poles)]))
+    specification = chart_specification(pole_zero_chart([PolesZeros("yaw", poles=poles)]))
     encoding = specification["layer"][-1]["encoding"]
     (left, right), (low, high) = encoding["x"]["scale"]["domain"], encoding["y"]["scale"]["domain"]
     assert (right - left) / specification["width"] == pytest.approx((high - low) / specification["height"], rel=1e-12)

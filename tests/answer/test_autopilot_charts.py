@@ -21,7 +21,7 @@ def rows_of(chart: object, layer: int) -> list[dict[str, float]]:
 
 def test_the_nyquist_curve_touches_the_circle_of_its_peak() -> None:
     peak = float(1 / np.abs(1 + LOOP).min())
-    chart = nyquist_chart([FrequencyResponse(label="L", omega_radps=OMEGA, response=LOOP)], peak)
+    chart = nyquist_chart([FrequencyResponse("L", omega_radps=OMEGA, response=LOOP)], peak)
     circle, curve = (np.array([complex(row["x"], row["v"]) for row in rows_of(chart, n)]) for n in (4, 2))
     np.testing.assert_allclose(np.abs(circle + 1), 1 / peak, rtol=1e-4)
     assert np.abs(curve + 1).min() == pytest.approx(1 / peak, rel=2e-3)
@@ -29,7 +29,7 @@ def test_the_nyquist_curve_touches_the_circle_of_its_peak() -> None:
 
 
 def test_sensitivities_are_in_decibel_over_frequency() -> None:
-    chart = sensitivity_chart([FrequencyResponse(label="S", omega_radps=OMEGA, response=1 / (1 + LOOP))])
+    chart = sensitivity_chart([FrequencyResponse("S", omega_radps=OMEGA, response=1 / (1 + LOOP))])
     rows = rows_of(chart, 1)
     for row in rows[:: len(rows) // 7]:
         s = 1j * row["x"]

@@ -39,7 +39,7 @@ def test_a_picture_has_the_size_of_its_chart_times_the_scale(charts):
 
 
 def test_a_run_to_the_north_east_goes_up_and_to_the_right_in_the_picture():
-    pixels = picture(track_chart([TrackData(label="run", x_m=[0, 1000], y_m=[0, 400])]), scale=1.0)
+    pixels = picture(track_chart([TrackData("run", x_m=[0, 1000], y_m=[0, 400])]), scale=1.0)
     line = near(pixels, LIGHT_PALETTE[0])
     top, bottom = line[line[:, 0].argmin()], line[line[:, 0].argmax()]
     assert top[1] > bottom[1]

@@ -64,7 +64,7 @@ def test_labels_of_one_place_are_moved_apart() -> None:
 
 
 def test_labels_of_one_place_without_a_choice_are_seen_as_a_fault_and_the_second_is_left_out() -> None:
-    spot = Spot(at=(200.0, 100.0))
+    spot = Spot((200.0, 100.0))
     one, other = (drawn([(text, [spot])]) for text in ("advance 570 m", "tactical diameter 1029 m"))
     over = one | {"layer": [*one["layer"], *other["layer"]]}
     assert faults(over) == ["'advance 570 m' on 'tactical diameter 1029 m'"]

@@ -17,7 +17,7 @@ from tank2sim.answer.charts.manoeuvre import (
     turn_dimensions,
     zigzag_chart,
 )
-from tank2sim.answer.charts.motion import SpiralData, spiral_chart
+from tank2sim.answer.charts.motion import spiral_chart
 from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.answer.parts import Verdict
 from tank2sim.notices import caution
@@ -163,9 +163,8 @@ def test_a_stop_shows_speed_and_revolutions_over_the_distance_along_the_track():
 
 
 def test_the_loop_of_a_spiral_is_marked_between_its_rudders_of_no_yaw_rate():
-    rudder = np.radians([10.0, 0.0, -10.0, 0.0, 10.0])
-    spiral = SpiralData(label="spiral", rudder_rad=rudder, yaw_rate_radps=np.radians([0.5, 0.2, -0.5, -0.2, 0.5]))
-    specification = chart_specification(spiral_chart([spiral], loop_rad=(np.radians(-2.0), np.radians(2.5))))
+    chart = spiral_chart([10.0, 0.0, -10.0, 0.0, 10.0], [0.5, 0.2, -0.5, -0.2, 0.5], loop_deg=(-2.0, 2.5))
+    specification = chart_specification(chart)
     (mark,) = in_style(specification, "overshoot")
     assert (mark["x"], mark["to"], mark["v"]) == (-2.0, 2.5, 0.0)
 

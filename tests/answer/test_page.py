@@ -63,8 +63,8 @@ def drawings(html):
 def test_notes_of_a_table_are_below_it_and_cautions_at_the_top_of_the_page() -> None:
     mark = caution("beyond the card").of("advance")
     notes = ("advance: the larger side", mark)
-    criteria = Table(caption="Criteria", columns=[Column(title="criterion")], rows=[["advance"]], notes=notes)
-    found = render_page(Page(title="A ship", sections=[Section(heading="IMO", tables=[criteria])]))
+    criteria = Table(caption="Criteria", columns=[Column("criterion")], rows=[["advance"]], notes=notes)
+    found = render_page(Page(title="A ship", sections=[Section("IMO", tables=[criteria])]))
     assert found.count(mark) == 1 and found.index(mark) < found.index("<main")
     assert found.index("</table>") < found.index(notes[0])
 
@@ -149,20 +149,18 @@ def test_verdicts_are_words_and_not_only_colours(reader):
 
 
 def test_nothing_a_card_says_becomes_markup():
-    chart = track_chart(
-        [TrackData(label=NASTY, x_m=[0, 1], y_m=[0, 1]), TrackData(label="b", x_m=[0, 1], y_m=[0, 1])], title=NASTY
-    )
+    chart = track_chart([TrackData(NASTY, x_m=[0, 1], y_m=[0, 1]), TrackData("b", x_m=[0, 1], y_m=[0, 1])], title=NASTY)
     page = Page(
         title=NASTY,
         subtitle=NASTY,
-        figures=[KeyFigure(label=NASTY, value=NASTY, unit=NASTY, note=NASTY)],
+        figures=[KeyFigure(NASTY, NASTY, NASTY, note=NASTY)],
         sections=[
             Section(
-                heading=NASTY,
+                NASTY,
                 text=NASTY,
                 notes=[NASTY],
-                tables=[Table(caption=NASTY, columns=[Column(title=NASTY, unit=NASTY)], rows=[[NASTY]])],
-                charts=[Illustration(chart=chart, caption=NASTY)],
+                tables=[Table(caption=NASTY, columns=[Column(NASTY, NASTY)], rows=[[NASTY]])],
+                charts=[Illustration(chart, caption=NASTY)],
             )
         ]
         * 2,
@@ -179,26 +177,24 @@ def test_nothing_a_card_says_becomes_markup():
 
 
 def test_the_page_stays_below_6_mb_with_twenty_charts_of_long_runs(charts):
-    section = Section(
-        heading="Many", charts=[Illustration(chart=charts["track"]), Illustration(chart=charts["history"])] * 10
-    )
+    section = Section("Many", charts=[Illustration(charts["track"]), Illustration(charts["history"])] * 10)
     assert len(render_page(Page(title="Long", sections=[section])).encode()) < 6e6
 
 
 def test_a_page_without_charts_carries_no_library():
-    html = render_page(Page(title="Tables alone", sections=[Section(heading="One", text="Text.")]))
+    html = render_page(Page(title="Tables alone", sections=[Section("One", text="Text.")]))
     assert len(html) < 30_000
     assert "<script" not in html
 
 
 def test_a_row_that_does_not_fit_its_table_is_refused():
     with pytest.raises(ValueError, match="1 cells in a row of 2 columns"):
-        Table(caption="Figures", columns=[Column(title="a"), Column(title="b")], rows=[[1.0]])
+        Table(caption="Figures", columns=[Column("a"), Column("b")], rows=[[1.0]])
 
 
 def test_truth_values_and_missing_ones_are_words():
-    table = Table(caption="Checks", columns=[Column(title="valid"), Column(title="n")], rows=[[True, 1], [False, None]])
-    reader = Reader(render_page(Page(title="t", sections=[Section(heading="s", tables=[table])])))
+    table = Table(caption="Checks", columns=[Column("valid"), Column("n")], rows=[[True, 1], [False, None]])
+    reader = Reader(render_page(Page(title="t", sections=[Section("s", tables=[table])])))
     assert reader.words("tbody").split() == ["yes", "1", "no", "–"]
 
 
@@ -206,19 +202,19 @@ def test_truth_values_and_missing_ones_are_words():
     ("count", "across"), [(1, 3), (4, 4), (5, 5), (6, 3), (7, 4), (8, 4), (9, 3), (10, 5), (12, 4)]
 )
 def test_cards_leave_few_gaps_in_their_last_row(count, across):
-    page = Page(title="t", figures=[KeyFigure(label=str(n), value=n, verdict=Verdict.NONE) for n in range(count)])
+    page = Page(title="t", figures=[KeyFigure(str(n), n, verdict=Verdict.NONE) for n in range(count)])
     html = render_page(page)
     assert f'class="cards across-{across}"' in html
     assert f".cards.across-{across} " in html
 
 
 def one_section(**content):
-    return Reader(render_page(Page(title="T", sections=[Section(heading="H", **content)])))
+    return Reader(render_page(Page(title="T", sections=[Section("H", **content)])))
 
 
 @pytest.mark.parametrize(("rows", "folded", "details"), [(10, None, 0), (11, None, 1), (11, False, 0), (1, True, 1)])
 def test_a_long_table_is_folded_unless_it_says_otherwise(rows, folded, details):
-    table = Table(caption="Long", columns=[Column(title="a")], rows=[[1.0]] * rows, folded=folded)
+    table = Table(caption="Long", columns=[Column("a")], rows=[[1.0]] * rows, folded=folded)
     reader = one_section(tables=[table])
     assert len(reader.all("details")) == details
     assert "Long" in reader.words("summary" if details else "caption")
@@ -237,7 +233,7 @@ def test_a_caution_is_at_the_top_of_the_page_alone():
 
 
 def test_the_bar_of_a_figure_is_in_proportion_to_its_limit():
-    below, above = (KeyFigure(label="a", value=value, limit=4.0) for value in (1.0, -8.0))
+    below, above = (KeyFigure("a", value, limit=4.0) for value in (1.0, -8.0))
     assert below.reach_percent / below.limit_percent == pytest.approx(0.25, rel=1e-2)
     assert above.reach_percent / above.limit_percent == pytest.approx(2.0, rel=1e-2)
     assert 0 < below.limit_percent < 100 and 0 < above.reach_percent < 100

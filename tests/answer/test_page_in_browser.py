@@ -61,7 +61,7 @@ def test_the_page_draws_every_chart_without_a_word_in_the_console(page, tmp_path
 
 def wheel_over(chart, folder, *flags):
     """What a chart shows at first, after the wheel alone, and after the wheel with Ctrl."""
-    html = render_page(Page(title="Wheel", sections=[Section(heading="Chart", charts=[Illustration(chart=chart)])]))
+    html = render_page(Page(title="Wheel", sections=[Section("Chart", charts=[Illustration(chart)])]))
     place = html.rindex('<script>\n"use strict"')
     html = html[:place] + KEEP_VIEWS + html[place:].replace("</body>", TURN_WHEEL + "</body>")
     seen, console = opened(html, folder, *flags)
@@ -72,7 +72,7 @@ def wheel_over(chart, folder, *flags):
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [1200, 420])
 def test_a_track_keeps_equal_scales_when_it_is_zoomed_and_when_the_window_is_narrow(tmp_path, width):
-    track = TrackData(label="run", x_m=[0, 300, 500], y_m=[0, 50, 900])
+    track = TrackData("run", x_m=[0, 300, 500], y_m=[0, 50, 900])
     before, wheel, zoomed = wheel_over(track_chart([track]), tmp_path, f"--window-size={width},900")
     assert before["width"] < width
     assert before["x"] / before["width"] == pytest.approx(before["y"] / before["height"], rel=1e-9)
@@ -91,12 +91,8 @@ def test_stacked_charts_are_zoomed_along_their_common_axis(charts, tmp_path, nam
 
 def test_a_name_that_is_a_script_is_not_run(tmp_path):
     name = "</script><script>document.body.dataset.run = 1</script><img src=x onerror='document.body.dataset.run = 2'>"
-    chart = track_chart(
-        [TrackData(label=name, x_m=[0, 1], y_m=[0, 1]), TrackData(label="b", x_m=[0, 1], y_m=[0, 1])], title=name
-    )
-    page = Page(
-        title=name, sections=[Section(heading=name, text=name, charts=[Illustration(chart=chart, caption=name)])]
-    )
+    chart = track_chart([TrackData(name, x_m=[0, 1], y_m=[0, 1]), TrackData("b", x_m=[0, 1], y_m=[0, 1])], title=name)
+    page = Page(title=name, sections=[Section(name, text=name, charts=[Illustration(chart, caption=name)])])
     seen, console = opened(render_page(page), tmp_path)
     assert console == []
     assert 'data-charts="drawn"' in seen
@@ -118,8 +114,8 @@ measure();
 
 @pytest.mark.slow
 def test_charts_fit_a_window_of_400_px_at_the_size_of_their_letters(charts, tmp_path):
-    shown = [Illustration(chart=charts[name]) for name in ("track", "history", "bode")]
-    inner = render_page(Page(title="Narrow", sections=[Section(heading="Charts", charts=shown)]))
+    shown = [Illustration(charts[name]) for name in ("track", "history", "bode")]
+    inner = render_page(Page(title="Narrow", sections=[Section("Charts", charts=shown)]))
     html = f'<body><iframe width="400" height="800" srcdoc="{escape(inner)}"></iframe>{MEASURE}</body>'
     seen, _ = opened(html, tmp_path)
     found = json.loads(unescape(re.search(r'data-seen="(.*?)"', seen)[1]))
@@ -151,7 +147,7 @@ measure();
 
 @pytest.mark.slow
 def test_halves_and_panels_are_side_by_side_only_where_there_is_room_and_folded_charts_are_drawn(charts, tmp_path):
-    half = Illustration(chart=charts["track"], half=True)
+    half = Illustration(charts["track"], half=True)
     panel = alt.Chart(alt.Data(values=[{"a": 1}])).mark_point().encode(x="a:Q", y="a:Q").properties(width=300)
     kinds = (
         alt.Chart(alt.Data(values=[{"a": 1, "k": "one"}, {"a": 2, "k": "two"}])).mark_point().encode(x="a:Q", y="a:Q")
@@ -162,8 +158,8 @@ def test_halves_and_panels_are_side_by_side_only_where_there_is_room_and_folded_
         alt.vconcat(kinds.properties(width=300).facet(column="k:N"), usermeta=STACKS),
     ]
     sections = [
-        Section(heading="First", charts=[half, half, *(Illustration(chart=grid) for grid in grids)]),
-        Section(heading="Folded", charts=[Illustration(chart=charts["history"])], folded=True),
+        Section("First", charts=[half, half, *(Illustration(grid) for grid in grids)]),
+        Section("Folded", charts=[Illustration(charts["history"])], folded=True),
     ]
     inner = escape(render_page(Page(title="Places", verdict="It fits.", sections=sections)))
     frames = (f'<iframe width="{width}" height="800" srcdoc="{inner}"></iframe>' for width in (1300, 400))
@@ -189,9 +185,9 @@ setTimeout(widths, 300);
 @pytest.mark.slow
 def test_a_legend_as_wide_as_the_window_does_not_squeeze_the_plot(tmp_path):
     times = [0.0, 1.0, 2.0]
-    lines = [PlotSeries(label=name, x=times, y=times) for name in ("fit", "0.4 rad/s", "0.6 rad/s")]
-    chart = curve_chart(Plot(series=lines, up=PlotAxis(title="Yv")), PlotAxis(title="v'"), described="three lines")
-    inner = escape(render_page(Page(title="x", sections=[Section(heading="x", charts=[Illustration(chart=chart)])])))
+    lines = [PlotSeries(name, x=times, y=times) for name in ("fit", "0.4 rad/s", "0.6 rad/s")]
+    chart = curve_chart(Plot(lines, up=PlotAxis("Yv")), PlotAxis("v'"), described="three lines")
+    inner = escape(render_page(Page(title="x", sections=[Section("x", charts=[Illustration(chart)])])))
     frames = "".join(
         f'<iframe width="{width}" height="800" srcdoc="{inner}"></iframe>' for width in range(340, 430, 10)
     )

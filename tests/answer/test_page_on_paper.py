@@ -30,10 +30,10 @@ def printed(sections: list[Section], folder: Path, *how: str) -> str:
 @pytest.mark.skipif(shutil.which("pdftotext") is None, reason="no pdftotext is installed to read the print with")
 @pytest.mark.parametrize("count", [7, 10, 20])
 def test_no_column_of_a_wide_table_falls_off_the_sheet(count: int, tmp_path: Path) -> None:
-    columns = [Column(title=f"standard error of the quantity{place}x", unit="kg m²") for place in range(count)]
+    columns = [Column(f"standard error of the quantity{place}x", "kg m²") for place in range(count)]
     rows = [[1000.0 + 13 * row + place for place in range(count)] for row in range(6)]
     table = Table(caption="wide", columns=columns, rows=rows)
-    boxes = printed([Section(heading="Part", tables=[table])], tmp_path, "-bbox")
+    boxes = printed([Section("Part", tables=[table])], tmp_path, "-bbox")
     sheet = float(re.search(r'<page width="([\d.]+)"', boxes)[1])
     words = re.findall(r'xMin="([\d.]+)" yMin="[\d.]+" xMax="([\d.]+)" yMax="[\d.]+">([^<]*)<', boxes)
     assert max(float(right) for _, right, _ in words) < sheet - 40  # the margin of 15 mm is 42.5 points
@@ -49,12 +49,12 @@ def test_no_table_leaves_its_head_behind_at_the_foot_of_a_sheet(tmp_path) -> Non
     tables = [
         Table(
             caption=f"caption{place}x",
-            columns=[Column(title=f"head{place}x")],
+            columns=[Column(f"head{place}x")],
             rows=[[f"row{place}x{row}x"] for row in range(4 if place % 2 else 16)],
         )
         for place in range(24)
     ]
-    sections = [Section(heading=f"Part {n}", text="word " * 30 * (n % 5 + 1), tables=[t]) for n, t in enumerate(tables)]
+    sections = [Section(f"Part {n}", text="word " * 30 * (n % 5 + 1), tables=[t]) for n, t in enumerate(tables)]
     sheets = printed(sections, tmp_path, "-layout")
     for sheet in sheets.split("\f"):
         for place in re.findall(r"caption(\d+)x", sheet):

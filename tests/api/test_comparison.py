@@ -7,7 +7,7 @@ import doctest
 import pytest
 
 import tank2sim as t2s
-from tank2sim.api import comparison as module
+from tank2sim.api import validation as module
 
 
 @pytest.fixture(scope="module")

@@ -54,13 +54,13 @@ def format_column(values: Sequence[float], digits: int = 4) -> list[str]:
     The largest gets `digits` significant digits. A column whose numbers are too far apart for that (some would be
     shown as 0), or too large or small, shows each number for itself as :func:`format_number` does.
     """
-    sizes = [abs(float(value)) for value in values if math.isfinite(value) and value != 0]
-    if all(isinstance(value, Integral) for value in values) or not sizes:
+    finite = list(map(float, filter(math.isfinite, values)))
+    sizes = sorted(filter(None, map(abs, finite))) or [0.0]
+    decimals = _decimals(sizes[-1], digits)
+    apart = not _SMALL <= sizes[-1] < _LARGE or sizes[0] < 10.0**-decimals
+    if apart or all(isinstance(value, Integral) for value in values):
         return [format_number(value, digits) for value in values]
-    decimals = _decimals(max(sizes), digits)
-    if max(sizes) >= _LARGE or max(sizes) < _SMALL or min(sizes) < 10.0**-decimals:
-        return [format_number(value, digits) for value in values]
-    needed = _needed([float(value) for value in values if math.isfinite(value)], decimals)
+    needed = _needed(finite, decimals)
     return [
         _grouped(f"{float(value):.{needed}f}") if math.isfinite(value) else format_number(value) for value in values
     ]

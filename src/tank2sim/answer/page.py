@@ -56,9 +56,8 @@ def render_page(page: Page) -> str:
     numbers = {"chart": itertools.count(1), "table": itertools.count(1)}
     cautions = foremost(_messages(page))
     sections = [_section(section, numbers) for section in page.sections]
-    # What is left of a section whose notices are at the top of the page.
-    parts = ("notes", "tables", "charts")
-    sections = [section for section in sections if any(section[part] for part in parts) or section["content"].text]
+    # A section whose notices are at the top of the page may have nothing left.
+    sections = list(filter(_has_content, sections))
     specifications = [chart["specification"] for section in sections for chart in section["charts"]]
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("tank2sim", "answer"), autoescape=True, undefined=jinja2.StrictUndefined
@@ -78,6 +77,10 @@ def render_page(page: Page) -> str:
         library=Markup(_vega()) if specifications else None,
         drawings=json_in_html({"light": LIGHT, "dark": DARK, "locale": LOCALE, "charts": specifications}),
     )
+
+
+def _has_content(section: Mapping[str, Any]) -> bool:
+    return bool(section["notes"] or section["tables"] or section["charts"] or section["content"].text)
 
 
 def _messages(page: Page) -> Iterable[object]:

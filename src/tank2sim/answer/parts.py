@@ -29,21 +29,11 @@ class Verdict(StrEnum):
     FAILED = "failed"
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class KeyFigure:
     """A key figure, shown on a card at the top of the page.
 
-    Parameters
-    ----------
-    label : str
-    value : float or str
-        In `unit`.
-    unit : str
-    verdict : Verdict
-    note : str
-        A few words under the value.
-    limit : float, optional
-        Largest value allowed, in `unit`; a bar then shows the size of the value next to it.
+    `note`: a few words under the value; `limit`: largest value allowed, in `unit`; a bar then shows the value's size.
     """
 
     label: str
@@ -73,7 +63,7 @@ _ROOM = 1.15
 """Room of the bar of a key figure, over the larger of figure and limit. Project choice: both ends are seen."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Column:
     """Head of a column: its title, the unit of its numbers, and their significant digits."""
 
@@ -114,25 +104,9 @@ REPR_ROWS = 20
 class Table:
     """A table, on the screen, on the page and as a data frame. :func:`table` makes one from heads with units.
 
-    Parameters
-    ----------
-    caption : str
-    columns : sequence of Column
-    rows : sequence of sequences of Cell
-    notes : sequence of str
-        Sentences under the table.
-    folded : bool, optional
-        Whether the page shows only the caption until the reader opens the table; by default a long table is folded.
-        On paper all are open.
-    on_screen : bool
-        Whether the command prints it; ``.tables`` and the page have every table.
-    wide : bool
-        Names in it are never broken on the screen, however wide it becomes.
-
-    Raises
-    ------
-    ValueError
-        A row has not as many cells as there are columns.
+    `notes`: sentences under it; `folded`: whether the page shows only the caption until the reader opens the table
+    (by default if it is long; on paper all are open); `on_screen`: whether the command prints it; `wide`: names in it
+    are never broken on the screen. Raises ValueError: a row has not as many cells as there are columns.
     """
 
     caption: str
@@ -180,20 +154,9 @@ def table(
     folded: bool | None = None,
     on_screen: bool = True,
 ) -> Table:
-    """Return a table whose heads are written with their units: ``("run", "speed (m/s)")``.
+    """Return a table whose heads are texts with the unit in the last brackets: ``("run", "speed (m/s)")``.
 
-    Parameters
-    ----------
-    caption : str
-    heads : iterable of str or Column
-        Heads as text; the unit is in the last brackets.
-    rows : iterable of sequences of Cell
-    *notes : str
-        Sentences under the table.
-    digits : int
-        Significant digits of the numbers.
-    folded, on_screen
-        As of :class:`Table`.
+    `digits`: significant digits of the numbers; `notes`, `folded`, `on_screen`: as of :class:`Table`.
 
     Examples
     --------
@@ -208,20 +171,15 @@ def table(
 def _column(head: str, digits: int) -> Column:
     title, bracket, unit = head.rpartition(" (")
     if not bracket or not unit.endswith(")"):
-        return Column(title=head, digits=digits)
-    return Column(title=title, unit=unit.removesuffix(")"), digits=digits)
+        return Column(head, digits=digits)
+    return Column(title, unit.removesuffix(")"), digits=digits)
 
 
 def quantities(caption: str, values: Mapping[str, Cell], **options: Any) -> Table:
     """Return a table with one row a value: its words, the value, and its unit, both from its name.
 
-    Parameters
-    ----------
-    caption : str
-    values : mapping
-        Names with their units (``Kd_s``) to values; what is not known (None) has no row.
-    **options
-        As of :func:`table`.
+    `values`: names with their units (``Kd_s``) to values; what is not known (None) has no row; **options: as of
+    :func:`table`.
 
     Examples
     --------
@@ -246,30 +204,29 @@ def records_table(
 ) -> Table:
     """Return a table with one row a record (a dataclass); its fields are the columns, with units from their names.
 
-    Parameters
-    ----------
-    caption : str
-    records : mapping or sequence
-        Records; with names, `first` heads the column of the names.
-    first : str
-    fields : mapping or iterable of str
-        Fields to show, in their order, by default all; a mapping also gives the words of each ("" for those of its
-        name).
-    **options
-        As of :func:`table`.
+    `first`: head of the names of records that are a mapping; `fields`: those to show, by default all; a mapping also
+    gives the words of each ("" for those of its name); **options: as of :func:`table`.
     """
     values = list(records.values()) if isinstance(records, Mapping) else list(records)
     words = dict(fields) if isinstance(fields, Mapping) else dict.fromkeys(fields, "")
     if not words:
         words = dict.fromkeys((field.name for field in dataclasses.fields(values[0])) if values else (), "")
-    heads = [Column(title=first)] if isinstance(records, Mapping) else []
+    heads = [Column(first)] if isinstance(records, Mapping) else []
     for name, title in words.items():
         own, unit = in_words(name)
-        heads.append(Column(title=title or own, unit=unit, digits=options.get("digits", 4)))
+        heads.append(Column(title or own, unit, digits=options.get("digits", 4)))
     rows: list[list[Cell]] = [[getattr(record, name) for name in words] for record in values]
     if isinstance(records, Mapping):
         rows = [[name, *row] for name, row in zip(records, rows, strict=True)]
     return table(caption, heads, rows, **options)
+
+
+def data_frame(rows: Any, columns: Sequence[str] | None = None, *, index: str = "") -> pd.DataFrame:
+    """Return a data frame of rows, or of columns by name; the column `index` becomes its index."""
+    import pandas as pd
+
+    found = pd.DataFrame(rows, columns=columns)
+    return found.set_index(index) if index else found
 
 
 def records_frame(
@@ -277,13 +234,7 @@ def records_frame(
 ) -> pd.DataFrame:
     """Return a data frame with one row a record, whose columns are fields of it.
 
-    Parameters
-    ----------
-    records : mapping or iterable
-        Records; those with names have them as the index.
-    fields : iterable of str
-    index : str
-        Name of the index of names.
+    `index`: name of the index, of records that are a mapping.
     """
     import pandas as pd
 
@@ -312,19 +263,12 @@ def cell_text(value: object, digits: int = 5) -> str:
             return str(value)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Illustration:
     """A chart and what the reader should see in it; the chart's own title becomes the heading of its caption.
 
-    Parameters
-    ----------
-    chart : ChartSpec
-        Or a chart of Altair.
-    caption : str
-    half : bool
-        Where the page is wide, two such charts that follow each other are side by side.
-    name : str
-        Name in ``charts()`` and of its picture; by default from the title of the chart or the heading of its section.
+    `half`: two such charts that follow each other are side by side where the page is wide; `name`: in ``charts()``
+    and of its picture; by default from the title of the chart or the heading of its section.
     """
 
     chart: ChartSpec | alt.TopLevelMixin
@@ -343,21 +287,12 @@ class Illustration:
         return text if isinstance(text, str) else ""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Section:
     """A part of an answer.
 
-    Parameters
-    ----------
-    heading : str
-    text : str
-        An empty line starts a paragraph.
-    tables : sequence of Table
-    charts : sequence of Illustration
-    notes : sequence of str
-        What the reader must not miss.
-    folded : bool
-        Whether the page shows only the heading until the reader opens the section; on paper it is open.
+    `text`: an empty line starts a paragraph; `notes`: what the reader must not miss; `folded`: whether the page shows
+    only the heading until the reader opens the section; on paper it is open.
     """
 
     heading: str
@@ -371,4 +306,4 @@ class Section:
 def notices_section(notices: Sequence[Notice]) -> list[Section]:
     """Return the section with the notices of a result, empty without any."""
     notes = [Notice(without_exponents(notice), notice.level) for notice in notices]
-    return [Section(heading="Notices", notes=notes)] if notes else []
+    return [Section("Notices", notes=notes)] if notes else []

@@ -34,18 +34,25 @@ class Result(ABC, Generic[_S]):
     command: ClassVar[str]
     """Command that gives the same result on the command line; its name is in :attr:`schema`."""
 
+    subject: ClassVar[str] = ""
+    """What was done, after the name of the ship in the title."""
+
+    procedure: ClassVar[str] = ""
+    """How it was done, where that is always the same: the line under the title."""
+
     study: _S
     """Numbers with units in the names of their fields."""
 
     @property
-    @abstractmethod
     def title(self) -> str:
         """Head of the page: the ship, and what was done."""
+        study: Any = self.study
+        return f"{study.ship}: {self.subject}" if self.subject else str(study.ship)
 
     @property
     def subtitle(self) -> str:
         """A line under the title."""
-        return ""
+        return self.procedure
 
     @property
     @abstractmethod

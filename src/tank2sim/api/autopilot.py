@@ -12,7 +12,6 @@ from tank2sim.api.verbs import Output, Progress, verb
 from tank2sim.arguments import ArgumentBounds, NonNegativeArgument, PositiveArgument, Seed, SpeedArgument
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.files import FMU
-from tank2sim.notices import Notice
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,9 +38,6 @@ def write_controller(
 
     Parameters
     ----------
-    result : AutopilotResult or CraftAutopilotResult
-    path : Path
-        Where it goes.
     fmi : int
         Version of FMI.
     verify : bool
@@ -117,6 +113,7 @@ def autopilot(
     from tank2sim.analysis.heading.track_keeping import waypoints_of
     from tank2sim.cards import SteeredBy
     from tank2sim.results.autopilot import AutopilotResult, CraftAutopilotResult
+    from tank2sim.simulation.integrator import compiler_notices
 
     if course_change_deg == 0:
         raise ArgumentError("course_change_deg", "", "is 0", "give the angle to turn by")
@@ -142,13 +139,13 @@ def autopilot(
     try:
         if card.steered_by is SteeredBy.THRUSTERS:
             craft, piloted = study_craft_autopilot(card, ship.model, settings)
-            return CraftAutopilotResult(replace(craft, notices=(*craft.notices, *_no_compiler())), piloted)
+            return CraftAutopilotResult(replace(craft, notices=(*craft.notices, *compiler_notices())), piloted)
         study, piloted = study_autopilot(card.manoeuvring(), ship.model, settings)
     except ArgumentError as fault:
         if fault.source != "track" or not isinstance(track, str | Path):
             raise
         raise InputError(track, fault.place, fault.problem, fault.remedy) from None  # named by the file
-    return AutopilotResult(replace(study, notices=(*study.notices, *_no_compiler())), piloted)
+    return AutopilotResult(replace(study, notices=(*study.notices, *compiler_notices())), piloted)
 
 
 def _refuse_rudder(given: dict[str, Any]) -> None:
@@ -157,10 +154,3 @@ def _refuse_rudder(given: dict[str, Any]) -> None:
     if name := next((name for name, value in given.items() if value != usual[name]), ""):
         remedy = "leave it out: the controller of a craft with thrusters has one design"
         raise ArgumentError(name, "", "is of a rudder", remedy)
-
-
-def _no_compiler() -> tuple[Notice, ...]:
-    from tank2sim.native.compiler import find_compiler
-    from tank2sim.simulation.integrator import NO_COMPILER
-
-    return () if find_compiler() else (NO_COMPILER,)

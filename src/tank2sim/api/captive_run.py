@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from tank2sim.api.verbs import Output, verb
 from tank2sim.arguments import AngleArgument, SpeedArgument
@@ -13,7 +13,7 @@ from tank2sim.errors import ArgumentError, InputError
 from tank2sim.files import TABLE
 
 if TYPE_CHECKING:
-    from tank2sim.records.campaign_form import CampaignFile, RunType, TankTest
+    from tank2sim.records.campaign_form import CampaignFile, RunSheet, RunType, TankTest
     from tank2sim.records.captive_record import CaptiveRun
     from tank2sim.results.captive_run import CaptiveRunResult
 
@@ -97,89 +97,99 @@ def reduce_runs(
     Traceback (most recent call last):
     tank2sim.errors.ArgumentError: type: is 'sway'; did you mean pure_sway?
     """
-    import numpy as np
-
     from tank2sim.identification.captive.single_runs import study_runs
     from tank2sim.records.campaign_form import TankTest
     from tank2sim.records.campaigns import Campaign, copied_runs, read_campaign_form
     from tank2sim.results.captive_run import CaptiveRunResult
 
-    paths = [Path(runs)] if isinstance(runs, str | Path) else [Path(file) for file in runs]
-    if not paths:
-        raise ArgumentError("runs", "", "has no file", "give at least one run")
-    form = read_campaign_form(campaign) if campaign is not None else None
-    if form is not None and (given := "force_convention" if force_convention else "speed_mps" if speed_mps else ""):
-        raise ArgumentError(given, "", f"is stated by {campaign}", "leave it out")
-    angles = {
-        name: math.radians(angle)
-        for name, angle in (("drift_rad", drift_deg), ("rudder_rad", rudder_deg))
-        if angle is not None
-    }
-    if type == "straight":
-        angles = {"drift_rad": 0.0, "rudder_rad": 0.0} | angles
-    test = form.test if form else TankTest(speed_mps=speed_mps or 1.0, force_convention=force_convention or "on_gauge")
-    if again := next((path for place, path in enumerate(paths) if path in paths[:place]), None):
-        raise InputError(again, "", "is given twice", "give each run once")
-    read = [_read(path, type, form, Path(campaign) if campaign else None, test, angles) for path in paths]
+    paths = _files(runs)
+    form = None
+    if campaign is not None:
+        form = read_campaign_form(campaign)
+        if given := "force_convention" if force_convention else "speed_mps" if speed_mps else "":
+            raise ArgumentError(given, "", f"is stated by {campaign}", "leave it out")
+    angles = _angles(type, {"drift_rad": drift_deg, "rudder_rad": rudder_deg})
+    test = TankTest(speed_mps=speed_mps or 1.0, force_convention=force_convention or "on_gauge")
+    read = [_read(path, type, form, campaign, test, angles) for path in paths]
     copies, mirrored = copied_runs(read)
     if copies:
         raise next(iter(copies.values()))
-    if form is None and speed_mps is None:
-        for path, run in zip(paths, read, strict=True):
-            if np.ptp(run.speed_mps) == 0.0 and run.speed_mps[0] == 1.0:
-                raise ArgumentError("speed_mps", str(path), "states no speed", "give the speed, or a campaign")
-    known_campaign = None
-    if form is not None:
-        known_campaign = Campaign(
-            path=Path(str(campaign)),
-            model=form.model,
-            test=form.test,
-            tank=form.tank,
-            uncertainty=form.uncertainty,
-            full_scale=form.full_scale,
-            runs=tuple(read),
-        )
-    return CaptiveRunResult(*study_runs(read, known_campaign, mirrored))
+    if form is None:
+        if speed_mps is None:
+            _refuse_unknown_speed(paths, read)
+        return CaptiveRunResult(*study_runs(read, None, mirrored))
+    sections = {name: getattr(form, name) for name in ("model", "test", "tank", "uncertainty", "full_scale")}
+    known = Campaign(path=Path(str(campaign)), runs=tuple(read), **sections)
+    return CaptiveRunResult(*study_runs(read, known, mirrored))
+
+
+def _angles(type_name: str | None, stated_deg: Mapping[str, float | None]) -> dict[str, float]:
+    """Angles (rad) of those stated (deg), by the names of the result; of a straight run the others are 0."""
+    straight = dict.fromkeys(stated_deg, 0.0) if type_name == "straight" else {}
+    return straight | {name: math.radians(angle) for name, angle in stated_deg.items() if angle is not None}
+
+
+def _files(runs: str | Path | Sequence[str | Path]) -> list[Path]:
+    paths = [Path(file) for file in ([runs] if isinstance(runs, str | Path) else runs)]
+    if not paths:
+        raise ArgumentError("runs", "", "has no file", "give at least one run")
+    if again := next((path for place, path in enumerate(paths) if path in paths[:place]), None):
+        raise InputError(again, "", "is given twice", "give each run once")
+    return paths
+
+
+def _refuse_unknown_speed(paths: Sequence[Path], runs: Sequence[CaptiveRun]) -> None:
+    """Refuse runs with the speed of 1 m/s, which is put in for an unknown one."""
+    for path, run in zip(paths, runs, strict=True):
+        if (run.speed_mps == 1.0).all():
+            raise ArgumentError("speed_mps", str(path), "states no speed", "give the speed, or a campaign")
 
 
 def _read(
     path: Path,
     type_name: str | None,
     form: CampaignFile | None,
-    campaign: Path | None,
+    campaign: str | Path | None,
     test: TankTest,
     angles: Mapping[str, float],
 ) -> CaptiveRun:
+    """A run by its form; without one by `test`, and `angles` (rad) that are known."""
     import numpy as np
 
-    from tank2sim.records.campaign_form import RUN_TYPES, FilesSection, RunSheet
+    from tank2sim.records.campaign_form import FilesSection, RunSheet
     from tank2sim.records.captive_record import read_captive_run
 
-    sheet = None
-    if form is not None and campaign is not None:
-        place = path.resolve()
-        sheet = next((sheet for sheet in form.runs if (campaign.parent / sheet.file).resolve() == place), None)
-    columns = {**(form.columns if form else {}), **(sheet.columns if sheet else {})}
-    files = form.files if form else FilesSection()
-    if type_name is None and sheet is None:
-        remedy = f"give one of: {', '.join(get_args(RunName))}"
-        raise ArgumentError("type", str(path), "is not stated", remedy)
-    kinds: list[RunType]
-    if type_name == "combined":
-        kinds = ["yaw_with_drift", "drift_and_rudder"]
-    elif type_name in SHORT_TYPES:
-        kinds = [SHORT_TYPES[type_name]]
-    else:
-        kinds = [kind for kind in RUN_TYPES if kind == type_name] or [sheet.type for sheet in (sheet,) if sheet]
-    stated = sheet.model_dump(exclude={"type", "file", "columns"}) if sheet else {}
+    sheet, columns, files = None, {}, FilesSection()
+    if form is not None:
+        folder, place = Path(str(campaign)).parent, path.resolve()
+        sheet = next((sheet for sheet in form.runs if (folder / sheet.file).resolve() == place), None)
+        test, columns, files = form.test, dict(form.columns), form.files
+    stated: dict[str, Any] = dict(angles)
+    if sheet:
+        columns |= sheet.columns
+        stated = sheet.model_dump(exclude={"type", "file", "columns"}) | stated
+    kinds = _kinds(path, type_name, sheet)
     for kind in kinds:
-        described = RunSheet(file=path.name, type=kind, **{**stated, **angles})
+        described = RunSheet(file=path.name, type=kind, **stated)
         try:
             run = read_captive_run(path, described, test, columns, files)
         except InputError:
             if kind == kinds[-1]:
                 raise
             continue
-        if len(kinds) == 1 or kind == kinds[-1] or float(np.ptp(run.r_radps)) > _STEADY_YAW_RADPS:
+        if kind == kinds[-1] or float(np.ptp(run.r_radps)) > _STEADY_YAW_RADPS:
             return run
     raise AssertionError("every type was tried")
+
+
+def _kinds(path: Path, type_name: str | None, sheet: RunSheet | None) -> list[RunType]:
+    """Types of run to try: the one that is asked for, else that of the campaign."""
+    from tank2sim.records.campaign_form import RUN_TYPES
+
+    if type_name is None and sheet is None:
+        raise ArgumentError("type", str(path), "is not stated", f"give one of: {', '.join(get_args(RunName))}")
+    if type_name == "combined":
+        return ["yaw_with_drift", "drift_and_rudder"]
+    if type_name in SHORT_TYPES:
+        return [SHORT_TYPES[type_name]]
+    return [kind for kind in RUN_TYPES if kind == type_name] or [sheet.type for sheet in (sheet,) if sheet]

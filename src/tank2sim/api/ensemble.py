@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from concurrent.futures import Executor
-from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import TypeVar
 
+from tank2sim.analysis.ensemble.results import EnsembleRequest
 from tank2sim.arguments import ENSEMBLE, PROCESSES
 from tank2sim.errors import ArgumentError
 from tank2sim.executors import check_executor, executing
@@ -23,27 +24,16 @@ _BYTES = 400
 turning circle of 20 s."""
 
 
+_T = TypeVar("_T")
+
+
 @dataclass(frozen=True)
-class EnsembleOptions:
-    """An ensemble drawn from the standard errors of a card.
+class EnsembleOptions(EnsembleRequest):
+    """An ensemble drawn from the standard errors of a card (none with 0 members), and its executor.
 
-    Parameters
-    ----------
-    members : int
-        Ships drawn; 0 for no ensemble.
-    seed : int
-        The same seed gives the same members everywhere.
-    executor : str
-        ``processes`` or ``dask://host:port``.
-
-    Raises
-    ------
-    InputError
-        The executor cannot be used, there is one member, or an executor or a seed without members.
+    Raises InputError: the executor cannot be used, there is one member, or an executor or a seed without members.
     """
 
-    members: int = 0
-    seed: int = 0
     executor: str = PROCESSES
 
     def __post_init__(self) -> None:
@@ -55,11 +45,11 @@ class EnsembleOptions:
             raise ArgumentError("members", "", "is 1", "give 2 or more, or 0 for no ensemble")
         refuse_beyond_memory("members", self.members, _BYTES)
 
-    @contextmanager
-    def computing(self, few: int = FEW) -> Iterator[Executor | None]:
-        """The executor; None for at most `few` members, which are computed here."""
+    def drawn(self, bands: Callable[[EnsembleRequest, Executor | None], _T], few: int = FEW) -> _T | None:
+        """Return the bands of the ensemble, None without one; at most `few` members are computed in this process."""
+        if not self.members:
+            return None
         if self.executor == PROCESSES and self.members <= few:
-            yield None
-            return
-        with executing(self.executor) as found:
-            yield found
+            return bands(self, None)
+        with executing(self.executor) as computing:
+            return bands(self, computing)

@@ -81,10 +81,7 @@ def make_fmu_file(
     from tank2sim.fmu.provenance import documents_of, documents_without_card
     from tank2sim.results.fmu import ExportResult, ExportStudy
 
-    if ssp_inputs and ssp is None:
-        raise ArgumentError("ssp_inputs", "", "needs an SSP package", "give ssp too")
-    if lean and ssp:
-        raise ArgumentError("lean", "", "lacks what an autopilot is designed with", "leave ssp or lean out")
+    _refuse_without_package(ssp, ssp_inputs, lean)
     chosen = named_platforms(platforms)
     model = with_simulator_interface(ship.model)
     if lean:
@@ -113,6 +110,13 @@ def make_fmu_file(
         notices=(*ship.model.notices, *(_renamed(output, made.model_identifier) if lean else ())),
     )
     return ExportResult(study, made, files, ship.card)
+
+
+def _refuse_without_package(ssp: Path | None, ssp_inputs: bool, lean: bool) -> None:
+    if ssp_inputs and ssp is None:
+        raise ArgumentError("ssp_inputs", "", "needs an SSP package", "give ssp too")
+    if lean and ssp:
+        raise ArgumentError("lean", "", "lacks what an autopilot is designed with", "leave ssp or lean out")
 
 
 def _renamed(output: Path, identifier: str) -> tuple[Notice, ...]:

@@ -189,19 +189,9 @@ def identify_craft(
 ) -> CraftIdentificationResult:
     """Identify hull and thrust curves of a craft with thrusters from trials with position, heading and revolutions.
 
-    Parameters
-    ----------
-    card : SteeredCard
-        Mass and places of the thrusters are taken as exact, all else with the stated standard errors or wide ones.
-    fitted, held : sequence of Trial
-        Trials to fit, and trials only to predict (:func:`.read_craft_trial`).
-    progress : callable, optional
-        Called with each better estimate.
-
-    Raises
-    ------
-    InputError
-        A file is at fault, or a trial is given twice.
+    `card`: mass and places of the thrusters are taken as exact, all else with the stated standard errors or wide ones;
+    `fitted`, `held`: trials to fit, and trials only to predict (:func:`.read_craft_trial`); `progress`: called with
+    each better estimate. Raises InputError: a file is at fault, or a trial is given twice.
     """
     import numpy as np
     from threadpoolctl import threadpool_limits
@@ -266,13 +256,7 @@ def _card(found: Identification, fitted: Measured) -> Card:
 
 
 def captive_runs(campaign: str | Path) -> CaptiveRuns:
-    """The reduced runs of a campaign, with rudder tests at other speeds.
-
-    Raises
-    ------
-    InputError
-        The campaign is at fault (:func:`tank2sim.reduce`), or one of its runs is at a heel.
-    """
+    """The reduced runs of a campaign, with rudder tests at other speeds; InputError if it is at fault or at a heel."""
     from tank2sim.identification.captive.reduction import ReductionOptions, reduce_campaign
     from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
     from tank2sim.records.campaigns import read_campaign

@@ -88,6 +88,12 @@ def _read_bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
     return found
 
 
+def _refuse_empty(bounds: Mapping[str, tuple[float, float]]) -> None:
+    for name, (low, high) in bounds.items():
+        if not low < high:
+            raise ArgumentError("bounds", name, "leaves no room", "give LOW..HIGH with LOW below HIGH")
+
+
 @verb(
     "the card changed until figures have given values",
     Output("-o", CARD, "Write the tuned card.", lambda result, path: result.card.files(path), "CARD.toml"),
@@ -155,13 +161,13 @@ def tune_ship(
     from tank2sim.results.influence import TuningResult
 
     ensemble = EnsembleOptions(members, seed, executor)
+    bounds = bounds or {}
     if not targets:
         raise ArgumentError("targets", "", "has no target", "give FIGURE=VALUE, as steady_radius_m@20=424")
-    if wrong := next((name for name, (low, high) in (bounds or {}).items() if not low < high), ""):
-        raise ArgumentError("bounds", wrong, "leaves no room", "give LOW..HIGH with LOW below HIGH")
+    _refuse_empty(bounds)
     parsed = [parse_target(text) for text in _listed(targets)]
     asked = [*(parse_figure(text) for text in _listed(figures)), *(target.figure for target in parsed)]
-    means = Means(by=by, within=within, hold=hold, bounds=bounds or {}, agreed=joint_variation or {})
+    means = Means(by=by, within=within, hold=hold, bounds=bounds, agreed=joint_variation or {})
     card = ship.steered()
     study = Study(card, list(dict.fromkeys(asked)))
     tuned = tune(study, parsed, means)
@@ -242,12 +248,7 @@ def find_influence(
 
 
 def default_figures(card: SteeredCard) -> list[InfluenceFigure]:
-    """Figures where none is given: of a ship usual ones, of a craft its top speed, turn and spin in standard trials.
-
-    Parameters
-    ----------
-    card : SteeredCard
-    """
+    """Figures where none is given: of a ship usual ones, of a craft its top speed, turn and spin in standard trials."""
     from tank2sim.analysis.influence.figures import parse_figure
     from tank2sim.analysis.validation.standard_trials import craft_trials
     from tank2sim.cards import SteeredBy
@@ -270,19 +271,14 @@ def _listed(texts: str | Sequence[str]) -> list[str]:
 
 def _reported(found: CardInfluence, notices: Sequence[Notice] = ()) -> InfluenceStudy:
     """The study, with further notices."""
-    from tank2sim.native.compiler import find_compiler
-    from tank2sim.simulation.integrator import NO_COMPILER
+    from tank2sim.simulation.integrator import compiler_notices
 
-    compiler = () if find_compiler() else (NO_COMPILER,)
-    return replace(found.reported(), notices=tuple(dict.fromkeys([*found.notices, *notices, *compiler])))
+    return replace(found.reported(), notices=tuple(dict.fromkeys([*found.notices, *notices, *compiler_notices()])))
 
 
 def _bands(ship: Vessel, study: Study, ensemble: EnsembleOptions) -> FigureBands | None:
-    from tank2sim.analysis.ensemble.results import EnsembleRequest, named_bands
+    from tank2sim.analysis.ensemble.results import named_bands
     from tank2sim.api.ensemble import FEW_IN_LANES
 
-    if not ensemble.members:
-        return None
     names = [figure.text for figure in study.figures]
-    with ensemble.computing(FEW_IN_LANES) as computing:
-        return named_bands(ship.steered(), names, EnsembleRequest(ensemble.members, ensemble.seed), computing)
+    return ensemble.drawn(lambda *request: named_bands(ship.steered(), names, *request), FEW_IN_LANES)

@@ -75,17 +75,21 @@ def simulate_manoeuvre(
     >>> round(run.figures["advance_lengths"], 1)
     3.5
     """
+    from tank2sim.analysis.ensemble.results import manoeuvre_bands
     from tank2sim.analysis.manoeuvre import study_manoeuvre
     from tank2sim.api.ensemble import FEW, FEW_IN_LANES, EnsembleOptions
     from tank2sim.dynamics.simulator_interface import external_inputs, with_external_forces
     from tank2sim.results.manoeuvre import ManoeuvreResult
+    from tank2sim.simulation.lane_figures import runs_in_lanes
     from tank2sim.simulation.manoeuvres import PullOut, parse_manoeuvre
     from tank2sim.simulation.run import simulate
 
-    if not isinstance(manoeuvre, str) and not hasattr(manoeuvre, "words"):
+    if isinstance(manoeuvre, str):
+        words, parsed = manoeuvre, parse_manoeuvre(manoeuvre)
+    elif hasattr(manoeuvre, "words"):
+        words, parsed = manoeuvre.words, manoeuvre
+    else:
         raise ArgumentError("manoeuvre", "", f"is of the type {type(manoeuvre).__name__}", "give a text, as 'turn:35'")
-    parsed = parse_manoeuvre(manoeuvre) if isinstance(manoeuvre, str) else manoeuvre
-    words = manoeuvre if isinstance(manoeuvre, str) else manoeuvre.words
     ensemble = EnsembleOptions(members, seed, executor)
     if external and members:
         raise ArgumentError("external", "", "cannot act on an ensemble", "leave out either the members or the force")
@@ -96,12 +100,7 @@ def simulate_manoeuvre(
     if isinstance(parsed, PullOut):
         other = simulate(model, PullOut(-parsed.rudder), duration_s=duration_s, inputs=inputs)
     study = study_manoeuvre(ship.model, words, run, getattr(ship.card, "ship", None), other)
-    if members:
-        from tank2sim.analysis.ensemble.results import EnsembleRequest, manoeuvre_bands
-        from tank2sim.simulation.lane_figures import runs_in_lanes
-
-        length = duration_s, float(run.trajectory.t[-1])
-        with ensemble.computing(FEW_IN_LANES if runs_in_lanes(parsed, duration_s) else FEW) as computing:
-            bands = manoeuvre_bands(ship.steered(), parsed, length, EnsembleRequest(members, seed), computing)
-        study = replace(study, ensemble=bands)
-    return ManoeuvreResult(study, run, ship)
+    length = duration_s, float(run.trajectory.t[-1])
+    few = FEW_IN_LANES if runs_in_lanes(parsed, duration_s) else FEW
+    bands = ensemble.drawn(lambda *request: manoeuvre_bands(ship.steered(), parsed, length, *request), few)
+    return ManoeuvreResult(replace(study, ensemble=bands), run, ship)

@@ -1,4 +1,4 @@
-"""The page of a result that was written as JSON, in this session or before."""
+"""The page of a result that was written as JSON, in this session or before, and pages in a browser."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
 _REMEDY = "give what a command wrote with --json"
 _FAULTS = (AttributeError, IndexError, KeyError, TypeError, ValueError, ArithmeticError)
+
+SHOWN_ENDINGS = (".html", ".htm", ".svg", ".png")
+"""Endings of pages and pictures that a browser shows."""
 
 
 @verb("one page of any result", page_required=True, name="report")
@@ -54,13 +57,34 @@ def make_report(result: Mapping[str, object] | str | Path) -> Result[Any]:
 
 
 def read_values(path: Path) -> Any:
-    """The JSON of a file.
+    """The JSON of a file. Raises InputError: it cannot be read, or is not JSON that a page can show."""
+    from tank2sim.files import parsed_json, read_text
+
+    return parsed_json(read_text(path), path, _REMEDY)
+
+
+@verb("a page, in the browser", name="open")
+def open_page(page: str | Path) -> str:
+    """Open a page or a picture that a command wrote in the browser, and return its address.
+
+    Parameters
+    ----------
+    page : path
+        File that ends in .html, .svg or .png.
 
     Raises
     ------
     InputError
-        The file cannot be read, or is not JSON that a page can show.
+        The file is missing or of another kind, or there is no browser.
     """
-    from tank2sim.files import parsed_json, read_text
+    import webbrowser
 
-    return parsed_json(read_text(path), path, _REMEDY)
+    path = Path(page)
+    if not path.is_file():
+        raise InputError(page, "", "is not a file", "give a page that a command wrote with --page")
+    if path.suffix.lower() not in SHOWN_ENDINGS:
+        raise InputError(page, "", "is not a page", "give the .html that a command wrote with --page")
+    address = path.resolve().as_uri()
+    if not webbrowser.open(address):
+        raise InputError(page, "", "cannot be shown: no browser is found", f"open {address} yourself")
+    return address

@@ -66,10 +66,7 @@ def json_schema(command: str) -> dict[str, Any]:
 def read_result(values: Mapping[str, Any], source: str) -> Result[Any]:
     """Return the result whose JSON values these are.
 
-    Raises
-    ------
-    InputError
-        They are not the result of a command of this version, or a value is not as the command writes it.
+    Raises InputError: they are not of a command of this version, or a value is not as the command writes it.
     """
     if "schema" not in values:
         remedy = "give what a command wrote with --json"

@@ -61,31 +61,24 @@ def judge_stability(
     True
     """
     from tank2sim.analysis.ensemble.questions import ShipText
-    from tank2sim.analysis.ensemble.results import EnsembleRequest, growth_bands, stability_bands
+    from tank2sim.analysis.ensemble.results import growth_bands, stability_bands
     from tank2sim.analysis.ensemble.steering import Grid
     from tank2sim.analysis.stability.craft import OfCraft, craft_stability
     from tank2sim.analysis.stability.study import stability_study
     from tank2sim.api.ensemble import EnsembleOptions
     from tank2sim.cards import SteeredBy
-    from tank2sim.native.compiler import find_compiler
     from tank2sim.results.stability import CraftStabilityResult, StabilityResult
-    from tank2sim.simulation.integrator import NO_COMPILER
+    from tank2sim.simulation.integrator import compiler_notices
 
     ensemble = EnsembleOptions(members, seed, executor)
     card = ship.steered()
     if card.steered_by is SteeredBy.THRUSTERS:
         craft = craft_stability(card, speed_mps)
-        if members:
-            question = OfCraft(ShipText.of(card), craft.straight_run.speed_mps)
-            with ensemble.computing() as computing:
-                craft = replace(craft, ensemble=growth_bands(card, question, EnsembleRequest(members, seed), computing))
-        return CraftStabilityResult(craft, ship)
+        speed = craft.straight_run.speed_mps
+        bands = ensemble.drawn(lambda *request: growth_bands(card, OfCraft(ShipText.of(card), speed), *request))
+        return CraftStabilityResult(replace(craft, ensemble=bands), ship)
     study = stability_study(ship.model, speed_mps, spirals=spirals)
-    compiler = () if find_compiler() else (NO_COMPILER,)
-    study = replace(study, notices=tuple(dict.fromkeys([*ship.model.notices, *study.notices, *compiler])))
-    if members:
-        curves = (speed_mps, Grid.of(ship.model, study.responses[0])) if study.responses else None
-        with ensemble.computing() as computing:
-            bands = stability_bands(card, study.imo, EnsembleRequest(members, seed), computing, curves)
-        study = replace(study, ensemble=bands)
-    return StabilityResult(study, ship)
+    curves = (speed_mps, Grid.of(ship.model, study.responses[0])) if members and study.responses else None
+    bands = ensemble.drawn(lambda request, pool: stability_bands(card, study.imo, request, pool, curves))
+    notices = tuple(dict.fromkeys([*ship.model.notices, *study.notices, *compiler_notices()]))
+    return StabilityResult(replace(study, notices=notices, ensemble=bands), ship)

@@ -158,24 +158,13 @@ def trials_of(
 ) -> list[Trial]:
     """The trials that are meant: records as they are, files and data frames read, and of a folder the trials in it.
 
-    Parameters
-    ----------
-    given : path, TrialRecord, Trial, DataFrame, or sequence of them
-        A data frame has the columns of a trial CSV (``t_s``, ``delta_deg``, ``r_degps``, ...); its ``attrs`` are the
-        comments of the file (``noise``, ``scale``, ``rudder_sign``, ``origin``).
-    name : str
-        Name of the argument: data frames are called ``trials[0]``, ``trials[1]``, ... by it.
-    rising : bool
-        False lets times through that do not rise.
-    thrusters : sequence of ThrusterSection
-        Thrusters of the craft that was tried, by which its files are read; none of a ship with a rudder. Files of
-        records are read again.
+    `given`: a data frame has the columns of a trial CSV (``t_s``, ``delta_deg``, ``r_degps``, ...); its ``attrs`` are
+    the comments of the file (``noise``, ``scale``, ``rudder_sign``, ``origin``); `name`: of the argument, by which data
+    frames are called ``trials[0]``, ...; `rising`: False lets times through that do not rise; `thrusters`: those of the
+    craft that was tried, by which its files (of records, too) are read; none of a ship with a rudder.
 
-    Raises
-    ------
-    InputError
-        It is none of these; as :func:`tank2sim.records.reading.read_trial_file`, or of a craft as
-        :func:`tank2sim.records.craft_trials.read_craft_trial`; or a folder holds no trial.
+    Raises InputError: it is none of these; as :func:`tank2sim.records.reading.read_trial_file`, or of a craft as
+    :func:`tank2sim.records.craft_trials.read_craft_trial`; or a folder holds no trial.
     """
     sources = trial_sources(given, name)
     if thrusters:
@@ -222,14 +211,10 @@ def fitted_and_held(
 ) -> tuple[Measured, Measured]:
     """Trials to be fitted and those of `holdout`, at the size of the card's ship.
 
-    `report_unused`: whether a notice says that a wind or depth was measured which no effect of the card uses.
-
-    Raises
-    ------
-    InputError
-        A file is at fault (:func:`tank2sim.identification.trials.problem.prepare_trials.measured`), or two have one
-        name or are one record, also where one of them is held out; the card was fitted to one that is held out; or
-        there is none to fit.
+    `report_unused`: whether a notice says that a wind or depth was measured which no effect of the card uses. Raises
+    InputError: a file is at fault (:func:`tank2sim.identification.trials.problem.prepare_trials.measured`), or two have
+    one name or are one record, also where one of them is held out; the card was fitted to one that is held out; or
+    there is none to fit.
     """
     from tank2sim.identification.trials.problem.prepare_trials import fitted_as, measured
     from tank2sim.records.same_record import refuse_copies

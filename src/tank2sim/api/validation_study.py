@@ -41,15 +41,7 @@ itself is the file."""
 def validate_ship(
     card: SteeredCard, records: Sequence[Trial], members: int, required_percent: float
 ) -> tuple[ValidationStudy, SteeredCard, tuple[Path, ...]]:
-    """Validate a ship or craft: the study, its card, and the files of its trials. Raises as :func:`.validate`.
-
-    Parameters
-    ----------
-    card : SteeredCard
-    records : sequence of Trial
-    members, required_percent
-        As of :func:`.validate`.
-    """
+    """The study, the card and the files of trials; `members`, `required_percent`: as of :func:`.validate`."""
     ready = ship_of(card)
     more = _of_craft(card, records) if card.thrusters else _of_ship(ready, records, members, required_percent)
     study = _documented(ready, members)

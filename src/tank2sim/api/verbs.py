@@ -28,14 +28,8 @@ Progress = Callable[[str], None]
 class Written:
     """Mark of an argument that names a file to be written: the ``files`` of the result hold its content.
 
-    Parameters
-    ----------
-    endings : tuple of str, optional
-        As of :class:`Output`.
-    metavar : str
-    by_function : bool
-        The function itself writes there (a folder, as its work goes on), and the command requires it unless it has a
-        default. The ``written`` of the result are the files.
+    `endings`: as of :class:`Output`; `by_function`: the function itself writes there (a folder, as its work goes on),
+    and the command requires it unless it has a default; the ``written`` of the result are the files.
     """
 
     endings: tuple[str, ...] | None
@@ -80,32 +74,15 @@ class Output:
 class Verb:
     """A command as its function declares it.
 
-    Parameters
-    ----------
-    function : callable
-    name : str
-        Of the command.
-    words : str
-        A few words for the list of commands.
-    outputs : sequence of Output
-    results : sequence of str
-        Classes of the results, ``module:class``: with them JSON is read back and its schema is made.
-    texts : mapping
-        Argument to a function that makes its value of the words on the command line.
-    choices : mapping
-        Argument to the words of its choices.
-    options : mapping
-        Argument to the option that sets it, where the command line does not take it by position or has another name.
-    variants : mapping
-        Flag to another verb, which the command calls with this flag in place of the function. An option of the other
-        verb of that name is the flag. The key of a verb that `takes` certain first arguments is their kind
-        (``steering_card``).
-    takes : callable, optional
-        As a variant, the verb is called if this is true of the first argument as a text.
-    default_ship : str
-        Name of the bundled ship that the command takes where no card is given; empty if one must be.
-    page_required : bool
-        Whether the page is the result itself, and must be written.
+    `words`: for the list of commands; `results`: classes of the results, ``module:class``, by which JSON is read back
+    and its schema is made; `texts`: argument to a function that makes its value of the words on the command line;
+    `choices`: argument to the words of its choices; `options`: argument to the option that sets it, where the command
+    line does not take it by position or has another name; `variants`: flag to another verb, which the command calls
+    with this flag in place of the function (an option of the other verb of that name is the flag; the key of a verb
+    that `takes` certain first arguments is their kind, ``steering_card``); `takes`: as a variant, the verb is called
+    if this is true of the first argument as a text; `default_ship`: name of the bundled ship that the command takes
+    where no card is given; empty if one must be; `page_required`: whether the page is the result itself, and must be
+    written.
     """
 
     function: Callable[..., Any]
@@ -123,15 +100,7 @@ class Verb:
 
 
 def named_numbers(argument: str, example: str) -> Callable[[Sequence[str]], dict[str, float]]:
-    """Return a reader of words ``NAME=NUMBER``, for `texts` of a verb.
-
-    Parameters
-    ----------
-    argument : str
-        The argument that gets the numbers by name.
-    example : str
-        A word with its name and number, for the remedy.
-    """
+    """Return a reader of words ``NAME=NUMBER`` for an argument, for `texts` of a verb; `example` is for the remedy."""
 
     def read(given: Sequence[str]) -> dict[str, float]:
         found: dict[str, float] = {}

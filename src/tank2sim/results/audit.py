@@ -8,7 +8,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from tank2sim.answer.charts.motion import TimeMark, motions, stem_of
-from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, data_frame, table
 from tank2sim.answer.result import Result
 from tank2sim.notices import Notice
 from tank2sim.records.audit import AuditedTrial, AuditStudy
@@ -40,10 +40,8 @@ class AuditResult(Result[AuditStudy]):
     @property
     def findings(self) -> pd.DataFrame:
         """Findings, a row each: file, columns, kind (``fault`` or ``note``), what, likely truth."""
-        import pandas as pd
-
         rows = [(one.file, names, one.kind, one.what, one.likely_truth) for one, names in self._findings()]
-        return pd.DataFrame(rows, columns=["file", "column", "kind", "what", "likely_truth"])
+        return data_frame(rows, columns=["file", "column", "kind", "what", "likely_truth"])
 
     @property
     def passed(self) -> bool:
@@ -56,14 +54,12 @@ class AuditResult(Result[AuditStudy]):
 
         ``stated`` is true where the file states it; elsewhere the white part is estimated from the record.
         """
-        import pandas as pd
-
         rows = [
             asdict(noise) | {"file": trial.file, "sigma": from_si(noise.column, noise.sigma)}
             for trial in self.study.trials
             for noise in trial.noise.values()
         ]
-        return pd.DataFrame(rows, columns=["file", "column", "sigma", "stated"])
+        return data_frame(rows, columns=["file", "column", "sigma", "stated"])
 
     @property
     def title(self) -> str:
@@ -101,17 +97,17 @@ class AuditResult(Result[AuditStudy]):
         trials = self.study.trials
         clean = len(trials) - len({finding.file for finding in findings})
         return [
-            KeyFigure(label="Faults", value=faults, verdict=Verdict.FAILED if faults else Verdict.PASSED),
-            KeyFigure(label="Notes", value=len(findings) - faults, note="smaller findings to look at"),
-            KeyFigure(label="Repaired when the trials are read", value=f"{repaired} of {len(findings)}"),
-            KeyFigure(label="Trials without a finding", value=f"{clean} of {len(trials)}"),
+            KeyFigure("Faults", faults, verdict=Verdict.FAILED if faults else Verdict.PASSED),
+            KeyFigure("Notes", len(findings) - faults, note="smaller findings to look at"),
+            KeyFigure("Repaired when the trials are read", f"{repaired} of {len(findings)}"),
+            KeyFigure("Trials without a finding", f"{clean} of {len(trials)}"),
         ]
 
     @property
     def sections(self) -> Sequence[Section]:
         """Findings, records with the places of findings, and the trials."""
-        first = [Section(heading="Findings", tables=[self._findings_table()])] if self.study.findings else []
-        trials = Section(heading="Trials", tables=[self._trials_table(), self._noise_table()])
+        first = [Section("Findings", tables=[self._findings_table()])] if self.study.findings else []
+        trials = Section("Trials", tables=[self._trials_table(), self._noise_table()])
         return [*first, *self._records(), trials]
 
     def _findings(self) -> list[tuple[ColumnFinding, str]]:
@@ -144,7 +140,7 @@ class AuditResult(Result[AuditStudy]):
         charts: Sequence[Illustration] = motions(_name(trial), {"measured": trial.histories}, marks=marks)
         red = "Red in the histories: where findings about single values and rows are."
         return Section(
-            heading=f"Record {_name(trial)}",
+            f"Record {_name(trial)}",
             text=red if marks else "" if mine else "Nothing wrong was found.",
             charts=[replace(chart, half=len(charts) > 1, name=f"record {_name(trial)}") for chart in charts],
         )

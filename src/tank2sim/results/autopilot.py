@@ -33,6 +33,7 @@ from tank2sim.answer.parts import (
     KeyFigure,
     Section,
     Verdict,
+    data_frame,
     quantities,
     records_table,
     table,
@@ -49,13 +50,9 @@ if TYPE_CHECKING:
 HIGHEST_PEAK = 2.0
 """Ms above which a loop is thought to be weak: Astrom & Hagglund (2006), Advanced PID Control, take 1.2 to 2."""
 
-_HEADING = Signal(name="psi_deg", title="heading", unit="deg")
-_SPEED = Signal(name="u_mps", title="surge velocity", unit="m/s")
-_SIGNALS = (
-    _HEADING,
-    Signal(name="delta_deg", title="rudder", unit="deg"),
-    Signal(name="r_degps", title="yaw rate", unit="deg/s"),
-)
+_HEADING = Signal("psi_deg", "heading", "deg")
+_SPEED = Signal("u_mps", "surge velocity", "m/s")
+_SIGNALS = (_HEADING, Signal("delta_deg", "rudder", "deg"), Signal("r_degps", "yaw rate", "deg/s"))
 
 
 _S = TypeVar("_S", AutopilotStudy, CraftAutopilotStudy)
@@ -92,10 +89,8 @@ class ResultWithController(Result[_S]):
     @property
     def runs(self) -> dict[str, pd.DataFrame]:
         """The motions by name, one row a step, with the columns of a trial file: ``t_s``, ``psi_deg``, ``x_m``, ..."""
-        import pandas as pd
-
         motions = self.piloted.runs if self.piloted else {}
-        return {name: pd.DataFrame(trial_columns(run)) for name, run in motions.items()}
+        return {name: data_frame(trial_columns(run)) for name, run in motions.items()}
 
     def make_fmu(
         self,
@@ -169,17 +164,17 @@ class ResultWithController(Result[_S]):
             return []
         study, runs, points = self.study, self.study.track_histories.items(), self.study.waypoints_m
         sailed: list[TrackData] = [
-            TrackData(label=name, x_m=one["x_m"], y_m=one["y_m"], time_s=one["t_s"]) for name, one in runs
+            TrackData(name, x_m=one["x_m"], y_m=one["y_m"], time_s=one["t_s"]) for name, one in runs
         ]
         wanted: list[TrackData] = [
-            TrackData(label=label, x_m=points[:, 0], y_m=points[:, 1], time_s=np.zeros(len(points)), measured=measured)
+            TrackData(label, x_m=points[:, 0], y_m=points[:, 1], time_s=np.zeros(len(points)), measured=measured)
             for label, measured in (("legs", False), ("waypoints", True))
         ]
-        errors = [PlotSeries(label=name, x=one["t_s"], y=one["cross_track_error_m"]) for name, one in runs]
-        plot = Plot(series=errors, up=PlotAxis(title="cross-track error (m)"), height_px=220, rules=[Rule(at=[0.0])])
-        apart = curve_chart(plot, PlotAxis(title="time (s)", nice=False), title="Cross-track error", window=["x"])
+        errors = [PlotSeries(name, x=one["t_s"], y=one["cross_track_error_m"]) for name, one in runs]
+        plot = Plot(errors, up=PlotAxis("cross-track error (m)"), height_px=220, rules=[Rule([0.0])])
+        apart = curve_chart(plot, PlotAxis("time (s)", nice=False), title="Cross-track error", window=["x"])
         section = Section(
-            heading="Track keeping",
+            "Track keeping",
             text="Line of sight with lookahead, in the current and the wind of the course keeping. Errors leap at the "
             "end of a leg, where the next one begins to count; errors on legs are taken from the second half of each.",
             tables=[
@@ -187,10 +182,7 @@ class ResultWithController(Result[_S]):
                     "Cross-track errors, positive to starboard", study.track, first="guidance", fields=_TRACK, digits=3
                 )
             ],
-            charts=[
-                Illustration(chart=track_chart([*sailed, *wanted], title="Track and its legs")),
-                Illustration(chart=apart),
-            ],
+            charts=[Illustration(track_chart([*sailed, *wanted], title="Track and its legs")), Illustration(apart)],
         )
         return [section]
 
@@ -204,8 +196,7 @@ class ResultWithController(Result[_S]):
             f"{weather['wind_from_deg']:.0f} deg, and waves of {weather['wave_radps']:.3g} rad/s that alone would "
             f"yaw the ship by {weather['wave_yaw_deg']:.3g} deg (standard deviation); seed {weather['seed']:.0f}."
         )
-        tables = [quantities(caption, figures)]
-        return Section(heading="Course keeping", text=text, tables=tables, charts=[chart])
+        return Section("Course keeping", text=text, tables=[quantities(caption, figures)], charts=[chart])
 
     def _fmu_line(self) -> tuple[str, ...]:
         """The FMU in a line, if there is one."""
@@ -223,14 +214,12 @@ class ResultWithController(Result[_S]):
             caption = f"Ship and autopilot co-simulated, against one model: order {found.order:.2f}"
             words = {"step_s": "communication step", "error_deg": "largest difference of heading"}
             tables.append(records_table(caption, found.steps, fields=words))
-        return [Section(heading="FMU", tables=tables)]
+        return [Section("FMU", tables=tables)]
 
     @property
     def cross_track(self) -> pd.DataFrame:
         """Figures of the track by guidance, m and s; empty without a track."""
-        import pandas as pd
-
-        return pd.DataFrame({name: asdict(one) for name, one in self.study.track.items()}).T
+        return data_frame({name: asdict(one) for name, one in self.study.track.items()}).T
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -240,24 +229,17 @@ class AutopilotResult(ResultWithController[AutopilotStudy]):
     Parameters are those of :class:`ResultWithController`, with the study :class:`.AutopilotStudy`.
     """
 
-    @property
-    def title(self) -> str:
-        """The ship."""
-        return f"{self.study.ship}: heading autopilot"
+    subject: ClassVar[str] = "heading autopilot"
 
     @property
     def margins(self) -> pd.DataFrame:
         """Margins by speed (m/s), the first at the speed of the design; infinite ones have no limit."""
-        import pandas as pd
-
-        return pd.DataFrame([asdict(one) for one in self.study.margins]).drop(columns="poles").set_index("speed_mps")
+        return data_frame([asdict(one) for one in self.study.margins], index="speed_mps").drop(columns="poles")
 
     @property
     def course_changes(self) -> pd.DataFrame:
         """Figures of the changes of course by name: rise and settling time (s), overshoot and largest rudder (deg)."""
-        import pandas as pd
-
-        return pd.DataFrame({name: asdict(one) for name, one in self.study.closed_loop.course_changes.items()}).T
+        return data_frame({name: asdict(one) for name, one in self.study.closed_loop.course_changes.items()}).T
 
     @property
     def course_keeping(self) -> dict[str, float]:
@@ -291,30 +273,20 @@ class AutopilotResult(ResultWithController[AutopilotStudy]):
         first, margins, loop = self.study.margins[0], self.study.margins, self.study.closed_loop
         change, stable = loop.course_changes["change"], sum(one.stable for one in margins)
         return [
+            KeyFigure("Overshoot", change.overshoot_deg, "deg", note=f"in a change by {change.ordered_deg:.3g} deg"),
+            KeyFigure("Heading error", loop.course_keeping.heading_error_rms_deg, "deg", note="rms, in weather"),
+            KeyFigure("Phase margin", first.phase_margin_deg, "deg"),
             KeyFigure(
-                label="Overshoot",
-                value=change.overshoot_deg,
-                unit="deg",
-                note=f"in a change by {change.ordered_deg:.3g} deg",
-            ),
-            KeyFigure(
-                label="Heading error",
-                value=loop.course_keeping.heading_error_rms_deg,
-                unit="deg",
-                note="rms, in weather",
-            ),
-            KeyFigure(label="Phase margin", value=first.phase_margin_deg, unit="deg"),
-            KeyFigure(
-                label="Peak of sensitivity, Ms",
-                value=first.sensitivity_peak,
+                "Peak of sensitivity, Ms",
+                first.sensitivity_peak,
                 verdict=Verdict.PASSED if first.sensitivity_peak <= HIGHEST_PEAK else Verdict.CAUTION,
                 note=f"no more than {HIGHEST_PEAK:g}",
                 limit=HIGHEST_PEAK,
             ),
-            KeyFigure(label="Delay margin", value=first.delay_margin_s, unit="s"),
+            KeyFigure("Delay margin", first.delay_margin_s, "s"),
             KeyFigure(
-                label="Stable",
-                value=f"{stable} of {len(margins)}",
+                "Stable",
+                f"{stable} of {len(margins)}",
                 verdict=Verdict.PASSED if stable == len(margins) else Verdict.FAILED,
                 note="speeds" if len(margins) > 1 else "speed of the design",
             ),
@@ -338,7 +310,7 @@ class AutopilotResult(ResultWithController[AutopilotStudy]):
         changes = self.study.closed_loop.course_changes
         large = [name for name in changes if name.startswith("large")]
         return Section(
-            heading="Course changes",
+            "Course changes",
             text="On the nonlinear model with the limits of the gear, in calm water, from a course that the autopilot "
             f"has kept: it holds the {self.study.ship_alone.rudder_deg:.3g} deg of rudder that the ship needs for it.",
             tables=[records_table("Course changes", changes, first="run", fields=_CHANGES, digits=3)],
@@ -362,16 +334,16 @@ class AutopilotResult(ResultWithController[AutopilotStudy]):
         near = [pole for pole in margins[0].poles if abs(pole) < 5 * margins[0].crossover_radps]
         limits = {"rate of the gear": steps.within_rate_deg, "largest rudder": steps.within_angle_deg}
         linear = [f"{step:.3g} deg ({name})" for name, step in limits.items() if math.isfinite(step)]
-        poles = [PolesZeros(label=f"{margins[0].speed_mps:.3g} m/s", poles=near)]
+        poles = [PolesZeros(f"{margins[0].speed_mps:.3g} m/s", poles=near)]
         return Section(
-            heading="Loop",
+            "Loop",
             text="The ship with its steering gear, linearised at each speed, and the gains of the design."
             + (f" Changes of course stay linear up to {' and '.join(linear)}." if linear else ""),
             tables=[records_table("Margins, the first at the speed of the design", margins, fields=_MARGINS, digits=3)],
             charts=[
                 *self._responses(),
                 Illustration(
-                    chart=pole_zero_chart(poles, title="Poles of the closed loop"),
+                    pole_zero_chart(poles, title="Poles of the closed loop"),
                     caption="Poles as slow as the ship are shown; the poles of the gear lie farther to the left.",
                 ),
             ],
@@ -382,20 +354,20 @@ class AutopilotResult(ResultWithController[AutopilotStudy]):
         for one in self.study.responses:
             loops.append(_from_the_near_end(one))
             sensitivity = FrequencyResponse(
-                label=f"S, {one.speed_mps:.3g} m/s", omega_radps=one.omega_radps, response=1 / (1 + one.loop)
+                f"S, {one.speed_mps:.3g} m/s", omega_radps=one.omega_radps, response=1 / (1 + one.loop)
             )
             curves.append(sensitivity)
         label = f"heading by its order, {first.speed_mps:.3g} m/s"
-        curves.append(FrequencyResponse(label=label, omega_radps=first.omega_radps, response=first.heading))
+        curves.append(FrequencyResponse(label, omega_radps=first.omega_radps, response=first.heading))
         peak = self.study.margins[0].sensitivity_peak
         return [
-            Illustration(chart=bode_chart(loops, title="Loop transfer"), caption="Broken at the rudder order."),
+            Illustration(bode_chart(loops, title="Loop transfer"), caption="Broken at the rudder order."),
             Illustration(
-                chart=nyquist_chart(loops, peak, title="Nyquist curve"),
+                nyquist_chart(loops, peak, title="Nyquist curve"),
                 caption="Cross: the critical point. Red: the circle 1/Ms about it.",
             ),
             Illustration(
-                chart=sensitivity_chart(curves, title="Sensitivity and closed loop"),
+                sensitivity_chart(curves, title="Sensitivity and closed loop"),
                 caption="Where S is above 0 dB the loop amplifies. Waves should lie to the right of its peak.",
             ),
         ]
@@ -414,7 +386,7 @@ class AutopilotResult(ResultWithController[AutopilotStudy]):
                 "rudder is at its limit the integral is emptied, with a time constant of "
                 f"{limits['anti_windup_time_s']:.3g} s."
             )
-        return Section(heading="Controller", text=text, tables=[quantities("Gains", self.study.gains)], folded=True)
+        return Section("Controller", text=text, tables=[quantities("Gains", self.study.gains)], folded=True)
 
     def _histories(self, title: str, *names: str, caption: str = "") -> Illustration:
         """Heading, rudder and yaw rate of runs; changes of course up to twice the time in which all settle."""
@@ -422,7 +394,7 @@ class AutopilotResult(ResultWithController[AutopilotStudy]):
         settled = [changes[name].settling_time_s if name in changes else None for name in names]
         until = max(math.inf if seconds is None else 2 * seconds for seconds in settled)
         drawn = [_history(name, self.study.histories[name], _SIGNALS, until) for name in names]
-        return Illustration(chart=history_chart(drawn, _SIGNALS, title=title), caption=caption)
+        return Illustration(history_chart(drawn, _SIGNALS, title=title), caption=caption)
 
 
 _CHANGES = {
@@ -461,10 +433,7 @@ class CraftAutopilotResult(ResultWithController[CraftAutopilotStudy]):
     Parameters are those of :class:`ResultWithController`, with the study :class:`.CraftAutopilotStudy`.
     """
 
-    @property
-    def title(self) -> str:
-        """The craft."""
-        return f"{self.study.ship}: autopilot of heading and speed"
+    subject: ClassVar[str] = "autopilot of heading and speed"
 
     @property
     def headline(self) -> tuple[str, ...]:
@@ -492,10 +461,10 @@ class CraftAutopilotResult(ResultWithController[CraftAutopilotStudy]):
             ("speed", "m/s", self.study.speed_change),
         ):
             note = f"in a change by {change.ordered:.3g} {unit}"
-            figures.append(KeyFigure(label=f"Overshoot of {words}", value=change.overshoot, unit=unit, note=note))
+            figures.append(KeyFigure(f"Overshoot of {words}", change.overshoot, unit, note=note))
             if change.settling_time_s is not None:
                 label = f"{words.capitalize()} settled"
-                figures.append(KeyFigure(label=label, value=change.settling_time_s, unit="s", note=note))
+                figures.append(KeyFigure(label, change.settling_time_s, "s", note=note))
         return sorted(figures, key=lambda figure: not figure.label.startswith("Overshoot"))
 
     @property
@@ -514,14 +483,13 @@ class CraftAutopilotResult(ResultWithController[CraftAutopilotStudy]):
         ]
 
     def _drawn(self, name: str, signals: Sequence[Signal], title: str) -> Illustration:
-        drawn = [_history(name, self.study.histories[name], signals)]
-        return Illustration(chart=history_chart(drawn, signals, title=title))
+        return Illustration(history_chart([_history(name, self.study.histories[name], signals)], signals, title=title))
 
     @property
     def _revolutions(self) -> list[Signal]:
         names = sorted(name for name in self.study.histories["course"] if name.startswith("n_"))
         titles = [name.removeprefix("n_").removesuffix("_rpm").replace("_", " ") for name in names]
-        return [Signal(name=name, title=title, unit="rpm") for name, title in zip(names, titles, strict=True)]
+        return [Signal(name, title, "rpm") for name, title in zip(names, titles, strict=True)]
 
     def _changes(self) -> Section:
         study, turning = self.study, self._revolutions
@@ -547,7 +515,7 @@ class CraftAutopilotResult(ResultWithController[CraftAutopilotStudy]):
             "a thruster at its limit (%)",
         )
         return Section(
-            heading="Changes of course and speed",
+            "Changes of course and speed",
             text="On the nonlinear craft in calm water, from a steady course.",
             charts=[replace(chart, half=True) for chart in charts],
             tables=[table("Changes of course and speed", heads, rows, digits=3)],
@@ -555,14 +523,14 @@ class CraftAutopilotResult(ResultWithController[CraftAutopilotStudy]):
 
     def _controller(self) -> Section:
         low, high = self.study.largest_moment_Nm
-        drawn = [PolesZeros(label=f"{self.study.speed_mps:.3g} m/s", poles=self.study.poles)]
+        drawn = [PolesZeros(f"{self.study.speed_mps:.3g} m/s", poles=self.study.poles)]
         return Section(
-            heading="Controller",
+            "Controller",
             text=f"The largest yaw moment is {-low:.3g} N m to port and {high:.3g} N m to starboard; the surge force "
             "takes the thrust that is left. Thrusts become revolutions by the thrust curves of the card, at the "
             "present speed.",
             tables=[quantities("Gains", self.study.gains)],
-            charts=[Illustration(chart=pole_zero_chart(drawn, title="Poles of the closed loop"))],
+            charts=[Illustration(pole_zero_chart(drawn, title="Poles of the closed loop"))],
         )
 
 
@@ -573,7 +541,7 @@ def _settles(seconds: float) -> str:
 def _history(label: str, columns: Columns, signals: Sequence[Signal], until_s: float = math.inf) -> History:
     shown = columns["t_s"] <= until_s
     values = {signal.name: columns[signal.name][shown] for signal in signals}
-    return History(label=label, time_s=columns["t_s"][shown], values=values)
+    return History(label, time_s=columns["t_s"][shown], values=values)
 
 
 def _from_the_near_end(response: LoopResponse) -> FrequencyResponse:
@@ -587,6 +555,6 @@ def _from_the_near_end(response: LoopResponse) -> FrequencyResponse:
     phase = np.unwrap(np.angle(value))
     phase -= 2 * math.pi * math.ceil((phase[middle] - math.pi) / (2 * math.pi))
     if abs(phase[0]) <= math.pi:
-        return FrequencyResponse(label=label, omega_radps=omega, response=value)
+        return FrequencyResponse(label, omega_radps=omega, response=value)
     last = int(np.flatnonzero(np.abs(phase) < math.pi)[-1])
-    return FrequencyResponse(label=label, omega_radps=omega[last::-1], response=value[last::-1])
+    return FrequencyResponse(label, omega_radps=omega[last::-1], response=value[last::-1])

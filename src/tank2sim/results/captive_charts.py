@@ -51,11 +51,11 @@ def force_chart(plot: ForcePlot) -> ChartSpec:
     points = [_force_series(each, factor, fit=False) for each in plot.series]
     low, high = extent(np.concatenate([vector(each.y) for each in (*lines, *points)]))
     # A line at zero far from the values would squeeze them into an edge of the chart.
-    rules = [Rule(at=[0.0])] if low <= 0 <= high else []
+    rules = [Rule([0.0])] if low <= 0 <= high else []
     labels = ", ".join(each.label for each in plot.series)
     return curve_chart(
-        Plot(series=[*lines, *points], up=PlotAxis(title=plot.up), height_px=380, rules=rules),
-        PlotAxis(title=with_unit(plot.across, unit), padding=10),
+        Plot([*lines, *points], up=PlotAxis(plot.up), height_px=380, rules=rules),
+        PlotAxis(with_unit(plot.across, unit), padding=10),
         title=plot.title,
         width_px=620,
         described=f"{plot.up} against {plot.across} of {labels}; points: measured, lines: the fit with its band.",
@@ -68,7 +68,7 @@ def _force_series(each: ForceSeries, factor: float, *, fit: bool) -> PlotSeries:
     order = np.argsort(vector(x), kind="stable") if fit else np.arange(len(vector(x)))
     y, width = vector(value)[order], None if half is None else vector(half)[order]
     return PlotSeries(
-        label=each.label,
+        each.label,
         x=factor * vector(x)[order],
         y=y,
         low=None if width is None else y - width,
@@ -84,14 +84,11 @@ def loop_chart(plot: LoopPlot, forces: Mapping[str, str]) -> ChartSpec:
     from top to bottom.
     """
     unit, factor = shown_unit(plot.unit)
-    plots = [
-        Plot(series=_loops(plot.loops, force, factor), up=PlotAxis(title=up), height_px=260)
-        for force, up in forces.items()
-    ]
+    plots = [Plot(_loops(plot.loops, force, factor), up=PlotAxis(up), height_px=260) for force, up in forces.items()]
     labels = [loop.label for loop in plot.loops]
     return curve_panels(
         plots,
-        PlotAxis(title=with_unit(plot.across, unit)),
+        PlotAxis(with_unit(plot.across, unit)),
         title=plot.title,
         width_px=560,
         described=f"Forces over {plot.across} of {', '.join(labels)}.",
@@ -106,10 +103,10 @@ def _loops(loops: Sequence[ForceLoop], force: str, factor: float) -> list[PlotSe
         if force in loop.forces:
             x, value = factor * vector(loop.motion), vector(loop.forces[force])
             kept = thin_points([value], POINT_SAMPLES)
-            found.append(PlotSeries(label=loop.label, x=x[kept], y=value[kept], points=True))
+            found.append(PlotSeries(loop.label, x=x[kept], y=value[kept], points=True))
         if force in loop.fitted:
             found.append(
-                PlotSeries(label=loop.label, x=factor * vector(loop.fitted_motion), y=loop.fitted[force], closed=True)
+                PlotSeries(loop.label, x=factor * vector(loop.fitted_motion), y=loop.fitted[force], closed=True)
             )
     if not found:
         raise ValueError(f"no loop has the force {force}")
@@ -125,7 +122,7 @@ def harmonic_chart(plot: HarmonicsPlot) -> ChartSpec:
         x = _runs_axis("run:N", [run.run for run in runs], named=order == count, bars=True)
         rows = [{"run": run.run, "v": _at(run.amplitude, order)} for run in runs]
         fits = [{"run": run.run, "v": _at(run.fitted, order)} for run in runs if run.fitted is not None]
-        size = PlotAxis(title=f"harmonic {order} of {up}", above=True, ticks=4, zero=True)
+        size = PlotAxis(f"harmonic {order} of {up}", above=True, ticks=4, zero=True)
         place = {"x": x, "y": size.channel("v")}
         said: ChartSpec = {"tooltip": tooltips({"run:N": "run", "v:Q": up})}
         layers = [layer("bar", rows, place | said, opacity=0.7)]
@@ -157,7 +154,7 @@ def residual_chart(residuals: Sequence[Residual], *, title: str = "") -> ChartSp
     panels = []
     for force in forces:
         up = PlotAxis(
-            title=f"{force}: residual / standard error", domain=(-reach, reach), nice=False, ticks=5, above=True
+            f"{force}: residual / standard error", domain=(-reach, reach), nice=False, ticks=5, above=True
         ).channel("v")
         rows = [
             {"run": residual.kind, "name": residual.run, "v": plain(residual.value)}
@@ -166,7 +163,7 @@ def residual_chart(residuals: Sequence[Residual], *, title: str = "") -> ChartSp
         ]
         marks: ChartSpec = {"x": _runs_axis("name:N", runs, named=force == forces[-1]), "y": up}
         marks |= {"color": look.colour, "shape": look.shape, "tooltip": tooltips({"name:N": "run", "v:Q": "residual"})}
-        limits = Rule(at=[-_USUAL_LIMIT, 0.0, _USUAL_LIMIT], dash=(2, 3))
+        limits = Rule([-_USUAL_LIMIT, 0.0, _USUAL_LIMIT], dash=(2, 3))
         panels.append(layered([limits.layer(up), layer("point", rows, marks)], size=(720, 140)))
     described = f"Residuals of {', '.join(forces)} in {len(runs)} runs."
     return stacked(panels, window=False, title=title, description=described)
@@ -206,10 +203,10 @@ def derivative_certainty_chart(found: Mapping[str, _Estimated], *, title: str) -
     ]
     return row_chart(
         RowPlot(
-            rows=rows,
-            across=PlotAxis(title="standard error (% of the value)", log=True, form="~g"),
+            rows,
+            across=PlotAxis("standard error (% of the value)", log=True, form="~g"),
             shown={"name:N": "number", "run:N": "origin", "v:Q": "standard error (%)"},
-            rules=[Rule(at=[100.0], style="limit")],
+            rules=[Rule([100.0], style="limit")],
         ),
         title=title,
         described=f"Standard errors of {len(rows)} numbers in per cent of their values.",

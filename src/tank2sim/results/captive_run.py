@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,7 +14,7 @@ from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_panels
 from tank2sim.answer.charts.motion import History, Signal, history_chart
 from tank2sim.answer.charts.vega import ChartSpec, PlotAxis
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, data_frame, table
 from tank2sim.answer.result import Result
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
@@ -60,6 +58,7 @@ class CaptiveRunResult(Result[CaptiveRunStudy]):
     study: CaptiveRunStudy
     reduced: tuple[ReducedRun, ...] = ()
     command: ClassVar[str] = "run"
+    procedure: ClassVar[str] = "Captive run, reduced by itself"
 
     @property
     def runs(self) -> tuple[SingleRun, ...]:
@@ -74,9 +73,8 @@ class CaptiveRunResult(Result[CaptiveRunStudy]):
     @property
     def coefficients(self) -> pd.DataFrame:
         """A row each Fourier coefficient: run, signal, unit, order, cosine, sine, amplitude, phase (deg), errors."""
-        import pandas as pd
-
-        return pd.DataFrame(self._rows(), columns=_HEADS)
+        rows = [[run.name, *_coefficient_cells(each)] for run in self.runs for each in run.coefficients]
+        return data_frame(rows, columns=_HEADS)
 
     def cycle(self, run: int = 0) -> pd.DataFrame:
         """Averaged cycle of a run: ``phase_deg``, and mean, standard deviation and fit of each force (N, N m).
@@ -91,8 +89,6 @@ class CaptiveRunResult(Result[CaptiveRunStudy]):
         InputError
             The run does not oscillate.
         """
-        import pandas as pd
-
         found = self.runs[run]
         if not found.cycles:
             raise InputError(found.name, "", "does not oscillate: it has no cycle", "take a run that does")
@@ -100,21 +96,10 @@ class CaptiveRunResult(Result[CaptiveRunStudy]):
         for force, cycle in found.cycles.items():
             named = {"mean": cycle.mean, "deviation": cycle.deviation, "fit": cycle.fit}
             columns |= {f"{force}_{name}": values for name, values in named.items()}
-        return pd.DataFrame(columns)
+        return data_frame(columns)
 
     def cycle_csv(self, run: int = 0) -> str:
-        """The averaged cycle of a run as CSV, columns as :meth:`cycle` has them.
-
-        Parameters
-        ----------
-        run : int
-            Place of the run.
-
-        Raises
-        ------
-        InputError
-            The run does not oscillate.
-        """
+        """The averaged cycle of a run (by its place) as CSV: columns, and errors, as of :meth:`cycle`."""
         text: str = self.cycle(run).to_csv(index=False, float_format="%.9g", lineterminator="\n")
         return text
 
@@ -126,26 +111,15 @@ class CaptiveRunResult(Result[CaptiveRunStudy]):
         InputError
             The file cannot be written.
         """
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(_HEADS)
-        writer.writerows([f"{cell:.9g}" if isinstance(cell, float) else cell for cell in row] for row in self._rows())
+        text: str = self.coefficients.to_csv(index=False, na_rep="nan", float_format="%.9g", lineterminator="\n")
         if path is not None:
-            write_together({Path(path): text.getvalue()}, inputs=[])
-        return text.getvalue()
-
-    def _rows(self) -> list[list[Cell]]:
-        return [[run.name, *_coefficient_cells(each)] for run in self.runs for each in run.coefficients]
+            write_together({Path(path): text}, inputs=[])
+        return text
 
     @property
     def title(self) -> str:
         """The runs."""
         return f"Run: {', '.join(run.name.rpartition('/')[2] for run in self.runs)}"
-
-    @property
-    def subtitle(self) -> str:
-        """What was done."""
-        return "Captive run, reduced by itself"
 
     @property
     def headline(self) -> tuple[str, ...]:
@@ -174,22 +148,20 @@ class CaptiveRunResult(Result[CaptiveRunStudy]):
         """The surest derivatives of a run that is alone, runs, speed, periods, faults, repeats that differ."""
         runs, faults = self.runs, sum(len(run.faults) for run in self.runs)
         figures = [
-            KeyFigure(
-                label=f"{name}, times 10⁵", value=1e5 * value, note=f"standard error {format_number(1e5 * error, 2)}"
-            )
+            KeyFigure(f"{name}, times 10⁵", 1e5 * value, note=f"standard error {format_number(1e5 * error, 2)}")
             for name, value, error in (_surest_derivatives(runs[0])[:2] if len(runs) == 1 else ())
         ]
         kinds = ", ".join(dict.fromkeys(_words(run.type) for run in runs))
         figures += [
-            KeyFigure(label="Runs", value=len(runs), note=kinds),
-            KeyFigure(label="Speed", value=runs[0].speed_mps, unit="m/s"),
-            KeyFigure(label="Periods", value=sum(run.periods for run in runs)),
-            KeyFigure(label="Faults", value=faults, verdict=Verdict.FAILED if faults else Verdict.PASSED),
+            KeyFigure("Runs", len(runs), note=kinds),
+            KeyFigure("Speed", runs[0].speed_mps, "m/s"),
+            KeyFigure("Periods", sum(run.periods for run in runs)),
+            KeyFigure("Faults", faults, verdict=Verdict.FAILED if faults else Verdict.PASSED),
         ]
         if self.repeats:
             odd = sum(row.differs for row in self.repeats)
             verdict = Verdict.CAUTION if odd else Verdict.PASSED
-            figures.append(KeyFigure(label="Coefficients in which repeats differ", value=odd, verdict=verdict))
+            figures.append(KeyFigure("Coefficients in which repeats differ", odd, verdict=verdict))
         return figures
 
     @property
@@ -201,15 +173,13 @@ class CaptiveRunResult(Result[CaptiveRunStudy]):
         cycles = []
         if swinging:
             chart = cycle_chart(swinging, title="Averaged cycle")
-            cycles = [
-                Section(heading="Averaged cycle", charts=[Illustration(chart=chart, caption=caption, name="cycle")])
-            ]
+            cycles = [Section("Averaged cycle", charts=[Illustration(chart, caption=caption, name="cycle")])]
         fourier = [_forces_table(self.runs, water=self.study.inertia_removed), *map(_coefficients_table, self.runs)]
         return [
             *cycles,
             *_derivatives_section(self.runs),
             *_repeats_section(self.repeats),
-            Section(heading="Fourier coefficients", text=_FOURIER, tables=fourier),
+            Section("Fourier coefficients", text=_FOURIER, tables=fourier),
             _over_time("Forces over time", "forces", "Points: readings; lines: harmonics and trend.", named),
             _over_time("Residual", "residual", "Record less harmonics and trend.", named),
         ]
@@ -281,8 +251,7 @@ def _derivatives_section(runs: Sequence[SingleRun]) -> list[Section]:
     if not rows:
         return []
     caption = "Derivatives of the run alone, at its frequency and amplitude (prime, times 10⁵)"
-    found = table(caption, ("run", "derivative", "value", "±"), rows)
-    return [Section(heading="Derivatives of the run alone", tables=[found])]
+    return [Section("Derivatives of the run alone", tables=[table(caption, ("run", "derivative", "value", "±"), rows)])]
 
 
 def _repeats_section(repeats: Sequence[RepeatedCoefficient]) -> list[Section]:
@@ -297,12 +266,12 @@ def _repeats_section(repeats: Sequence[RepeatedCoefficient]) -> list[Section]:
     ]
     heads = ("force", "part", "order", "mean", "deviation", "by noise", "chance", "verdict")
     note = "Deviation: standard deviation of one run. By noise: the deviation that the noise within the runs explains."
-    return [Section(heading="Repeats", tables=[table(f"{len(repeats[0].values)} runs compared", heads, rows, note)])]
+    return [Section("Repeats", tables=[table(f"{len(repeats[0].values)} runs compared", heads, rows, note)])]
 
 
 def _over_time(heading: str, stem: str, caption: str, runs: Mapping[str, SingleRun]) -> Section:
     """Forces or residuals of each run over time."""
-    signals = [Signal(name=force, title=force, unit="N.m" if force == "N" else "N") for force in _FORCES]
+    signals = [Signal(force, force, "N.m" if force == "N" else "N") for force in _FORCES]
     charts = []
     for place, (label, run) in enumerate(runs.items(), start=1):
         title = f"{stem.capitalize()}: {label}"
@@ -311,13 +280,13 @@ def _over_time(heading: str, stem: str, caption: str, runs: Mapping[str, SingleR
             chart = history_chart(lines, signals, title=title)
         else:
             chart = history_chart([_history(run, "residual", "_residual")], signals, title=title, height_px=80)
-        charts.append(Illustration(chart=chart, caption=caption, name=f"{stem}_{place}"))
-    return Section(heading=heading, charts=charts)
+        charts.append(Illustration(chart, caption=caption, name=f"{stem}_{place}"))
+    return Section(heading, charts=charts)
 
 
 def _history(run: SingleRun, label: str, part: str, *, measured: bool = False) -> History:
     values = {force: run.history[f"{force}{part}_{unit}"] for force, unit in _KEYS.items()}
-    return History(label=label, time_s=run.history["t_s"], values=values, measured=measured)
+    return History(label, time_s=run.history["t_s"], values=values, measured=measured)
 
 
 def _labels(runs: Sequence[SingleRun]) -> list[str]:
@@ -341,13 +310,13 @@ def cycle_chart(runs: Mapping[str, SingleRun], *, title: str = "") -> ChartSpec:
             cycle = each.cycles[force]
             phase, mean, spread = np.degrees(cycle.phase_rad), cycle.mean, np.nan_to_num(cycle.deviation)
             series += [
-                PlotSeries(label=label, x=phase, y=cycle.fit),
-                PlotSeries(label=label, x=phase, y=mean, low=mean - spread, high=mean + spread, points=True),
+                PlotSeries(label, x=phase, y=cycle.fit),
+                PlotSeries(label, x=phase, y=mean, low=mean - spread, high=mean + spread, points=True),
             ]
-        plots.append(Plot(series=series, up=PlotAxis(title=up), height_px=200))
+        plots.append(Plot(series, up=PlotAxis(up), height_px=200))
     return curve_panels(
         plots,
-        PlotAxis(title="phase (deg)", domain=(0.0, 360.0), nice=False),
+        PlotAxis("phase (deg)", domain=(0.0, 360.0), nice=False),
         title=title,
         width_px=640,
         described=f"Forces over the phase of the motion of {', '.join(labels)}.",

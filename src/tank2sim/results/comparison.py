@@ -13,7 +13,18 @@ from tank2sim.answer.charts.parts import plain, series_look, with_unit
 from tank2sim.answer.charts.rows import RowPlot, names_of, row_chart, row_layers
 from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, Rule, layered, stacked
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.parts import (
+    Cell,
+    Column,
+    Illustration,
+    KeyFigure,
+    Section,
+    Table,
+    Verdict,
+    data_frame,
+    records_table,
+    table,
+)
 from tank2sim.answer.result import Result
 from tank2sim.units import in_words
 
@@ -73,9 +84,7 @@ class ComparisonResult(Result[CardComparison]):
     @property
     def summary(self) -> pd.DataFrame:
         """By card but the reference (index): coefficients compared, the same number, beyond 2 standard errors, rms."""
-        import pandas as pd
-
-        return pd.DataFrame([asdict(summary) for summary in self.study.summary]).set_index("card")
+        return data_frame([asdict(summary) for summary in self.study.summary], index="card")
 
     @property
     def coefficients(self) -> pd.DataFrame:
@@ -86,8 +95,6 @@ class ComparisonResult(Result[CardComparison]):
         ``difference_percent`` is in per cent of the reference's size, ``standard_errors`` the difference over the root
         of both variances; missing where they cannot be compared.
         """
-        import pandas as pd
-
         rows = [
             (label, row.name, row.cards[0].value, row.cards[place].value, apart.percent, apart.standard_errors)
             for place, label in self._others()
@@ -95,14 +102,12 @@ class ComparisonResult(Result[CardComparison]):
             for apart in [row.differences[place - 1]]
         ]
         columns = ["card", "coefficient", "reference", "value", "difference_percent", "standard_errors"]
-        return pd.DataFrame(rows, columns=columns)
+        return data_frame(rows, columns=columns)
 
     @property
     def figures(self) -> pd.DataFrame:
         """Figures of the standard trials, a row each with its card: value, standard deviation, difference from the
         reference, the same in standard errors; in the unit of the figure's name."""
-        import pandas as pd
-
         rows = [
             (trial.name, name, label, value, deviation, apart, errors)
             for trial in self.study.trials
@@ -117,7 +122,7 @@ class ComparisonResult(Result[CardComparison]):
             )
         ]
         columns = ["trial", "figure", "card", "value", "standard_deviation", "difference", "standard_errors"]
-        return pd.DataFrame(rows, columns=columns)
+        return data_frame(rows, columns=columns)
 
     @property
     def title(self) -> str:
@@ -165,15 +170,15 @@ class ComparisonResult(Result[CardComparison]):
                 _, trial, figure, percent, _ = max(own, key=lambda row: abs(row[3]))
                 value = float(f"{percent:.3g}")
                 note = f"{trial}: {figure}"
-                figures.append(KeyFigure(label=f"{label}: largest difference", value=value, unit="%", note=note))
+                figures.append(KeyFigure(f"{label}: largest difference", value, "%", note=note))
         return [*figures, *map(_beyond, self.study.summary)]
 
     @property
     def sections(self) -> Sequence[Section]:
         """Tracks, figures, coefficients and cards."""
-        rows = [[card.label, card.ship, card.source] for card in self.study.cards]
-        cards = table("Cards, the reference first", ("card", "ship", "source"), rows, on_screen=False)
-        return [*self._tracks(), *self._figures(), self._coefficients(), Section(heading="Cards", tables=[cards])]
+        fields = {"label": "card", "ship": "", "source": ""}
+        cards = records_table("Cards, the reference first", self.study.cards, fields=fields, on_screen=False)
+        return [*self._tracks(), *self._figures(), self._coefficients(), Section("Cards", tables=[cards])]
 
     def _others(self) -> list[tuple[int, str]]:
         return list(enumerate(self.labels))[1:]
@@ -192,11 +197,11 @@ class ComparisonResult(Result[CardComparison]):
     def _tracks(self) -> list[Section]:
         charts = []
         for trial in self.study.trials:
-            tracks = [TrackData(label=one.card, x_m=one.x_m, y_m=one.y_m, time_s=one.t_s) for one in trial.tracks]
+            tracks = [TrackData(one.card, x_m=one.x_m, y_m=one.y_m, time_s=one.t_s) for one in trial.tracks]
             if tracks:
                 chart = track_chart(tracks, title=trial.name[:1].upper() + trial.name[1:], height_px=400)
-                charts.append(Illustration(chart=chart, half=True, name="tracks"))
-        return [Section(heading="Tracks", charts=charts)] if charts else []
+                charts.append(Illustration(chart, half=True, name="tracks"))
+        return [Section("Tracks", charts=charts)] if charts else []
 
     def _figures(self) -> list[Section]:
         """Differences of the figures from those of the reference, all manoeuvres in one chart."""
@@ -206,7 +211,7 @@ class ComparisonResult(Result[CardComparison]):
         chart = _percent_chart(
             percents, self.labels, ", standard errors assumed" * any(card.assumed_errors for card in self.study.cards)
         )
-        drawn = Illustration(chart=chart, caption=_PERCENT, name="figures_of_manoeuvres")
+        drawn = Illustration(chart, caption=_PERCENT, name="figures_of_manoeuvres")
         shown = _SHOWN_OF_CRAFT if self.study.craft else _SHOWN
         rows: list[list[Cell]] = [
             [trial.name, with_unit(*in_words(name)), *_with_deviations(row)]
@@ -216,12 +221,12 @@ class ComparisonResult(Result[CardComparison]):
         ]
         main = table("Main figures (standard deviation)", ("trial", "figure", *self.labels), rows)
         tables = [main, *map(self._trial_table, self.study.trials)]
-        return [Section(heading="Figures of manoeuvres", text=_TRIALS, charts=[drawn], tables=tables)]
+        return [Section("Figures of manoeuvres", text=_TRIALS, charts=[drawn], tables=tables)]
 
     def _trial_table(self, trial: TrialComparison) -> Table:
         heads: list[str | Column] = ["figure", "unit", *self.labels]
         for label in self.labels[1:]:
-            heads += [f"{label}: difference", Column(title="z", digits=3)]
+            heads += [f"{label}: difference", Column("z", digits=3)]
         rows: list[list[Cell]] = []
         for name, row in trial.figures.items():
             if name.endswith("_lengths"):  # the figure in m has the same differences
@@ -251,9 +256,8 @@ class ComparisonResult(Result[CardComparison]):
         charts = []
         if any(summary.compared for summary in study.summary):
             caption = f"Lines at {BEYOND_STANDARD_ERRORS:g} standard errors."
-            chart = _errors_chart(study.rows, self.labels)
-            charts.append(Illustration(chart=chart, caption=caption, name="coefficients"))
-        return Section(heading="Coefficients", text="\n\n".join(texts), tables=tables, charts=charts)
+            charts.append(Illustration(_errors_chart(study.rows, self.labels), caption=caption, name="coefficients"))
+        return Section("Coefficients", text="\n\n".join(texts), tables=tables, charts=charts)
 
     def _farthest(self, place: int, label: str) -> Table:
         every = [(row, row.differences[place - 1]) for row in self.study.rows]
@@ -271,9 +275,9 @@ class ComparisonResult(Result[CardComparison]):
     def _coefficient_table(self, caption: str, rows: Sequence[CoefficientRow], factor: float) -> Table:
         heads: list[str | Column] = ["coefficient"]
         for label in self.labels:
-            heads += [Column(title=label, digits=6), Column(title="s.e.", digits=3)]
+            heads += [Column(label, digits=6), Column("s.e.", digits=3)]
         for label in self.labels[1:]:
-            heads += [Column(title=f"{label}: difference", unit="%", digits=3), Column(title="z", digits=3)]
+            heads += [Column(f"{label}: difference", "%", digits=3), Column("z", digits=3)]
         return table(caption, [*heads, "remark"], [_coefficient_row(row, factor) for row in rows], on_screen=False)
 
 
@@ -283,8 +287,8 @@ def _beyond(summary: CardSummary) -> KeyFigure:
     note = "no standard errors" if rms is None else f"rms {rms:.3g} standard errors"
     note += f"; {summary.same_number} more taken over" if summary.same_number else ""
     return KeyFigure(
-        label=f"{summary.card}: coefficients beyond {BEYOND_STANDARD_ERRORS:g}",
-        value=f"{beyond} of {compared}",
+        f"{summary.card}: coefficients beyond {BEYOND_STANDARD_ERRORS:g}",
+        f"{beyond} of {compared}",
         # One in twenty differs by more by chance alone.
         verdict=Verdict.PASSED if beyond <= 0.05 * compared + 1 else Verdict.CAUTION,
         note=note,
@@ -324,10 +328,10 @@ def _errors_chart(coefficients: Sequence[CoefficientRow], labels: Sequence[str])
     ]
     return row_chart(
         RowPlot(
-            rows=rows,
-            across=PlotAxis(title="difference (standard errors)", zero=True),
+            rows,
+            across=PlotAxis("difference (standard errors)", zero=True),
             look=series_look(labels[1:], as_points=labels[1:]),
-            rules=[Rule(at=[-BEYOND_STANDARD_ERRORS, BEYOND_STANDARD_ERRORS], style="limit")],
+            rules=[Rule([-BEYOND_STANDARD_ERRORS, BEYOND_STANDARD_ERRORS], style="limit")],
             shown={"run:N": "card", "name:N": "coefficient", "v:Q": "standard errors"},
         ),
         title="Differences in standard errors",
@@ -349,14 +353,12 @@ def _percent_chart(percents: Sequence[_FigurePercent], labels: Sequence[str], as
             row |= {"low": plain(percent * (1 - 2 / abs(z))), "high": plain(percent * (1 + 2 / abs(z)))}
         ends += [float(row[key]) for key in ("v", "low", "high") if row.get(key) is not None]
         panels.setdefault(trial, []).append(row)
-    across = PlotAxis(title="", domain=(min(0.0, *ends), max(0.0, *ends)))
+    across = PlotAxis("", domain=(min(0.0, *ends), max(0.0, *ends)))
     look = series_look(labels[1:], as_points=labels[1:])
     shown = {"run:N": "card", "whole:N": "figure", "v:Q": "difference (%)"}
     drawn = []
     for trial, rows in panels.items():
-        layers = row_layers(
-            RowPlot(rows=rows, across=across, look=look, shown=shown, rules=[Rule(at=[0.0])]), filled=True
-        )
+        layers = row_layers(RowPlot(rows, across=across, look=look, shown=shown, rules=[Rule([0.0])]), filled=True)
         title = {"text": trial, "anchor": "start", "fontSize": 11}
         drawn.append(layered(layers, size=(560, {"step": 16}), title=title))
     return stacked(

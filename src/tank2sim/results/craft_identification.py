@@ -32,6 +32,7 @@ class CraftIdentificationResult(Result[CraftIdentificationStudy]):
     fit: CraftFit | None = None
     predictions: tuple[FreePrediction, ...] = ()
     command: ClassVar[str] = "identify"
+    subject: ClassVar[str] = "coefficients from trials"
 
     @property
     def determination(self) -> dict[str, float] | None:
@@ -42,11 +43,6 @@ class CraftIdentificationResult(Result[CraftIdentificationStudy]):
     def next_trials(self) -> tuple[CandidateTrial, ...]:
         """Manoeuvres of five minutes; the first would determine most of the coefficients that these trials do not."""
         return self.study.next_trials
-
-    @property
-    def title(self) -> str:
-        """The craft."""
-        return f"{self.study.ship}: coefficients from trials"
 
     @property
     def subtitle(self) -> str:
@@ -74,10 +70,10 @@ class CraftIdentificationResult(Result[CraftIdentificationStudy]):
         """Coefficients determined, and R^2 of the predictions."""
         count = len(self.study.coefficients)
         return [
-            KeyFigure(label="Coefficients determined", value=f"{self._determined} of {count}"),
-            KeyFigure(label="Within a quarter of their value", value=f"{self._identified} of {count}"),
+            KeyFigure("Coefficients determined", f"{self._determined} of {count}"),
+            KeyFigure("Within a quarter of their value", f"{self._identified} of {count}"),
             *(
-                KeyFigure(label=f"R^2 of {name}", value=round(value, 3), note="predictions of held-out trials")
+                KeyFigure(f"R^2 of {name}", round(value, 3), note="predictions of held-out trials")
                 for name, value in (self.study.determination or {}).items()
             ),
         ]
@@ -94,8 +90,8 @@ class CraftIdentificationResult(Result[CraftIdentificationStudy]):
         found = [] if self.study.compass is None else [records_table("Compass", [self.study.compass], folded=False)]
         return [
             *craft_sections(self.study),
-            *([Section(heading=heading, tables=shown)] if shown else []),
-            *([Section(heading="Deviation of the compass", text=parts, tables=found)] if found else []),
+            *([Section(heading, tables=shown)] if shown else []),
+            *([Section("Deviation of the compass", text=parts, tables=found)] if found else []),
         ]
 
     @property
@@ -109,7 +105,7 @@ class CraftIdentificationResult(Result[CraftIdentificationStudy]):
 
 def craft_sections(study: CraftIdentificationStudy) -> list[Section]:
     """Return the section with each coefficient, the verdict on it, and the five minutes that would determine more."""
-    heads: list[str | Column] = ["coefficient (SI)", "value", Column(title="standard error", digits=2)]
+    heads: list[str | Column] = ["coefficient (SI)", "value", Column("standard error", digits=2)]
     rows: list[list[Cell]] = [
         [name, one.value, one.standard_error, one.before, one.prior_standard_error, one.verdict.value, one.by]
         for name, one in study.coefficients.items()
@@ -117,10 +113,10 @@ def craft_sections(study: CraftIdentificationStudy) -> list[Section]:
     tables = [table("Coefficients", [*heads, "card", "error of the card", "verdict", "mostly by"], rows, folded=False)]
     if study.next_trials:
         orders: list[list[Cell]] = [[one.words, ", ".join(one.determines) or None] for one in study.next_trials]
-        further = (Column(title="five minutes of (port/starboard, % of full)"), "would determine")
+        further = (Column("five minutes of (port/starboard, % of full)"), "would determine")
         tables.append(table("Next five minutes", further, orders))
     text = (
         "Identified: the standard error is at most a quarter of the value. Bounded: the trials have at least halved "
         "the standard error of the card. Not determined: the value is the card's."
     )
-    return [Section(heading="Coefficients determined by the trials", text=text, tables=tables)]
+    return [Section("Coefficients determined by the trials", text=text, tables=tables)]

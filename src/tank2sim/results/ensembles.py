@@ -15,13 +15,14 @@ from tank2sim.analysis.ensemble.tails import Tail
 from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_panels
 from tank2sim.answer.charts.vega import ChartSpec, PlotAxis
-from tank2sim.answer.parts import Cell, Illustration, Section, Table, table
+from tank2sim.answer.parts import Cell, Illustration, Section, Table, data_frame, table
 from tank2sim.answer.result import Result
 from tank2sim.arrays import Array
 from tank2sim.errors import ArgumentError
 from tank2sim.memory import refuse_beyond_memory
 from tank2sim.notices import Notice
 from tank2sim.results.imo import BEYOND_THE_CARD
+from tank2sim.results.stability_charts import steering_curves
 from tank2sim.simulation.bands import Band
 from tank2sim.units import in_words
 
@@ -87,8 +88,6 @@ class EnsembleResult(Result[_S]):
             The result has no ensemble, was read from its JSON, which has only the bands, or the frame does not fit
             into the memory.
         """
-        import pandas as pd
-
         found: Members | None = self.study.ensemble
         if found is None:
             raise ArgumentError("members", "", "is 0: this result has no ensemble", "give members=100 or more")
@@ -98,7 +97,7 @@ class EnsembleResult(Result[_S]):
         columns = len(found.drawn.draws.names) + len(found.drawn.figures)
         refuse_beyond_memory("members", found.members, 2 * 8 * columns)
         values = {**found.drawn.coefficients(), **found.drawn.figures, "usable": found.drawn.usable}
-        return pd.DataFrame(values).rename_axis("member")
+        return data_frame(values).rename_axis("member")
 
 
 def band_table(found: Members, figures: Mapping[str, Band]) -> Table:
@@ -117,7 +116,7 @@ def band_table(found: Members, figures: Mapping[str, Band]) -> Table:
 
 def figures_section(found: FigureBands | StabilityBands) -> Section:
     """Return the section with bands of figures by name."""
-    return Section(heading=ensemble_heading(found), text=MEMBERS_TEXT, tables=[band_table(found, found.figures)])
+    return Section(ensemble_heading(found), text=MEMBERS_TEXT, tables=[band_table(found, found.figures)])
 
 
 def stability_section(found: StabilityBands, criteria: Sequence[ImoCriterion]) -> Section:
@@ -127,7 +126,7 @@ def stability_section(found: StabilityBands, criteria: Sequence[ImoCriterion]) -
         rare["any of these"] = found.imo_all.tail
     text = [MEMBERS_TEXT, _CHANCES, *([_RARE] if rare else [])]
     return Section(
-        heading=ensemble_heading(found),
+        ensemble_heading(found),
         text="\n\n".join(text),
         tables=[
             _chances(found, {criterion.name for criterion in criteria if criterion.beyond_card}),
@@ -139,9 +138,11 @@ def stability_section(found: StabilityBands, criteria: Sequence[ImoCriterion]) -
     )
 
 
-def chance_sentences(found: StabilityBands) -> list[str]:
+def chance_sentences(found: StabilityBands | None) -> list[str]:
     """Return sentences on the probabilities of stability and of meeting all criteria together."""
-    sentences = []
+    sentences: list[str] = []
+    if found is None:
+        return sentences
     if found.probability_stable is not None and found.probability_stable_interval_95:
         interval = _interval(found.probability_stable_interval_95)
         probability = f"probability {found.probability_stable:.3g} (95 % interval {interval})"
@@ -233,9 +234,9 @@ def curve_charts(curves: SteeringBands) -> list[Illustration]:
             "in the loop a ship keeps turning to the side that it comes from."
         )
     return [
-        Illustration(chart=turns_chart(turning, title="Stable turns over the ensemble"), caption=turns),
-        Illustration(chart=_bode_chart(bode, title="Bode diagram over the ensemble"), caption=shaded),
-        Illustration(chart=_step_chart(step, title="Step of the rudder over the ensemble"), caption=shaded),
+        Illustration(turns_chart(turning, title="Stable turns over the ensemble"), caption=turns),
+        Illustration(_bode_chart(bode, title="Bode diagram over the ensemble"), caption=shaded),
+        Illustration(_step_chart(step, title="Step of the rudder over the ensemble"), caption=shaded),
     ]
 
 
@@ -253,8 +254,8 @@ def turns_chart(turning: TurningBands, *, title: str = "") -> ChartSpec:
     if not apart.any():
         series = [_banded("stable turns", rudder, starboard)]
     return curve_chart(
-        Plot(series=series, up=PlotAxis(title="yaw rate (deg/s)")),
-        PlotAxis(title="rudder angle, starboard positive (deg)", nice=False, zero=True),
+        Plot(series, up=PlotAxis("yaw rate (deg/s)")),
+        PlotAxis("rudder angle, starboard positive (deg)", nice=False, zero=True),
         title=title,
         width_px=_WIDTH,
         window=["x"],
@@ -266,28 +267,23 @@ def turns_chart(turning: TurningBands, *, title: str = "") -> ChartSpec:
 def _bode_chart(bode: BodeBands, *, title: str) -> ChartSpec:
     """Magnitude and phase of the yaw rate by the rudder angle."""
     plots = [
-        Plot(
-            series=[_banded("yaw rate by rudder angle", bode.omega_radps, band)],
-            up=PlotAxis(title=name),
-            height_px=180,
-        )
+        Plot([_banded("yaw rate by rudder angle", bode.omega_radps, band)], up=PlotAxis(name), height_px=180)
         for name, band in (("magnitude (dB)", bode.magnitude_dB), ("phase (deg)", bode.phase_deg))
     ]
-    across = PlotAxis(title="angular frequency (rad/s)", log=True, nice=False, form="~g")
+    across = PlotAxis("angular frequency (rad/s)", log=True, nice=False, form="~g")
     described = "Bode diagram of yaw rate by rudder angle, with its band over an ensemble."
     return curve_panels(plots, across, title=title, width_px=_WIDTH, described=described, shown=_SHOWN)
 
 
 def _step_chart(step: StepBands, *, title: str) -> ChartSpec:
     """Yaw rate after a step of one degree of rudder."""
-    series = [_banded("yaw rate", step.time_s, step.step_per_s)]
-    return curve_chart(
-        Plot(series=series, up=PlotAxis(title="yaw rate per degree of rudder (deg/s)"), height_px=240),
-        PlotAxis(title="time after the step (s)", nice=False),
+    return steering_curves(
+        [_banded("yaw rate", step.time_s, step.step_per_s)],
+        ("time after the step (s)", "yaw rate per degree of rudder (deg/s)"),
         title=title,
-        width_px=_WIDTH,
-        window=["x"],
         described="Yaw rate after a step of the rudder, with its band over an ensemble.",
+        height=240,
+        zero=False,
         shown=_SHOWN,
     )
 
@@ -297,4 +293,4 @@ def _banded(label: str, x: Array, band: CurveBand, shown: NDArray[np.bool_] | No
     own, low, high = (
         values if shown is None else np.where(shown, values, np.nan) for values in (band.own, band.p5, band.p95)
     )
-    return PlotSeries(label=label, x=x, y=own, low=low, high=high)
+    return PlotSeries(label, x=x, y=own, low=low, high=high)

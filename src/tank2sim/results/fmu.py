@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from tank2sim.answer.charts.analysis import OutputError, error_chart
-from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Verdict, quantities, table
+from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Verdict, quantities, records_table, table
 from tank2sim.answer.result import Result
 from tank2sim.cards.card import Card
 from tank2sim.escaping import c_comment
@@ -58,6 +58,7 @@ class ExportResult(Result[ExportStudy]):
     files: Mapping[Path, str | bytes] = field(default_factory=dict)
     card: Card | None = None
     command: ClassVar[str] = "export"
+    subject: ClassVar[str] = "FMU"
 
     def c_files(self, folder: Path) -> dict[Path, str | bytes]:
         """The ship in plain C99 in a folder: ``ship.h``, ``ship.c``, ``self_test.c`` and a README."""
@@ -80,11 +81,6 @@ class ExportResult(Result[ExportStudy]):
         return Path(self.study.ssp) if self.study.ssp else None
 
     @property
-    def title(self) -> str:
-        """The ship."""
-        return f"{self.study.ship}: FMU"
-
-    @property
     def headline(self) -> tuple[str, ...]:
         """File, version of FMI, platforms and size."""
         study = self.study
@@ -99,7 +95,7 @@ class ExportResult(Result[ExportStudy]):
         study = self.study
         values: dict[str, Cell] = {"file": study.fmu, "ssp": study.ssp, "fmi": study.fmi}
         values |= {"model_identifier": study.model_identifier, "token": study.token, "size_bytes": study.size_bytes}
-        return [Section(heading="FMU", tables=[quantities("The FMU", values, on_screen=False)])]
+        return [Section("FMU", tables=[quantities("The FMU", values, on_screen=False)])]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -156,29 +152,25 @@ class CheckResult(Result[CheckReport]):
         report = self.study
         verdict = Verdict.PASSED if report.passed else Verdict.FAILED
         largest = [
-            KeyFigure(label=kind, value=max(errors.values()), limit=report.limits[kind], note="largest relative error")
+            KeyFigure(kind, max(errors.values()), limit=report.limits[kind], note="largest relative error")
             for kind, errors in report.errors.items()
             if errors
         ]
-        return [KeyFigure(label="Check", value=str(verdict), verdict=verdict), *largest]
+        return [KeyFigure("Check", str(verdict), verdict=verdict), *largest]
 
     @property
     def sections(self) -> Sequence[Section]:
         """Problems, and the largest error of each output, relative to its range."""
-        report, sections = self.study, []
-        if self.problems:
-            rows: list[list[Cell]] = [[problem] for problem in self.problems]
-            first = table(f"Problems, {MOST_PROBLEMS} of {len(rows)}", ["problem"], rows[:MOST_PROBLEMS])
-            listed = table("Problems", ["problem"], rows, on_screen=len(rows) <= MOST_PROBLEMS)
-            tables = [listed] if listed.on_screen else [first, listed]
-            sections.append(Section(heading="Problems", tables=tables))
+        report, sections = self.study, self._problems()
         if report.conditions:
-            judged: list[list[Cell]] = [[one.condition, one.met, one.found] for one in report.conditions]
-            conditions = table(f"Conditions of {report.host}", ("condition", "met", "found"), judged)
-            sections.append(Section(heading=f"Conditions of {report.host}", tables=[conditions]))
+            caption = f"Conditions of {report.host}"
+            judged = records_table(caption, report.conditions, fields=("condition", "met", "found"))
+            sections.append(Section(caption, tables=[judged]))
         if not report.errors:
             return sections
-        rows = [[name, *(errors.get(name) for errors in report.errors.values())] for name in report.max_error]
+        rows: list[list[Cell]] = [
+            [name, *(errors.get(name) for errors in report.errors.values())] for name in report.max_error
+        ]
         rows.append(["limit", *(report.limits[kind] for kind in report.errors)])
         caption = f"Largest errors in {report.duration_s:g} s, relative to each output's range"
         drawn = [
@@ -186,6 +178,12 @@ class CheckResult(Result[CheckReport]):
             for kind, errors in report.errors.items()
             for name, error in errors.items()
         ]
-        chart = Illustration(chart=error_chart(drawn, title="Errors by output"))
+        chart = Illustration(error_chart(drawn, title="Errors by output"))
         tables = [table(caption, ("output", *report.errors), rows, digits=2)]
-        return [*sections, Section(heading="Outputs", tables=tables, charts=[chart])]
+        return [*sections, Section("Outputs", tables=tables, charts=[chart])]
+
+    def _problems(self) -> list[Section]:
+        rows: list[list[Cell]] = [[problem] for problem in self.problems]
+        first = table(f"Problems, {MOST_PROBLEMS} of {len(rows)}", ["problem"], rows[:MOST_PROBLEMS])
+        listed = table("Problems", ["problem"], rows, on_screen=len(rows) <= MOST_PROBLEMS)
+        return [Section("Problems", tables=[listed] if listed.on_screen else [first, listed])] if rows else []

@@ -23,7 +23,7 @@ from tank2sim.answer.charts.vega import (
     layered,
     tooltips,
 )
-from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, Verdict, data_frame, table
 from tank2sim.answer.result import Result
 from tank2sim.arrays import Array
 from tank2sim.cards import Card
@@ -126,6 +126,7 @@ class IdentificationResult(Result[IdentificationStudy]):
     card: Card | None = None
     identification: Identification | None = None
     command: ClassVar[str] = "identify"
+    subject: ClassVar[str] = "coefficients from trials"
 
     @property
     def estimates(self) -> pd.DataFrame:
@@ -143,28 +144,18 @@ class IdentificationResult(Result[IdentificationStudy]):
 
         A figure of a held-out trial was expected in the interval (``low_95``, ``high_95``).
         """
-        import pandas as pd
-
         rows = [
             (one.trial, word, one.figure, one.measured, one.before, one.predicted, *(one.interval_95 or (None, None)))
             for word, key in SET_KEYS.items()
             for one in self.study.figures[key]
         ]
-        columns = ["trial", "set", "figure", "measured", "before", "now", "low_95", "high_95"]
-        return pd.DataFrame(rows, columns=columns)
+        return data_frame(rows, columns=["trial", "set", "figure", "measured", "before", "now", "low_95", "high_95"])
 
     @property
     def samples(self) -> pd.DataFrame | None:
         """Draws of the posterior, a column for each parameter in the units of `estimates`; None without sampling."""
-        import pandas as pd
-
         samples = self.identification.posterior if self.identification else None
-        return None if samples is None else pd.DataFrame(samples.flat, columns=list(samples.free))
-
-    @property
-    def title(self) -> str:
-        """The ship."""
-        return f"{self.study.ship}: coefficients from trials"
+        return None if samples is None else data_frame(samples.flat, columns=list(samples.free))
 
     @property
     def subtitle(self) -> str:
@@ -205,12 +196,12 @@ class IdentificationResult(Result[IdentificationStudy]):
         return [
             *figures,
             KeyFigure(
-                label="Trials held out",
-                value=held_out,
+                "Trials held out",
+                held_out,
                 verdict=Verdict.NONE if held_out else Verdict.CAUTION,
                 note=f"{fitted} were fitted",
             ),
-            KeyFigure(label="Numbers fitted", value=len(study.parameters), note=effects),
+            KeyFigure("Numbers fitted", len(study.parameters), note=effects),
         ]
 
     @property
@@ -239,13 +230,13 @@ class IdentificationResult(Result[IdentificationStudy]):
         trials = [trial for trial in self.study.replays if trial.held_out == (word == HELD_OUT)]
         shown, stem, charts = _worst(trials, windows), word.replace(" ", "_"), []
         if tracks := track_grid(shown, title=f"Tracks of trials {word}"):
-            charts.append(Illustration(chart=tracks, caption=_TRACKS, name=f"tracks_{stem}"))
+            charts.append(Illustration(tracks, caption=_TRACKS, name=f"tracks_{stem}"))
         for first in range(0, len(shown), _PER_SHEET):
             sheet = history_grid(shown[first : first + _PER_SHEET], title=f"Motions of trials {word}")
-            charts.append(Illustration(chart=sheet, caption=_HISTORIES, name=f"histories_{stem}"))
+            charts.append(Illustration(sheet, caption=_HISTORIES, name=f"histories_{stem}"))
         many = f"The {MOST_TRIALS} of {len(windows)} trials with the largest error of yaw rate."
         text = many if len(windows) > MOST_TRIALS else ""
-        return Section(heading=f"Trials {word}", text=text, charts=charts)
+        return Section(f"Trials {word}", text=text, charts=charts)
 
     def _parameters(self) -> Section:
         study, known = self.study, self.study.identifiability
@@ -269,15 +260,13 @@ class IdentificationResult(Result[IdentificationStudy]):
         information = "Information of the trials: singular values"
         singular = _singular_value_chart(known.singular_values, title=information)
         return Section(
-            heading="Parameters",
+            "Parameters",
             text=_PARAMETERS + _widened(study.prior_scale),
             tables=tables,
             charts=[
-                Illustration(
-                    chart=_parameter_chart(study.parameters, title=title), caption=in_errors, name="parameters"
-                ),
-                Illustration(chart=correlation, name="correlation"),
-                Illustration(chart=singular, caption=_SINGULAR, name="singular_values"),
+                Illustration(_parameter_chart(study.parameters, title=title), caption=in_errors, name="parameters"),
+                Illustration(correlation, name="correlation"),
+                Illustration(singular, caption=_SINGULAR, name="singular_values"),
             ],
         )
 
@@ -302,17 +291,14 @@ class IdentificationResult(Result[IdentificationStudy]):
         title = "Samples of the posterior, next to a normal distribution"
         chart = _posterior_chart(self.study.parameters, posterior, title=title)
         text = _POSTERIOR.format(
-            draws=posterior.draws,
-            chains=posterior.chains,
-            sampler=posterior.sampler,
-            simulations=posterior.simulations,
+            draws=posterior.draws, chains=posterior.chains, sampler=posterior.sampler, simulations=posterior.simulations
         )
         caption = f"Posterior, {posterior.draws} draws"
         return Section(
-            heading="Posterior",
+            "Posterior",
             text=text + ("" if posterior.converged else _CHAINS_APART),
             tables=[table(caption, ("parameter", "95 %", "R-hat", "effective size"), rows)],
-            charts=[Illustration(chart=chart, caption=_POSTERIOR_CHART, name="posterior")],
+            charts=[Illustration(chart, caption=_POSTERIOR_CHART, name="posterior")],
         )
 
     def _signals(self) -> Section:
@@ -326,10 +312,10 @@ class IdentificationResult(Result[IdentificationStudy]):
         title = "Error over windows of five ship lengths, of each signal"
         chart = window_chart(self._sets(self.study.errors_over_windows), title=title)
         return Section(
-            heading="Error of each signal",
+            "Error of each signal",
             text=_FOLLOWED,
             tables=[table(caption, ("trial", "set", "before", "now"), rows)],
-            charts=[Illustration(chart=chart, name="windows")],
+            charts=[Illustration(chart, name="windows")],
         )
 
     def _structures(self) -> Section:
@@ -339,7 +325,7 @@ class IdentificationResult(Result[IdentificationStudy]):
             rows.append([name, float(np.mean(single)), largest])
         heads = ("structure", "one at a time, mean (%)", "largest amplitudes (%)")
         caption = "Yaw-rate error of trials left out of the fit"
-        return Section(heading="Structure, by cross-validation", tables=[table(caption, heads, rows)])
+        return Section("Structure, by cross-validation", tables=[table(caption, heads, rows)])
 
     def _figures(self) -> list[Section]:
         """Figures by unit: in one column the digits of distances would hide the errors of angles."""
@@ -356,8 +342,8 @@ class IdentificationResult(Result[IdentificationStudy]):
                 every = ["trial", "set", "figure", *heads, "error", f"95 % ({unit})"]
                 tables.append(replace(table(caption, every, rows), wide=True))
         chart = figure_chart(self._sets(self.study.figures), title="Figures of turns and zigzags, in closed loop")
-        charts = [Illustration(chart=chart, caption=_FIGURE_CHART, name="figures")] if chart else []
-        return [Section(heading="Figures of manoeuvres", text=_FIGURES, tables=tables, charts=charts)] if tables else []
+        charts = [Illustration(chart, caption=_FIGURE_CHART, name="figures")] if chart else []
+        return [Section("Figures of manoeuvres", text=_FIGURES, tables=tables, charts=charts)] if tables else []
 
     def _sets(self, entries: Mapping[str, tuple[_T, ...]]) -> dict[str, tuple[_T, ...]]:
         """Words for a set of trials to its entries, without a set that has no trial."""
@@ -376,7 +362,7 @@ def _worst(trials: Sequence[CardReplay], windows: Sequence[TrialErrors]) -> list
 def _compared(label: str, word: str, unit: str, before: float, after: float) -> KeyFigure:
     worse = Verdict.CAUTION if after > before else Verdict.NONE
     note = f"rms; before {before:.3g} {unit}" if np.isfinite(before) else "rms; before: not reached"
-    return KeyFigure(label=f"{label}, {word}", value=float(f"{after:.3g}"), unit=unit, verdict=worse, note=note)
+    return KeyFigure(f"{label}, {word}", float(f"{after:.3g}"), unit, verdict=worse, note=note)
 
 
 def _rms(figures: Sequence[PredictedFigure], key: str, factor: float) -> float:
@@ -424,7 +410,7 @@ def _parameter_chart(parameters: Mapping[str, ParameterEstimate], *, title: str 
     # A few derivatives may move by dozens of standard errors, where the others move by one.
     wide = farthest > 12
     across = PlotAxis(
-        title="value less prior, in standard errors of the prior (-)",
+        "value less prior, in standard errors of the prior (-)",
         zero=not wide,
         scale={"type": "symlog", "constant": 2} if wide else None,
         ticks=_symmetric_ticks(farthest) if wide else None,
@@ -433,12 +419,10 @@ def _parameter_chart(parameters: Mapping[str, ParameterEstimate], *, title: str 
     prior = [row | {"run": "prior", "v": 0.0, "low": -_NORMAL, "high": _NORMAL} for row in found]
     shown = {"name:N": "parameter", "own:N": "found", "known:N": "before", "share_text:N": "from trials"}
     intervals = [
-        *row_layers(
-            RowPlot(rows=found, across=across, look=look, shown=shown, rules=[Rule(at=[0.0])]), size=34, yOffset=-4
-        ),
-        *row_layers(RowPlot(rows=prior, across=across, look=look, shown=shown), size=34, yOffset=4),
+        *row_layers(RowPlot(found, across=across, look=look, shown=shown, rules=[Rule([0.0])]), size=34, yOffset=-4),
+        *row_layers(RowPlot(prior, across=across, look=look, shown=shown), size=34, yOffset=4),
     ]
-    shares = PlotAxis(title="information from trials (%)", domain=(0, 100))
+    shares = PlotAxis("information from trials (%)", domain=(0, 100))
     bare = {"labels": False, "ticks": False, "grid": False}
     bars = [{"name": row["name"], "v": row["share"]} | {key: row[key] for key in _SAID} for row in found]
     height = 21 * len(found)
@@ -446,9 +430,7 @@ def _parameter_chart(parameters: Mapping[str, ParameterEstimate], *, title: str 
         "hconcat": [
             layered(intervals, size=(400, height)),
             layered(
-                row_layers(
-                    RowPlot(rows=bars, across=shares, shown=shown, side=bare), mark="bar", height=9, opacity=0.7
-                ),
+                row_layers(RowPlot(bars, across=shares, shown=shown, side=bare), mark="bar", height=9, opacity=0.7),
                 size=(150, height),
             ),
         ],
@@ -498,9 +480,9 @@ def _posterior_chart(
         rows.append(
             {"name": name, **shown, "interval": f"{low:.4g} to {high:.4g}", "found": f"{middle:.4g}", "run": "samples"}
         )
-    across = PlotAxis(title="value less mean, in standard deviations (-)", zero=True)
+    across = PlotAxis("value less mean, in standard deviations (-)", zero=True)
     shown_as = {"name:N": "parameter", "found:N": "median", "interval:N": "95 %"}
-    layers = row_layers(RowPlot(rows=rows, across=across, shown=shown_as), size=40)
+    layers = row_layers(RowPlot(rows, across=across, shown=shown_as), size=40)
     half = {"x": across.channel("quarter"), "x2": "three", "y": layers[0]["encoding"]["y"]}
     half["color"] = layers[0]["encoding"]["color"]
     normal = layer(
@@ -561,18 +543,13 @@ def _correlation_chart(known: IdentifiabilityStudy, *, title: str = "") -> Chart
 def _singular_value_chart(values: Array, *, title: str = "") -> ChartSpec:
     """Singular values of the sensitivities in units of the prior, falling; below 1 the prior determines more."""
     rows = [{"order": order, "v": plain(value)} for order, value in enumerate(values.tolist(), start=1) if value > 0]
-    across = PlotAxis(
-        title="direction, by the information of the trials (-)", nice=False, padding=10, form="d", zero=True
-    )
-    x, up = across.channel("order"), PlotAxis(title="singular value (-)", log=True, form="~g")
+    across = PlotAxis("direction, by the information of the trials (-)", nice=False, padding=10, form="d", zero=True)
+    x, up = across.channel("order"), PlotAxis("singular value (-)", log=True, form="~g")
     x["axis"] |= {"tickMinStep": 1}
     place: ChartSpec = {"x": x, "y": up.channel("v")}
     place["tooltip"] = tooltips({"order:Q": ("direction", "d"), "v:Q": "singular value"})
     return layered(
-        [
-            Rule(at=[1.0], style="limit", dash=(5, 3)).layer(place["y"]),
-            layer("point", rows, place, filled=True, size=45),
-        ],
+        [Rule([1.0], style="limit", dash=(5, 3)).layer(place["y"]), layer("point", rows, place, filled=True, size=45)],
         size=(620, 220),
         title=title,
         description=f"{len(rows)} singular values; {sum(value < 1 for value in values)} are below 1.",

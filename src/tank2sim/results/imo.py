@@ -30,19 +30,16 @@ def imo_section(criteria: Sequence[ImoCriterion], *, heading: str = "IMO criteri
             level = Level.CAUTION if criterion.beyond_card else Level.INFO
             remarks.setdefault(Notice(criterion.remark, level), []).append(criterion.name)
     rows: list[list[Cell]] = [
-        [
-            *(one.name, one.found, one.allowed, one.unit, _verdict(one)),
-            None if one.beyond_card else one.margin_percent,
-        ]
+        [*(one.name, one.found, one.allowed, one.unit, _verdict(one)), None if one.beyond_card else one.margin_percent]
         for one in criteria
     ]
     heads = ("criterion", "found", "allowed", "unit", "verdict", "margin (%)")
     notes = [remark.of("; ".join(names)) for remark, names in remarks.items()]
     charts = []
     if any(criterion.found is not None for criterion in criteria):
-        charts.append(Illustration(chart=criteria_chart(criteria, title="IMO MSC.137(76)"), caption=_BARS))
+        charts.append(Illustration(criteria_chart(criteria, title="IMO MSC.137(76)"), caption=_BARS))
     tables = [table("IMO MSC.137(76), worse side", heads, rows, *notes)]
-    return Section(heading=heading, text=text, tables=tables, charts=charts)
+    return Section(heading, text=text, tables=tables, charts=charts)
 
 
 def _verdict(criterion: ImoCriterion) -> Cell:

@@ -65,11 +65,7 @@ class InfluenceResult(EnsembleResult[InfluenceStudy]):
     study: InfluenceStudy
     ship: Any = None
     command: ClassVar[str] = "influence"
-
-    @property
-    def title(self) -> str:
-        """The ship."""
-        return f"{self.study.ship}: influence coefficients"
+    subject: ClassVar[str] = "influence coefficients"
 
     @property
     def subtitle(self) -> str:
@@ -138,12 +134,12 @@ class InfluenceResult(EnsembleResult[InfluenceStudy]):
         label, unit, tuned = figure_label(text), _unit(text), self.study.tuned
         if tuned is None or text not in tuned.figures:
             note = f"standard error {format_number(figure.standard_error, 2)}"
-            return KeyFigure(label=label, value=figure.value, unit=unit, note=note)
+            return KeyFigure(label, figure.value, unit, note=note)
         note, verdict = f"was {figure.value:.5g} before tuning", Verdict.NONE
         if text in (targets := _targets_of(tuned)):
             target, verdict = targets[text]
             note = f"was {figure.value:.5g}, target {target.relation} {target.wanted:g}"
-        return KeyFigure(label=label, value=tuned.figures[text], unit=unit, verdict=verdict, note=note)
+        return KeyFigure(label, tuned.figures[text], unit, verdict=verdict, note=note)
 
     @property
     def sections(self) -> Sequence[Section]:
@@ -164,17 +160,16 @@ class InfluenceResult(EnsembleResult[InfluenceStudy]):
         for text, figure in self.study.figures.items():
             target, verdict = targets.get(text, (None, None))
             wanted = f"{target.relation} {target.wanted:g}" if target else None
-            row: list[Cell] = [figure_label(text), wanted, figure.value, tuned.figures.get(text), _unit(text), verdict]
-            rows.append(row)
+            rows.append([figure_label(text), wanted, figure.value, tuned.figures.get(text), _unit(text), verdict])
         notes = [] if tuned.reached else ["The nearest figures are shown, in least squares of relative misses."]
         moves: list[list[Cell]] = [
             [move.name, move.before, move.after, move.standard_errors] for move in tuned.parameters.values()
         ]
         return Section(
-            heading="Tuning",
+            "Tuning",
             text=f"By the {'fewest' if tuned.by == FEWEST else 'most uncertain'} parameters, each within "
             f"{tuned.within_standard_errors:g} standard errors of the card.",
-            charts=[Illustration(chart=moves_chart(tuned))] if tuned.parameters else [],
+            charts=[Illustration(moves_chart(tuned))] if tuned.parameters else [],
             tables=[
                 table(
                     "Figures before and after",
@@ -205,8 +200,8 @@ class InfluenceResult(EnsembleResult[InfluenceStudy]):
             heads = ("parameter", *(figures[row] for row in rows))
             tables.append(table("K %: change for 10 % more, by exact slopes | by the 10 % difference", heads, cells))
         drawn = influence_charts(data)
-        charts = [Illustration(chart=chart, half=len(drawn) > 1) for chart in drawn]
-        return Section(heading="Influence coefficients", text=_COEFFICIENTS, charts=charts, tables=tables)
+        charts = [Illustration(chart, half=len(drawn) > 1) for chart in drawn]
+        return Section("Influence coefficients", text=_COEFFICIENTS, charts=charts, tables=tables)
 
     def _uncertainty(self) -> Section:
         rows: list[list[Cell]] = []
@@ -219,10 +214,10 @@ class InfluenceResult(EnsembleResult[InfluenceStudy]):
         heads = ("figure", "value", "unit", "standard error", "relative (%)", "most of it from")
         known = any(figure.standard_error > 0 for figure in self.study.figures.values())
         return Section(
-            heading=f"Errors of the figures{', standard errors assumed' * self.study.assumed_errors}",
+            f"Errors of the figures{', standard errors assumed' * self.study.assumed_errors}",
             text=f"By the delta method: {self.study.standard_errors}. The share of a number is the part of the "
             "variance that would go if it were known exactly; shares of correlated numbers overlap.",
-            charts=[Illustration(chart=variance_chart(self.study))] if known else [],
+            charts=[Illustration(variance_chart(self.study))] if known else [],
             tables=[table("Figures and their standard errors", heads, rows)],
         )
 
@@ -237,7 +232,7 @@ class InfluenceResult(EnsembleResult[InfluenceStudy]):
         ]
         heads = ("figure", "by exact slopes (%)", "by 10 % differences (%)", "direct (%)")
         return Section(
-            heading="Agreed variation",
+            "Agreed variation",
             text="All these numbers change together. To first order a figure changes by the sum of Kc K / 10; the "
             "direct change is read from the changed ship.",
             tables=[
@@ -253,7 +248,7 @@ class InfluenceResult(EnsembleResult[InfluenceStudy]):
                 labels = [figure_label(figures[row]) for row in rows]
                 part = f", from {labels[0]} on" if len(rows) < len(data.figures) else ""
                 tables.append(_all_of(f"{caption}{part}", data, K, rows))
-        return Section(heading="Coefficients of all parameters", tables=tables)
+        return Section("Coefficients of all parameters", tables=tables)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -348,11 +343,11 @@ def _pair(exact: float, difference: float) -> str:
 
 def _all_of(caption: str, data: InfluenceStudy, K: Array, rows: Sequence[int]) -> Table:
     figures = list(data.figures)
-    heads = [Column(title=figure_label(figures[row]), unit="%", digits=3) for row in rows]
+    heads = [Column(figure_label(figures[row]), "%", digits=3) for row in rows]
     cells: list[list[Cell]] = [
         [name, *(_rounded(K[row, place]) for row in rows)] for place, name in enumerate(data.names)
     ]
-    return table(caption, (Column(title="parameter"), *heads), cells, on_screen=False)
+    return table(caption, (Column("parameter"), *heads), cells, on_screen=False)
 
 
 def _rounded(value: float) -> float | None:
@@ -365,9 +360,7 @@ def _moves(tuned: TunedStudy) -> Section:
     ]
     heads = ("key", "before", "after", "move (standard errors)")
     caption = "Parameters that changed, as the card's file has them"
-    return Section(
-        heading="Numbers that tuning changed", tables=[table(caption, heads, rows, digits=6, on_screen=False)]
-    )
+    return Section("Numbers that tuning changed", tables=[table(caption, heads, rows, digits=6, on_screen=False)])
 
 
 EXACT, DIFFERENCE = "exact slope", "10 % difference"
@@ -408,16 +401,15 @@ def _bars(result: InfluenceStudy, row: int) -> ChartSpec:
         for run, sizes in values.items()
     }
     look = series_look([EXACT, DIFFERENCE], as_points=[EXACT, DIFFERENCE])
-    across = PlotAxis(title="K (%)", zero=True, ticks=4)
     exact = RowPlot(
-        rows=both[EXACT],
-        across=across,
+        both[EXACT],
+        across=PlotAxis("K (%)", zero=True, ticks=4),
         shown={"name:N": "parameter", "exact:Q": f"K, {EXACT} (%)", "step:Q": f"K, {DIFFERENCE} (%)"},
         look=look,
         side={"labelLimit": 170},
     )
     bars = row_layers(exact, mark="bar", height=9, opacity=0.65)
-    difference = replace(exact, rows=both[DIFFERENCE], rules=[Rule(at=[0.0])])
+    difference = replace(exact, rows=both[DIFFERENCE], rules=[Rule([0.0])])
     points = row_layers(difference, size=34, strokeWidth=1.6)
     figure = figure_label(list(result.figures)[row])
     return layered(
@@ -439,20 +431,19 @@ def variance_chart(result: InfluenceStudy) -> ChartSpec:
         for row in range(len(figures))
         for place in order
     ]
-    cells = Matrix(
-        colour="share",
-        rows=figures,
-        columns=names,
-        names=("figure", "name"),
-        scale={"domain": [0, max(10.0, float(shares.max(initial=0.0)))], "scheme": "blues"},
-        legend={"title": "share of the variance (%)"},
-        side={"labelLimit": 200, "ticks": False},
-        foot={"labelAngle": -90, "ticks": False},
-        shown={"figure:N": "figure", "name:N": "parameter", "share:Q": ("share (%)", ".1f")},
-        written=False,
-    ).layers
     return layered(
-        cells,
+        Matrix(
+            colour="share",
+            rows=figures,
+            columns=names,
+            names=("figure", "name"),
+            scale={"domain": [0, max(10.0, float(shares.max(initial=0.0)))], "scheme": "blues"},
+            legend={"title": "share of the variance (%)"},
+            side={"labelLimit": 200, "ticks": False},
+            foot={"labelAngle": -90, "ticks": False},
+            shown={"figure:N": "figure", "name:N": "parameter", "share:Q": ("share (%)", ".1f")},
+            written=False,
+        ).layers,
         size=(_WIDTH, 28 * len(figures)),
         data={"values": rows},
         title="Standard errors behind those of the figures",
@@ -470,10 +461,10 @@ def moves_chart(tuned: TunedStudy) -> ChartSpec:
     within = tuned.within_standard_errors
     return row_chart(
         RowPlot(
-            rows=rows,
-            across=PlotAxis(title="move (standard errors of the card)", zero=True),
+            rows,
+            across=PlotAxis("move (standard errors of the card)", zero=True),
             side={"labelLimit": 170},
-            rules=[Rule(at=[0.0]), Rule(at=[-within, within], style="limit", dash=(5, 3))],
+            rules=[Rule([0.0]), Rule([-within, within], style="limit", dash=(5, 3))],
             shown={
                 "name:N": "parameter",
                 "before:Q": ("before", ".6~g"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -23,9 +24,9 @@ from tank2sim.answer.charts.manoeuvre import (
     way_chart,
     zigzag_chart,
 )
-from tank2sim.answer.charts.motion import SpiralData, spiral_chart, varying_histories
+from tank2sim.answer.charts.motion import spiral_chart, varying_histories
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, data_frame, table
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.files import write_together
@@ -39,7 +40,7 @@ from tank2sim.units import in_words
 if TYPE_CHECKING:
     import pandas as pd
 
-_SIDE_NAMES = {1: "starboard", -1: "port"}
+_SIDE_NAMES: Mapping[float, str] = {1: "starboard", -1: "port"}
 
 
 _FIRST: Mapping[str, tuple[str, ...]] = {
@@ -63,6 +64,11 @@ _MEET = 0.05
 have met. Project choice: what is left of a stable ship's after three of its time constants."""
 
 _OUTSIDE = "outside"
+_NO_LOOP = ("The curve has no loop: at each rudder angle the ship has one steady turn.",)
+_LOOP = (
+    "Within the loop the ship keeps turning to its side: it is unstable on a straight course.",
+    "Its width is read between the rudder angles of the spiral; the command stability is exact.",
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -130,9 +136,7 @@ class ManoeuvreResult(EnsembleResult[ManoeuvreStudy]):
 
         Of a result that was read from its JSON only some steps are known.
         """
-        import pandas as pd
-
-        return pd.DataFrame(trial_columns(self.run.trajectory) if self.run else self.study.histories)
+        return data_frame(trial_columns(self.run.trajectory) if self.run else self.study.histories)
 
     def to_csv(self, path: str | Path | None = None) -> str:
         """The motion as text of a trial CSV, also written to `path`: readable wherever a measured trial is.
@@ -154,29 +158,17 @@ class ManoeuvreResult(EnsembleResult[ManoeuvreStudy]):
     @property
     def headline(self) -> tuple[str, ...]:
         """The limits of IMO, or the behaviour that a pull-out or a spiral shows, or the first figures."""
-        study, figures = self.study, self.key_figures
+        study = self.study
         if study.kind == "pullout" and study.other_side:
             return (_pull_outs(study.figures, study.other_side.figures),)
-        judged = [figure for figure in figures if figure.limit is not None]
-        if failed := [figure.label.lower() for figure in judged if figure.verdict is Verdict.FAILED]:
-            return (f"These figures exceed their limits of IMO MSC.137(76): {', '.join(failed)}.",)
-        if any(figure.verdict is Verdict.CAUTION for figure in judged):
-            return (
-                "The run leaves the card's valid range: figures outside it are not judged against IMO MSC.137(76).",
-            )
-        if judged:
-            names = ", ".join(figure.label.lower() for figure in judged)
-            return (f"These figures are within the limits of IMO MSC.137(76): {names}.",)
+        if judged := [figure for figure in self.key_figures if figure.limit is not None]:
+            return (_judged(judged),)
         width = study.figures.get("loop_width_deg")
-        if study.kind == "spiral" and isinstance(width, float):
-            if width > 0:
-                return (
-                    "Within the loop the ship keeps turning to its side: it is unstable on a straight course.",
-                    "Its width is read between the rudder angles of the spiral; the command stability is exact.",
-                )
-            return ("The curve has no loop: at each rudder angle the ship has one steady turn.",)
+        if isinstance(width, float):
+            return _LOOP if width > 0 else _NO_LOOP
         shown = [
-            f"{each.label.lower()} {format_number(float(each.value), 3)} {each.unit}".strip() for each in figures[:3]
+            f"{each.label.lower()} {format_number(float(each.value), 3)} {each.unit}".strip()
+            for each in self.key_figures[:3]
         ]
         return (f"{self.title}: {', '.join(shown)}.",) if shown else ()
 
@@ -202,10 +194,10 @@ class ManoeuvreResult(EnsembleResult[ManoeuvreStudy]):
         elif limit is not None:
             verdict = Verdict.PASSED if value <= limit else Verdict.FAILED
         if name == "side_reach_m":
-            notes.append(f"to {_SIDE_NAMES[-1 if value < 0 else 1]}")
+            notes.append(f"to {_SIDE_NAMES[math.copysign(1, value)]}")
             value = abs(value)
         label = label[:1].upper() + label[1:]
-        return KeyFigure(label=label, value=value, unit=unit, verdict=verdict, note="; ".join(notes), limit=limit)
+        return KeyFigure(label, value, unit, verdict=verdict, note="; ".join(notes), limit=limit)
 
     def _limit(self, name: str) -> float | None:
         """The largest value that IMO MSC.137(76) allows, in the unit of the figure."""
@@ -225,9 +217,9 @@ class ManoeuvreResult(EnsembleResult[ManoeuvreStudy]):
                 "is zero at the neutral rudder; on an unstable ship they remain apart."
             )
         sections = [
-            Section(heading="The manoeuvre", text=text, charts=_manoeuvre_charts(self.study)),
-            Section(heading="Time histories", charts=_history_charts(self.study)),
-            Section(heading="Figures", tables=self._tables()),
+            Section("The manoeuvre", text=text, charts=_manoeuvre_charts(self.study)),
+            Section("Time histories", charts=_history_charts(self.study)),
+            Section("Figures", tables=self._tables()),
         ]
         return [section for section in sections if section.charts or section.tables]
 
@@ -250,13 +242,14 @@ class ManoeuvreResult(EnsembleResult[ManoeuvreStudy]):
 
     def _figure_table(self, figures: Mapping[str, float], missing: Sequence[str]) -> Table:
         """One row a figure, its size in ship lengths and its limit next to it; empty columns are left out."""
+        outside = dict.fromkeys(self.study.outside_card_range, _OUTSIDE)
         rows: list[list[Cell]] = [
             [
                 *in_words(name),
                 value,
                 self.figures.get(_in_lengths(name)),
                 self._limit(name),
-                _OUTSIDE if name in self.study.outside_card_range else None,
+                outside.get(name),
             ]
             for name, value in figures.items()
         ]
@@ -277,15 +270,26 @@ class ManoeuvreResult(EnsembleResult[ManoeuvreStudy]):
             [place + 1, *(values[place] if place < len(values) else None for values in lists.values())]
             for place in range(longest)
         ]
-        heads = [Column(title="no.")]
+        heads = [Column("no.")]
         for name in lists:
             title, unit = in_words(name)
-            heads.append(Column(title=title, unit=unit))
+            heads.append(Column(title, unit))
         beyond = [any(entry_name(name, place) in outside for name in lists) for place in range(longest)]
         if any(beyond):
-            heads.append(Column(title="range of the card"))
+            heads.append(Column("range of the card"))
             rows = [[*row, _OUTSIDE if each else None] for row, each in zip(rows, beyond, strict=True)]
         return table("Figures by number", heads, rows)
+
+
+def _judged(judged: Sequence[KeyFigure]) -> str:
+    """Whether figures with a limit of IMO MSC.137(76) keep it."""
+    failed = [figure.label.lower() for figure in judged if figure.verdict is Verdict.FAILED]
+    if failed:
+        return f"These figures exceed their limits of IMO MSC.137(76): {', '.join(failed)}."
+    if any(figure.verdict is Verdict.CAUTION for figure in judged):
+        return "The run leaves the card's valid range: figures outside it are not judged against IMO MSC.137(76)."
+    names = ", ".join(figure.label.lower() for figure in judged)
+    return f"These figures are within the limits of IMO MSC.137(76): {names}."
 
 
 def _in_lengths(name: str) -> str:
@@ -342,27 +346,28 @@ def _manoeuvre_charts(study: ManoeuvreStudy) -> list[Illustration]:
     match study.kind:
         case "turn" | "difference":
             chart = turn_chart(motion, figures, bands=bands, edges_m=_track_edges(study), title=title)
-            return [Illustration(chart=chart, caption=shaded)]
+            return [Illustration(chart, caption=shaded)]
         case "zigzag":
             heading = float(study.argument.partition("/")[2])
             overshoots = {name: value for name, value in study.figures.items() if isinstance(value, list)}
             edges = _heading_edges(study)
             chart = zigzag_chart(motion, overshoots, heading, bands=bands, edges_deg=edges, title=title)
-            return [Illustration(chart=chart, caption=f"Red: the overshoots. {shaded}".strip())]
+            return [Illustration(chart, caption=f"Red: the overshoots. {shaded}".strip())]
         case "pullout":
             return [_pull_out(study, motion, title)]
         case "spiral":
             return [_spiral(study, title)]
         case "stop":
-            revolutions, held = motion.revolutions_rpm, ""
-            if revolutions is not None and np.ptp(revolutions) == 0:
-                held = f"Revolutions: {format_number(float(revolutions[-1]), 4)} rpm from the order on."
             way = way_chart(motion, stop_dimensions(motion, figures), title="Track of the stop")
-            return [
-                Illustration(chart=stop_speed_chart(motion, title="Speed over distance"), caption=held),
-                Illustration(chart=way, caption=shaded),
-            ]
-    return [Illustration(chart=way_chart(motion, [], title="Track"), caption=shaded)]
+            return [_stop_speed(motion), Illustration(way, caption=shaded)]
+    return [Illustration(way_chart(motion, [], title="Track"), caption=shaded)]
+
+
+def _stop_speed(motion: Motion) -> Illustration:
+    revolutions, held = motion.revolutions_rpm, ""
+    if revolutions is not None and np.ptp(revolutions) == 0:
+        held = f"Revolutions: {format_number(float(revolutions[-1]), 4)} rpm from the order on."
+    return Illustration(stop_speed_chart(motion, title="Speed over distance"), caption=held)
 
 
 def _history_charts(study: ManoeuvreStudy) -> list[Illustration]:
@@ -379,15 +384,14 @@ def _pull_out(study: ManoeuvreStudy, motion: Motion, title: str) -> Illustration
     if study.other_side:
         sides[-next(iter(sides))] = motion_of(study.other_side.histories)
     named = {f"from a turn to {_SIDE_NAMES[side]}": sides[side] for side in sorted(sides, reverse=True)}
-    return Illustration(chart=pull_out_chart(named, neutral, title=title))
+    return Illustration(pull_out_chart(named, neutral, title=title))
 
 
 def _spiral(study: ManoeuvreStudy, title: str) -> Illustration:
     figures = study.figures
-    rudder, rate = (np.radians(np.asarray(figures[name], dtype=float)) for name in ("rudder_deg", "rate_degps"))
-    spiral = SpiralData(label="spiral", rudder_rad=rudder, yaw_rate_radps=rate)
+    rudder, rate = (np.asarray(figures[name], dtype=float) for name in ("rudder_deg", "rate_degps"))
     loop = zero_rate_rudders(rudder, rate) if figures.get("loop_width_deg") else None
-    return Illustration(chart=spiral_chart([spiral], loop_rad=loop, title=title))
+    return Illustration(spiral_chart(rudder, rate, loop_deg=loop, title=title))
 
 
 def _track_edges(study: ManoeuvreStudy) -> tuple[Array, Array] | None:

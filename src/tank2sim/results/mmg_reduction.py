@@ -107,16 +107,16 @@ class MmgReductionResult(Result[MmgStudy]):
         return [
             *(
                 KeyFigure(
-                    label=f"{_CHANNELS[name].capitalize()} followed within",
-                    value=float(f"{100 * channel.unexplained:.2g}"),
-                    unit="%",
+                    f"{_CHANNELS[name].capitalize()} followed within",
+                    float(f"{100 * channel.unexplained:.2g}"),
+                    "%",
                     note=f"rms, {channel.standard_deviation:.3g} {channel.unit.replace('.', ' ')}",
                 )
                 for name, channel in self.study.channels.items()
             ),
             KeyFigure(
-                label="Left open by the tests",
-                value=len(self._open),
+                "Left open by the tests",
+                len(self._open),
                 verdict=Verdict.CAUTION if self._open else Verdict.NONE,
                 note=", ".join(self._open) or "none",
             ),
@@ -129,26 +129,25 @@ class MmgReductionResult(Result[MmgStudy]):
         known = {name: found for name, found in self.coefficients.items() if found.standard_error and found.value}
         if known:
             title = "Certainty of the coefficients"
-            certainty = [Illustration(chart=derivative_certainty_chart(known, title=title))]
+            certainty = [Illustration(derivative_certainty_chart(known, title=title))]
         readings = [
-            Illustration(chart=computed_chart(name, readings), half=True)
-            for name, readings in self.study.readings.items()
+            Illustration(computed_chart(name, readings), half=True) for name, readings in self.study.readings.items()
         ]
         return [
             Section(
-                heading="Coefficients",
+                "Coefficients",
                 text="One weighted regression of all readings.",
                 charts=certainty,
                 tables=[self._coefficients()],
             ),
             Section(
-                heading="Computed against measured",
+                "Computed against measured",
                 text="Each point is a condition; on the line computed and measured reading agree.",
                 charts=readings,
                 tables=[self._residuals()],
             ),
             Section(
-                heading="Uncertainty budget",
+                "Uncertainty budget",
                 text="After ITTC 7.5-02-06-04: the scatter of the tests, and errors common to all of them as "
                 "[uncertainty] of the campaign states them.",
                 tables=[self._budget()],
@@ -190,23 +189,20 @@ class MmgReductionResult(Result[MmgStudy]):
             for name, found in self.coefficients.items()
         ]
         columns = [
-            *(Column(title="coefficient"), Column(title="scatter", unit="%", digits=3)),
-            *(Column(title=source.rpartition("_")[0], unit="%", digits=3) for source in sources),
-            *(Column(title="combined", digits=3), Column(title="expanded, k = 2", digits=3)),
+            *(Column("coefficient"), Column("scatter", "%", digits=3)),
+            *(Column(source.rpartition("_")[0], "%", digits=3) for source in sources),
+            *(Column("combined", digits=3), Column("expanded, k = 2", digits=3)),
         ]
         return table("Shares of the variance", columns, rows, on_screen=False)
 
 
-def computed_chart(name: str, readings: ChannelReadings, *, size_px: int = 300) -> ChartSpec:
-    """Computed over measured readings of one channel, with the line on which both are the same.
-
-    `name`: name of the channel; `size_px`: width and height.
-    """
+def computed_chart(name: str, readings: ChannelReadings) -> ChartSpec:
+    """Computed over measured readings of one channel (by its name), with the line on which both are the same."""
     unit = readings.unit.replace(".", " ")
     ends = [float(readings.measured.min()), float(readings.measured.max())]
-    equal = PlotSeries(label="equal", x=ends, y=ends)
-    both = PlotSeries(label="", x=readings.measured, y=readings.computed, points=True)
-    across, up = (PlotAxis(title=f"{name} {kind} ({unit})", zero=True) for kind in ("measured", "computed"))
+    equal = PlotSeries("equal", x=ends, y=ends)
+    both = PlotSeries("", x=readings.measured, y=readings.computed, points=True)
+    across, up = (PlotAxis(f"{name} {kind} ({unit})", zero=True) for kind in ("measured", "computed"))
     place = {"x": across.channel("x"), "y": up.channel("v")}
     shown = tooltips({"x:Q": "measured", "v:Q": "computed"})
     return layered(
@@ -214,7 +210,7 @@ def computed_chart(name: str, readings: ChannelReadings, *, size_px: int = 300) 
             layer("line", equal.rows, place, opacity=0.5),
             layer("circle", both.rows, {**place, "tooltip": shown}, size=36, opacity=0.7),
         ],
-        size=(size_px, size_px),
+        size=(300, 300),
         title=_CHANNELS[name].capitalize(),
         description=f"Computed and measured {_CHANNELS[name]}.",
     )

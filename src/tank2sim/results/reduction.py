@@ -9,7 +9,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from tank2sim.answer.charts.vega import ChartSpec
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, records_frame, table
+from tank2sim.answer.parts import (
+    Cell,
+    Column,
+    Illustration,
+    KeyFigure,
+    Section,
+    Table,
+    Verdict,
+    data_frame,
+    records_frame,
+    records_table,
+    table,
+)
 from tank2sim.answer.result import Result
 from tank2sim.cards import Card, parse_card
 from tank2sim.cards.covariance import Covariance
@@ -62,6 +74,7 @@ class ReductionResult(Result[ReductionStudy]):
     reduction: Reduction | None = None
     contents: Contents | None = None
     command: ClassVar[str] = "reduce"
+    procedure: ClassVar[str] = "Captive model tests, reduced"
 
     @property
     def inputs(self) -> tuple[Path, ...]:
@@ -100,23 +113,16 @@ class ReductionResult(Result[ReductionStudy]):
     def budget(self) -> pd.DataFrame:
         """Uncertainty budget by derivative (ITTC 7.5-02-06-04): share of the variance of each source; prime
         ``combined`` and ``expanded`` (k = 2) uncertainty."""
-        import pandas as pd
-
         rows = [
             {"name": row.name, "value": row.value, "combined": row.combined, "expanded": row.expanded, **row.shares}
             for row in self.study.uncertainty_budget.derivatives.values()
         ]
-        return pd.DataFrame(rows).set_index("name")
+        return data_frame(rows, index="name")
 
     @property
     def title(self) -> str:
         """The model."""
         return str(self.study.model["name"])
-
-    @property
-    def subtitle(self) -> str:
-        """What was done."""
-        return "Captive model tests, reduced"
 
     @property
     def headline(self) -> tuple[str, ...]:
@@ -156,23 +162,23 @@ class ReductionResult(Result[ReductionStudy]):
         estimated = [name for name, found in study.derivatives.items() if found.origin == "estimated"]
         return [
             KeyFigure(
-                label="Derivatives measured",
-                value=f"{self._measured} of {len(study.derivatives)}",
+                "Derivatives measured",
+                f"{self._measured} of {len(study.derivatives)}",
                 note=f"by {len(study.runs)} runs; {len(study.not_used)} left out",
             ),
             *(
                 KeyFigure(
-                    label=f"{_FORCES[force].capitalize()} predicted within",
-                    value=float(f"{percent:.2g}"),
-                    unit="%",
+                    f"{_FORCES[force].capitalize()} predicted within",
+                    float(f"{percent:.2g}"),
+                    "%",
                     verdict=Verdict.CAUTION if percent > _POOR_PREDICTION else Verdict.NONE,
                     note=f"of its range, in {kind}, the worst type of run",
                 )
                 for force, (percent, kind) in self._worst_predictions().items()
             ),
             KeyFigure(
-                label="Derivatives estimated",
-                value=len(estimated),
+                "Derivatives estimated",
+                len(estimated),
                 verdict=Verdict.CAUTION if estimated else Verdict.NONE,
                 note=", ".join(estimated) or "none",
             ),
@@ -202,11 +208,11 @@ class ReductionResult(Result[ReductionStudy]):
         """Derivatives, forces against motion, predicted runs, terms left out, the budget."""
         title = "Certainty of the derivatives"
         certainty = Illustration(
-            chart=derivative_certainty_chart(self.study.derivatives, title=title), caption=_CERTAINTY, name="certainty"
+            derivative_certainty_chart(self.study.derivatives, title=title), caption=_CERTAINTY, name="certainty"
         )
         return [
             Section(
-                heading="Derivatives",
+                "Derivatives",
                 text="One weighted regression over the whole campaign; in the table, next to it the tests one after "
                 "the other.",
                 tables=[self._derivatives()],
@@ -238,14 +244,9 @@ class ReductionResult(Result[ReductionStudy]):
             words = _FORCES.get(stem.rpartition("_")[2])
             heading = f"{words.capitalize()} against motion" if words else loops
             half = isinstance(plot, ForcePlot)
-            groups.setdefault(heading, []).append(Illustration(chart=_plot_chart(plot), half=half, name=stem))
+            groups.setdefault(heading, []).append(Illustration(_plot_chart(plot), half=half, name=stem))
         return [
-            Section(
-                heading=heading,
-                text="" if heading == loops else _AGAINST_MOTION,
-                charts=charts,
-                folded=heading == loops,
-            )
+            Section(heading, text="" if heading == loops else _AGAINST_MOTION, charts=charts, folded=heading == loops)
             for heading, charts in groups.items()
         ]
 
@@ -264,21 +265,16 @@ class ReductionResult(Result[ReductionStudy]):
         caption = "Leave-one-out: root mean square error of each run predicted from the others, % of the force's range"
         note = f"Not excited by any run: {', '.join(excited)}"
         return Section(
-            heading="Each run predicted from the others",
+            "Each run predicted from the others",
             tables=[table(caption, heads, rows, note, digits=2)],
-            charts=[Illustration(chart=chart, name="residuals")],
+            charts=[Illustration(chart, name="residuals")],
         )
 
     def _left_out(self) -> list[Section]:
-        rows: list[list[Cell]] = [
-            [choice.name, choice.reason, choice.explanation]
-            for choice in self.study.choices
-            if choice.reason in _LEFT_OUT
-        ]
-        if not rows:
-            return []
-        found = table("Terms that the runs excite and that were left out", ("term", "reason", "why"), rows)
-        return [Section(heading="Which terms, and why", tables=[found], folded=True)]
+        choices = [choice for choice in self.study.choices if choice.reason in _LEFT_OUT]
+        fields = {"name": "term", "reason": "", "explanation": "why"}
+        found = records_table("Terms that the runs excite and that were left out", choices, fields=fields)
+        return [Section("Which terms, and why", tables=[found], folded=True)] if choices else []
 
     def _budget(self) -> Section:
         budget = self.study.uncertainty_budget
@@ -294,9 +290,9 @@ class ReductionResult(Result[ReductionStudy]):
             for name, row in budget.derivatives.items()
         ]
         columns = [
-            *(Column(title="derivative"), Column(title="value")),
-            *(Column(title=source, unit="%", digits=3) for source in sources),
-            *(Column(title="combined", digits=3), Column(title="expanded, k = 2", digits=3)),
+            *(Column("derivative"), Column("value")),
+            *(Column(source, "%", digits=3) for source in sources),
+            *(Column("combined", digits=3), Column("expanded, k = 2", digits=3)),
         ]
         notes = []
         if budget.not_stated:
@@ -306,7 +302,7 @@ class ReductionResult(Result[ReductionStudy]):
             notes.append(f"By Schuster's formula the walls raise the speed past the model by {percent:.2g} %.")
         caption = "Shares of the variance; values and uncertainties prime, times 10⁵"
         return Section(
-            heading="Uncertainty budget",
+            "Uncertainty budget",
             text="After ITTC 7.5-02-06-04: the combined uncertainty is the standard error of the result.",
             tables=[
                 table(caption, columns, rows, on_screen=False),

@@ -70,4 +70,4 @@ class ShipsResult(Result[BundledShips]):
         fields = {"name": "CARD", "ship": "", "kind": "model", "length_m": ""}
         listed = records_table("Bundled ships", self.study.ships, fields=fields, folded=False)
         sources = [f"{one.name}: {one.source}" for one in self.study.ships]
-        return [Section(heading="Ships", tables=[replace(listed, notes=sources)])]
+        return [Section("Ships", tables=[replace(listed, notes=sources)])]

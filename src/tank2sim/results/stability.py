@@ -89,11 +89,6 @@ class ResultOnCourse(EnsembleResult[_S]):
     ship: Any = None
     command: ClassVar[str] = "stability"
 
-    @property
-    def title(self) -> str:
-        """The ship."""
-        return self.study.ship
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StabilityResult(ResultOnCourse[StabilityStudy]):
@@ -139,8 +134,7 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
             f"{self.study.ship} at {point.speed_mps:.4g} m/s (drift {point.drift_deg:.3g} deg, rudder "
             f"{point.rudder_deg:.3g} deg) is {verdict} on a straight course: {self._margin()}."
         )
-        chances = chance_sentences(self.study.ensemble) if self.study.ensemble else []
-        return (course, *self._turns(), *self._criteria(), *chances)
+        return (course, *self._turns(), *self._criteria(), *chance_sentences(self.study.ensemble))
 
     def _margin(self) -> str:
         found, margin = self.study.stability_criterion, self.study.margins
@@ -182,26 +176,26 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
         straight, prime = study.stability_criterion, study.nomoto.prime
         figures = [
             KeyFigure(
-                label="Straight course",
-                value="stable" if straight.stable else "unstable",
+                "Straight course",
+                "stable" if straight.stable else "unstable",
                 verdict=Verdict.PASSED if straight.stable else Verdict.CAUTION,
                 note=f"C′ = {format_number(straight.C_prime, 3)}",
             ),
             self._margin_figure(),
-            KeyFigure(label="Nomoto K′", value=prime.K_prime, note=f"T′ = {format_number(prime.T_prime, 3)}"),
+            KeyFigure("Nomoto K′", prime.K_prime, note=f"T′ = {format_number(prime.T_prime, 3)}"),
         ]
         if study.steady_turning and (loop := study.steady_turning.loop):
             note = "of rudder, between the folds"
-            figures.append(KeyFigure(label="Hysteresis loop", value=loop.width_deg, unit="deg", note=note))
+            figures.append(KeyFigure("Hysteresis loop", loop.width_deg, "deg", note=note))
         return [*figures, self._criteria_figure()]
 
     def _margin_figure(self) -> KeyFigure:
         straight, margins = self.study.stability_criterion, self.study.margins
         if not straight.C_prime_decides:
             note = f"a mode grows at {straight.growth_per_s:.3g} 1/s that C′ does not show"
-            return KeyFigure(label="Margin", value="none", verdict=Verdict.CAUTION, note=note)
+            return KeyFigure("Margin", "none", verdict=Verdict.CAUTION, note=note)
         note = f"levers {format_number(margins.lever_margin_lengths, 3)} L apart"
-        return KeyFigure(label="Margin", value=margins.margin_percent, unit="%", note=note)
+        return KeyFigure("Margin", margins.margin_percent, "%", note=note)
 
     def _criteria_figure(self) -> KeyFigure:
         criteria = self.study.imo
@@ -212,7 +206,7 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
         notes = [f"{unknown} open"] if unknown else []
         notes += [f"{beyond} beyond the card's validity"] if beyond else []
         value = f"{met.count(True)} of {len(met)}"
-        return KeyFigure(label="IMO criteria met", value=value, verdict=verdict, note=", ".join(notes))
+        return KeyFigure("IMO criteria met", value, verdict=verdict, note=", ".join(notes))
 
     @property
     def sections(self) -> Sequence[Section]:
@@ -234,12 +228,11 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
         tables = [records_table("Steady turns", turning.turns, on_screen=False)]
         if turning.folds:
             tables.append(records_table("Folds, where the ship leaves its branch", turning.folds, on_screen=False))
-        chart = steering_diagram(turning, spirals, title="Steady turns against the rudder")
         return Section(
-            heading="Steady turning",
+            "Steady turning",
             text=f"{_TURNING}\n\n{_SPIRALS}" if spirals.direct or spirals.reverse else _TURNING,
             tables=tables,
-            charts=[Illustration(chart=chart)],
+            charts=[Illustration(steering_diagram(turning, spirals, title="Steady turns against the rudder"))],
         )
 
     def _straight_line(self) -> Section:
@@ -252,17 +245,17 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
             ["margin" if straight.C_prime_decides else "margin of C′ alone", margins.margin_percent, "%"],
         ]
         slow = f", in slow motions ({', '.join(states)} at rest)" if states else ""
-        models: list[list[Cell]] = [
-            ["1/s and s", *vars(nomoto.dimensional).values()],
-            ["prime", *vars(nomoto.prime).values()],
-        ]
         return Section(
-            heading="Straight-line stability",
+            "Straight-line stability",
             text=_CRITERION,
             tables=[
                 table("Margin of stability", ("quantity", "value", "unit"), levers, on_screen=False),
                 _eigenvalues(self.study.eigenvalues, "".join(f", {name}" for name in states)),
-                table(f"Nomoto's coefficients{slow}", ("units", "K", "T", "T1", "T2", "T3"), models),
+                table(
+                    f"Nomoto's coefficients{slow}",
+                    ("units", "K", "T", "T1", "T2", "T3"),
+                    [["1/s and s", *vars(nomoto.dimensional).values()], ["prime", *vars(nomoto.prime).values()]],
+                ),
             ],
         )
 
@@ -277,18 +270,18 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
         changed = ", ".join(f"{name} {change:+.3g} %" for name, change in changes)
         charts = []
         if margins.derivatives:
-            charts.append(Illustration(chart=influence_chart(margins, title="Influence on C′")))
+            charts.append(Illustration(influence_chart(margins, title="Influence on C′")))
         if margins.speed:
             chart = criterion_by_speed_chart(margins.speed, title="Speed")
-            charts.append(Illustration(chart=chart, caption="Over the card's range of speeds."))
+            charts.append(Illustration(chart, caption="Over the card's range of speeds."))
         charts.append(
             Illustration(
-                chart=trim_chart(trim, title="Trim (estimate)"),
+                trim_chart(trim, title="Trim (estimate)"),
                 caption=f"After Inoue, 1 % of length of trim by the stern changes {changed}.",
             )
         )
         return Section(
-            heading="Influences on the margin",
+            "Influences on the margin",
             text=f"Derivatives are prime, mass in kg and x_G in m. A coefficient is neutral at the value for which "
             f"C′ = 0, all else unchanged. {_TRIM}",
             tables=[table("Influences on C', strongest first", heads, rows)],
@@ -299,23 +292,20 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
     def _response(self) -> Section:
         heading, responses = "Response to the rudder", self.study.responses
         if not responses:
-            return Section(heading=heading, text="The yaw rate does not answer to the rudder.")
+            return Section(heading, text="The yaw rate does not answer to the rudder.")
         # Poles of the gear lie far out and are left out.
         systems = [
-            PolesZeros(label=one.label, poles=one.poles.tolist(), zeros=one.zeros.tolist())
+            PolesZeros(one.label, poles=one.poles.tolist(), zeros=one.zeros.tolist())
             for one in responses
             if one.label in (responses[0].label, FIRST_ORDER)
         ]
-        curves = [
-            FrequencyResponse(label=one.label, omega_radps=one.omega_radps, response=one.response) for one in responses
-        ]
+        curves = [FrequencyResponse(one.label, omega_radps=one.omega_radps, response=one.response) for one in responses]
         charts = [
             pole_zero_chart(systems, title="Poles and zeros"),
             bode_chart(curves, title="Bode diagram"),
             step_chart(responses, title="Step of the rudder"),
         ]
-        drawn = [Illustration(chart=chart) for chart in charts]
-        return Section(heading=heading, text=_RESPONSE, charts=drawn, folded=True)
+        return Section(heading, text=_RESPONSE, charts=[Illustration(chart) for chart in charts], folded=True)
 
     def _characteristic(self) -> Section:
         found = self.study.characteristic
@@ -326,12 +316,11 @@ class StabilityResult(ResultOnCourse[StabilityStudy]):
         ]
         errors = ("rms error (deg)", "largest error (deg)", "error beyond the fit (deg)")
         caption = "Coefficients by powers of the yaw rate, rad and s: Bech's of δ, Norrbin's of K δ"
-        chart = characteristic_chart(found, title="Rudder that holds a yaw rate")
         return Section(
-            heading="Nonlinear steering characteristic",
+            "Nonlinear steering characteristic",
             text=_CHARACTERISTIC,
             tables=[table(caption, ("cubic", "r⁰", "r¹", "r²", "r³", *errors), rows, on_screen=False)],
-            charts=[Illustration(chart=chart)],
+            charts=[Illustration(characteristic_chart(found, title="Rudder that holds a yaw rate"))],
             folded=True,
         )
 
@@ -394,7 +383,7 @@ class CraftStabilityResult(ResultOnCourse[CraftStabilityStudy]):
                 f"Steady turns: up to {last.yaw_rate_degps:.3g} deg/s, {last.diameter_m:.3g} m wide, at "
                 f"{last.difference_rpm:.4g} rpm of difference."
             )
-        return (*lines, *(chance_sentences(study.ensemble) if study.ensemble else []))
+        return (*lines, *chance_sentences(study.ensemble))
 
     def _left_alone(self) -> str:
         """Motion of an unstable craft without a difference of revolutions."""
@@ -412,14 +401,14 @@ class CraftStabilityResult(ResultOnCourse[CraftStabilityStudy]):
         run = self.study.straight_run
         figures = [
             KeyFigure(
-                label="Straight course",
-                value="stable" if run.stable else "unstable",
+                "Straight course",
+                "stable" if run.stable else "unstable",
                 verdict=Verdict.PASSED if run.stable else Verdict.CAUTION,
             )
         ]
         if run.surge_time_constant_s is not None:
-            figures.append(KeyFigure(label="Surge time constant", value=run.surge_time_constant_s, unit="s"))
-        figures.append(KeyFigure(label="Highest speed", value=self.study.highest_speed_mps, unit="m/s"))
+            figures.append(KeyFigure("Surge time constant", run.surge_time_constant_s, "s"))
+        figures.append(KeyFigure("Highest speed", self.study.highest_speed_mps, "m/s"))
         return figures
 
     @property
@@ -428,26 +417,23 @@ class CraftStabilityResult(ResultOnCourse[CraftStabilityStudy]):
         study, run = self.study, self.study.straight_run
         runs = sorted((run, *study.speeds), key=lambda one: one.speed_mps)
         surge = {"speed_mps": "", "revolutions_rpm": "", "stable": "", "surge_time_constant_s": ""}
-        steering: list[list[Cell]] = [
-            [one.speed_mps, one.K * _DEGPS_PER_100_RPM, one.T_s, one.T1_s, one.T2_s, one.T3_s] for one in runs
-        ]
         nomoto = table(
             "Nomoto's coefficients; K: yaw rate for 100 rpm of port less starboard",
             ("speed (m/s)", "K (deg/s)", "T (s)", "T1 (s)", "T2 (s)", "T3 (s)"),
-            steering,
+            [[one.speed_mps, one.K * _DEGPS_PER_100_RPM, one.T_s, one.T1_s, one.T2_s, one.T3_s] for one in runs],
         )
         caption = f"Steady turns about {run.revolutions_rpm:.4g} rpm, positive to starboard"
         turn = dict.fromkeys(("difference_rpm", "yaw_rate_degps", "speed_mps", "drift_deg", "diameter_m"), "")
         turns = records_table(caption, study.difference_turns, fields=turn | {"difference_rpm": "port less starboard"})
         return [
             Section(
-                heading="Straight course",
+                "Straight course",
                 tables=[
                     _eigenvalues(run.eigenvalues),
                     records_table("Straight runs by speed", runs, fields=surge),
                     nomoto,
                 ],
             ),
-            Section(heading="Steady turning", tables=[turns]),
+            Section("Steady turning", tables=[turns]),
             *([figures_section(study.ensemble)] if study.ensemble else []),
         ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -32,7 +33,7 @@ def steering_diagram(turning: TurningDiagram, spirals: Spirals, *, title: str = 
     """Yaw rate, speed, drift and heel of steady turns against the rudder; unstable turns dashed, spirals as points."""
     points = turning.points
     runs = [
-        PlotSeries(label=name, x=spiral.rudder_deg, y=spiral.yaw_rate_degps, points=True)
+        PlotSeries(name, x=spiral.rudder_deg, y=spiral.yaw_rate_degps, points=True)
         for name, spiral in ((DIRECT, spirals.direct), (REVERSE, spirals.reverse))
         if spiral
     ]
@@ -45,15 +46,15 @@ def steering_diagram(turning: TurningDiagram, spirals: Spirals, *, title: str = 
         shown["heel (deg)"] = (points.heel_deg, 110)
     plots = [
         Plot(
-            series=[*_branches(turning, values), *(runs if place == 0 else [])],
-            up=PlotAxis(title=name),
+            [*_branches(turning, values), *(runs if place == 0 else [])],
+            up=PlotAxis(name),
             height_px=height,
-            rules=[Rule(at=[0.0], upright=True)],
+            rules=[Rule([0.0], upright=True)],
         )
         for place, (name, (values, height)) in enumerate(shown.items())
     ]
     described = "Steady yaw rate, speed and drift against the rudder angle."
-    across = PlotAxis(title=_RUDDER, nice=False, padding=8)
+    across = PlotAxis(_RUDDER, nice=False, padding=8)
     said = {"run:N": "branch", "x:Q": "rudder (deg)"}
     return curve_panels(plots, across, title=title, width_px=_WIDTH, described=described, shown=said)
 
@@ -76,35 +77,25 @@ def _branches(turning: TurningDiagram, values: Array) -> list[PlotSeries]:
     for first, last in itertools.pairwise(ends):
         parts[STABLE if stable[(first + last + 1) // 2] else UNSTABLE].append(slice(first, last + 1))
     return [
-        PlotSeries(
-            label=label, x=gapped([rudder[kept] for kept in slices]), y=gapped([values[kept] for kept in slices])
-        )
+        PlotSeries(label, x=gapped([rudder[kept] for kept in slices]), y=gapped([values[kept] for kept in slices]))
         for label, slices in parts.items()
         if slices
     ]
 
 
-def _curves(
-    series: Sequence[PlotSeries],
-    axes: tuple[str, str],
-    *,
-    title: str,
-    described: str,
-    height: int = 260,
-    zero: bool = True,
+def steering_curves(
+    series: Sequence[PlotSeries], axes: tuple[str, str], *, height: int = 260, zero: bool = True, **options: Any
 ) -> ChartSpec:
-    """Lines, with a line at zero below them; the titles of the axes are those across and up."""
-    rules = [Rule(at=[0.0])] if zero else []
-    plot = Plot(series=series, up=PlotAxis(title=axes[1]), height_px=height, rules=rules)
-    axis = PlotAxis(title=axes[0], nice=False)
-    return curve_chart(plot, axis, title=title, width_px=_WIDTH, window=["x"], described=described)
+    """Lines, with a line at zero below them if `zero`; `axes`: titles across and up; **options: of `curve_chart`."""
+    plot = Plot(series, up=PlotAxis(axes[1]), height_px=height, rules=[Rule([0.0])] if zero else [])
+    return curve_chart(plot, PlotAxis(axes[0], nice=False), width_px=_WIDTH, window=["x"], **options)
 
 
 def step_chart(responses: Sequence[SteeringResponse], *, title: str = "") -> ChartSpec:
     """Yaw rate after a step of one degree of rudder (or of its order), deg/s."""
-    series = [PlotSeries(label=one.label, x=one.time_s, y=one.step_per_s) for one in responses]
+    series = [PlotSeries(one.label, x=one.time_s, y=one.step_per_s) for one in responses]
     up, described = "yaw rate per degree of rudder (deg/s)", "Yaw rate over time after a step of the rudder."
-    return _curves(series, ("time after the step (s)", up), title=title, described=described, zero=False)
+    return steering_curves(series, ("time after the step (s)", up), title=title, described=described, zero=False)
 
 
 def influence_chart(margins: Margin, *, title: str = "") -> ChartSpec:
@@ -113,9 +104,9 @@ def influence_chart(margins: Margin, *, title: str = "") -> ChartSpec:
     rows: list[ChartRecord] = [{"name": one.short_name, "v": plain(one.percent)} for one in strongest]
     return row_chart(
         RowPlot(
-            rows=rows,
-            across=PlotAxis(title="change of C′ when the coefficient grows by 10 % (% of |C′|)", zero=True),
-            rules=[Rule(at=[0.0])],
+            rows,
+            across=PlotAxis("change of C′ when the coefficient grows by 10 % (% of |C′|)", zero=True),
+            rules=[Rule([0.0])],
             shown={"name:N": "coefficient", "v:Q": "change of C′ (%)"},
         ),
         title=title,
@@ -130,9 +121,9 @@ def influence_chart(margins: Margin, *, title: str = "") -> ChartSpec:
 
 def criterion_by_speed_chart(speed: CriterionBySpeed, *, title: str = "") -> ChartSpec:
     """C' over speed."""
-    series = [PlotSeries(label="C′", x=speed.speed_mps, y=1e5 * speed.C_prime)]
+    series = [PlotSeries("C′", x=speed.speed_mps, y=1e5 * speed.C_prime)]
     described = "Stability criterion over speed."
-    return _curves(series, ("speed (m/s)", "C′ · 10⁵"), title=title, described=described, height=200)
+    return steering_curves(series, ("speed (m/s)", "C′ · 10⁵"), title=title, described=described, height=200)
 
 
 def _short(criterion: str) -> str:
@@ -158,10 +149,10 @@ def criteria_chart(criteria: Sequence[ImoCriterion], *, title: str = "") -> Char
     longest = max([*(row["v"] for row in rows), 100.0])
     bars, limit = row_layers(
         RowPlot(
-            rows=rows,
-            across=PlotAxis(title="per cent of the limit", domain=(0.0, 1.05 * longest), nice=False),
+            rows,
+            across=PlotAxis("per cent of the limit", domain=(0.0, 1.05 * longest), nice=False),
             shown={"name:N": "criterion"},
-            rules=[Rule(at=[100.0], style="limit")],
+            rules=[Rule([100.0], style="limit")],
             side=_TWO_LINES,
         ),
         mark="bar",
@@ -184,9 +175,9 @@ def trim_chart(trim: TrimEffect, *, title: str = "") -> ChartSpec:
     values = {"Inoue et al.": criteria}
     for name, reading in trim.paper_7_5_percent.items():
         values[f"7.5 % of {name}"] = base + per_cent * (reading.more - reading.less) / 2
-    series = [PlotSeries(label=label, x=per_cent, y=1e5 * value) for label, value in values.items()]
+    series = [PlotSeries(label, x=per_cent, y=1e5 * value) for label, value in values.items()]
     across, described = "trim by the stern (% of length)", "Stability criterion over trim, estimated."
-    return _curves(series, (across, "C′ · 10⁵"), title=title, described=described, height=220)
+    return steering_curves(series, (across, "C′ · 10⁵"), title=title, described=described, height=220)
 
 
 def characteristic_chart(found: SteeringCharacteristic, *, title: str = "") -> ChartSpec:
@@ -203,6 +194,6 @@ def characteristic_chart(found: SteeringCharacteristic, *, title: str = "") -> C
         "Bech, nearest cubic": cubic(found.bech.coefficients),
         "Norrbin, slope kept": cubic(found.norrbin.coefficients) / found.norrbin.K_per_s,
     }
-    series = [PlotSeries(label=label, x=rate, y=value) for label, value in values.items()]
+    series = [PlotSeries(label, x=rate, y=value) for label, value in values.items()]
     across, described = "yaw rate, starboard positive (deg/s)", "Rudder angle against steady yaw rate."
-    return _curves(series, (across, "rudder angle (deg)"), title=title, described=described)
+    return steering_curves(series, (across, "rudder angle (deg)"), title=title, described=described)

@@ -76,30 +76,32 @@ def track_grid(trials: Sequence[TrialMotions], *, title: str = "") -> ChartSpec 
     The scale fits the measurement and the card found: the card before may leave the panel. None where no trial has a
     track.
     """
-    panels, names = [], []
-    for trial in trials:
-        series = {label: columns for label, columns in _series(trial, _TRACK).items() if set(_TRACK) <= set(columns)}
-        if not series:
-            continue
-        shown = [columns for label, columns in series.items() if label != BEFORE] or list(series.values())
-        north, east = (np.concatenate([columns[name] for columns in shown]) for name in _TRACK)
-        frame = equal_frame(east, north, width_px=205, height_px=260)
-        place = frame.axes(across=("y", "east y (m)"), up=("x", "north x (m)"))
-        ticks = max(2, frame.width_px // 70)
-        place["x"]["axis"] = {"tickCount": ticks, "labelOverlap": "greedy", "labelSeparation": 6}
-        rows: list[ChartRecord] = []
-        for label, columns in series.items():
-            kept = _thinned(label, [columns["x_m"], columns["y_m"]])
-            rows += records(label, {"x": columns["x_m"][kept], "y": columns["y_m"][kept]})
-        marks = _marks(place | {"tooltip": tooltips({"x:Q": "north (m)", "y:Q": "east (m)"})})
-        size = frame.width_px, frame.height_px
-        panels.append(layered(marks, size=size, data={"values": rows}, title=panel_title(trial.trial)))
-        names.append(trial.trial)
-    if not panels:
+    drawn = {trial.trial: panel for trial in trials if (panel := _track_panel(trial))}
+    if not drawn:
         return None
-    text = f"Tracks of {', '.join(names)}, measured and simulated; north is up."
+    text = f"Tracks of {', '.join(drawn)}, measured and simulated; north is up."
+    panels = list(drawn.values())
     slender = all(panel["width"] <= 110 for panel in panels)
     return panel_grid(panels, title, text, columns=PANELS_PER_ROW + slender) | {"usermeta": {"equal_scales": True}}
+
+
+def _track_panel(trial: TrialMotions) -> ChartSpec | None:
+    series = {label: columns for label, columns in _series(trial, _TRACK).items() if set(_TRACK) <= set(columns)}
+    if not series:
+        return None
+    shown = [columns for label, columns in series.items() if label != BEFORE] or list(series.values())
+    north, east = (np.concatenate([columns[name] for columns in shown]) for name in _TRACK)
+    frame = equal_frame(east, north, width_px=205, height_px=260)
+    place = frame.axes(across=("y", "east y (m)"), up=("x", "north x (m)"))
+    ticks = max(2, frame.width_px // 70)
+    place["x"]["axis"] = {"tickCount": ticks, "labelOverlap": "greedy", "labelSeparation": 6}
+    rows: list[ChartRecord] = []
+    for label, columns in series.items():
+        kept = _thinned(label, [columns["x_m"], columns["y_m"]])
+        rows += records(label, {"x": columns["x_m"][kept], "y": columns["y_m"][kept]})
+    marks = _marks(place | {"tooltip": tooltips({"x:Q": "north (m)", "y:Q": "east (m)"})})
+    size = frame.width_px, frame.height_px
+    return layered(marks, size=size, data={"values": rows}, title=panel_title(trial.trial))
 
 
 def history_grid(
@@ -116,7 +118,7 @@ def _histories(trial: TrialMotions, signals: Mapping[str, str]) -> ChartSpec:
     fields = {name: f"s{place}" for place, name in enumerate(signals)}
     rows: list[ChartRecord] = []
     for label, columns in series.items():
-        shown = {name: columns[name] for name in names if name in columns}
+        shown = _chosen(columns, names)
         kept = _thinned(label, list(shown.values()))
         values = {fields[name]: column[kept] for name, column in shown.items()}
         rows += records(label, {"t": columns["t_s"][kept], **values})
@@ -136,8 +138,8 @@ def place_over_time(
     times: tuple[float, float], ends: tuple[float, float], up: str, field: str, *, labelled: bool
 ) -> ChartSpec:
     """Return the axes of a small panel over time; the ends are given, so that they stay when a line is taken away."""
-    across = PlotAxis(title="time (s)", domain=times, nice=False, ticks=4 if labelled else None, hidden=not labelled)
-    size = PlotAxis(title=up, domain=ends, above=True, ticks=3)
+    across = PlotAxis("time (s)", domain=times, nice=False, ticks=4 if labelled else None, hidden=not labelled)
+    size = PlotAxis(up, domain=ends, above=True, ticks=3)
     return {"x": across.channel("t"), "y": size.channel(field)}
 
 
@@ -259,8 +261,7 @@ def _figure_panels(rows: list[ChartRecord], words: str, unit: str, error_unit: s
         "error:Q": f"error ({error_unit})",
     }
     across, up = (
-        PlotAxis(title=f"{kind} {words} ({unit})", domain=domain, nice=False, ticks=5)
-        for kind in ("measured", "predicted")
+        PlotAxis(f"{kind} {words} ({unit})", domain=domain, nice=False, ticks=5) for kind in ("measured", "predicted")
     )
     x, colour = across.channel("measured"), {"color": look.colour}
     equal = layer(
@@ -276,11 +277,10 @@ def _figure_panels(rows: list[ChartRecord], words: str, unit: str, error_unit: s
     points = layer("point", reached, marks, filled=False, size=46)
     names = list(dict.fromkeys(row["name"] for row in rows))
     errors = [row | {"v": row["error"], "low": row["least"], "high": row["most"]} for row in reached]
-    error_axis = PlotAxis(title=f"predicted less measured ({error_unit})", padding=10, ticks=6, zero=True)
+    error_axis = PlotAxis(f"predicted less measured ({error_unit})", padding=10, ticks=6, zero=True)
     side = {"labelLimit": 300}
     lines = row_layers(
-        RowPlot(rows=errors, across=error_axis, look=look, names=names, side=side, rules=[Rule(at=[0.0])], shown=shown),
-        size=46,
+        RowPlot(errors, across=error_axis, look=look, names=names, side=side, rules=[Rule([0.0])], shown=shown), size=46
     )
     return {
         "hconcat": [
@@ -297,17 +297,18 @@ def _series(trial: TrialMotions, names: Sequence[str]) -> dict[str, dict[str, Ar
 
     Of what was measured the part that was simulated: after a turn, a model or ship may have sailed on for long.
     """
-    series = {
-        label: {name: columns[name] for name in ("t_s", *names) if name in columns}
-        for label, columns in ((label, getattr(trial, name)) for label, name in SERIES.items())
-        if not set(names).isdisjoint(columns)
-    }
+    every = {label: _chosen(getattr(trial, name), ("t_s", *names)) for label, name in SERIES.items()}
+    series = {label: columns for label, columns in every.items() if set(columns) - {"t_s"}}
     times = [columns["t_s"] for label, columns in series.items() if label != MEASURED]
     if times and MEASURED in series:
-        time = series[MEASURED]["t_s"]
-        inside = (time >= min(model[0] for model in times)) & (time <= max(model[-1] for model in times))
+        time, simulated = series[MEASURED]["t_s"], np.concatenate(times)
+        inside = (time >= simulated.min()) & (time <= simulated.max())
         series[MEASURED] = {name: values[inside] for name, values in series[MEASURED].items()}
     return series
+
+
+def _chosen(columns: Mapping[str, Array], names: Iterable[str]) -> dict[str, Array]:
+    return {name: columns[name] for name in names if name in columns}
 
 
 def _thinned(label: str, columns: Sequence[Array]) -> Indices:

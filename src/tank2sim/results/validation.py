@@ -169,6 +169,8 @@ class ValidationResult(Result[ValidationStudy]):
     card: SteeredCard | None = None
     paths: tuple[Path, ...] = ()
     command: ClassVar[str] = "validate"
+    procedure: ClassVar[str] = "Validation of the manoeuvring simulation model, in the manner of ITTC 7.5-02-06-03"
+    subject: ClassVar[str] = "validation"
 
     @property
     def verdict(self) -> str:
@@ -187,16 +189,6 @@ class ValidationResult(Result[ValidationStudy]):
         """Figures of standard trials, a row each: value, numerical uncertainty U_num, deviation by the inputs."""
         frame = records_frame(self.study.verification, ("trial", "name", "value", "U_num", "deviation"))
         return frame.rename(columns={"name": "figure", "U_num": "numerical"})
-
-    @property
-    def title(self) -> str:
-        """The ship."""
-        return f"{self.study.ship}: validation"
-
-    @property
-    def subtitle(self) -> str:
-        """The procedure."""
-        return "Validation of the manoeuvring simulation model, in the manner of ITTC 7.5-02-06-03"
 
     @property
     def headline(self) -> tuple[str, ...]:
@@ -219,32 +211,33 @@ class ValidationResult(Result[ValidationStudy]):
     @property
     def key_figures(self) -> Sequence[KeyFigure]:
         """Figures validated, median error and level, and the numerical uncertainty."""
-        figures, counts = self.study.figures, self.study.counts
-        if figures:
-            validated = counts[ComparisonOutcome.VALIDATED.value]
-            incomplete = Verdict.FAILED if counts[ComparisonOutcome.REFUTED.value] else Verdict.CAUTION
-            verdict = Verdict.PASSED if validated == len(figures) else incomplete
-            shown = [KeyFigure(label="Figures validated", value=f"{validated} of {len(figures)}", verdict=verdict)]
-        elif found := self.study.predictions:
-            shown = [
-                KeyFigure(label=f"R^2 of {name}", value=round(one, 3)) for name, one in found.determination.items()
-            ]
-            ends = {"position": (found.end_distance_m, "m"), "heading": (found.end_heading_deg, "deg")}
-            note = f"rms, after up to {PREDICTED_S:g} s"
-            for name, (value, unit) in ends.items():
-                if value is not None:
-                    shown.append(KeyFigure(label=f"Error of {name}", value=value, unit=unit, note=note))
-        else:
-            note = "no trial to compare with"
-            shown = [KeyFigure(label="Validation", value="none", verdict=Verdict.CAUTION, note=note)]
+        figures, shown = self.study.figures, self._outcomes()
         errors = [100 * abs(one.error / one.measured) for one in figures if one.error is not None and one.measured]
         levels = [one.level_percent for one in figures if one.level_percent is not None]
         for label, values in (("Median error |E|", errors), ("Median level U_val", levels)):
             if values:
-                shown.append(KeyFigure(label=label, value=float(np.median(values)), unit="% of D"))
+                shown.append(KeyFigure(label, float(np.median(values)), "% of D"))
         if self._numerical_percent:
             value = max(self._numerical_percent)
-            shown.append(KeyFigure(label="Largest numerical uncertainty", value=value, unit="%"))
+            shown.append(KeyFigure("Largest numerical uncertainty", value, "%"))
+        return shown
+
+    def _outcomes(self) -> list[KeyFigure]:
+        """Figures validated, or the errors of predictions."""
+        count, counts = len(self.study.figures), self.study.counts
+        if count:
+            validated = counts[ComparisonOutcome.VALIDATED.value]
+            incomplete = Verdict.FAILED if counts[ComparisonOutcome.REFUTED.value] else Verdict.CAUTION
+            verdict = Verdict.PASSED if validated == count else incomplete
+            return [KeyFigure("Figures validated", f"{validated} of {count}", verdict=verdict)]
+        if (found := self.study.predictions) is None:
+            return [KeyFigure("Validation", "none", verdict=Verdict.CAUTION, note="no trial to compare with")]
+        shown = [KeyFigure(f"R^2 of {name}", round(one, 3)) for name, one in found.determination.items()]
+        ends = {"position": (found.end_distance_m, "m"), "heading": (found.end_heading_deg, "deg")}
+        for name, (value, unit) in ends.items():
+            if value is not None:
+                note = f"rms, after up to {PREDICTED_S:g} s"
+                shown.append(KeyFigure(f"Error of {name}", value, unit, note=note))
         return shown
 
     @property
@@ -272,7 +265,7 @@ class ValidationResult(Result[ValidationStudy]):
         if not figures:
             given = "trial" if self.study.steered_by is SteeredBy.THRUSTERS else "turning circle or zigzag"
             text = f"No {given} was given: the model is documented and verified, and not validated."
-            return Section(heading="Validation", text=text)
+            return Section("Validation", text=text)
         manoeuvres = {figure.trial: figure.manoeuvre for figure in figures}
         numbers = {trial: number for number, trial in enumerate(manoeuvres, start=1)}
         rows: list[list[Cell]] = [
@@ -285,20 +278,18 @@ class ValidationResult(Result[ValidationStudy]):
             ]
             for one in figures
         ]
-        heads = ("no.: figure", "D", "S", "E", "u_input", "u_D", "U_val", Column(title="level", unit="%", digits=3))
+        heads = ("no.: figure", "D", "S", "E", "u_input", "u_D", "U_val", Column("level", "%", digits=3))
         caption = "E = simulated S less measured D, and its uncertainty"
         benchmark: list[list[Cell]] = [[numbers[trial], trial, what] for trial, what in manoeuvres.items()]
         return Section(
-            heading="Validation",
+            "Validation",
             tables=[
                 table("Trials", ("no.", "trial", "manoeuvre, as recognised"), benchmark, folded=False),
                 replace(table(caption, [*heads, "verdict"], rows, folded=True), wide=True),
                 *_one_sided(self.study.one_sided),
             ],
             charts=[
-                Illustration(
-                    chart=_comparison_error_chart(figures, numbers), caption=_COMPARISON_ERRORS, name="validation"
-                )
+                Illustration(_comparison_error_chart(figures, numbers), caption=_COMPARISON_ERRORS, name="validation")
             ],
         )
 
@@ -322,7 +313,7 @@ class ValidationResult(Result[ValidationStudy]):
             )
         ]
         errors = table("Free-running replays with the recorded inputs", heads, rows, digits=3, on_screen=False)
-        return Section(heading="Replays", text=_REPLAY, tables=[errors], charts=charts)
+        return Section("Replays", text=_REPLAY, tables=[errors], charts=charts)
 
     def _verification(self) -> Section:
         rows: list[list[Cell]] = [
@@ -337,16 +328,15 @@ class ValidationResult(Result[ValidationStudy]):
             for row in self.study.verification
         ]
         heads = ("trial", "figure", "value", "by half the step", "U_num", "u_input")
-        relative = Column(title="u_input", unit="%", digits=3)
+        relative = Column("u_input", "%", digits=3)
         caption = "Standard trials at the speed of expansion in calm water"
         tables = [table(caption, [*heads, relative], rows, on_screen=False)]
-        return Section(heading="Verification and uncertainty of the simulation", text=_NUMERICAL, tables=tables)
+        return Section("Verification and uncertainty of the simulation", text=_NUMERICAL, tables=tables)
 
     def _documentation(self) -> Section:
         rows = list(self.study.documentation.items())
         caption = "Documentation asked for by ITTC 7.5-02-06-03"
-        tables = [table(caption, ("item", "statement"), rows, on_screen=False)]
-        return Section(heading="The simulation model", tables=tables)
+        return Section("The simulation model", tables=[table(caption, ("item", "statement"), rows, on_screen=False)])
 
     def _coefficients(self) -> Section:
         prime = self.study.steered_by is SteeredBy.RUDDER
@@ -361,15 +351,15 @@ class ValidationResult(Result[ValidationStudy]):
             ]
             for name, row in self.study.coefficients.items()
         ]
-        errors = [Column(title="standard error", digits=3), Column(title="error over value", unit="%", digits=3)]
+        errors = [Column("standard error", digits=3), Column("error over value", "%", digits=3)]
         tables = [table(caption, ["coefficient", "value", *errors, "error"], rows, on_screen=False)]
         text = f"Where the card states no standard error, {DEFAULT_RELATIVE_ERROR:.0%} of the value is assumed."
-        return Section(heading="Coefficients", text=text, tables=tables)
+        return Section("Coefficients", text=text, tables=tables)
 
     def _causes(self) -> Section:
         causes = (*_CAUSES, *([] if self.study.propulsion else [_NO_PROPULSION]))
         tables = [table("Potential causes of errors", ("cause",), [[cause] for cause in causes], on_screen=False)]
-        return Section(heading="Causes of error and sensitivity", text=_SENSITIVITY, tables=tables)
+        return Section("Causes of error and sensitivity", text=_SENSITIVITY, tables=tables)
 
 
 def _predictions(found: PredictionStudy) -> Section:
@@ -384,7 +374,7 @@ def _predictions(found: PredictionStudy) -> Section:
     }
     caption = "Rms errors of the motion, and of position and heading at the end of each prediction"
     return Section(
-        heading="Predictions",
+        "Predictions",
         text=f"Each prediction of {PREDICTED_S:g} s is driven by the recorded revolutions. It begins in the state that "
         "a filter has found, and uses nothing measured later.",
         tables=[records_table(caption, found.trials, first="trial", fields=fields)],
@@ -403,8 +393,8 @@ def _one_sided(errors: Sequence[OneSidedError]) -> list[Table]:
         ]
         for error in errors
     ]
-    percent = Column(title="mean error", unit="% of D", digits=2)
-    heads = ("figure", "errors on one side", Column(title="mean E", digits=3), percent, Column(title="p", digits=2))
+    percent = Column("mean error", "% of D", digits=2)
+    heads = ("figure", "errors on one side", Column("mean E", digits=3), percent, Column("p", digits=2))
     caption = "Errors to one side (sign test; p corrected for the number of figures)"
     return [table(caption, heads, rows, on_screen=False)] if rows else []
 
@@ -415,7 +405,7 @@ def _method(figures: Sequence[Validated]) -> Section:
     numerical = f"u_num is {format_number(max(shares, default=0.0), 2)} % of D at most."
     level = f"The level is U_val in per cent of D; required here: {figures[0].required_percent:g} %."
     text = f"{_METHOD} {level}\n\n{_SOURCES_OF_U} {numerical}\n\n{_CLOSED_LOOP}"
-    return Section(heading="Method", text=text)
+    return Section("Method", text=text)
 
 
 def _digits(value: float | None, digits: int = 4) -> str | None:
@@ -440,14 +430,12 @@ def _comparison_error_chart(figures: Sequence[Validated], numbers: Mapping[str, 
         for figure in figures
         if figure.error is not None and figure.measured
     ]
-    across = PlotAxis(title="per cent of the measured figure", zero=True)
+    across = PlotAxis("per cent of the measured figure", zero=True)
     y = channel("name:N", sort=names_of(rows), title=None, axis=SIDE | {"labelLimit": 170})
     bars = layer("bar", rows, {"x": across.channel("least"), "x2": "most", "y": y}, style="uncertainty", height=14)
     shown = {"trial:N": "trial", "name:N": "figure", "v:Q": "E (%)", "most:Q": "U_val (%)"}
     side = {"labelLimit": 170}
-    points = row_layers(
-        RowPlot(rows=rows, across=across, shown=shown, side=side, rules=[Rule(at=[0.0])]), filled=True, size=80
-    )
+    points = row_layers(RowPlot(rows, across=across, shown=shown, side=side, rules=[Rule([0.0])]), filled=True, size=80)
     return layered(
         [bars, *points],
         size=(520, {"step": 24}),

@@ -18,6 +18,11 @@ from tank2sim.simulation.scheme import step_and_constants
 NO_COMPILER = Notice("no working C compiler was found: CasADi evaluates the model, many times slower")
 
 
+def compiler_notices() -> tuple[Notice, ...]:
+    """Return :data:`NO_COMPILER` where there is no compiler, else nothing."""
+    return () if find_compiler() else (NO_COMPILER,)
+
+
 class Integrator:
     """Takes a model's Runge-Kutta steps (:func:`tank2sim.simulation.scheme.runge_kutta_step`).
 

@@ -24,7 +24,7 @@ from tank2sim.answer.charts.vega import (
     tooltips,
 )
 
-_FREQUENCY = PlotAxis(title="angular frequency (rad/s)", log=True, nice=False, form="~g")
+_FREQUENCY = PlotAxis("angular frequency (rad/s)", log=True, nice=False, form="~g")
 _SHOWN = {"run:N": "system", "x:Q": "frequency (rad/s)"}
 
 _HALF = 2.5
@@ -32,7 +32,7 @@ _HALF = 2.5
 choice)."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class FrequencyResponse:
     """Response of one system: `omega_radps` (n,) in rad/s, above 0, and `response` (n,), complex."""
 
@@ -47,7 +47,7 @@ class FrequencyResponse:
         return found
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class PolesZeros:
     """Poles and zeros of one system, complex, 1/s."""
 
@@ -74,23 +74,17 @@ class OutputError:
         return self.error <= self.limit
 
 
-def bode_chart(
-    responses: Sequence[FrequencyResponse], *, title: str = "", width_px: int = 720, height_px: int = 200
-) -> ChartSpec:
-    """Magnitude (dB) and phase (deg, unwrapped) against angular frequency (rad/s, logarithmic); sizes of one panel."""
-    magnitudes = [PlotSeries(label=one.label, x=one.omega_radps, y=one.decibel) for one in responses]
+def bode_chart(responses: Sequence[FrequencyResponse], *, title: str = "") -> ChartSpec:
+    """Magnitude (dB) and phase (deg, unwrapped) against angular frequency (rad/s, logarithmic)."""
     phases = [np.rad2deg(np.unwrap(np.angle(np.asarray(one.response, dtype=complex)))) for one in responses]
-    turned = [
-        PlotSeries(label=one.label, x=one.omega_radps, y=phase) for one, phase in zip(responses, phases, strict=True)
-    ]
-    ticks = _phase_ticks(np.concatenate(phases))
-    plots = [
-        Plot(series=magnitudes, up=PlotAxis(title="magnitude (dB)"), height_px=height_px),
-        Plot(series=turned, up=PlotAxis(title="phase (deg)", ticks=ticks), height_px=height_px),
-    ]
+    phase_axis = PlotAxis("phase (deg)", ticks=_phase_ticks(np.concatenate(phases)))
+    plots = []
+    for up, curves in ((PlotAxis("magnitude (dB)"), [one.decibel for one in responses]), (phase_axis, phases)):
+        series = [PlotSeries(one.label, x=one.omega_radps, y=y) for one, y in zip(responses, curves, strict=True)]
+        plots.append(Plot(series, up=up, height_px=200))
     names = ", ".join(response.label for response in responses)
     described = f"Bode diagram of {names}: magnitude and phase."
-    return curve_panels(plots, _FREQUENCY, title=title, width_px=width_px, described=described, shown=_SHOWN)
+    return curve_panels(plots, _FREQUENCY, title=title, described=described, shown=_SHOWN)
 
 
 def sensitivity_chart(responses: Sequence[FrequencyResponse], *, title: str = "") -> ChartSpec:
@@ -98,16 +92,14 @@ def sensitivity_chart(responses: Sequence[FrequencyResponse], *, title: str = ""
     series = []
     for one in responses:
         shown = one.decibel > -60
-        series.append(PlotSeries(label=one.label, x=vector(one.omega_radps)[shown], y=one.decibel[shown]))
-    plot = Plot(series=series, up=PlotAxis(title="magnitude (dB)"), rules=[Rule(at=[0.0])])
+        series.append(PlotSeries(one.label, x=vector(one.omega_radps)[shown], y=one.decibel[shown]))
+    plot = Plot(series, up=PlotAxis("magnitude (dB)"), rules=[Rule([0.0])])
     described = f"Magnitude over frequency of {', '.join(response.label for response in responses)}."
     shown_as = {**_SHOWN, "run:N": "function"}
     return curve_chart(plot, _FREQUENCY, title=title, window=["x"], described=described, shown=shown_as)
 
 
-def nyquist_chart(
-    loops: Sequence[FrequencyResponse], sensitivity_peak: float, *, title: str = "", size_px: int = 460
-) -> ChartSpec:
+def nyquist_chart(loops: Sequence[FrequencyResponse], sensitivity_peak: float, *, title: str = "") -> ChartSpec:
     """Nyquist curves near the critical point (cross), with the circle of radius 1/Ms that the first one touches.
 
     `loops`: loop transfer L; 1 + L is what feedback divides by; `sensitivity_peak`: Ms of the first.
@@ -117,37 +109,32 @@ def nyquist_chart(
         value = np.asarray(loop.response, dtype=complex)
         near = np.abs(value + 1) < 3 * _HALF
         value, omega = value[near], vector(loop.omega_radps)[near]
-        series.append(PlotSeries(label=loop.label, x=value.real, y=value.imag, closed=True, more={"w": omega}))
-    across = PlotAxis(title="real part of L (-)", domain=(-1 - _HALF, -1 + _HALF), nice=False, ticks=6)
-    up = PlotAxis(title="imaginary part of L (-)", domain=(-_HALF, _HALF), nice=False, ticks=6)
+        series.append(PlotSeries(loop.label, x=value.real, y=value.imag, closed=True, more={"w": omega}))
+    across = PlotAxis("real part of L (-)", domain=(-1 - _HALF, -1 + _HALF), nice=False, ticks=6)
+    up = PlotAxis("imaginary part of L (-)", domain=(-_HALF, _HALF), nice=False, ticks=6)
     turn = np.linspace(0, 2 * math.pi, 121)
-    circle = PlotSeries(
-        label="", x=-1 + np.cos(turn) / sensitivity_peak, y=np.sin(turn) / sensitivity_peak, closed=True
-    ).rows
+    circle = PlotSeries("", x=-1 + np.cos(turn) / sensitivity_peak, y=np.sin(turn) / sensitivity_peak, closed=True).rows
     place = {"x": across.channel("x"), "y": up.channel("v")}
     over = [
         layer("line", circle, {**place, "order": "i:Q"}, style="limit", clip=True, strokeWidth=1.2),
         layer("point", [{"x": -1.0, "v": 0.0}], place, style="limit", shape=CROSS, size=90, strokeWidth=2, clip=True),
     ]
-    rules = [Rule(at=[0.0], upright=True), Rule(at=[0.0])]
     return curve_chart(
-        Plot(series=series, up=up, height_px=size_px, rules=rules, over=over),
+        Plot(series, up=up, height_px=460, rules=[Rule([0.0], upright=True), Rule([0.0])], over=over),
         across,
         title=title,
-        width_px=size_px,
+        width_px=460,
         described=f"Nyquist curves of {', '.join(loop.label for loop in loops)} near -1.",
         usermeta={"equal_scales": True},
         shown={"run:N": "loop", "w:Q": "frequency (rad/s)", "x:Q": "real part", "v:Q": "imaginary part"},
     )
 
 
-def pole_zero_chart(
-    systems: Sequence[PolesZeros], *, title: str = "", width_px: int = 560, height_px: int = 420
-) -> ChartSpec:
+def pole_zero_chart(systems: Sequence[PolesZeros], *, title: str = "") -> ChartSpec:
     """Poles (crosses) and zeros (circles) in the complex plane, both axes in one scale, the unstable half tinted."""
     rows = [row for system in systems for row in _pole_zero_rows(system)]
     real, imaginary = (np.array([row[key] for row in rows] + [0.0]) for key in ("re", "im"))
-    frame = equal_frame(real, np.concatenate([imaginary, -imaginary]), width_px=width_px, height_px=height_px)
+    frame = equal_frame(real, np.concatenate([imaginary, -imaginary]), width_px=560, height_px=420)
     place = frame.axes(across=("re", "real part (1/s)"), up=("im", "imaginary part (1/s)"))
     names = [system.label for system in systems]
     kinds = {"scale": {"domain": ["pole", "zero"], "range": [CROSS, "circle"]}, "legend": {}}
@@ -157,8 +144,8 @@ def pole_zero_chart(
     return layered(
         [
             layer("rect", [{"re": 0.0}], {"x": place["x"], "x2": edge}, style="region", clip=True),
-            Rule(at=[0.0], upright=True).layer(place["x"]),
-            Rule(at=[0.0]).layer(place["y"]),
+            Rule([0.0], upright=True).layer(place["x"]),
+            Rule([0.0]).layer(place["y"]),
             layer("point", rows, marks, size=110, strokeWidth=2, clip=True),
         ],
         size=(frame.width_px, frame.height_px),
@@ -169,7 +156,7 @@ def pole_zero_chart(
     )
 
 
-def error_chart(errors: Sequence[OutputError], *, title: str = "", width_px: int = 720) -> ChartSpec:
+def error_chart(errors: Sequence[OutputError], *, title: str = "") -> ChartSpec:
     """Largest error of every output on a logarithmic scale next to its limit, one panel a kind of check.
 
     An error of exactly 0 (or one that is not finite) has no place on a logarithmic scale: it is drawn at the left
@@ -181,9 +168,7 @@ def error_chart(errors: Sequence[OutputError], *, title: str = "", width_px: int
     low, high = 10.0 ** math.floor(math.log10(min(sizes)) - 0.01), 10.0 ** math.ceil(math.log10(max(sizes)) + 0.01)
     decades = round(math.log10(high / low))
     powers = [float(f"{low * 10.0**power:.6g}") for power in range(0, decades + 1, 1 + decades // 5)]
-    across = PlotAxis(
-        title="largest error (line: limit)", log=True, domain=(low, high), nice=False, ticks=powers, form=".0e"
-    )
+    across = PlotAxis("largest error (line: limit)", log=True, domain=(low, high), nice=False, ticks=powers, form=".0e")
     y = channel("output:N", title=None, sort=outputs, axis={"grid": True, "labelLimit": 220})
     verdict = channel("verdict:N", scale={"domain": _VERDICTS})
     shape = channel("verdict:N", scale={"domain": _VERDICTS, "range": ["circle", CROSS]})
@@ -207,7 +192,7 @@ def error_chart(errors: Sequence[OutputError], *, title: str = "", width_px: int
         "facet": channel("kind:N", sort=kinds, header={"title": None, "labelAnchor": "start"}),
         "columns": len(kinds),
         "spacing": 20,
-        "spec": {"layer": panel, "width": max(110, width_px // len(kinds) - 20), "height": {"step": 19}},
+        "spec": {"layer": panel, "width": max(110, 720 // len(kinds) - 20), "height": {"step": 19}},
         "title": title,
         "description": f"Largest error of {len(outputs)} outputs in {', '.join(kinds)}. {over}",
     }

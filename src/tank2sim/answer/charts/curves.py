@@ -9,15 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tank2sim.answer.charts.parts import (
-    HOVER_SAMPLES,
-    LINE_SAMPLES,
-    SeriesLook,
-    every,
-    records,
-    series_look,
-    vector,
-)
+from tank2sim.answer.charts.parts import HOVER_SAMPLES, LINE_SAMPLES, SeriesLook, every, records, series_look, vector
 from tank2sim.answer.charts.theme import BAND_OPACITY
 from tank2sim.answer.charts.vega import (
     ChartRecord,
@@ -34,7 +26,7 @@ from tank2sim.answer.charts.vega import (
 from tank2sim.records.thinning import thin_line
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class PlotSeries:
     """Values `y` (n,) over `x` (n,) under one name: a line, or points (measured); NaN leaves a gap.
 
@@ -66,7 +58,7 @@ class PlotSeries:
         return records(self.label, columns)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Plot:
     """One panel: series along a vertical axis, with rules. `over`: layers drawn over the series."""
 

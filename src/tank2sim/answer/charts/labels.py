@@ -29,7 +29,7 @@ _WIDTHS = {"narrow": 0.42, "usual": 0.61, "capital": 0.75, "wide": 0.95}
 _Point = tuple[float, float]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Spot:
     """A place for a label: `at` across and up in units of the data, its offset in px, and the side that is there."""
 
@@ -47,12 +47,12 @@ def spots_about(at: _Point, *, up: bool = True) -> list[Spot]:
     """Return places about a point: above it (below, if not `up`), to its sides, and on its other side."""
     first, second = (-9.0, 11.0) if up else (11.0, -9.0)
     return [
-        Spot(at=at, dy=first),
-        Spot(at=at, dx=6.0, dy=first, align="left"),
-        Spot(at=at, dx=-6.0, dy=first, align="right"),
-        Spot(at=at, dx=8.0, align="left"),
-        Spot(at=at, dx=-8.0, align="right"),
-        Spot(at=at, dy=second),
+        Spot(at, dy=first),
+        Spot(at, dx=6.0, dy=first, align="left"),
+        Spot(at, dx=-6.0, dy=first, align="right"),
+        Spot(at, dx=8.0, align="left"),
+        Spot(at, dx=-8.0, align="right"),
+        Spot(at, dy=second),
     ]
 
 
@@ -62,14 +62,11 @@ def spots_along(begin: _Point, end: _Point, frame: Frame) -> list[Spot]:
     places: list[_Point] = [tuple((first + share * (last - first)).tolist()) for share in _SHARES]
     across, up = np.abs(np.subtract(frame.pixels(*end), frame.pixels(*begin)))
     if across >= up:
-        middle = [Spot(at=place, dy=dy) for place in places for dy in (-9.0, 11.0)]
+        middle = [Spot(place, dy=dy) for place in places for dy in (-9.0, 11.0)]
         aside = [(dy, dx, side) for dy in (0.0, -9.0, 11.0) for dx, side in _SIDES]
-        return [
-            *middle,
-            *(Spot(at=point, dx=dx, dy=dy, align=side) for point in (end, begin) for dy, dx, side in aside),
-        ]
-    middle = [Spot(at=place, dx=dx, align=side) for place in places for dx, side in _SIDES]
-    return [*middle, *(Spot(at=point, dy=dy) for point in (end, begin) for dy in (-9.0, 11.0))]
+        return [*middle, *(Spot(point, dx=dx, dy=dy, align=side) for point in (end, begin) for dy, dx, side in aside)]
+    middle = [Spot(place, dx=dx, align=side) for place in places for dx, side in _SIDES]
+    return [*middle, *(Spot(point, dy=dy) for point in (end, begin) for dy in (-9.0, 11.0))]
 
 
 _SIDES: tuple[tuple[float, Literal["left", "right"]], ...] = ((6.0, "left"), (-6.0, "right"))
@@ -97,10 +94,7 @@ def place_labels(
 
 
 def label_layers(
-    labels: Sequence[Label],
-    frame: Frame,
-    position: Mapping[str, ChartSpec],
-    lines: Sequence[tuple[Array, Array]] = (),
+    labels: Sequence[Label], frame: Frame, position: Mapping[str, ChartSpec], lines: Sequence[tuple[Array, Array]] = ()
 ) -> list[ChartSpec]:
     """Return labels in their places, over a rim in the colour of the paper that keeps them legible.
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_panels
 from tank2sim.answer.charts.labels import label_layers, spots_about, spots_along
@@ -118,7 +117,7 @@ def along_course(columns: Mapping[str, Any], points_m: Array) -> Array:
     return np.column_stack([north * cos + east * sin, east * cos - north * sin])
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Dimension:
     """A figure drawn on a track: a line from `begin` to `end`, each (to starboard, ahead) in m, with its words.
 
@@ -146,7 +145,7 @@ def turn_dimensions(motion: Motion, figures: Mapping[str, float | None], bands: 
         band = bands.get(f"{name.replace(' ', '_')}_m")
         low, high = (point(band.p5), point(band.p95)) if band else (None, None)
         text = _sized(name, size_m, motion.length_m)
-        return Dimension(text=text, begin=point(0.0), end=point(size_m), low=low, high=high)
+        return Dimension(text, point(0.0), point(size_m), low=low, high=high)
 
     found: list[Dimension] = []
     if advance is not None and transfer is not None:
@@ -173,8 +172,7 @@ def turn_chart(
     """
     turned = np.abs(motion.heading_deg) <= _FULL_TURN
     dimensions = turn_dimensions(motion, figures, bands or {})
-    shown = motion.until(float(motion.time_s[turned][-1]))
-    return way_chart(motion, dimensions, shown, edges_m=edges_m, title=title)
+    return way_chart(motion, dimensions, motion.until(float(motion.time_s[turned][-1])), edges_m=edges_m, title=title)
 
 
 def way_chart(
@@ -190,22 +188,13 @@ def way_chart(
     `hulls_until`: the part of the motion with outlines of the ship; by default all of it; `edges_m`, `title`: as of
     :func:`turn_chart`.
     """
-    polygon = _polygon(edges_m) if edges_m is not None else np.empty((0, 2))
+    polygon = _polygon(edges_m)
     step, outlines = hull_rows(hulls_until or motion)
-    ends = [point for dimension in dimensions for point in (dimension.begin, dimension.end)]
-    across: list[ArrayLike] = [
-        motion.starboard_m,
-        polygon[:, 1],
-        [row["y"] for row in outlines],
-        [point[0] for point in ends],
-    ]
-    up: list[ArrayLike] = [motion.ahead_m, polygon[:, 0], [row["x"] for row in outlines], [point[1] for point in ends]]
-    frame = equal_frame(
-        np.concatenate([vector(part) for part in across]),
-        np.concatenate([vector(part) for part in up]),
-        width_px=640,
-        height_px=540,
-    )
+    ends = [point[::-1] for dimension in dimensions for point in (dimension.begin, dimension.end)]
+    shown = [*ends, *((row["x"], row["y"]) for row in outlines)]
+    track = np.column_stack([motion.ahead_m, motion.starboard_m])
+    up, across = np.concatenate([track, polygon, np.array(shown, dtype=float).reshape(-1, 2)]).T
+    frame = equal_frame(across, up, width_px=640, height_px=540)
     place = frame.axes(across=("y", "to starboard (m)"), up=("x", "ahead (m)"))
     kept = thin_line([motion.ahead_m, motion.starboard_m], LINE_SAMPLES)
     rows = records("track", {"x": motion.ahead_m[kept], "y": motion.starboard_m[kept], "t": motion.time_s[kept]})
@@ -213,8 +202,8 @@ def way_chart(
     layers = [layer("line", rows, {**place, "color": _ONE, "order": "i:Q"}, clip=True)]
     closed = {"interpolate": "linear-closed", "clip": True}
     if len(polygon):
-        corners = records("band", {"x": polygon[:, 0], "y": polygon[:, 1]})
-        layers.append(layer("line", corners, {**place, "order": "i:Q"}, style="band", strokeWidth=0, **closed))
+        edge = records("band", {"x": polygon[:, 0], "y": polygon[:, 1]})
+        layers.append(layer("line", edge, {**place, "order": "i:Q"}, style="band", strokeWidth=0, **closed))
     if outlines:
         layers.append(layer("line", outlines, {**place, "order": "i:Q", "detail": "hull:N"}, style="hull", **closed))
     lines = [(motion.starboard_m, motion.ahead_m), *_outline_lines(outlines)]
@@ -254,8 +243,8 @@ def zigzag_chart(
     angles = [motion.heading_deg, motion.rudder_deg, np.array([-heading_deg, heading_deg]), vector(beyond), *edges[1:]]
     times = np.concatenate([motion.time_s, *edges[:1]])
     frame = free_frame(times, np.concatenate(angles), width_px=680, height_px=340, margins_px=(0.0, 22.0))
-    across = PlotAxis(title="time (s)", domain=frame.across, nice=False)
-    up = PlotAxis(title="heading and rudder, + to starboard (deg)", domain=frame.up, nice=False)
+    across = PlotAxis("time (s)", domain=frame.across, nice=False)
+    up = PlotAxis("heading and rudder, + to starboard (deg)", domain=frame.up, nice=False)
     place, over = {"x": across.channel("x"), "y": up.channel("v")}, []
     if edges:
         area = records("heading", dict(zip(("x", "low", "high"), edges, strict=True)))
@@ -272,13 +261,13 @@ def zigzag_chart(
         drawn = [(motion.time_s, motion.heading_deg), (motion.time_s, motion.rudder_deg)]
         over += label_layers(labels, frame, place, drawn)
     series = [
-        PlotSeries(label="heading", x=motion.time_s, y=motion.heading_deg),
-        PlotSeries(label="rudder", x=motion.time_s, y=motion.rudder_deg),
+        PlotSeries("heading", x=motion.time_s, y=motion.heading_deg),
+        PlotSeries("rudder", x=motion.time_s, y=motion.rudder_deg),
     ]
-    rules = [Rule(at=[heading_deg, -heading_deg], style="dimension")]
+    rules = [Rule([heading_deg, -heading_deg], style="dimension")]
     sizes = ", ".join(str(peak["text"]) for peak in peaks)
     return curve_chart(
-        Plot(series=series, up=up, height_px=frame.height_px, rules=rules, over=over),
+        Plot(series, up=up, height_px=frame.height_px, rules=rules, over=over),
         across,
         title=title,
         width_px=frame.width_px,
@@ -310,20 +299,18 @@ def pull_out_chart(sides: Mapping[str, Motion], neutral_deg: float, *, title: st
     `sides`: label to motion, of the pull-out from each side.
     """
     series = [
-        PlotSeries(label=label, x=motion.time_s - pull_out_time(motion, neutral_deg), y=motion.rate_degps)
+        PlotSeries(label, x=motion.time_s - pull_out_time(motion, neutral_deg), y=motion.rate_degps)
         for label, motion in sides.items()
     ]
     longest = max(float(np.max(one.x)) for one in series)
-    across = PlotAxis(
-        title=f"time from the order of the neutral rudder, {format_number(neutral_deg, _ROUND)}° (s)",
-        domain=(-0.1 * longest, longest),
-        nice=False,
-    )
-    up = PlotAxis(title="yaw rate, + to starboard (deg/s)", zero=True)
-    rules = [Rule(at=[0.0]), Rule(at=[0.0], upright=True, style="dimension")]
+    rules = [Rule([0.0]), Rule([0.0], upright=True, style="dimension")]
     return curve_chart(
-        Plot(series=series, up=up, height_px=320, rules=rules),
-        across,
+        Plot(series, up=PlotAxis("yaw rate, + to starboard (deg/s)", zero=True), height_px=320, rules=rules),
+        PlotAxis(
+            f"time from the order of the neutral rudder, {format_number(neutral_deg, _ROUND)}° (s)",
+            domain=(-0.1 * longest, longest),
+            nice=False,
+        ),
         title=title,
         width_px=680,
         window=["x"],
@@ -346,16 +333,15 @@ def stop_speed_chart(motion: Motion, *, title: str = "") -> ChartSpec:
         panels["revolutions (rpm)"] = motion.revolutions_rpm
     plots = [
         Plot(
-            series=[PlotSeries(label="run", x=motion.way_m, y=values, closed=True, more={"t": motion.time_s})],
-            up=PlotAxis(title=name, zero=True),
+            [PlotSeries("run", x=motion.way_m, y=values, closed=True, more={"t": motion.time_s})],
+            up=PlotAxis(name, zero=True),
             height_px=200 if not place else 110,
         )
         for place, (name, values) in enumerate(panels.items())
     ]
-    across = PlotAxis(title="distance along the track (m)", nice=False)
+    across = PlotAxis("distance along the track (m)", nice=False)
     described = "Speed over the distance along the track of the stop."
-    shown = {"t:Q": "time (s)"}
-    return curve_panels(plots, across, title=title, width_px=640, described=described, shown=shown)
+    return curve_panels(plots, across, title=title, width_px=640, described=described, shown={"t:Q": "time (s)"})
 
 
 def stop_dimensions(motion: Motion, figures: Mapping[str, float | None]) -> list[Dimension]:
@@ -366,10 +352,7 @@ def stop_dimensions(motion: Motion, figures: Mapping[str, float | None]) -> list
     head_words, side_words = (
         _sized(name, abs(size), motion.length_m) for name, size in (("head reach", head), ("side reach", side))
     )
-    return [
-        Dimension(text=head_words, begin=(0.0, 0.0), end=(0.0, head)),
-        Dimension(text=side_words, begin=(0.0, head), end=(side, head)),
-    ]
+    return [Dimension(head_words, (0.0, 0.0), (0.0, head)), Dimension(side_words, (0.0, head), (side, head))]
 
 
 def hull_outline(length_m: float, beam_m: float) -> tuple[Array, Array]:
@@ -406,17 +389,16 @@ def _sized(name: str, size_m: float, length_m: float | None) -> str:
     return f"{name} {format_number(size_m, _ROUND)} m{lengths}"
 
 
-def _polygon(edges: tuple[Array, Array]) -> Array:
+def _polygon(edges: tuple[Array, Array] | None) -> Array:
+    if edges is None:
+        return np.empty((0, 2))
     low, high = (np.asarray(edge, dtype=float).reshape(-1, 2) for edge in edges)
     known = np.isfinite(low).all(axis=1) & np.isfinite(high).all(axis=1)
     return np.concatenate([low[known], high[known][::-1]])
 
 
 def _dimension_layers(
-    dimensions: Sequence[Dimension],
-    place: Mapping[str, ChartSpec],
-    frame: Frame,
-    lines: Sequence[tuple[Array, Array]],
+    dimensions: Sequence[Dimension], place: Mapping[str, ChartSpec], frame: Frame, lines: Sequence[tuple[Array, Array]]
 ) -> list[ChartSpec]:
     """Lines from end to end of each figure, bars of an ensemble, and their words."""
     found = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,15 +25,7 @@ from tank2sim.answer.charts.parts import (
     vector,
     with_unit,
 )
-from tank2sim.answer.charts.vega import (
-    ChartRecord,
-    ChartSpec,
-    PlotAxis,
-    Rule,
-    layer,
-    layered,
-    tooltips,
-)
+from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, Rule, layer, layered, tooltips
 from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Illustration
 from tank2sim.arrays import Array
@@ -76,7 +69,7 @@ _TRACK = ("x_m", "y_m")
 _ORDER, _ANGLE = "delta_order", "delta"
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class TrackData:
     """The path of one run: x north and y east in m, in the order of time; `time_s` (s) is for the tooltip alone."""
 
@@ -86,8 +79,17 @@ class TrackData:
     time_s: ArrayLike | None = None
     measured: bool = False
 
+    @property
+    def rows(self) -> list[ChartRecord]:
+        """Rows of the chart: ``x``, ``y`` and ``t``, thinned."""
+        columns = {"x": vector(self.x_m), "y": vector(self.y_m)}
+        thinned = thin_points if self.measured else thin_line
+        kept = thinned(list(columns.values()), POINT_SAMPLES if self.measured else LINE_SAMPLES)
+        columns |= {} if self.time_s is None else {"t": vector(self.time_s)}
+        return records(self.label, {name: values[kept] for name, values in columns.items()})
 
-@dataclass(frozen=True, kw_only=True)
+
+@dataclass(frozen=True)
 class Signal:
     """What one panel of a time history shows.
 
@@ -111,7 +113,7 @@ class HistoryBand:
     high: ArrayLike
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class History:
     """Signals of one run over time: `time_s` (n,) in s, `values` by name of signal, (n,) each, in the signal's unit.
 
@@ -135,49 +137,33 @@ class TimeMark:
     text: str
 
 
-@dataclass(frozen=True, kw_only=True)
-class SpiralData:
-    """Steady yaw rate (rad/s) against rudder angle (rad, positive to starboard), in the order they were run."""
-
-    label: str
-    rudder_rad: ArrayLike
-    yaw_rate_radps: ArrayLike
-
-
-def track_chart(
-    tracks: Sequence[TrackData], *, title: str = "", width_px: int = 720, height_px: int = 540
-) -> ChartSpec:
+def track_chart(tracks: Sequence[TrackData], *, title: str = "", height_px: int = 540) -> ChartSpec:
     """Tracks over each other, x north up and y east to the right, both axes in one scale (also when zoomed).
 
-    `tracks`: measured ones are drawn as open points, the others as lines. The start is marked. `title`: title of the
-    chart; `width_px`, `height_px`: size of the plot at most; it takes the shape of the tracks.
+    `tracks`: measured ones are drawn as open points, the others as lines; the start is marked; `height_px`: of the plot
+    at most; it takes the shape of the tracks.
     """
-    paths = [(track, vector(track.x_m), vector(track.y_m)) for track in tracks]
     frame = equal_frame(
-        np.concatenate([y for _, _, y in paths]),
-        np.concatenate([x for _, x, _ in paths]),
-        width_px=width_px,
+        np.concatenate([vector(track.y_m) for track in tracks]),
+        np.concatenate([vector(track.x_m) for track in tracks]),
+        width_px=720,
         height_px=height_px,
     )
     place = frame.axes(across=("y", "east y (m)"), up=("x", "north x (m)"))
     look = series_look([track.label for track in tracks], as_points={track.label for track in tracks if track.measured})
-    rows = {track.label: _track_rows(track, x, y) for track, x, y in paths}
-    lines, points = (
-        [row for track in tracks if track.measured == measured for row in rows[track.label]]
-        for measured in (False, True)
-    )
+    lines, points = ([track.rows for track in tracks if track.measured == kind] for kind in (False, True))
     timed = {"t:Q": "time (s)"} if all(track.time_s is not None for track in tracks) else {}
     said = {"tooltip": tooltips({"run:N": "run", **timed, "x:Q": "north (m)", "y:Q": "east (m)"})}
     marks = place | {"color": look.colour}
     layers = []
     if lines:
-        layers.append(layer("line", lines, {**marks, "strokeDash": look.dash, "order": "i:Q"}, clip=True))
+        layers.append(layer("line", list(chain(*lines)), {**marks, "strokeDash": look.dash, "order": "i:Q"}, clip=True))
     if points:
-        layers.append(layer("point", points, {**marks, "shape": look.shape, **said}, clip=True))
+        layers.append(layer("point", list(chain(*points)), {**marks, "shape": look.shape, **said}, clip=True))
     if lines:
-        hover = [row for track in tracks if not track.measured for row in every(rows[track.label], _HOVER_SAMPLES)]
+        hover = [row for rows in lines for row in every(rows, _HOVER_SAMPLES)]
         layers.append(layer("point", hover, {**place, **said}, clip=True, opacity=0, filled=True, size=110))
-    starts = [rows[track.label][0] for track in tracks if not (lines and track.measured)]
+    starts = [rows[0] for rows in lines or points]
     layers.append(layer("point", starts, place, style="start", shape="diamond", tooltip="start", clip=True))
     return layered(
         layers,
@@ -194,51 +180,43 @@ def history_chart(
     signals: Sequence[Signal],
     *,
     title: str = "",
-    width_px: int = 720,
     height_px: int = 120,
     marks: Sequence[TimeMark] = (),
 ) -> ChartSpec:
     """Signals over each other with one time axis, the runs overlaid in each; angles in degrees.
 
     `runs`: measured ones are drawn as open points, the others as lines; `signals`: the panels from top to bottom;
-    `width_px`, `height_px`: size of one panel; `marks`: places to tint.
+    `height_px`: of one panel; `marks`: places to tint.
     """
     span = np.concatenate([vector(run.time_s) for run in runs])
-    across = PlotAxis(title="time (s)", domain=(float(np.nanmin(span)), float(np.nanmax(span))), nice=False)
+    across = PlotAxis("time (s)", domain=(float(np.nanmin(span)), float(np.nanmax(span))), nice=False)
     look = series_look([run.label for run in runs], as_points={run.label for run in runs if run.measured})
     plots = [_signal_plot(runs, signal, height_px, across, marks) for signal in signals]
     names = ", ".join(signal.title for signal in signals)
     described = f"Time histories of {names}, of {_listed(runs)}."
-    shown = {"run:N": "run"}
-    return curve_panels(plots, across, title=title, width_px=width_px, described=described, look=look, shown=shown)
+    return curve_panels(plots, across, title=title, described=described, look=look, shown={"run:N": "run"})
 
 
 def spiral_chart(
-    spirals: Sequence[SpiralData], *, loop_rad: tuple[float, float] | None = None, title: str = ""
+    rudder_deg: ArrayLike, rate_degps: ArrayLike, *, loop_deg: tuple[float, float] | None = None, title: str = ""
 ) -> ChartSpec:
-    """Yaw rate against rudder angle, in degrees, the points joined in the order they were run.
+    """Steady yaw rate against rudder angle (n,), positive to starboard, joined in the order they were run.
 
-    `loop_rad`: rudder angles between which the ship has two steady turns, rad: the width of the loop is marked.
+    `loop_deg`: rudder angles between which the ship has two steady turns: the width of the loop is marked.
     """
-    degree = shown_unit("rad")[1]
-    drawn = [(degree * vector(one.rudder_rad), degree * vector(one.yaw_rate_radps)) for one in spirals]
-    series = [
-        PlotSeries(label=spiral.label, x=rudder, y=rate, points=points, closed=True)
-        for points in (False, True)
-        for spiral, (rudder, rate) in zip(spirals, drawn, strict=True)
-    ]
-    left, up = (np.concatenate([[0.0], *(line[axis] for line in drawn)]) for axis in (0, 1))
-    frame = free_frame(left, up, width_px=620, height_px=400, margins_px=(24.0, 24.0))
-    across = PlotAxis(title="rudder angle, starboard positive (deg)", domain=frame.across, nice=False)
-    rate = PlotAxis(title="yaw rate, starboard positive (deg/s)", domain=frame.up, nice=False)
-    over = _loop_layers(degree * vector(loop_rad), across, rate, frame, drawn) if loop_rad else []
-    rules = [Rule(at=[0.0], upright=True), Rule(at=[0.0])]
+    rudder, rate = vector(rudder_deg), vector(rate_degps)
+    series = [PlotSeries("spiral", x=rudder, y=rate, points=points, closed=True) for points in (False, True)]
+    ends = np.append(rudder, 0.0), np.append(rate, 0.0)
+    frame = free_frame(*ends, width_px=620, height_px=400, margins_px=(24.0, 24.0))
+    across = PlotAxis("rudder angle, starboard positive (deg)", domain=frame.across, nice=False)
+    up = PlotAxis("yaw rate, starboard positive (deg/s)", domain=frame.up, nice=False)
+    over = _loop_layers(loop_deg, across, up, frame, (rudder, rate)) if loop_deg else []
     return curve_chart(
-        Plot(series=series, up=rate, height_px=frame.height_px, rules=rules, over=over),
+        Plot(series, up=up, height_px=frame.height_px, rules=[Rule([0.0], upright=True), Rule([0.0])], over=over),
         across,
         title=title,
         width_px=frame.width_px,
-        described=f"Steady yaw rate against rudder angle of {_listed(spirals)}.",
+        described="Steady yaw rate against rudder angle of spiral.",
         shown={"run:N": "run"},
     )
 
@@ -248,10 +226,10 @@ _HOVER_SAMPLES = 90
 
 
 def _loop_layers(
-    rudders: Array, across: PlotAxis, up: PlotAxis, frame: Frame, lines: Sequence[tuple[Array, Array]]
+    loop_deg: tuple[float, float], across: PlotAxis, up: PlotAxis, frame: Frame, line: tuple[Array, Array]
 ) -> list[ChartSpec]:
-    """The width of a loop along the line of zero yaw rate, in deg."""
-    low, high = sorted(rudders.tolist())
+    """The width of a loop along the line of zero yaw rate."""
+    low, high = sorted(map(float, loop_deg))
     text = f"loop {format_number(high - low, 3)}°"
     place = {"x": across.channel("x"), "y": up.channel("v")}
     row = {"x": plain(low), "to": plain(high), "v": 0.0, "text": text}
@@ -259,18 +237,12 @@ def _loop_layers(
     zero = [(vector(frame.across), np.zeros(2)), (np.zeros(2), vector(frame.up))]
     return [
         layer("rule", [row], {**place, "x2": "to"}, style="overshoot", clip=True),
-        *label_layers([label], frame, place, [*lines, *zero]),
+        *label_layers([label], frame, place, [line, *zero]),
     ]
 
 
-def _listed(series: Sequence[TrackData] | Sequence[History] | Sequence[SpiralData]) -> str:
+def _listed(series: Sequence[TrackData] | Sequence[History]) -> str:
     return ", ".join(each.label for each in series)
-
-
-def _track_rows(track: TrackData, x: Array, y: Array) -> list[ChartRecord]:
-    kept = thin_points([x, y], POINT_SAMPLES) if track.measured else thin_line([x, y], LINE_SAMPLES)
-    time = {} if track.time_s is None else {"t": vector(track.time_s)[kept]}
-    return records(track.label, {"x": x[kept], "y": y[kept]} | time)
 
 
 def _signal_plot(
@@ -281,12 +253,12 @@ def _signal_plot(
         raise ValueError(f"no run has the signal {signal.name}")
     unit, factor = shown_unit(signal.unit, signal.display_unit)
     series, over = [], []
-    x, up = across.channel("x"), PlotAxis(title=with_unit(signal.title, unit))
+    x, up = across.channel("x"), PlotAxis(with_unit(signal.title, unit))
     for run in runs:
         if signal.name in run.values:
             time, value = vector(run.time_s), factor * vector(run.values[signal.name])
             kept = thin_points([value], POINT_SAMPLES) if run.measured else slice(None)
-            series.append(PlotSeries(label=run.label, x=time[kept], y=value[kept], points=run.measured))
+            series.append(PlotSeries(run.label, x=time[kept], y=value[kept], points=run.measured))
         for band in run.bands:
             if band.signal == signal.name:
                 edges = {"low": factor * vector(band.low), "high": factor * vector(band.high)}
@@ -294,12 +266,16 @@ def _signal_plot(
                 over.append(
                     layer("area", rows, {"x": x, "y": up.channel("low"), "y2": "high"}, style="band", clip=True)
                 )
-    spans = [{"x": mark.begin_s, "end": mark.end_s, "text": mark.text} for mark in marks if mark.signal == signal.name]
-    if spans:  # each with a line where it begins, for the shortest are no wider than that
-        place = {"x": x, "tooltip": tooltips({"text:N": "found", "x:Q": "from (s)"})}
-        over.append(layer("rect", spans, {**place, "x2": "end"}, style="region", clip=True))
-        over.append(layer("rule", spans, place, style="limit", clip=True, strokeWidth=1.2))
-    return Plot(series=series, up=up, height_px=height_px, over=over)
+    over += _mark_layers([mark for mark in marks if mark.signal == signal.name], x)
+    return Plot(series, up=up, height_px=height_px, over=over)
+
+
+def _mark_layers(marks: Sequence[TimeMark], x: ChartSpec) -> list[ChartSpec]:
+    """Tinted spans, each with a line where it begins, for the shortest are no wider than that."""
+    spans = [{"x": mark.begin_s, "end": mark.end_s, "text": mark.text} for mark in marks]
+    place = {"x": x, "tooltip": tooltips({"text:N": "found", "x:Q": "from (s)"})}
+    region = layer("rect", spans, {**place, "x2": "end"}, style="region", clip=True)
+    return [region, layer("rule", spans, place, style="limit", clip=True, strokeWidth=1.2)] if spans else []
 
 
 def motions(
@@ -313,10 +289,10 @@ def motions(
     tables = {label: _in_si(columns) for label, columns in runs.items()}
     drawn = []
     if tracks := [_track(label, table, label in measured) for label, table in tables.items() if _moves(table)]:
-        drawn.append(Illustration(chart=track_chart(tracks, title=f"Track: {title}")))
+        drawn.append(Illustration(track_chart(tracks, title=f"Track: {title}")))
     height = 110 if len(_signals(runs)) <= 6 else 80
     if chart := columns_chart(runs, f"Histories: {title}", measured=measured, height_px=height, marks=marks):
-        drawn.append(Illustration(chart=chart))
+        drawn.append(Illustration(chart))
     return drawn
 
 
@@ -333,7 +309,7 @@ def columns_chart(
         return None
     tables = {label: _in_si(columns) for label, columns in runs.items()}
     histories = [
-        History(label=label, time_s=table["t_s"], values=_by_stem(table), measured=label in measured)
+        History(label, time_s=table["t_s"], values=_by_stem(table), measured=label in measured)
         for label, table in tables.items()
     ]
     return history_chart(histories, signals, title=title, height_px=height_px, marks=marks)
@@ -348,12 +324,11 @@ def varying_histories(columns: _Columns, bands: Mapping[str, BandOverTime], band
     if not shown:
         return None
     shaded = [_band(name, band, band_t_s) for name, band in bands.items() if name not in _TRACK]
-    run = History(label="simulated", time_s=_in_si({"t_s": columns["t_s"]})["t_s"], values=table, bands=shaded)
+    run = History("simulated", time_s=_in_si({"t_s": columns["t_s"]})["t_s"], values=table, bands=shaded)
     held = ", ".join(f"{signal.title} {_held(signal, table[signal.name][0])}" for signal in constant)
     said = ["Shaded: nine of ten ships at each time."] if shaded else []
     said += [f"Constant: {held}."] if held else []
-    chart = history_chart([run], shown, title="Time histories", height_px=110)
-    return Illustration(chart=chart, caption=" ".join(said))
+    return Illustration(history_chart([run], shown, title="Time histories", height_px=110), caption=" ".join(said))
 
 
 def _band(name: str, band: BandOverTime, time_s: Array) -> HistoryBand:
@@ -393,7 +368,7 @@ def _signals(runs: Mapping[str, _Columns]) -> list[Signal]:
         known = _UNITS.get(unit, "1")
         words, written = in_words(name)
         title = _TITLES.get(stem_of(name)) or (words if unit in _UNITS or not written else f"{words} ({written})")
-        found.append(Signal(name=stem_of(name), title=title, unit=known, display_unit=display))
+        found.append(Signal(stem_of(name), title, known, display_unit=display))
     order = list(_TITLES)
     return sorted(found, key=lambda signal: order.index(signal.name) if signal.name in order else len(order))
 
@@ -403,4 +378,4 @@ def _moves(table: Mapping[str, Array]) -> bool:
 
 
 def _track(label: str, table: Mapping[str, Array], measured: bool) -> TrackData:
-    return TrackData(label=label, x_m=table["x_m"], y_m=table["y_m"], time_s=table["t_s"], measured=measured)
+    return TrackData(label, x_m=table["x_m"], y_m=table["y_m"], time_s=table["t_s"], measured=measured)

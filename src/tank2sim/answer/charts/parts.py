@@ -80,12 +80,6 @@ def with_unit(title: str, unit: str) -> str:
     return f"{title} ({unit})" if unit else title
 
 
-def check_labels(labels: Sequence[str]) -> None:
-    """Raise ValueError if two series have the same label: they would be drawn as one line."""
-    if len(set(labels)) != len(labels):
-        raise ValueError(f"two series have one label: {labels}")
-
-
 @dataclass(frozen=True)
 class SeriesLook:
     """Encodings that distinguish the series of a chart; together they make one legend."""
@@ -104,19 +98,17 @@ class SeriesLook:
 def series_look(labels: Sequence[str], as_points: Collection[str] = ()) -> SeriesLook:
     """Colour, dash and shape of each series; :data:`USUAL_MARKS` have their own, others take theirs in order.
 
-    Those in `as_points` appear in the legend by the shape of their points, the others by a stroke of their line.
+    Those in `as_points` appear in the legend by the shape of their points, the others by a stroke of their line. Raises
+    ValueError: two series have the same label, and would be drawn as one line.
     """
-    check_labels(labels)
+    if len(set(labels)) != len(labels):
+        raise ValueError(f"two series have one label: {labels}")
     places = _places(labels)
     shown = [places.get(place, " " * (place + 1)) for place in range(max(places, default=-1) + 1)]
     points = [label for label in labels if label in as_points]
     dashes = [[1, 0] if label in as_points else list(DASHES[place % len(DASHES)]) for place, label in enumerate(shown)]
     shapes = [SHAPES[points.index(label) % len(SHAPES)] if label in points else STROKE for label in shown]
-    legend: ChartSpec | None = None
-    if len(labels) > 1:
-        legend = {"title": None} | ({} if list(labels) == shown else {"values": list(labels)})
-        # Where a chart has lines alone no shape enters the legend, and its symbol is to be reported.
-        legend |= {} if as_points else {"symbolType": STROKE}
+    legend = _legend(labels, shown, lines_alone=not as_points)
 
     def encoding(**scale: Any) -> ChartSpec:
         return {"field": "run", "type": "nominal", "scale": {"domain": shown, **scale}, "legend": legend}
@@ -124,11 +116,19 @@ def series_look(labels: Sequence[str], as_points: Collection[str] = ()) -> Serie
     return SeriesLook(encoding(), encoding(range=dashes), encoding(range=shapes))
 
 
+def _legend(labels: Sequence[str], shown: Sequence[str], *, lines_alone: bool) -> ChartSpec | None:
+    if len(labels) < 2:
+        return None
+    legend: ChartSpec = {"title": None} | ({} if list(labels) == shown else {"values": list(labels)})
+    # Where a chart has lines alone no shape enters the legend, and its symbol is stated.
+    return legend | ({"symbolType": STROKE} if lines_alone else {})
+
+
 def _places(labels: Sequence[str]) -> dict[int, str]:
     """Place of each series among colours and dashes, to its label."""
-    usual = [USUAL_MARKS.get(label) for label in labels]
-    known = {place: label for place, label in zip(usual, labels, strict=True) if place is not None}
-    if len(known) < sum(place is not None for place in usual) or len(labels) == 1:
+    usual = [label for label in labels if label in USUAL_MARKS]
+    known = {USUAL_MARKS[label]: label for label in usual}
+    if len(known) < len(usual) or len(labels) == 1:
         return dict(enumerate(labels))
     left = iter(place for place in range(len(labels) + len(known) + len(USUAL_MARKS)) if place not in known)
     return known | {next(left): label for label in labels if label not in known.values()}
@@ -159,7 +159,7 @@ class Frame:
 
         def axis(domain: tuple[float, float], size_px: int, field: str, title: str) -> ChartSpec:
             ticks = max(2, round(size_px / 70))
-            return PlotAxis(title=title, domain=domain, nice=False, ticks=ticks).channel(field)
+            return PlotAxis(title, domain=domain, nice=False, ticks=ticks).channel(field)
 
         return {"x": axis(self.across, self.width_px, *across), "y": axis(self.up, self.height_px, *up)}
 

@@ -105,13 +105,11 @@ def chart_picture(chart: ChartSpec | alt.TopLevelMixin, ending: str = ".png") ->
     """
     import vl_convert
 
-    match ending.lower():
-        case ".svg":
-            return str(vl_convert.vegalite_to_svg(chart_specification(chart), **_HOW)).encode()
-        case ".pdf":
-            return bytes(vl_convert.vegalite_to_pdf(chart_specification(chart), **_HOW))
-        case _:
-            return chart_png(chart)
+    if ending.lower() == ".svg":
+        return str(vl_convert.vegalite_to_svg(chart_specification(chart), **_HOW)).encode()
+    if ending.lower() == ".pdf":
+        return bytes(vl_convert.vegalite_to_pdf(chart_specification(chart), **_HOW))
+    return chart_png(chart)
 
 
 def chart_png(chart: ChartSpec | alt.TopLevelMixin, *, scale: float = 2.0) -> bytes:

@@ -35,7 +35,7 @@ def runs_of(rows: Sequence[ChartRecord]) -> list[str]:
     return list(dict.fromkeys(str(row["run"]) for row in rows if row.get("run")))
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class RowPlot:
     """Rows along a horizontal axis, with rules.
 

@@ -50,7 +50,7 @@ def tooltips(shown: TooltipFields) -> list[ChartSpec]:
     return found
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class PlotAxis:
     """An axis with its scale.
 
@@ -98,7 +98,7 @@ SIDE = {"grid": True, "labelLimit": 200}
 """Axis of names at the side of rows."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Rule:
     """Lines across a plot at values of its vertical axis, or upright ones at values of the other axis."""
 
