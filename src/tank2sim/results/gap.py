@@ -292,10 +292,10 @@ class GapResult(Result[GapStudy]):
         value, note = (named, MISSING) if missing else (study.verdict, named)
         label = "What is missing" if missing else "Verdict"
         return (
-            KeyFigure(label=label, value=value, verdict=caution, note=note),
+            KeyFigure(label, value, verdict=caution, note=note),
             *_probability_figure(study),
             *_misfit_figures(study),
-            *([KeyFigure(label="Next test", value=study.next_test.manoeuvre)] if study.next_test else []),
+            *([KeyFigure("Next test", study.next_test.manoeuvre)] if study.next_test else []),
         )
 
     @cached_property
@@ -309,30 +309,30 @@ class GapResult(Result[GapStudy]):
         expected = expected_chart(test, title="Information of other manoeuvres") if test else None
         sections = [
             Section(
-                heading="What was found",
+                "What was found",
                 tables=[*_parameters(study), *_by_trial(study)],
                 charts=_drawn("worst_tracks", worst_tracks(study, title="Tracks of the largest misfits")),
             ),
             Section(
-                heading="How sure, and what else it could be",
+                "How sure, and what else it could be",
                 text="\n\n".join(verdict_context(study)),
                 tables=[*_candidates(study), *_explanations(study)],
                 charts=_drawn("rivals", rival_chart(study, title="Explanations compared")),
             ),
             *_shown("What could hide", _COULD_HIDE, tables=_could_hide(study)),
-            Section(heading="Next test", text=_next_test(study), charts=_drawn("expected", expected)),
+            Section("Next test", text=_next_test(study), charts=_drawn("expected", expected)),
             Section(
-                heading="Before and after" if changed else "How well the card follows",
+                "Before and after" if changed else "How well the card follows",
                 text=text,
                 tables=[_trials(study), _signals(study)],
                 charts=_drawn("misfit", misfit_chart(study, title="Misfit by signal and manoeuvre")),
             ),
             _place_of_the_gap(study),
-            Section(heading="Tracks and motions", text=_track_text(study), charts=_motions(study)),
+            Section("Tracks and motions", text=_track_text(study), charts=_motions(study)),
             *_shown("Figures of manoeuvres", _FIGURES, tables=_figures(study)),
             *_shown("Coefficients", _COEFFICIENTS, tables=_coefficients(study)),
             *_shown("Do the trials agree", _AGREEMENT, charts=_drawn("agreement", agreement)),
-            Section(heading="Noise", text=_NOISE, tables=[_noise(study)]),
+            Section("Noise", text=_NOISE, tables=[_noise(study)]),
         ]
         return [each for each in sections if each.text or each.tables or each.charts]
 
@@ -465,7 +465,7 @@ def _probability_figure(study: GapStudy) -> list[KeyFigure]:
     else:
         return []
     unsure = Verdict.NONE if probability >= _SURE else Verdict.CAUTION
-    return [KeyFigure(label=label, value=as_percent(probability), verdict=unsure, note=note)]
+    return [KeyFigure(label, as_percent(probability), verdict=unsure, note=note)]
 
 
 def _misfit_figures(study: GapStudy) -> Iterator[KeyFigure]:
@@ -476,18 +476,18 @@ def _misfit_figures(study: GapStudy) -> Iterator[KeyFigure]:
             worse = Verdict.CAUTION if after > max(before, GOOD) else Verdict.NONE
             note = f"noise units; before {format_number(before, 3)}" if changes_simulation(study) else "noise units"
             label = f"Misfit, trials {_ON[word]}"
-            yield KeyFigure(label=label, value=float(f"{after:.3g}"), verdict=worse, note=note)
+            yield KeyFigure(label, float(f"{after:.3g}"), verdict=worse, note=note)
 
 
 def _drawn(name: str, chart: ChartSpec | None) -> list[Illustration]:
-    return [] if chart is None else [Illustration(chart=chart, caption=_CAPTIONS.get(name, ""), name=name)]
+    return [] if chart is None else [Illustration(chart, caption=_CAPTIONS.get(name, ""), name=name)]
 
 
 def _shown(
     heading: str, text: str, *, tables: Sequence[Table] = (), charts: Sequence[Illustration] = ()
 ) -> list[Section]:
     """A section that has tables or charts."""
-    return [Section(heading=heading, text=text, tables=tables, charts=charts)] if tables or charts else []
+    return [Section(heading, text=text, tables=tables, charts=charts)] if tables or charts else []
 
 
 def _motions(study: GapStudy) -> list[Illustration]:
@@ -627,9 +627,9 @@ def _place_of_the_gap(study: GapStudy) -> Section:
         ]
         for passage in study.acting[:_MOST_PASSAGES]
     ]
-    interval = [Column(title=head, unit="s", digits=4) for head in ("from", "to")]
-    share = Column(title="share of the misfit", unit="%", digits=2)
-    size = Column(title="size", unit="standard errors", digits=3)
+    interval = [Column(head, "s", digits=4) for head in ("from", "to")]
+    share = Column("share of the misfit", "%", digits=2)
+    size = Column("size", "standard errors", digits=3)
     tables = [
         table(
             "Where the misfit arises, beyond the noise", ["trial", "signal", *interval, share], places, on_screen=False
@@ -642,7 +642,7 @@ def _place_of_the_gap(study: GapStudy) -> Section:
             charts += _drawn(f"when_{what}", when_chart(lacking, title=_WHEN[what]))
             charts += _drawn(what, lacking_chart(lacking, title=_OVER[what]))
     return Section(
-        heading="Where the gap is",
+        "Where the gap is",
         text=f"{_place_text(study)}\n\n{_acting_text(study)}",
         tables=[each for each in tables if each.rows],
         charts=[*charts, *_drawn("places", place_chart(study, title="Where the misfit is worst"))],

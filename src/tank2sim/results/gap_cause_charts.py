@@ -90,12 +90,12 @@ def lacking_chart(lacking: Lacking, *, title: str = "") -> ChartSpec:
         )
     ]
     across, up = with_unit(words, in_words(state)[1]), with_unit(f"missing {what.words}", what.unit)
-    x = PlotAxis(title=across, nice=False, padding=8, ticks=6)
-    y = PlotAxis(title=up, zero=True, ticks=6)
+    x = PlotAxis(across, nice=False, padding=8, ticks=6)
+    y = PlotAxis(up, zero=True, ticks=6)
     place = {"x": x.channel("s"), "y": y.channel("f")}
     cloud = place | {"tooltip": tooltips({"trial:N": "trial", "s:Q": across, "f:Q": up})}
     layers = [
-        Rule(at=[0.0], dash=(4, 3)).layer(place["y"]),
+        Rule([0.0], dash=(4, 3)).layer(place["y"]),
         layer("point", cloud_rows, cloud, style="reference", size=12, opacity=0.45, clip=True),
         *_means(mean_rows, place, y.channel("low")),
     ]
@@ -124,7 +124,7 @@ def when_chart(lacking: Lacking, *, title: str = "") -> ChartSpec:
     scale = {"domain": [-largest, 0, largest], "range": list(DIVERGING), "type": "linear", "clamp": True}
     legend = {"title": up, "gradientLength": 180, "titleLimit": 420}
     strips = {
-        "x": PlotAxis(title="time (s)", nice=False, zero=True).channel("t"),
+        "x": PlotAxis("time (s)", nice=False, zero=True).channel("t"),
         "x2": "to",
         "y": channel("trial:N", sort=names, title=None, axis={"labelLimit": 220}),
         "color": channel("f:Q", scale=scale, legend=legend),
@@ -183,14 +183,14 @@ def _bars(
     end = 140 if percent else farthest * (12 if symlog else 1.25)
     powers = [step for step in (0, 10, 100, 1e3, 1e4, 1e5, 1e6) if step <= end]
     across = PlotAxis(
-        title=across_title,
+        across_title,
         domain=(0, end),
         nice=False,
         scale={"type": "symlog", "constant": 10} if symlog else None,
         ticks=[0, 50, 100] if percent else powers if symlog else 4,
     )
     side = {"labelExpr": _LINES, "labelLimit": 150, "ticks": False, "grid": False}
-    (bars,) = row_layers(RowPlot(rows=rows, across=across, side=side), mark="bar", height=11, clip=True)
+    (bars,) = row_layers(RowPlot(rows, across=across, side=side), mark="bar", height=11, clip=True)
     place = {name: bars["encoding"][name] for name in ("x", "y")}
     texts = layer("text", rows, {**place, "text": "text:N"}, align="left", dx=5, fontSize=10.5, style="reference")
     lines = max((row["name"].count(" + ") + 1 for row in rows), default=1)
@@ -267,18 +267,18 @@ def _agreement_panel(study: GapStudy, name: str, trials: Mapping[str, TrialEstim
     rows = [_row_of_trial(trial, alone, held.get(trial, False), around) for trial, alone in trials.items()]
     band = NORMAL * whole.standard_errors.get(parameter, 0.0) if whole else 0.0
     domain = _informative_range(rows, [] if middle is None else [middle - band, middle + band])
-    across = PlotAxis(title=with_unit(words, unit), domain=domain, nice=False, ticks=5)
+    across = PlotAxis(with_unit(words, unit), domain=domain, nice=False, ticks=5)
     names = [trial_name(trial) for trial in held if trial in trials]
     side = {"labelLimit": 220} | ({} if named else {"labels": False, "ticks": False})
     shown = {"name:N": "trial", "v:Q": "estimate", "low:Q": "from", "high:Q": "to"}
     look = series_look(list(SETS), as_points=list(SETS))
     layers = row_layers(
-        RowPlot(rows=rows, across=across, look=look, names=names, side=side, shown=shown), size=36, clip=True
+        RowPlot(rows, across=across, look=look, names=names, side=side, shown=shown), size=36, clip=True
     )
     if middle is not None:
         strip = [{"low": plain(middle - band), "high": plain(middle + band)}]
         edges = {"x": across.channel("low"), "x2": "high"}
-        together = Rule(at=[middle], upright=True).layer(across.channel("v"))
+        together = Rule([middle], upright=True).layer(across.channel("v"))
         layers = [layer("rect", strip, edges, style="reference", opacity=0.25), together, *layers]
     title = panel_title(f"{effect.replace('_', ' ')}: {words}")
     return layered(layers, size=(230, 22 * len(names)), title=title)

@@ -63,4 +63,4 @@ class ServeResult(Result[Served]):
     @property
     def sections(self) -> Sequence[Section]:
         """The parameters."""
-        return [Section(heading="Parameters", tables=[quantities("Of the boat", asdict(self.study.parameters))])]
+        return [Section("Parameters", tables=[quantities("Of the boat", asdict(self.study.parameters))])]

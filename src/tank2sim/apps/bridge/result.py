@@ -98,18 +98,17 @@ class BridgeResult(Result[BridgeStudy]):
         charts = []
         for field, title in _TRACKS.items():
             tracks = [
-                TrackData(label=track.name, x_m=track.ahead_m, y_m=track.starboard_m)
-                for track in getattr(self.study, field)
+                TrackData(track.name, x_m=track.ahead_m, y_m=track.starboard_m) for track in getattr(self.study, field)
             ]
             if tracks:
                 chart = track_chart(tracks, title=title)
-                charts.append(Illustration(chart=chart, caption="The ship heads up the page."))
+                charts.append(Illustration(chart, caption="The ship heads up the page."))
         tables: list[Table] = []
         if self.study.telegraph:
             tables.append(records_table("Engine telegraph", self.study.telegraph, on_screen=False))
         if self.study.full_astern_from:
             tables.append(records_table("Full astern", self.study.full_astern_from, on_screen=False))
-        return [Section(heading="Manoeuvres", charts=charts, tables=tables)]
+        return [Section("Manoeuvres", charts=charts, tables=tables)]
 
     def page(self) -> str:
         """The sheet: self-contained HTML that prints on one page."""

@@ -85,33 +85,29 @@ def _manoeuvre_section(workshop: Workshop, name: str, text: str, run: dict[str, 
     motions: dict[str, Trajectory | dict[str, Array]] = {THIRD: third, IN_FMU: fmu, FIRST: first}
     tracks = track_chart(
         [
-            TrackData(label=label, x_m=motion["motion.x"], y_m=motion["motion.y"], time_s=third.t)
+            TrackData(label, x_m=motion["motion.x"], y_m=motion["motion.y"], time_s=third.t)
             for label, motion in motions.items()
         ],
         title=f"{IN_WORDS[text]}: tracks".capitalize(),
     )
     histories = history_chart(
         [
-            History(label=label, time_s=third.t, values={name: motion[name] for name in _SIGNALS})
+            History(label, time_s=third.t, values={name: motion[name] for name in _SIGNALS})
             for label, motion in motions.items()
         ],
-        [Signal(name=name, title=title, unit=third.model[name].unit) for name, title in _SIGNALS.items()],
+        [Signal(name, title, third.model[name].unit) for name, title in _SIGNALS.items()],
         title=f"{IN_WORDS[text]}: time histories".capitalize(),
     )
     workshop.write(f"mariner-{name}-track.png", chart_png(tracks))
     workshop.write(f"mariner-{name}-history.png", chart_png(histories))
     apart = np.hypot(fmu["motion.x"] - third["motion.x"], fmu["motion.y"] - third["motion.y"])
     return Section(
-        heading=f"Mariner: {IN_WORDS[text]}",
+        f"Mariner: {IN_WORDS[text]}",
         text=f"The FMU, given the same orders by FMPy, stays within {apart.max():.1e} m of the model.",
         tables=[_figure_table(run)],
         charts=[
-            Illustration(
-                chart=tracks,
-                caption="North is up. The FMU's track lies on the track of its model.",
-                half=True,
-            ),
-            Illustration(chart=histories, caption="Rudder and yaw rate are positive to starboard.", half=True),
+            Illustration(tracks, caption="North is up. The FMU's track lies on the track of its model.", half=True),
+            Illustration(histories, caption="Rudder and yaw rate are positive to starboard.", half=True),
         ],
         notes=[notice.of(str(kind)) for kind, result in run.items() for notice in result.notices],
     )
@@ -128,7 +124,7 @@ def _figure_table(run: dict[str, Run]) -> Table:
                 rows.append([f"{words}, {k + 1}", *(each[k] if k < len(each) else None for each in lists), unit])
         else:
             rows.append([words, *(_cell(each) for each in both), unit])
-    columns = [Column(title="figure"), *(Column(title=kind) for kind in run), Column(title="unit")]
+    columns = [Column("figure"), *(Column(kind) for kind in run), Column("unit")]
     return Table(caption="Manoeuvring figures", columns=columns, rows=rows)
 
 
@@ -148,11 +144,11 @@ def _fmu_section(reports: list[CheckReport]) -> Section:
     heads = ("file", "standard", "kind", "largest error", "limit", "verdict")
     table = Table(
         caption="Largest error of any output, relative to its range in the run",
-        columns=[Column(title=head, digits=2) for head in heads],
+        columns=[Column(head, digits=2) for head in heads],
         rows=rows,
     )
     return Section(
-        heading="Four FMUs of the Mariner, checked",
+        "Four FMUs of the Mariner, checked",
         text=(
             "Each file was validated by FMPy and driven through steps of rudder and a failure of the steering gear. "
             "Co-Simulation is held against the same Runge-Kutta steps in CasADi, "
@@ -161,9 +157,7 @@ def _fmu_section(reports: list[CheckReport]) -> Section:
         folded=True,
         tables=[table],
         charts=[
-            Illustration(
-                chart=error_chart(demo_output_errors(reports[:2]), title="Errors of the third-order FMUs by output")
-            )
+            Illustration(error_chart(demo_output_errors(reports[:2]), title="Errors of the third-order FMUs by output"))
         ],
     )
 
@@ -180,8 +174,8 @@ def _stability_section(
     first_order = nomoto.K_per_s / (1 + 1j * omega * nomoto.T_s)
     chart = bode_chart(
         [
-            FrequencyResponse(label="linearised, with gear", omega_radps=omega, response=response.frdata[0, 0]),
-            FrequencyResponse(label="Nomoto, first order", omega_radps=omega, response=first_order),
+            FrequencyResponse("linearised, with gear", omega_radps=omega, response=response.frdata[0, 0]),
+            FrequencyResponse("Nomoto, first order", omega_radps=omega, response=first_order),
         ],
         title="Yaw rate by rudder order",
     )
@@ -192,15 +186,15 @@ def _stability_section(
     ]
     imo = Table(
         caption="IMO MSC.137(76), the worse of the two sides",
-        columns=[Column(title=head) for head in ("criterion", "found", "allowed", "unit", "verdict")],
+        columns=[Column(head) for head in ("criterion", "found", "allowed", "unit", "verdict")],
         rows=rows,
     )
     return Section(
-        heading="Mariner: stability",
+        "Mariner: stability",
         text=f"C′ = {format_number(judged[THIRD].stability_criterion.C_prime, 3)}: {_verdict(judged[THIRD])} on a "
         "straight course.",
         tables=[_nomoto_table(judged), imo],
-        charts=[Illustration(chart=chart)],
+        charts=[Illustration(chart)],
     )
 
 
@@ -209,8 +203,8 @@ def _verdict(judged: Stability) -> str:
 
 
 def _nomoto_table(judged: dict[str, Stability]) -> Table:
-    times = [Column(title=name, unit="s") for name in ("T", "T1", "T2", "T3")]
-    columns = [Column(title="model"), Column(title="K", unit="1/s"), *times]
+    times = [Column(name, "s") for name in ("T", "T1", "T2", "T3")]
+    columns = [Column("model"), Column("K", "1/s"), *times]
     rows = [[kind, *vars(result.nomoto.dimensional).values()] for kind, result in judged.items()]
     return Table(caption="Nomoto's coefficients at the speed of expansion", columns=columns, rows=rows)
 
@@ -221,22 +215,22 @@ def _figures(reports: list[CheckReport], turn: Run, zigzag: Run, judged: Stabili
     same, exact = (largest_error(reports, kind) for kind in ("CoSimulation", "ModelExchange"))
     return [
         KeyFigure(
-            label="Mariner's FMUs, Co-Simulation",
-            value=error_words(same),
+            "Mariner's FMUs, Co-Simulation",
+            error_words(same),
             verdict=Verdict.PASSED,
             note="largest difference from the model, relative",
         ),
         KeyFigure(
-            label="Mariner's FMUs, Model Exchange",
-            value=error_words(exact),
+            "Mariner's FMUs, Model Exchange",
+            error_words(exact),
             verdict=Verdict.PASSED,
             note="largest difference from the exact solution, relative",
         ),
-        KeyFigure(label="Tactical diameter, 35 deg", value=_number(turn.figures["tactical_diameter_m"]), unit="m"),
-        KeyFigure(label="First overshoot, 20/20", value=overshoots[0], unit="deg"),
+        KeyFigure("Tactical diameter, 35 deg", _number(turn.figures["tactical_diameter_m"]), "m"),
+        KeyFigure("First overshoot, 20/20", overshoots[0], "deg"),
         KeyFigure(
-            label="Straight-line stability",
-            value=_verdict(judged),
+            "Straight-line stability",
+            _verdict(judged),
             verdict=Verdict.PASSED if judged.stability_criterion.stable else Verdict.CAUTION,
             note=f"C′ = {format_number(judged.stability_criterion.C_prime, 3)}",
         ),

@@ -60,7 +60,7 @@ class DemoResult(Result[DemoStudy]):
     def sections(self) -> Sequence[Section]:
         """The files."""
         rows: list[list[Cell]] = [[name] for name in self.study.files]
-        return [Section(heading="Files", tables=[table("Files", ["file"], rows, on_screen=False)])]
+        return [Section("Files", tables=[table("Files", ["file"], rows, on_screen=False)])]
 
     def page(self) -> str:
         """The page that was written."""

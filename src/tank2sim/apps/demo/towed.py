@@ -69,14 +69,11 @@ def _towed_again(model: Model, fmu: Path, tows: Tows, force_N: float) -> tuple[A
 
 def _chart(tows: Tows, times: Array, speed: Array) -> ChartSpec:
     measured = [
-        PlotSeries(label=f"tow {k + 1}", x=tows.time_s, y=column, points=True)
-        for k, column in enumerate(tows.speed_mps.T)
+        PlotSeries(f"tow {k + 1}", x=tows.time_s, y=column, points=True) for k, column in enumerate(tows.speed_mps.T)
     ]
     return curve_chart(
-        Plot(
-            series=[PlotSeries(label="FMU", x=times, y=speed), *measured], up=PlotAxis(title="speed (m/s)", zero=True)
-        ),
-        PlotAxis(title="time (s)", nice=False, zero=True),
+        Plot([PlotSeries("FMU", x=times, y=speed), *measured], up=PlotAxis("speed (m/s)", zero=True)),
+        PlotAxis("time (s)", nice=False, zero=True),
         title="Speed of the vehicle: five tows, and the FMU under the same force",
         described="Speed over time of five tows; points were measured, the line is the FMU.",
         shown={"run:N": "tow"},
@@ -87,7 +84,7 @@ def _section(
     paper: TowIdentification, chosen: TowIdentification, misses: list[dict[str, float]], chart: ChartSpec
 ) -> Section:
     return Section(
-        heading="A towed vehicle: from five tows to an FMU",
+        "A towed vehicle: from five tows to an FMU",
         text=(
             "An underwater vehicle was towed from rest by a known force (Wilinski and Zellman 1984, Table 1). Its mass "
             "with added mass M and its drag follow from M dv/dt + B1 v⁴ + B2 v³ + B3 v² = T.\n\n"
@@ -99,7 +96,7 @@ def _section(
             _estimates(chosen, "Two unknowns, as in the card"),
             _miss_table(misses),
         ],
-        charts=[Illustration(chart=chart, caption="Points were measured; the line is the exported FMU, run by FMPy.")],
+        charts=[Illustration(chart, caption="Points were measured; the line is the exported FMU, run by FMPy.")],
         notes=[*paper.notices[:1], *chosen.notices],
     )
 
@@ -108,20 +105,20 @@ def _figures(chosen: TowIdentification, misses: list[dict[str, float]], reports:
     fit = chosen.methods["output_error"]
     return [
         KeyFigure(
-            label="Vehicle's mass with added mass",
-            value=f"{fit.estimates['total_mass_kg']:.0f} ± {fit.standard_errors['total_mass_kg']:.0f}",
-            unit="kg",
+            "Vehicle's mass with added mass",
+            f"{fit.estimates['total_mass_kg']:.0f} ± {fit.standard_errors['total_mass_kg']:.0f}",
+            "kg",
             note="from five tows, without a start delay; ± one standard error",
         ),
         KeyFigure(
-            label="FMU against the tows",
-            value=max(miss["largest_mps"] for miss in misses),
-            unit="m/s",
+            "FMU against the tows",
+            max(miss["largest_mps"] for miss in misses),
+            "m/s",
             note="largest difference of any reading",
         ),
         KeyFigure(
-            label="Vehicle's FMU, Co-Simulation",
-            value=error_words(largest_error(reports, "CoSimulation")),
+            "Vehicle's FMU, Co-Simulation",
+            error_words(largest_error(reports, "CoSimulation")),
             verdict=Verdict.PASSED,
             note="largest difference from the model, relative",
         ),
@@ -147,10 +144,10 @@ def _miss_table(misses: list[dict[str, float]]) -> Table:
     return Table(
         caption="The FMU next to each tow",
         columns=[
-            Column(title="tow", digits=1),
-            Column(title="rms difference", unit="m/s", digits=2),
-            Column(title="largest difference", unit="m/s", digits=2),
-            Column(title="at", unit="s", digits=2),
+            Column("tow", digits=1),
+            Column("rms difference", "m/s", digits=2),
+            Column("largest difference", "m/s", digits=2),
+            Column("at", "s", digits=2),
         ],
         rows=[[int(miss["tow"]), miss["rms_mps"], miss["largest_mps"], miss["at_s"]] for miss in misses],
     )
@@ -164,7 +161,7 @@ def _estimates(result: TowIdentification, caption: str) -> Table:
         errors = [None] * len(unknowns) if fit.errors is None else fit.errors.tolist()
         pairs = [cell for pair in zip(fit.values.tolist(), errors, strict=True) for cell in pair]
         rows.append([method.replace("_", " "), *pairs, fit.condition_scaled])
-    columns = [Column(title="method")]
+    columns = [Column("method")]
     for name in unknowns:
-        columns += [Column(title=name, unit=units[name]), Column(title="±", unit=units[name], digits=2)]
-    return Table(caption=caption, columns=[*columns, Column(title="condition", digits=2)], rows=rows, folded=True)
+        columns += [Column(name, units[name]), Column("±", units[name], digits=2)]
+    return Table(caption=caption, columns=[*columns, Column("condition", digits=2)], rows=rows, folded=True)

@@ -73,9 +73,9 @@ class DesignResult(Result[_S]):
             [[row[place] for place in known] for row in rows],
         )
         return Section(
-            heading="Certainty of the figures",
+            "Certainty of the figures",
             text=text,
-            charts=[Illustration(chart=chart, half=True) for chart in charts],
+            charts=[Illustration(chart, half=True) for chart in charts],
             tables=[figures],
         )
 
@@ -83,9 +83,9 @@ class DesignResult(Result[_S]):
         cards = [
             first,
             KeyFigure(
-                label=f"Time for the certainty of the {usual}",
-                value="none found" if needed is None else 100 * needed / whole,
-                unit="" if needed is None else "%",
+                f"Time for the certainty of the {usual}",
+                "none found" if needed is None else 100 * needed / whole,
+                "" if needed is None else "%",
                 note="" if needed is None else f"{needed:.3g} {unit} in place of {whole:.3g} {unit}",
             ),
         ]
@@ -93,7 +93,7 @@ class DesignResult(Result[_S]):
             label = figure_label(name)
             note = f"± {one.design:.2g}; usual programme ± {one.usual:.2g}"
             figure_unit = in_words(name.partition("@")[0])[1]
-            cards.append(KeyFigure(label=label[:1].upper() + label[1:], value=one.value, unit=figure_unit, note=note))
+            cards.append(KeyFigure(label[:1].upper() + label[1:], one.value, figure_unit, note=note))
         return cards
 
 
@@ -177,7 +177,7 @@ class CampaignDesignResult(DesignResult[CampaignStudy]):
     def key_figures(self) -> Sequence[KeyFigure]:
         """Runs, hours, and each figure."""
         study = self.study
-        first = KeyFigure(label="Runs", value=len(study.runs), note=f"in {study.hours_used:.3g} h")
+        first = KeyFigure("Runs", len(study.runs), note=f"in {study.hours_used:.3g} h")
         return self._cards(first, study.hours_for_usual_certainty, self._compared_h, "h", "usual matrix")
 
     @property
@@ -192,13 +192,13 @@ class CampaignDesignResult(DesignResult[CampaignStudy]):
         return [
             self._certainty(_CAMPAIGN, 3600, "h"),
             Section(
-                heading="Where the runs are",
+                "Where the runs are",
                 text=_PLACES,
-                charts=[Illustration(chart=chart, half=True) for chart in planes],
+                charts=[Illustration(chart, half=True) for chart in planes],
                 tables=[kinds],
             ),
-            Section(heading="Coefficients that matter", text=_COEFFICIENTS, tables=list(self._coefficients())),
-            Section(heading="The plan", tables=[plan]),
+            Section("Coefficients that matter", text=_COEFFICIENTS, tables=list(self._coefficients())),
+            Section("The plan", tables=[plan]),
         ]
 
     def _coefficients(self) -> Sequence[Table]:
@@ -287,7 +287,7 @@ class TrialDesignResult(DesignResult[TrialStudy]):
         """Manoeuvres, time, and each figure."""
         study = self.study
         count = sum(one.repeats for one in study.manoeuvres)
-        first = KeyFigure(label="Manoeuvres", value=count, note=f"in {study.minutes_used:.3g} min")
+        first = KeyFigure("Manoeuvres", count, note=f"in {study.minutes_used:.3g} min")
         return self._cards(first, study.minutes_for_usual_certainty, study.minutes, "min", "usual set")
 
     @property
@@ -301,8 +301,8 @@ class TrialDesignResult(DesignResult[TrialStudy]):
         text = "Standard errors before the trial (prime), and after it over those before."
         return [
             self._certainty(_TRIAL, 60, "min"),
-            Section(heading="The plan", tables=[plan]),
-            Section(heading="Coefficients", text=text, tables=[known]),
+            Section("The plan", tables=[plan]),
+            Section("Coefficients", text=text, tables=[known]),
         ]
 
 
@@ -383,8 +383,8 @@ def _plane(rows: Sequence[ChartRecord], title: str, across: str, up: str) -> Cha
     counts = sorted({1, max(1, most // 2), most})
     scale = {"domain": [0, most], "range": [0, 500]}  # from no area for no runs: the legend has only numbers of runs
     place = {
-        "x": PlotAxis(title=across, padding=20).channel("x"),
-        "y": PlotAxis(title=up, padding=20, zero=True).channel("y"),
+        "x": PlotAxis(across, padding=20).channel("x"),
+        "y": PlotAxis(up, padding=20, zero=True).channel("y"),
         "size": channel("runs:Q", scale=scale, legend={"title": "runs", "values": counts, "format": "d"}),
         "color": look.colour,
         "shape": look.shape,
@@ -407,15 +407,15 @@ def _certainty_charts(curve: Certainty, seconds: float, unit: str) -> list[Chart
         for kind, (times, errors) in plans.items():
             known = np.isfinite(errors[figure])
             time, error = np.asarray(times)[known] / seconds, np.asarray(errors[figure])[known]
-            series.append(PlotSeries(label=kind, x=time, y=error))
-        up = PlotAxis(title=f"standard error ({in_words(figure.partition('@')[0])[1]})", zero=True)
-        across = PlotAxis(title=f"time ({unit})")
+            series.append(PlotSeries(kind, x=time, y=error))
+        up = PlotAxis(f"standard error ({in_words(figure.partition('@')[0])[1]})", zero=True)
+        across = PlotAxis(f"time ({unit})")
         dots = [row for each in series for row in each.rows]
         place = {"x": across.channel("x"), "y": up.channel("v")}
         place["color"] = series_look([DESIGN, USUAL]).colour
         charts.append(
             curve_chart(
-                Plot(series=series, up=up, height_px=160, over=[layer("point", dots, place, filled=True, size=36)]),
+                Plot(series, up=up, height_px=160, over=[layer("point", dots, place, filled=True, size=36)]),
                 across,
                 title=f"Certainty of the {figure_label(figure)}",
                 width_px=2 * _WIDTH,

@@ -90,15 +90,13 @@ class FleetResult(Result[FleetStudy]):
     def key_figures(self) -> Sequence[KeyFigure]:
         """Number of ships, in all and with each verdict."""
         counts = self.study.verdicts
-        figures = [KeyFigure(label="Ships", value=str(len(self.study.ships)))]
+        figures = [KeyFigure("Ships", str(len(self.study.ships)))]
         figures += [
-            KeyFigure(label=f"{word[0].upper()}{word[1:]}", value=str(counts[word]))
-            for word in GAP_VERDICTS
-            if word in counts
+            KeyFigure(f"{word[0].upper()}{word[1:]}", str(counts[word])) for word in GAP_VERDICTS if word in counts
         ]
         if self._faults:
             count = str(len(self._faults))
-            figures.append(KeyFigure(label="Without a result", value=count, verdict=Verdict.FAILED))
+            figures.append(KeyFigure("Without a result", count, verdict=Verdict.FAILED))
         return figures
 
     @property
@@ -109,11 +107,11 @@ class FleetResult(Result[FleetStudy]):
         if found:
             text = _SHIPS if self.linked else f"{_SHIPS} {_LINKS}"
             tables = [_ships(found, self.linked), *_sizes(found)]
-            sections.append(Section(heading="Ships", text=text, tables=tables, charts=_misfits(found)))
+            sections.append(Section("Ships", text=text, tables=tables, charts=_misfits(found)))
         if self._faults:
             rows = [[ship.folder, ship.fault] for ship in self._faults]
             faults = table("Ships that could not be judged", ("ship", "reason"), rows)
-            sections.append(Section(heading="Without a result", tables=[faults]))
+            sections.append(Section("Without a result", tables=[faults]))
         return sections
 
     @property
@@ -134,7 +132,7 @@ def _ships(found: Sequence[ShipSummary], linked: bool) -> Table:
         for ship in found
     ]
     # Misfits are rounded to hundredths: seven digits cut nothing off.
-    heads = [Column(title=head, digits=7) for head in ("before", "after")]
+    heads = [Column(head, digits=7) for head in ("before", "after")]
     columns: list[str | Column] = ["ship", "name", "verdict", "missing effect", *heads, "trials"]
     return table("Findings, and the misfit before and after in units of the noise", columns, rows)
 
@@ -174,11 +172,11 @@ def _misfits(found: Sequence[ShipSummary]) -> list[Illustration]:
         return []
     chart = row_chart(
         RowPlot(
-            rows=rows,
-            across=PlotAxis(title="misfit (standard deviations of the noise)", log=True),
+            rows,
+            across=PlotAxis("misfit (standard deviations of the noise)", log=True),
             look=series_look([_BEFORE, _AFTER], as_points=[_BEFORE, _AFTER]),
             names=[ship.folder for ship in found],
-            rules=[Rule(at=[1.0], style="limit")],
+            rules=[Rule([1.0], style="limit")],
             shown={"name:N": "ship", "run:N": "model", "v:Q": "misfit"},
         ),
         title="Misfit before and after",
@@ -187,4 +185,4 @@ def _misfits(found: Sequence[ShipSummary]) -> list[Illustration]:
         filled=True,
         size=70,
     )
-    return [Illustration(chart=chart, caption=_CHART, name="misfit")]
+    return [Illustration(chart, caption=_CHART, name="misfit")]

@@ -99,11 +99,11 @@ class GuessResult(Result[GuessStudy]):
         study = self.study
         cards = [_key_figure(key, study.figures[key]) for key in _FIRST if key in study.figures]
         note = f"{len(self._settled)} of {len(study.parameters)} numbers are settled by them"
-        cards.append(KeyFigure(label="Figures given", value=self._given, note=note))
+        cards.append(KeyFigure("Figures given", self._given, note=note))
         if study.next_figures:
             best, share = next(iter(study.next_figures.items()))
             note = f"removes {100 * share:.0f} % of the variance of the others"
-            cards.append(KeyFigure(label="Would help most", value=_named(best), note=note))
+            cards.append(KeyFigure("Would help most", _named(best), note=note))
         return cards
 
     @property
@@ -122,10 +122,10 @@ class GuessResult(Result[GuessStudy]):
         heads = ("figure", "unit", "given", "standard error", "5 %", "50 %", "95 %")
         prior_heads = ("figure", "unit", "5 %", "50 %", "95 %")
         return Section(
-            heading="Figures",
+            "Figures",
             text="Nine of ten ships lie in each interval. Intervals are wide for the dimensions alone, and narrower "
             "for ships that also have the figures given. Figures that were not given are predictions.",
-            charts=[Illustration(chart=figures_chart(self.study))],
+            charts=[Illustration(figures_chart(self.study))],
             tables=[
                 table("Figures: nine of ten ships lie between 5 and 95 %", heads, found),
                 table("The same by the dimensions alone", prior_heads, prior),
@@ -141,7 +141,7 @@ class GuessResult(Result[GuessStudy]):
             "settled": "",
         }
         return Section(
-            heading="Numbers that the figures settle",
+            "Numbers that the figures settle",
             text="A number is settled if the figures remove at least half of its variance. The other numbers have the "
             "errors of the prior; manoeuvres of another kind than those given may depend on them.",
             tables=[records_table("Numbers of the card, prime", self.study.parameters, first="number", fields=words)],
@@ -150,7 +150,7 @@ class GuessResult(Result[GuessStudy]):
     def _next(self) -> Section:
         rows: list[list[Cell]] = [[_named(key), 100 * share] for key, share in self.study.next_figures.items()]
         return Section(
-            heading="Further figures that would help most",
+            "Further figures that would help most",
             text="Mean share of the variance of all figures not given that one more figure would remove. The figure is "
             "measured with the usual error; covariances come from the ships found.",
             tables=[table("One more figure", ("figure", "variance removed (%)"), rows, digits=2)],
@@ -165,7 +165,7 @@ def _width(figure: GuessedFigure) -> float:
 def _key_figure(key: str, figure: GuessedFigure) -> KeyFigure:
     name, found = _named(key), figure.found
     note = f"{format_number(found.p5, 3)} to {format_number(found.p95, 3)} {figure.unit}, nine of ten ships"
-    return KeyFigure(label=name[:1].upper() + name[1:], value=found.p50, unit=figure.unit, note=note)
+    return KeyFigure(name[:1].upper() + name[1:], found.p50, figure.unit, note=note)
 
 
 def _named(key: str) -> str:
@@ -194,8 +194,8 @@ def figures_chart(study: GuessStudy) -> ChartSpec:
             points.append({"name": label, "run": "given", "v": figure.given / middle})
     kinds = [*runs_of(rows), *runs_of(points)]
     bars = RowPlot(
-        rows=rows,
-        across=PlotAxis(title="times the median", log=True, nice=False, form="~g"),
+        rows,
+        across=PlotAxis("times the median", log=True, nice=False, form="~g"),
         shown={"name:N": "figure", "run:N": "it is"},
         look=series_look(kinds, as_points=kinds),
         side={"labelExpr": "split(datum.label, ': ')"},

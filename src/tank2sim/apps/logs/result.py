@@ -27,19 +27,19 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _SIGNALS = (
-    Signal(name="rudder_order", title="rudder order", unit="rad"),
-    Signal(name="rudder_angle", title="rudder angle", unit="rad"),
-    Signal(name="thrust_order_port", title="port thruster", unit="1"),
-    Signal(name="thrust_order_starboard", title="starboard thruster", unit="1"),
-    Signal(name="rpm_order", title="ordered revolutions", unit="rad/s", display_unit="rpm"),
-    Signal(name="rpm", title="revolutions", unit="rad/s", display_unit="rpm"),
-    Signal(name="rpm_port", title="port revolutions", unit="rad/s", display_unit="rpm"),
-    Signal(name="rpm_starboard", title="starboard revolutions", unit="rad/s", display_unit="rpm"),
-    Signal(name="heading", title="heading", unit="rad"),
-    Signal(name="yaw_rate", title="yaw rate", unit="rad/s"),
-    Signal(name="sog", title="speed over ground", unit="m/s"),
-    Signal(name="u_water", title="speed ahead through the water", unit="m/s"),
-    Signal(name="v_water", title="speed to starboard through the water", unit="m/s"),
+    Signal("rudder_order", "rudder order", "rad"),
+    Signal("rudder_angle", "rudder angle", "rad"),
+    Signal("thrust_order_port", "port thruster", "1"),
+    Signal("thrust_order_starboard", "starboard thruster", "1"),
+    Signal("rpm_order", "ordered revolutions", "rad/s", display_unit="rpm"),
+    Signal("rpm", "revolutions", "rad/s", display_unit="rpm"),
+    Signal("rpm_port", "port revolutions", "rad/s", display_unit="rpm"),
+    Signal("rpm_starboard", "starboard revolutions", "rad/s", display_unit="rpm"),
+    Signal("heading", "heading", "rad"),
+    Signal("yaw_rate", "yaw rate", "rad/s"),
+    Signal("sog", "speed over ground", "m/s"),
+    Signal("u_water", "speed ahead through the water", "m/s"),
+    Signal("v_water", "speed to starboard through the water", "m/s"),
 )
 _MOST_TRACKS = 8
 """Stretches that have a line of their own on the map. Project choice: as many colours can be distinguished."""
@@ -186,15 +186,10 @@ class LogResult(Result[LogStudy]):
         study = self.study
         exciting = sum(stretch.duration_s for stretch in study.stretches if stretch.excites)
         return [
-            KeyFigure(label="Trials cut out", value=len(self._cut), note=f"of {len(study.stretches)} stretches"),
-            KeyFigure(
-                label="Time that excites the vessel",
-                value=round(exciting),
-                unit="s",
-                note=f"of {study.duration_s:.4g} s",
-            ),
-            KeyFigure(label="Channels in use", value=sum(channel.use for channel in study.channels)),
-            KeyFigure(label="Faults", value=self._faults, verdict=Verdict.CAUTION if self._faults else Verdict.PASSED),
+            KeyFigure("Trials cut out", len(self._cut), note=f"of {len(study.stretches)} stretches"),
+            KeyFigure("Time that excites the vessel", round(exciting), "s", note=f"of {study.duration_s:.4g} s"),
+            KeyFigure("Channels in use", sum(channel.use for channel in study.channels)),
+            KeyFigure("Faults", self._faults, verdict=Verdict.CAUTION if self._faults else Verdict.PASSED),
         ]
 
     @property
@@ -204,11 +199,11 @@ class LogResult(Result[LogStudy]):
         return [
             *([self._map(study.track)] if study.track else []),
             *self._time_line(),
-            Section(heading="Channels", tables=self._channel_tables()),
-            Section(heading="Stretches", tables=[self._stretch_table()]),
+            Section("Channels", tables=self._channel_tables()),
+            Section("Stretches", tables=[self._stretch_table()]),
             *([_gear_section(study.gear)] if study.gear else []),
             *(craft_sections(study.identified) if study.identified else []),
-            Section(heading="Logs", tables=[self._log_table()], folded=True),
+            Section("Logs", tables=[self._log_table()], folded=True),
         ]
 
     @property
@@ -227,18 +222,18 @@ class LogResult(Result[LogStudy]):
 
     def _map(self, track: Columns) -> Section:
         time, x, y = track["t_s"], track["x_m"], track["y_m"]
-        tracks = [TrackData(label="voyage", x_m=x, y_m=y, time_s=time)]
+        tracks = [TrackData("voyage", x_m=x, y_m=y, time_s=time)]
         longest = sorted(self._cut.items(), key=lambda trial: trial[1][0] - trial[1][1])[:_MOST_TRACKS]
         for file, (begin, end) in sorted(longest, key=lambda trial: trial[1]):
             inside = (time >= begin) & (time <= end)
             if inside.sum() > 1:
                 label = PurePath(file).stem
-                tracks.append(TrackData(label=label, x_m=x[inside], y_m=y[inside], time_s=time[inside]))
+                tracks.append(TrackData(label, x_m=x[inside], y_m=y[inside], time_s=time[inside]))
         origin = self.study.origin_deg
         caption = f"Origin at {origin[0]:g} deg N, {origin[1]:g} deg E (WGS 84)." if origin else ""
         if len(self._cut) > _MOST_TRACKS:
             caption += f" The longest {_MOST_TRACKS} of {len(self._cut)} trials are shown."
-        return Section(heading="Map", charts=[Illustration(chart=track_chart(tracks, title="Map"), caption=caption)])
+        return Section("Map", charts=[Illustration(track_chart(tracks, title="Map"), caption=caption)])
 
     def _time_line(self) -> list[Section]:
         line = self.study.time_line
@@ -263,10 +258,10 @@ class LogResult(Result[LogStudy]):
             for stretch in self.study.stretches
             if stretch.excites
         ]
-        logged = [History(label="log", time_s=time, values=values)]
+        logged = [History("log", time_s=time, values=values)]
         chart = history_chart(logged, shown, title="Logged signals", height_px=70, marks=marks)
         caption = "Tinted: the stretches that excite the vessel. Times from the begin of the log."
-        return [Section(heading="Time line", charts=[Illustration(chart=chart, caption=caption)])]
+        return [Section("Time line", charts=[Illustration(chart, caption=caption)])]
 
     def _channel_tables(self) -> list[Table]:
         """Channels in use, and all with the reasons of their confidence."""
@@ -325,8 +320,8 @@ def _gear_section(gear: LoggedGear) -> Section:
         f"{gear.angle} follows {gear.order} as a gear of one rate does, with a lag and a dead band; what remains is "
         f"{gear.residual_deg:.2g} deg rms over {gear.duration_s:.3g} s."
     )
-    heads = ("quantity", "unit", "value", Column(title="standard error", digits=2))
-    return Section(heading="Steering gear", text=text, tables=[table("Steering gear by this log", heads, rows)])
+    heads = ("quantity", "unit", "value", Column("standard error", digits=2))
+    return Section("Steering gear", text=text, tables=[table("Steering gear by this log", heads, rows)])
 
 
 def _cut_in_words(files: Collection[str]) -> str:

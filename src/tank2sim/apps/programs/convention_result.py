@@ -132,7 +132,7 @@ class ConventionResult(Result[ConventionStudy]):
     @property
     def key_figures(self) -> Sequence[KeyFigure]:
         """Probability of the first reading."""
-        return [KeyFigure(label="First reading", value=100 * self.readings[0].probability, unit="%")]
+        return [KeyFigure("First reading", 100 * self.readings[0].probability, "%")]
 
     @property
     def sections(self) -> Sequence[Section]:
@@ -162,7 +162,7 @@ class ConventionResult(Result[ConventionStudy]):
         against: list[list[Cell]] = [[number, "; ".join(entry.against)] for number, entry in shown if entry.against]
         if against:
             tables.append(table("Evidence against them", ("no.", "unlike a ship of these dimensions"), against))
-        return [Section(heading="Readings", tables=tables)]
+        return [Section("Readings", tables=tables)]
 
     def files(self, path: str | Path) -> dict[Path, str | bytes]:
         """The card of the first reading, at `path`."""

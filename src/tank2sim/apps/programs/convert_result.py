@@ -170,4 +170,4 @@ class ConversionResult(Result[ConversionStudy]):
             [one.manoeuvre, one.figure, one.before, one.after, one.error_percent] for one in self.study.figures
         ]
         heads = ("manoeuvre", "figure", "card", self.study.to, "error (%)")
-        return [Section(heading="Standard manoeuvres", tables=[table("Standard manoeuvres", heads, rows)])]
+        return [Section("Standard manoeuvres", tables=[table("Standard manoeuvres", heads, rows)])]

@@ -145,19 +145,19 @@ class SignalsResult(Result[SignalsStudy]):
     def key_figures(self) -> Sequence[KeyFigure]:
         """Stationary signals, the slowest of them, and the lag of the yaw rate."""
         varying = self._varying_signals
-        figures = [KeyFigure(label="Stationary signals", value=f"{self._steady} of {len(varying)}")]
+        figures = [KeyFigure("Stationary signals", f"{self._steady} of {len(varying)}")]
         correlations = [signal.autocorrelation for signal in varying if signal.autocorrelation]
         if correlations:
             time_s = max(one.correlation_time_s for one in correlations)
             count = min(one.effective_count for one in correlations)
             note = "of the slowest signal: the basis of its mean"
-            figures.append(KeyFigure(label="Longest correlation time", value=float(f"{time_s:.3g}"), unit="s"))
-            figures.append(KeyFigure(label="Independent samples, fewest", value=float(f"{count:.3g}"), note=note))
+            figures.append(KeyFigure("Longest correlation time", float(f"{time_s:.3g}"), "s"))
+            figures.append(KeyFigure("Independent samples, fewest", float(f"{count:.3g}"), note=note))
         steering = [trial.rudder_to_yaw_rate for trial in self.study.trials if trial.rudder_to_yaw_rate]
         if steering:
             lag_s = float(f"{steering[0].cross_correlation.lag_of_largest_s:.3g}")
             note = "lag of the largest correlation" + (" in the first trial" if len(self.study.trials) > 1 else "")
-            figures.append(KeyFigure(label="Yaw rate after the rudder", value=lag_s, unit="s", note=note))
+            figures.append(KeyFigure("Yaw rate after the rudder", lag_s, "s", note=note))
         return figures
 
     @property
@@ -203,19 +203,19 @@ def _filter_section(applied: FilterStudy) -> Section:
     runs = {"as measured": applied.before, applied.name: applied.after}
     title = f"{_signal(applied.column).words} before and after"
     response = effect_chart(applied.name, applied.effect)
-    drawn = [Illustration(chart=response, name="filter_response")]
+    drawn = [Illustration(response, name="filter_response")]
     if chart := columns_chart(runs, title, measured=("as measured",), height_px=300):
-        drawn.append(Illustration(chart=chart, name="filter_signal"))
-    return Section(heading="Filter", text=f"{applied.sentence}.", charts=drawn)
+        drawn.append(Illustration(chart, name="filter_signal"))
+    return Section("Filter", text=f"{applied.sentence}.", charts=drawn)
 
 
 def _trial_section(label: str, trial: TrialSignals) -> Section:
     charts = []
     if chart := columns_chart({"measured": trial.histories}, title=f"Measured: {label}"):
-        charts.append(Illustration(chart=chart, name=f"{label}_histories"))
+        charts.append(Illustration(chart, name=f"{label}_histories"))
     if trial.rudder_to_yaw_rate:
         charts += _steering_charts(label, trial.rudder_to_yaw_rate)
-    return Section(heading=label, tables=[_statistics(label, trial)], charts=charts)
+    return Section(label, tables=[_statistics(label, trial)], charts=charts)
 
 
 def _steering_charts(label: str, steering: Steering) -> list[Illustration]:
@@ -224,13 +224,13 @@ def _steering_charts(label: str, steering: Steering) -> list[Illustration]:
     correlation = cross_correlation_chart(rudder, rate, steering.cross_correlation)
     return [
         Illustration(
-            chart=transfer,
+            transfer,
             name=f"{label}_transfer",
             caption="Gain and phase where the coherence is above chance, with 95 % intervals. In a zigzag the rudder "
             "follows the heading, and only a high coherence shows the ship's own response.",
         ),
         Illustration(
-            chart=correlation,
+            correlation,
             name=f"{label}_cross_correlation",
             caption="Red: the lag of the largest. Dotted: 95 % of the coefficients of two independent signals are "
             "smaller. Right: the yaw rate comes after the rudder.",
@@ -241,7 +241,7 @@ def _steering_charts(label: str, steering: Steering) -> list[Illustration]:
 def _signals_section(label: str, trial: TrialSignals) -> Section:
     charts = [chart for name, signal in _varying(trial) for chart in _signal_charts(label, _signal(name), signal)]
     heading = f"Each signal of {label}"
-    return Section(heading=heading, text=_HOW, charts=charts, tables=[_tests(label, trial)], folded=True)
+    return Section(heading, text=_HOW, charts=charts, tables=[_tests(label, trial)], folded=True)
 
 
 def _signal_charts(label: str, name: SignalName, signal: SignalStudy) -> Iterator[Illustration]:
@@ -258,7 +258,7 @@ def _signal_charts(label: str, name: SignalName, signal: SignalStudy) -> Iterato
     }
     for kind, chart in charts.items():
         if chart:
-            yield Illustration(chart=chart, caption=described[kind], half=True, name=f"{label}_{name.stem}_{kind}")
+            yield Illustration(chart, caption=described[kind], half=True, name=f"{label}_{name.stem}_{kind}")
 
 
 def _statistics(label: str, trial: TrialSignals) -> Table:
@@ -293,7 +293,7 @@ def _steering_text(steering: Steering) -> str:
 
 
 def _tests(label: str, trial: TrialSignals) -> Table:
-    heads: list[str | Column] = ["signal", Column(title="independent samples", digits=3)]
+    heads: list[str | Column] = ["signal", Column("independent samples", digits=3)]
     heads += ["stationarity", "Dickey-Fuller p", "KPSS p", "normal", "least p", "skewness", "excess kurtosis"]
     rows: list[list[Cell]] = []
     for name, signal in _varying(trial):
@@ -317,10 +317,10 @@ def _subject(name: SignalName) -> str:
 def density_chart(name: SignalName, density: Density) -> ChartSpec:
     """Probability density of a signal next to the normal one."""
     curves = {"estimated": density.density, "normal": density.normal}
-    series = [PlotSeries(label=label, x=density.values, y=curve) for label, curve in curves.items()]
-    up = PlotAxis(title=with_unit("probability density", f"1/({name.unit})"), zero=True)
-    across = PlotAxis(title=with_unit(name.words, name.unit), nice=False)
-    return curve_chart(Plot(series=series, up=up), across, title=f"{_subject(name)}: probability density")
+    series = [PlotSeries(label, x=density.values, y=curve) for label, curve in curves.items()]
+    up = PlotAxis(with_unit("probability density", f"1/({name.unit})"), zero=True)
+    across = PlotAxis(with_unit(name.words, name.unit), nice=False)
+    return curve_chart(Plot(series, up=up), across, title=f"{_subject(name)}: probability density")
 
 
 def autocorrelation_chart(name: SignalName, found: Autocorrelation) -> ChartSpec:
@@ -343,11 +343,11 @@ def _correlation(
 ) -> ChartSpec:
     """Coefficients against the lag, with levels and a lag (s) that are marked."""
     levels, lag_s = marks
-    rules = [Rule(at=levels, dash=_DOTTED), Rule(at=[lag_s], upright=True, style="limit", dash=_DOTTED)]
-    series = [PlotSeries(label=label, x=found.lag_s, y=found.coefficient)]
-    up = PlotAxis(title="correlation coefficient", domain=(-1.0, 1.0))
-    across = PlotAxis(title="lag (s)", nice=False)
-    return curve_chart(Plot(series=series, up=up, rules=rules), across, title=title, described=described)
+    rules = [Rule(levels, dash=_DOTTED), Rule([lag_s], upright=True, style="limit", dash=_DOTTED)]
+    series = [PlotSeries(label, x=found.lag_s, y=found.coefficient)]
+    up = PlotAxis("correlation coefficient", domain=(-1.0, 1.0))
+    across = PlotAxis("lag (s)", nice=False)
+    return curve_chart(Plot(series, up=up, rules=rules), across, title=title, described=described)
 
 
 def spectrum_chart(name: SignalName, spectrum: Spectrum) -> ChartSpec:
@@ -355,16 +355,16 @@ def spectrum_chart(name: SignalName, spectrum: Spectrum) -> ChartSpec:
     kept = thin_line([np.log10(np.maximum(spectrum.density, np.finfo(float).tiny))], LINE_SAMPLES)
     kept = kept[spectrum.low[kept] > 0]  # what is exactly zero has no place on a logarithmic scale
     series = PlotSeries(
-        label=name.words,
+        name.words,
         x=spectrum.frequency_hz[kept],
         y=spectrum.density[kept],
         low=spectrum.low[kept],
         high=spectrum.high[kept],
     )
-    up = PlotAxis(title=f"power density (({name.unit})²/Hz)", log=True, form=".0e", ticks=8)
+    up = PlotAxis(f"power density (({name.unit})²/Hz)", log=True, form=".0e", ticks=8)
     return curve_chart(
-        Plot(series=[series], up=up),
-        PlotAxis(title="frequency (Hz)", log=True, nice=False, form="~g"),
+        Plot([series], up=up),
+        PlotAxis("frequency (Hz)", log=True, nice=False, form="~g"),
         title=f"{_subject(name)}: spectrum",
         described=f"Power spectral density of {name.words} with its 95 % confidence band.",
     )
@@ -382,24 +382,24 @@ def transfer_chart(source: SignalName, result: SignalName, transfer: Transfer) -
     label = f"{source.words} to {result.words}"
 
     def points(values: Array, low: Array, high: Array) -> list[PlotSeries]:
-        return [PlotSeries(label=label, x=frequency[kept], y=values, low=low, high=high, points=True)]
+        return [PlotSeries(label, x=frequency[kept], y=values, low=low, high=high, points=True)]
 
     plots = [
         Plot(
-            series=points(gain, gain * np.exp(-error), gain * np.exp(error)),
-            up=PlotAxis(title=with_unit("gain", "1/s"), log=True, form="~g"),
+            points(gain, gain * np.exp(-error), gain * np.exp(error)),
+            up=PlotAxis(with_unit("gain", "1/s"), log=True, form="~g"),
             height_px=150,
         ),
         Plot(
-            series=points(phase, phase - half, phase + half),
-            up=PlotAxis(title=_PHASE, domain=(-180.0, 180.0), ticks=[-180, -90, 0, 90, 180]),
+            points(phase, phase - half, phase + half),
+            up=PlotAxis(_PHASE, domain=(-180.0, 180.0), ticks=[-180, -90, 0, 90, 180]),
             height_px=150,
         ),
         Plot(
-            series=[PlotSeries(label=label, x=frequency, y=coherence)],
-            up=PlotAxis(title="coherence; dotted: by chance", domain=(0.0, 1.0)),
+            [PlotSeries(label, x=frequency, y=coherence)],
+            up=PlotAxis("coherence; dotted: by chance", domain=(0.0, 1.0)),
             height_px=150,
-            rules=[Rule(at=[transfer.coherence_by_chance], style="limit", dash=_DOTTED)],
+            rules=[Rule([transfer.coherence_by_chance], style="limit", dash=_DOTTED)],
         ),
     ]
     described = f"Transfer function from {label}: gain and phase with 95 % intervals, and coherence."
@@ -415,7 +415,7 @@ def effect_chart(label: str, effect: FilterEffect) -> ChartSpec:
     # Where nothing passes, the phase is that of rounding.
     phase = np.where(decibel > _LEAST_DECIBEL, np.rad2deg(phase), np.nan)
     plots = [
-        Plot(series=[PlotSeries(label=label, x=frequency, y=curve)], up=PlotAxis(title=up), height_px=130)
+        Plot([PlotSeries(label, x=frequency, y=curve)], up=PlotAxis(up), height_px=130)
         for up, curve in {"gain (dB)": decibel, _PHASE: phase, "group delay (s)": delay}.items()
     ]
     described = f"Gain, phase and group delay of {label}."
@@ -424,4 +424,4 @@ def effect_chart(label: str, effect: FilterEffect) -> ChartSpec:
 
 def _frequency(values: Array) -> PlotAxis:
     span = float(values[0]), float(values[-1])
-    return PlotAxis(title="frequency (Hz)", log=True, domain=span, nice=False, form="~g")
+    return PlotAxis("frequency (Hz)", log=True, domain=span, nice=False, form="~g")

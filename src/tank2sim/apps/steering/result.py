@@ -75,7 +75,7 @@ class SteeringPageResult(Result[SteeringStudy]):
         study = self.study
         values: dict[str, Cell] = {"measured trial": study.ghost, "autopilot": study.autopilot}
         values |= {"waters": study.scenario, "ships": study.members + 1}
-        return [Section(heading="The page", tables=[quantities("The page", values, on_screen=False)])]
+        return [Section("The page", tables=[quantities("The page", values, on_screen=False)])]
 
     def page(self) -> str:
         """The page: self-contained HTML."""

@@ -108,14 +108,14 @@ class SteeringModelsResult(Result[SteeringComparison]):
         study, titles = self.study, self.study.titles
         note = f"steady turn, {study.rudder_deg:g} deg of rudder"
         figures = [
-            KeyFigure(label=f"Radius, {titles[model]}", value=each.radius_m, unit="m", note=note)
+            KeyFigure(f"Radius, {titles[model]}", each.radius_m, "m", note=note)
             for model, each in study.influence.items()
         ]
         incomplete = len(titles) - len(study.steady_turns)
         verdict = Verdict.CAUTION if incomplete else Verdict.NONE
         note = f"of {len(titles)}: their coefficients are not printed"
         label = "Models that cannot be computed"
-        return [*figures, KeyFigure(label=label, value=incomplete, note=note, verdict=verdict)]
+        return [*figures, KeyFigure(label, incomplete, note=note, verdict=verdict)]
 
     @property
     def sections(self) -> Sequence[Section]:
@@ -141,10 +141,10 @@ class SteeringModelsResult(Result[SteeringComparison]):
         ]
         chart = steering_diagram_chart(study.diagrams)
         return Section(
-            heading="Steady turning",
+            "Steady turning",
             text="The speed of each model does not fall in the turn. Its steady turns are followed from the straight "
             "course, so they are those that the ship reaches.",
-            charts=[Illustration(chart=chart, caption="Lines: models. Points: known turns.")],
+            charts=[Illustration(chart, caption="Lines: models. Points: known turns.")],
             tables=tables,
             notes=[f"{point.label}: {point.source}" for point in points if point.radius_measured],
         )
@@ -160,15 +160,15 @@ class SteeringModelsResult(Result[SteeringComparison]):
         heads = [f"{key.removesuffix('_m').replace('_', ' ')} (m)" for key in keys]
         overshoot_heads = ("overshoot 1 (deg)", "overshoot 2 (deg)")
         tracks = [
-            TrackData(label=label, x_m=history["x_m"], y_m=history["y_m"], time_s=history["t_s"])
+            TrackData(label, x_m=history["x_m"], y_m=history["y_m"], time_s=history["t_s"])
             for label, history in study.histories.items()
         ]
         chart = track_chart(tracks, title=f"Turning circles, {study.rudder_deg:g} deg of rudder")
         caption = f"Turning circle at {study.rudder_deg:g} deg of rudder, and 10/10 zigzag"
         return Section(
-            heading="Manoeuvres",
+            "Manoeuvres",
             text="The steady models in time, by drift angle and yaw rate, from a straight course.",
-            charts=[Illustration(chart=chart)],
+            charts=[Illustration(chart)],
             tables=[table(caption, ("model", *heads, *overshoot_heads), rows)],
         )
 
@@ -187,9 +187,9 @@ class SteeringModelsResult(Result[SteeringComparison]):
             "and rudder angle d: C_m_wwb is that of b w²."
         )
         return Section(
-            heading="Influence on the steady radius",
+            "Influence on the steady radius",
             text=text,
-            charts=[Illustration(chart=influence_bars(models))],
+            charts=[Illustration(influence_bars(models))],
             tables=[table("K (%): change of the radius for 10 % more", heads, rows, digits=3)],
         )
 
@@ -216,7 +216,7 @@ class SteeringModelsResult(Result[SteeringComparison]):
         slip = ", ".join(f"{name} with the K of {misread}" for name, misread in pairs.items())
         heads = ["coefficient", *(study.titles[model] for model in predictions)]
         return Section(
-            heading="Agreed variation",
+            "Agreed variation",
             text="Kc: change of each coefficient in % with 1 % of draught. The sum of Kc K / 10 predicts the radius.",
             tables=[
                 table("Kc (%)", heads, variations, on_screen=False),
@@ -231,22 +231,22 @@ class SteeringModelsResult(Result[SteeringComparison]):
         heads = ["coefficient", *(f"T^{power}" for power in range(max(map(len, rows)) - 1))]
         caption = "K over the draught T in m, through its printed values"
         tables = [table(caption, heads, rows, on_screen=False)]
-        return Section(heading="Influence over the draught", tables=tables, folded=True)
+        return Section("Influence over the draught", tables=tables, folded=True)
 
 
 def _tuning(tuning: TwoPointTuning | str) -> Section:
     heading = "Two characteristics, two points"
     if isinstance(tuning, str):
-        return Section(heading=heading, text=TUNING_TEXT, notes=[tuning])
+        return Section(heading, text=TUNING_TEXT, notes=[tuning])
     factors = table("Factors", ("hull", "rudder"), [[tuning.hull_factor, tuning.rudder_factor]])
     tables = [factors, turn_table(tuning)]
-    return Section(heading=heading, text=TUNING_TEXT, tables=tables, notes=stability_change(tuning))
+    return Section(heading, text=TUNING_TEXT, tables=tables, notes=stability_change(tuning))
 
 
 def steering_diagram_chart(diagrams: SteeringDiagrams) -> ChartSpec:
     """Yaw rate (deg/min) against rudder (deg): the models as lines, the tuned one too, the card's points on top."""
     series = [
-        PlotSeries(label=label, x=line.rudder_deg, y=line.yaw_rate_degpmin, closed=True)
+        PlotSeries(label, x=line.rudder_deg, y=line.yaw_rate_degpmin, closed=True)
         for label, line in diagrams.models.items()
     ]
     points: list[ChartRecord] = [
@@ -254,8 +254,8 @@ def steering_diagram_chart(diagrams: SteeringDiagrams) -> ChartSpec:
         for one in diagrams.points
     ]
     marked = runs_of(points)
-    across = PlotAxis(title="rudder, starboard positive (deg)", padding=12)
-    up = PlotAxis(title="yaw rate, starboard positive (deg/min)", zero=True)
+    across = PlotAxis("rudder, starboard positive (deg)", padding=12)
+    up = PlotAxis("yaw rate, starboard positive (deg/min)", zero=True)
     shown = {"run:N": "of", "x:Q": "rudder (deg)", "v:Q": "yaw rate (deg/min)"}
     # Next to the lines these names would be too wide for the page.
     below = {"title": None, "orient": "bottom"}
@@ -263,7 +263,7 @@ def steering_diagram_chart(diagrams: SteeringDiagrams) -> ChartSpec:
     place["shape"] = channel("run:N", scale={"domain": marked, "range": list(SHAPES[: len(marked)])}, legend=below)
     turns = layer("point", points, place, style="start", filled=False, strokeWidth=1.8, clip=True)
     return curve_chart(
-        Plot(series=series, up=up, height_px=420, over=[turns] if points else []),
+        Plot(series, up=up, height_px=420, over=[turns] if points else []),
         across,
         title="Steering diagrams",
         described=f"Yaw rate against rudder angle of {', '.join(diagrams.models)}, with points of {', '.join(marked)}.",
@@ -281,10 +281,10 @@ def influence_bars(models: Mapping[str, Mapping[str, float]]) -> ChartSpec:
     ]
     return row_chart(
         RowPlot(
-            rows=rows,
-            across=PlotAxis(title="change of the radius for 10 % more (%)", zero=True),
+            rows,
+            across=PlotAxis("change of the radius for 10 % more (%)", zero=True),
             apart=True,
-            rules=[Rule(at=[0.0])],
+            rules=[Rule([0.0])],
             side={"labelLimit": 160},
             shown={"run:N": "model", "name:N": "coefficient", "v:Q": ("K (%)", "+.2f")},
         ),

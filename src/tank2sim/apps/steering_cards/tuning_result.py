@@ -87,17 +87,17 @@ class TurnTuningResult(Result[TwoPointStudy]):
     def key_figures(self) -> Sequence[KeyFigure]:
         """The two factors."""
         return [
-            KeyFigure(label="Hull factor", value=self.hull_factor, note="above 1 the ship is steadier"),
-            KeyFigure(label="Rudder factor", value=self.rudder_factor, note="all terms of the rudder"),
+            KeyFigure("Hull factor", self.hull_factor, note="above 1 the ship is steadier"),
+            KeyFigure("Rudder factor", self.rudder_factor, note="all terms of the rudder"),
         ]
 
     @property
     def sections(self) -> Sequence[Section]:
         """Both turns, and the scaled parameters."""
         return [
-            Section(heading="Turns", text=TUNING_TEXT, tables=[turn_table(self.study)]),
+            Section("Turns", text=TUNING_TEXT, tables=[turn_table(self.study)]),
             Section(
-                heading="Scaled parameters",
+                "Scaled parameters",
                 tables=[quantities("Parameters of the model", self.study.parameters, on_screen=False)],
             ),
         ]

@@ -103,9 +103,9 @@ class TrialOfficeResult(Result[TrialOffice]):
         """The criteria that were tried, at full load."""
         return [
             KeyFigure(
-                label=one.name,
-                value=one.full_load if one.full_load is not None else "undecided",
-                unit=one.unit if one.full_load is not None else "",
+                one.name,
+                one.full_load if one.full_load is not None else "undecided",
+                one.unit if one.full_load is not None else "",
                 limit=one.allowed,
                 verdict=_VERDICTS.get(one.verdict, Verdict.CAUTION),
                 note=_chance(one),
@@ -134,7 +134,7 @@ class TrialOfficeResult(Result[TrialOffice]):
         ]
         heads = ("criterion", "allowed", "as run", "trial as run", "P as run", "full load", "ship at full load", "P")
         return Section(
-            heading="Verdict",
+            "Verdict",
             text="The trial as it was run, and the ship at full load, on even keel, in calm water. The worse side "
             "counts. P is the probability of meeting the criterion; between 0.05 and 0.95 it is undecided.",
             tables=[table("Criteria of IMO MSC.137(76)", heads, rows, digits=3)],
@@ -146,7 +146,7 @@ class TrialOfficeResult(Result[TrialOffice]):
         ]
         heads = ("condition", "required", "found", "met", "source")
         return Section(
-            heading="Conditions of the trial",
+            "Conditions of the trial",
             text="A trial is reported whether or not its conditions were met.",
             tables=[table("Conditions", heads, rows)],
         )
@@ -170,16 +170,14 @@ class TrialOfficeResult(Result[TrialOffice]):
                 for one in study.tracks
                 for name in [one.trial if len(one.trial) <= _LONGEST else f"…{one.trial[1 - _LONGEST :]}"]
                 for data in (
-                    TrackData(label=f"{name}, as run", x_m=one.x_m, y_m=one.y_m, measured=True),
-                    TrackData(
-                        label=f"{name}, without current", x_m=one.x_without_current_m, y_m=one.y_without_current_m
-                    ),
+                    TrackData(f"{name}, as run", x_m=one.x_m, y_m=one.y_m, measured=True),
+                    TrackData(f"{name}, without current", x_m=one.x_without_current_m, y_m=one.y_without_current_m),
                 )
             ]
-            charts.append(Illustration(chart=track_chart(tracks, title="Turning circles"), caption="From the execute."))
+            charts.append(Illustration(track_chart(tracks, title="Turning circles"), caption="From the execute."))
         tables = [table("Drift of the turning circles", heads, rows, digits=3)] if rows else []
         return Section(
-            heading="Current and wind",
+            "Current and wind",
             text="Positions one full turn apart show the drift of a circle (MSC/Circ.1053, 3.4.2). A constant wind "
             "drifts it, too, with almost no spread, and to opposite sides for turns to port and starboard: the mean "
             "of both sides is the current. A large residual of the circle shows the wind.",
@@ -206,7 +204,7 @@ class TrialOfficeResult(Result[TrialOffice]):
                 by_model = (one.model_as_tried, agrees, one.model_full_load, one.full_load)
                 checked.append([one.trial, name, one.without_current, *by_model])
         return Section(
-            heading="Figures",
+            "Figures",
             text="The wind is taken off by the model: times its figure in calm water over that in the wind. At full "
             "load R = T F/B (MSC/Circ.1053): measured T, and simulated F at full load and B as tried, of the same "
             "member of the ensemble, so that errors of both cancel. Where the model as tried agrees with the trial, "
@@ -238,7 +236,7 @@ class TrialOfficeResult(Result[TrialOffice]):
                 for row in box.rows
             ]
             tables.append(table(box.title, heads, rows, on_screen=False))
-        return Section(heading="Form for reporting to IMO", tables=tables, folded=True)
+        return Section("Form for reporting to IMO", tables=tables, folded=True)
 
     def files(self, folder: Path) -> dict[Path, str | bytes]:
         """Return the files of the report by path: page, PDF, form, poster, pilot card, JSON, and both cards.

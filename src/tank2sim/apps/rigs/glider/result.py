@@ -156,14 +156,14 @@ class GlideResult(Result[GlideStudy]):
         least, fastest = self.study.design.smallest_angle_deg, self.study.design.fastest_glide
         distance, fast = 1 / math.tan(math.radians(least)), f"{fastest.horizontal_speed_mps:.4g} m/s"
         figures = [
-            KeyFigure(label="Smallest path angle", value=least, unit="deg", note="the best glide"),
-            KeyFigure(label="Distance for each metre of depth", value=distance, unit="m", note="at this angle"),
-            KeyFigure(label="Fastest over the ground", value=-fastest.path_angle_deg, unit="deg", note=fast),
+            KeyFigure("Smallest path angle", least, "deg", note="the best glide"),
+            KeyFigure("Distance for each metre of depth", distance, "m", note="at this angle"),
+            KeyFigure("Fastest over the ground", -fastest.path_angle_deg, "deg", note=fast),
         ]
         if transient := self.study.transient:
             label, far = "Programme flown by the transient model", float(transient.distance_m.max())
             note = "farthest from the path of steady glides"
-            figures.append(KeyFigure(label=label, value=far, unit="m", note=note))
+            figures.append(KeyFigure(label, far, "m", note=note))
         return figures
 
     @property
@@ -204,12 +204,12 @@ class GlideResult(Result[GlideStudy]):
             caption = f"Range on {first.budget_kg:g} kg of ballast pushed out at {first.depth_m:g} m"
             tables.append(table(caption, heads, rows))
         polar = Illustration(
-            chart=polar_chart(self.study.polar, marked),
+            polar_chart(self.study.polar, marked),
             caption="From the best glide to almost straight down. Grey: the path of the best glide; no path is less "
             "steep.",
         )
         return Section(
-            heading="Best glides",
+            "Best glides",
             text="The path angle, not the buoyancy, settles incidence and ratio of lift to drag; speeds go with the "
             f"root of the net buoyancy, here {self.study.buoyancy_kg:g} kg. Below the smallest angle the drag is too "
             "large for the lift at any incidence.",
@@ -229,7 +229,7 @@ class GlideResult(Result[GlideStudy]):
         tables = [records_table(caption, glides, fields=columns)]
         if printed:
             tables.append(_printed_table(glides, printed, turning=turning))
-        return Section(heading="Steady glides", text=f"{_SIGNS}{_TURNS if turning else ''}.", tables=tables)
+        return Section("Steady glides", text=f"{_SIGNS}{_TURNS if turning else ''}.", tables=tables)
 
     def _path(self) -> Section:
         study = self.study
@@ -242,16 +242,16 @@ class GlideResult(Result[GlideStudy]):
             paths["as printed"] = study.path_as_printed_histories
         isometric = isometric_chart("steady glides", study.path_histories, study.path)
         charts = [
-            Illustration(chart=plan_chart(paths)),
-            Illustration(chart=elevation_chart(paths)),
+            Illustration(plan_chart(paths)),
+            Illustration(elevation_chart(paths)),
             Illustration(
-                chart=isometric,
+                isometric,
                 caption="Plumb lines lead from the shadow, at the height of the start, to the ends of the steps.",
             ),
         ]
         if study.transient:
-            charts.append(Illustration(chart=programme_chart(study.transient)))
-        return Section(heading="Path of the programme", tables=tables, charts=charts)
+            charts.append(Illustration(programme_chart(study.transient)))
+        return Section("Path of the programme", tables=tables, charts=charts)
 
 
 def _printed_table(glides: Sequence[BalancedGlide], printed: Sequence[BalancedGlide], *, turning: bool) -> Table:
@@ -262,7 +262,7 @@ def _printed_table(glides: Sequence[BalancedGlide], printed: Sequence[BalancedGl
     shown = records_table("The same by the equations as printed", printed, fields=columns)
     return table(
         shown.caption,
-        [*shown.columns, Column(title="speed over that above", digits=3)],
+        [*shown.columns, Column("speed over that above", digits=3)],
         [[*row, ratio] for row, ratio in zip(shown.rows, ratios, strict=True)],
         f"Printed speeds are {factors} times the right ones: they balance the drag alpha (C_D0 + C_D alpha), which "
         "differs from (7).",
@@ -286,11 +286,11 @@ def _quasi_steady(errors: QuasiSteadyErrors) -> Section:
     swings = swing_chart(errors.swings)
     steps = quasi_steady_chart(errors.steps)
     return Section(
-        heading="How slowly the controls must change",
+        "How slowly the controls must change",
         text="A path of steady glides holds where the controls change slowly. The transient model, with mass and added "
         "mass, shows how slowly: it flies swings and steps of the controls.",
         folded=True,
-        charts=[Illustration(chart=swings, caption=_SWINGS), Illustration(chart=steps, caption=_STEPS)],
+        charts=[Illustration(swings, caption=_SWINGS), Illustration(steps, caption=_STEPS)],
     )
 
 
@@ -347,7 +347,7 @@ def _projected(north: Any, east: Any, height: Any) -> tuple[Any, Any]:
 def polar_chart(polar: Columns, marked: Mapping[str, GlideState]) -> ChartSpec:
     """The polar: speed down against speed over the ground, with marked glides."""
     line = PlotSeries(
-        label="polar",
+        "polar",
         x=polar["horizontal_speed_mps"],
         y=-polar["climb_mps"],
         closed=True,
@@ -355,7 +355,7 @@ def polar_chart(polar: Columns, marked: Mapping[str, GlideState]) -> ChartSpec:
     )
     glides = [
         PlotSeries(
-            label=label,
+            label,
             x=[glide.horizontal_speed_mps],
             y=[-glide.climb_mps],
             points=True,
@@ -364,12 +364,12 @@ def polar_chart(polar: Columns, marked: Mapping[str, GlideState]) -> ChartSpec:
         for label, glide in marked.items()
     ]
     best = max(marked.values(), key=lambda glide: glide.horizontal_speed_mps / -glide.climb_mps)
-    across = PlotAxis(title="speed over the ground (m/s)", zero=True)
-    up = PlotAxis(title="speed down (m/s)", zero=True, scale={"reverse": True})
+    across = PlotAxis("speed over the ground (m/s)", zero=True)
+    up = PlotAxis("speed down (m/s)", zero=True, scale={"reverse": True})
     tangent = [{"x": 0.0, "v": 0.0}, {"x": best.horizontal_speed_mps, "v": -best.climb_mps}]
     over = [layer("line", tangent, {"x": across.channel("x"), "y": up.channel("v")}, style="reference")]
     return curve_chart(
-        Plot(series=[line, *glides], up=up, height_px=380, over=over),
+        Plot([line, *glides], up=up, height_px=380, over=over),
         across,
         title="Glide polar",
         width_px=620,
@@ -393,8 +393,8 @@ def programme_chart(transient: TransientPath) -> ChartSpec:
     histories = []
     for label, columns in (("orders and steady glides", transient.orders), ("transient", transient.histories)):
         values = {name: to_si(name, 1.0)[1] * columns[name] for name in _PROGRAMME}
-        histories.append(History(label=label, time_s=columns["t_s"], values=values))
-    panels = [Signal(name=name, title=words, unit=unit) for name, (words, unit) in _PROGRAMME.items()]
+        histories.append(History(label, time_s=columns["t_s"], values=values))
+    panels = [Signal(name, words, unit) for name, (words, unit) in _PROGRAMME.items()]
     return history_chart(histories, panels, title="Programme and motion", height_px=90)
 
 
@@ -416,14 +416,14 @@ def swing_chart(errors: Sequence[SwingError]) -> ChartSpec:
 
 def _errors(series: Sequence[tuple[str, Array, Array]], titles: tuple[str, str], *, title: str) -> ChartSpec:
     """Shares in per cent against times, both logarithmic."""
-    curves = [PlotSeries(label=label, x=time, y=100 * share) for label, time, share in series]
-    across = PlotAxis(title=titles[0], log=True, nice=False, padding=12, form="~g")
-    up = PlotAxis(title=titles[1], log=True, form="~g")
+    curves = [PlotSeries(label, x=time, y=100 * share) for label, time, share in series]
+    across = PlotAxis(titles[0], log=True, nice=False, padding=12, form="~g")
+    up = PlotAxis(titles[1], log=True, form="~g")
     text = ", ".join(label for label, _, _ in series)
     place = {"x": across.channel("x"), "y": up.channel("v"), "color": look_of(curves).colour}
     dots = layer("point", [row for curve in curves for row in curve.rows], place, clip=True, filled=True)
     return curve_chart(
-        Plot(series=curves, up=up, height_px=340, over=[dots]),
+        Plot(curves, up=up, height_px=340, over=[dots]),
         across,
         title=title,
         width_px=680,
@@ -447,7 +447,7 @@ def _plane(
     place = frame.axes(across=("x", titles[0]), up=("v", titles[1]))
     if arms:
         place = {name: axis | {"axis": None} for name, axis in place.items()}
-    series = [PlotSeries(label=label, x=x, y=y, closed=True) for label, x, y in drawn]
+    series = [PlotSeries(label, x=x, y=y, closed=True) for label, x, y in drawn]
     look = look_of(series)
     rows = [row for each in series for row in each.rows]
     marks = {**place, "color": look.colour, "strokeDash": look.dash, "order": "i:Q"}

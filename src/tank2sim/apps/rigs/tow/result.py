@@ -162,19 +162,19 @@ class TowResult(Result[TowStudy]):
         if best is not None:
             mass, half = best.estimates["M"], best.half_widths_95["M"]
             note = f"± {half:.0f} kg at 95 %; output error of {best.label}"
-            figures.append(KeyFigure(label="Total mass M", value=round(mass), unit="kg", note=note))
+            figures.append(KeyFigure("Total mass M", round(mass), "kg", note=note))
             label, added = "Added mass λ₁₁ = M − m", round(mass - study.mass_kg)
-            figures.append(KeyFigure(label=label, value=added, unit="kg", note="of the same model"))
+            figures.append(KeyFigure(label, added, "kg", note="of the same model"))
         if study.mass_range_kg:
             low, high = study.mass_range_kg
             label, value = "Range of M that these tows leave", f"{low / 1000:.2f} to {high / 1000:.2f}"
-            figures.append(KeyFigure(label=label, value=value, unit="t", note="over all usable models"))
+            figures.append(KeyFigure(label, value, "t", note="over all usable models"))
         worst = max(study.methods.values(), key=lambda fit: fit.condition_scaled)
         condition = float(f"{worst.condition_scaled:.2g}")
         figures.append(
             KeyFigure(
-                label=f"Condition number of {', '.join(worst.estimated)}",
-                value=condition,
+                f"Condition number of {', '.join(worst.estimated)}",
+                condition,
                 note=f"scaled; at most {_LARGEST_CONDITION:g} distinguishes them",
                 verdict=Verdict.PASSED if condition <= _LARGEST_CONDITION else Verdict.CAUTION,
                 limit=_LARGEST_CONDITION,
@@ -188,17 +188,17 @@ class TowResult(Result[TowStudy]):
         study, sections = self.study, []
         if study.speeds.simulated_mps:
             chart = Illustration(
-                chart=tow_speed_chart(study.speeds),
+                tow_speed_chart(study.speeds),
                 caption=f"The lower panel shows the differences from {next(iter(study.speeds.simulated_mps))}.",
                 name="measured_and_computed_speeds",
             )
-            sections.append(Section(heading="Measured and computed speeds", charts=[chart]))
+            sections.append(Section("Measured and computed speeds", charts=[chart]))
         sections += [self._estimates(), self._models()]
         if study.body:
             sections += [self._drag(study.body), self._theory()]
         if study.tow_by_tow:
             by_tow = [_subset_table(label, subset) for label, subset in study.tow_by_tow.items()]
-            sections.append(Section(heading="Tow by tow", text=_BY_TOW, tables=by_tow, folded=True))
+            sections.append(Section("Tow by tow", text=_BY_TOW, tables=by_tow, folded=True))
         return sections
 
     def _estimates(self) -> Section:
@@ -218,7 +218,7 @@ class TowResult(Result[TowStudy]):
             rows.append([words, *(f"{getattr(fit, field):.4g}" for fit in fits)])
         heads = ("", *(_METHODS[method] for method in self.study.methods))
         tables = [table("Estimates by method, ± one standard error", heads, rows), self._polynomials()]
-        return Section(heading="Estimates by method", text=_ESTIMATES, tables=tables)
+        return Section("Estimates by method", text=_ESTIMATES, tables=tables)
 
     def _polynomials(self) -> Table:
         rows: list[list[Cell]] = []
@@ -242,10 +242,10 @@ class TowResult(Result[TowStudy]):
     def _models(self) -> Section:
         study, name, charts = self.study, "what_these_tows_determine", []
         if study.models:
-            charts.append(Illustration(chart=model_chart(study.models), caption=_MODELS, name=name))
+            charts.append(Illustration(model_chart(study.models), caption=_MODELS, name=name))
         if study.confidence_ellipses:
             chart = ellipse_chart(study.confidence_ellipses, study.tow_by_tow)
-            charts.append(Illustration(chart=chart, caption=_ELLIPSES, name=name))
+            charts.append(Illustration(chart, caption=_ELLIPSES, name=name))
         unknowns = [name for name in _UNITS if any(name in model.estimates for model in study.models)]
         by_tow = [
             f"M by single tows, {label}: {', '.join(f'{row[0]:.0f}' for row in subset.alone)} kg. With one tow left "
@@ -272,15 +272,15 @@ class TowResult(Result[TowStudy]):
             for model in study.models
         ]
         columns = [
-            Column(title="model"),
-            Column(title="M ± 95 %", unit="kg"),
-            Column(title="scatter", unit="m/s", digits=3),
-            Column(title="AIC"),
-            Column(title="condition", digits=2),
-            Column(title="drag nowhere negative"),
+            Column("model"),
+            Column("M ± 95 %", "kg"),
+            Column("scatter", "m/s", digits=3),
+            Column("AIC"),
+            Column("condition", digits=2),
+            Column("drag nowhere negative"),
         ]
         return Section(
-            heading="What these tows determine",
+            "What these tows determine",
             text="The same readings by output error with fewer and with more unknowns (delay: time from t = 0 to the "
             "start of the body).",
             tables=[
@@ -315,13 +315,13 @@ class TowResult(Result[TowStudy]):
             rows.append([name, "L²", *asdict(drag).values()])
             rows.append([name, "V^(2/3)", *asdict(drag.times(body.area_ratio)).values()])
         chart = Illustration(
-            chart=drag_chart(drags, body, study.top_speed_mps),
+            drag_chart(drags, body, study.top_speed_mps),
             caption=f"L = {body.length_m:g} m, V = {body.volume_m3:.4g} m³, ν = {format_number(body.viscosity_m2ps)} "
             "m²/s. The axes fit the curves that stay above zero; no hull has a coefficient below zero.",
         )
         heads = ("method", "referred to", "A1 (s²/m²)", "A2 (s/m)", "A3")
         drag_table = table("Drag coefficient C = A1 v² + A2 v + A3", heads, rows, folded=True)
-        return Section(heading="Drag coefficient", tables=[drag_table], charts=[chart])
+        return Section("Drag coefficient", tables=[drag_table], charts=[chart])
 
     def _theory(self) -> Section:
         estimate = ""
@@ -330,7 +330,7 @@ class TowResult(Result[TowStudy]):
             estimate = f" The tows give {mass:.0f} ± {half:.0f} kg by the best usable model."
         fields = {"basis": "body", "k11": "k₁₁", "deep_kg": "(1 + k₁₁) ρ V", "near_surface_kg": "near the surface, M_s"}
         masses = records_table("Mass in surge by theory (2.5)", self.study.mass_by_theory, fields=fields)
-        return Section(heading="Mass by theory", text=_THEORY + estimate, tables=[masses])
+        return Section("Mass by theory", text=_THEORY + estimate, tables=[masses])
 
 
 def _with_error(fit: TowFit, key: str) -> Cell:
@@ -355,7 +355,7 @@ def _subset_table(label: str, subset: TowByTow) -> Table:
     return table(label[0].upper() + label[1:], heads, rows, on_screen=False)
 
 
-_SPEEDS = (Signal(name="speed", title="speed", unit="m/s"), Signal(name="left", title="less the model", unit="m/s"))
+_SPEEDS = (Signal("speed", "speed", "m/s"), Signal("left", "less the model", "m/s"))
 
 
 def tow_speed_chart(speeds: TowSpeeds) -> ChartSpec:
@@ -372,11 +372,9 @@ def tow_speed_chart(speeds: TowSpeeds) -> ChartSpec:
     runs = []
     for label, speed in speeds.measured_mps.items():
         signals = {"speed": speed, "left": speed - at_readings}
-        runs.append(History(label=label, time_s=time, values=signals, measured=True))
+        runs.append(History(label, time_s=time, values=signals, measured=True))
     for name, speed in simulated.items():
-        runs.append(
-            History(label=name, time_s=speeds.simulated_t_s, values={"speed": speed, "left": speed - reference})
-        )
+        runs.append(History(name, time_s=speeds.simulated_t_s, values={"speed": speed, "left": speed - reference}))
     return history_chart(runs, _SPEEDS, title="Speeds of the tows and of the models", height_px=230)
 
 
@@ -392,9 +390,9 @@ def drag_chart(drags: Mapping[str, DragPolynomial], body: TowedBody, top_speed_m
         "cv:Q": "C by V^(2/3)",
     }
     for across, values, name, factor in (
-        (PlotAxis(title="speed (m/s)", nice=False), speeds, "C referred to L²", 1.0),
+        (PlotAxis("speed (m/s)", nice=False), speeds, "C referred to L²", 1.0),
         (
-            PlotAxis(title="Reynolds number v L / ν", nice=False, form="~s"),
+            PlotAxis("Reynolds number v L / ν", nice=False, form="~s"),
             body.reynolds(speeds),
             "C referred to V^(2/3)",
             body.area_ratio,
@@ -404,14 +402,14 @@ def drag_chart(drags: Mapping[str, DragPolynomial], body: TowedBody, top_speed_m
         for label, drag in drags.items():
             both = {"c": drag.at(speeds), "cv": drag.times(body.area_ratio).at(speeds)}
             more = {"speed": speeds, "re": body.reynolds(speeds), **both}
-            series.append(PlotSeries(label=label, x=values, y=drag.times(factor).at(speeds), more=more))
+            series.append(PlotSeries(label, x=values, y=drag.times(factor).at(speeds), more=more))
         # From a little below 0 to above the highest C of the curves that stay above zero; of all, if none does.
         curves = [vector(line.y) for line in series]
         kept = [curve for curve in curves if curve.min() >= 0] or curves
         low, high = min(0.0, *(float(curve.min()) for curve in kept)), max(float(curve.max()) for curve in kept)
         margin = 0.08 * (high - low)
-        up = PlotAxis(title=name, domain=(low - margin, high + margin))
-        plot = Plot(series=series, up=up, rules=[Rule(at=[0.0])])
+        up = PlotAxis(name, domain=(low - margin, high + margin))
+        plot = Plot(series, up=up, rules=[Rule([0.0])])
         layers = curve_layers(plot, across, look_of(series), shown=shown)
         panels.append(layered(layers, size=(330, 300)))
     return {
@@ -426,8 +424,7 @@ def drag_chart(drags: Mapping[str, DragPolynomial], body: TowedBody, top_speed_m
 def ellipse_chart(ellipses: Sequence[Ellipse], by_tow: Mapping[str, TowByTow]) -> ChartSpec:
     """Joint 95 % regions of M and B3 from all tows, and each tow by itself as a point."""
     series = [
-        PlotSeries(label=f"95 %: {ellipse.label}", x=ellipse.mass_kg, y=ellipse.B3_kgpm, closed=True)
-        for ellipse in ellipses
+        PlotSeries(f"95 %: {ellipse.label}", x=ellipse.mass_kg, y=ellipse.B3_kgpm, closed=True) for ellipse in ellipses
     ]
     for name, way in by_tow.items():
         if way.unknowns[:2] == ("M", "B3") and name.startswith("output error"):
@@ -435,10 +432,10 @@ def ellipse_chart(ellipses: Sequence[Ellipse], by_tow: Mapping[str, TowByTow]) -
             if len(known):
                 mass, drag = np.asarray(way.alone)[known, :2].T
                 label, more = f"each tow: {', '.join(way.unknowns)}", {"tow": known + 1.0}
-                series.append(PlotSeries(label=label, x=mass, y=drag, points=True, more=more))
+                series.append(PlotSeries(label, x=mass, y=drag, points=True, more=more))
     return curve_chart(
-        Plot(series=series, up=PlotAxis(title="B3 (kg/m)"), height_px=360),
-        PlotAxis(title="M (kg)"),
+        Plot(series, up=PlotAxis("B3 (kg/m)"), height_px=360),
+        PlotAxis("M (kg)"),
         title="M and B3 together",
         width_px=620,
         described="Joint 95 % regions of M and B3 with and without a start delay, and the estimates of each tow.",
@@ -472,15 +469,15 @@ def model_chart(models: Sequence[FittedModel]) -> ChartSpec:
         "aic:Q": "AIC above the lowest",
     }
     mass_rows = RowPlot(
-        rows=rows,
-        across=PlotAxis(title="M with its 95 % interval (kg)"),
+        rows,
+        across=PlotAxis("M with its 95 % interval (kg)"),
         shown=shown,
         look=series_look(verdicts, as_points=verdicts),
     )
     rank_rows = replace(
         mass_rows,
         rows=[row | {"v": row["aic"], "low": None} for row in rows],
-        across=PlotAxis(title="AIC above the lowest", zero=True),
+        across=PlotAxis("AIC above the lowest", zero=True),
         side={"labels": False},
     )
     masses, ranks = (row_layers(each, span_px=2, size=70, strokeWidth=2) for each in (mass_rows, rank_rows))

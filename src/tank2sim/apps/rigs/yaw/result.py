@@ -37,9 +37,9 @@ if TYPE_CHECKING:
 
 _NORMAL = 1.959964
 _SIGNALS = (
-    Signal(name="rate", title="yaw rate", unit="rad/s"),
-    Signal(name="error", title="tracking error", unit="rad"),
-    Signal(name="current", title="motor current", unit="A"),
+    Signal("rate", "yaw rate", "rad/s"),
+    Signal("error", "tracking error", "rad"),
+    Signal("current", "motor current", "A"),
 )
 
 
@@ -204,28 +204,28 @@ class YawResult(Result[YawStudy]):
         bias /= best.total_inertia_kgm2
         return [
             KeyFigure(
-                label="Added yaw inertia" if kind == "added" else "Yaw inertia",
-                value=float(f"{1e4 * inertia:.5g}"),
-                unit="10⁻⁴ kg m²",
+                "Added yaw inertia" if kind == "added" else "Yaw inertia",
+                float(f"{1e4 * inertia:.5g}"),
+                "10⁻⁴ kg m²",
                 note="energy least squares" + (f", ± {1e4 * error:.2g}" if error is not None else ""),
             ),
             KeyFigure(
-                label="Dissipation B + D",
-                value=float(f"{1e4 * best.dissipation_J:.4g}"),
-                unit="10⁻⁴ J",
+                "Dissipation B + D",
+                float(f"{1e4 * best.dissipation_J:.4g}"),
+                "10⁻⁴ J",
                 note=f"± {1e4 * (best.dissipation_standard_error_J or 0):.2g}",
             ),
             KeyFigure(
-                label="Bias of the two-interval formula",
-                value=float(f"{bias:.2g}"),
-                unit="%",
+                "Bias of the two-interval formula",
+                float(f"{bias:.2g}"),
+                "%",
                 note="of the total inertia",
                 verdict=Verdict.CAUTION if abs(bias) > 1 else Verdict.NONE,
             ),
             KeyFigure(
-                label="Mirror images differ by",
-                value=float(f"{100 * max(self.study.mirror_difference):.3g}"),
-                unit="%",
+                "Mirror images differ by",
+                float(f"{100 * max(self.study.mirror_difference):.3g}"),
+                "%",
                 note="of the largest rate, in the worst pair",
             ),
         ]
@@ -240,7 +240,7 @@ class YawResult(Result[YawStudy]):
         ]
         sections = [
             Section(
-                heading="Estimates by method",
+                "Estimates by method",
                 text=_ESTIMATES,
                 tables=[_estimates(study.methods)],
                 charts=[
@@ -248,7 +248,7 @@ class YawResult(Result[YawStudy]):
                 ],
             ),
             Section(
-                heading="Energy balance",
+                "Energy balance",
                 text=_BALANCE,
                 tables=[_friction(study.methods)],
                 charts=[
@@ -256,11 +256,11 @@ class YawResult(Result[YawStudy]):
                     _chart(_energy_residual_chart(study.energy_residuals), "", "energy_balance"),
                 ],
             ),
-            Section(heading="Record and programme", text="The rate is shown where it is evaluated.", charts=records),
+            Section("Record and programme", text="The rate is shown where it is evaluated.", charts=records),
         ]
         if study.angle_residual is not None:
             chart = _chart(_angle_residual_chart(study.angle_residual), "", "nonlinear_least_squares")
-            sections.append(Section(heading="Nonlinear least squares", text=_ANGLE, charts=[chart]))
+            sections.append(Section("Nonlinear least squares", text=_ANGLE, charts=[chart]))
         if study.theory:
             rows: list[list[Cell]] = [
                 [value.formula, 1e4 * value.value_kgm2, _scaled(value.printed_kgm2), value.remark]
@@ -268,12 +268,12 @@ class YawResult(Result[YawStudy]):
             ]
             heads = ("formula", "added inertia (10⁻⁴ kg m²)", "published, Table 1 (10⁻⁴ kg m²)", "remark")
             caption = "Added inertia from the form, by (7), (8) and (9) of Alyshev (2019)"
-            sections.append(Section(heading="Theory", tables=[table(caption, heads, rows, digits=5)]))
+            sections.append(Section("Theory", tables=[table(caption, heads, rows, digits=5)]))
         return sections
 
 
 def _chart(chart: Any, caption: str, name: str) -> Illustration:
-    return Illustration(chart=chart, caption=caption, name=name)
+    return Illustration(chart, caption=caption, name=name)
 
 
 def _scaled(value: float | None) -> float | None:
@@ -295,13 +295,13 @@ def _estimates(methods: Mapping[str, YawMethodEstimate]) -> Table:
         for method, found in methods.items()
     ]
     columns = [
-        Column(title="method"),
-        Column(title="added inertia", unit="10⁻⁴ kg m²", digits=5),
-        Column(title="±", digits=3),
-        Column(title="total inertia", unit="10⁻⁴ kg m²", digits=5),
-        Column(title="B + D", unit="10⁻⁴ J"),
-        Column(title="±", digits=3),
-        Column(title="bias", unit="10⁻⁴ kg m²", digits=3),
+        Column("method"),
+        Column("added inertia", "10⁻⁴ kg m²", digits=5),
+        Column("±", digits=3),
+        Column("total inertia", "10⁻⁴ kg m²", digits=5),
+        Column("B + D", "10⁻⁴ J"),
+        Column("±", digits=3),
+        Column("bias", "10⁻⁴ kg m²", digits=3),
     ]
     notes = [f"{method.replace('_', ' ')}: {_HOW[method]}." for method in methods]
     return table("Estimates with standard errors", columns, rows, *notes, folded=True)
@@ -329,7 +329,7 @@ def _record_chart(name: str, columns: Columns) -> ChartSpec:
     shown = {"rate": "rate_radps", "error": "tracking_error_rad", "current": "current_A"}
     runs = {name: shown, "programme": {"rate": "programme_rate_radps"}}
     histories = [
-        History(label=label, time_s=columns["t_s"], values={key: columns[column] for key, column in signals.items()})
+        History(label, time_s=columns["t_s"], values={key: columns[column] for key, column in signals.items()})
         for label, signals in runs.items()
     ]
     return history_chart(histories, _SIGNALS, title=f"{name}: programme and record")
@@ -350,7 +350,7 @@ def _balance_chart(balance: EnergyBalance) -> ChartSpec:
         points = [{"part": place, "run": "motor", "v": plain(1e3 * value)} for place, value in motor]
         place = {
             "x": channel("part:O", title=f"{name}: part of the interval", axis={"labelAngle": 0}),
-            "y": PlotAxis(title="work (mJ)", zero=True).channel("v"),
+            "y": PlotAxis("work (mJ)", zero=True).channel("v"),
             "color": look.colour,
             "tooltip": tooltips({"run:N": "spent on", "part:O": "part", "v:Q": "work (mJ)"}),
         }
@@ -384,9 +384,9 @@ def _estimates_chart(methods: Mapping[str, YawMethodEstimate]) -> ChartSpec:
     words = f"{kind} inertia"
     return row_chart(
         RowPlot(
-            rows=rows,
-            across=PlotAxis(title=f"{words} (10⁻⁴ kg m²)"),
-            rules=[Rule(at=[rows[0]["v"]], dash=(4, 3))],
+            rows,
+            across=PlotAxis(f"{words} (10⁻⁴ kg m²)"),
+            rules=[Rule([rows[0]["v"]], dash=(4, 3))],
             side={"labelLimit": 260},
             shown={"name:N": "method", "v:Q": "10⁻⁴ kg m²", "low:Q": "from", "high:Q": "to"},
         ),
@@ -407,16 +407,16 @@ def _energy_residual_chart(residuals: Sequence[EnergyResidual]) -> ChartSpec:
         for one in residuals
     ]
     look = series_look(["accelerating", "braking"], as_points=["accelerating", "braking"])
-    up = PlotAxis(title="work left over (µJ)", zero=True).channel("v")
+    up = PlotAxis("work left over (µJ)", zero=True).channel("v")
     place = {
-        "x": PlotAxis(title="mean rate of the subinterval (deg/s)").channel("x"),
+        "x": PlotAxis("mean rate of the subinterval (deg/s)").channel("x"),
         "y": up,
         "color": look.colour,
         "shape": look.shape,
         "tooltip": tooltips({"run:N": "interval", "hump:O": "hump", "v:Q": "left over (µJ)"}),
     }
     return layered(
-        [Rule(at=[0.0]).layer(up), layer("point", rows, place)],
+        [Rule([0.0]).layer(up), layer("point", rows, place)],
         size=(720, 220),
         title="Residuals of the energy balance",
         description="Work that the energy least squares do not explain, by subinterval.",
@@ -425,8 +425,6 @@ def _energy_residual_chart(residuals: Sequence[EnergyResidual]) -> ChartSpec:
 
 def _angle_residual_chart(residual: Columns) -> ChartSpec:
     """Residual angle of the integrated equation over time."""
-    history = History(
-        label="integrated less measured", time_s=residual["t_s"], values={"left": residual["residual_rad"]}
-    )
-    signal = Signal(name="left", title="angle, integrated less measured", unit="rad")
+    history = History("integrated less measured", time_s=residual["t_s"], values={"left": residual["residual_rad"]})
+    signal = Signal("left", "angle, integrated less measured", "rad")
     return history_chart([history], [signal], title="Residuals of the nonlinear least squares")
