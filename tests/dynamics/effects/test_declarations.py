@@ -28,7 +28,7 @@ OTHER_MEANINGS = {
     '"trim" in function': "part of the name of a generated function",
     'lacking("trim"': "caution on the trim of a towed model",
     '"trim",': "the same caution",
-    'name="current"': "current of a motor",
+    'Signal("current"': "current of a motor",
     '"current": "current_A"': "the same",
     '"wind" if true else': "part of the name of a quantity of a log",
     'quantity.startswith("wind")': "the same",
