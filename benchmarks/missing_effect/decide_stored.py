@@ -64,7 +64,7 @@ def read(folder: Path, truth: Path) -> list[Stored]:
 
 
 def judged(stored: list[Stored], price: float, temper: float) -> np.ndarray:
-    """Of each search: whether the first set is right, is among the named, holds a wrong name, and its probability."""
+    """A row a search: whether the first set is right, is among the named, holds a wrong name, and its probability."""
     rows = []
     for one in stored:
         named, probability, strange = one.decided(price, temper)

@@ -38,7 +38,7 @@ needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not i
 
 
 def self_tests(ship: PlainShip, folder: Path, *compiler: str) -> Iterator[tuple[bool, Done, Done]]:
-    """Of double and of float: whether it is float, and how compiler and self test ended."""
+    """A row for each precision: whether it is single, and how compiler and self test ended."""
     written(ship, folder)
     for single in (False, True):
         done = call(*compiler, *macro(ship, single), "ship.c", "self_test.c", "-lm", "-o", "run", folder=folder)

@@ -27,7 +27,7 @@ SETS = ((), (0,), (1,), (2,), (0, 1), (0, 2), (1, 2))
 
 
 def said(theta) -> module.Decision:
-    """Of the toy with some forces hidden, all single ones and pairs fitted."""
+    """The decision on the toy with some forces hidden, all single ones and pairs fitted."""
     of = judge(toy_motion(theta), spread=1.0)
     fits = [
         of.at_best(Toy((None,) * len(indices), indices=indices), np.full(len(indices), 0.1), [LOGS], [0, 8])

@@ -87,7 +87,7 @@ def test_a_burst_at_the_end_of_a_short_run_ends_with_it() -> None:
 
 @pytest.mark.parametrize("period", [8.3, 21.0, 60.0])
 def test_a_line_in_all_trials_is_a_period(period: float) -> None:
-    """Of a phase of its own in each, in one of six signals and as large as its noise: no passage stands out."""
+    """Its phase differs between trials; it is in one of six signals, as large as the noise: no passage stands out."""
     t = BLOCK_S * np.arange(BLOCKS)
     added = np.zeros((RUNS, BLOCKS, NY))
     added[..., 4] = np.sin(2 * np.pi * t / period + np.arange(RUNS)[:, None])

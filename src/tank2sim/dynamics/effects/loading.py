@@ -34,7 +34,7 @@ less: the blades come out of the water. Project choice."""
 
 
 def mean_draught(card: SteeredCard) -> float | None:
-    """Mean draught of a card's ship, m: that of its effect ``loading``, else its own; None without either."""
+    """Mean draught of a card's ship, m, by its effect ``loading``, else as stated; None without either."""
     loaded = (entry.parameters for entry in card.effects if entry.name == LOADING.name)
     return next((one["mean_draught_m"] for one in loaded), card.ship.draught_m)
 

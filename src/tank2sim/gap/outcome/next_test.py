@@ -27,6 +27,7 @@ from tank2sim.gap.outcome.next_test_candidates import (
 )
 from tank2sim.gap.proof.open_loop import COARSEST, INSTANTS, delays_of, shown_by
 from tank2sim.gap.result import NextTest
+from tank2sim.gap.search.decision import PRICE
 from tank2sim.identification.trials.problem.estimation_problem import driven_model
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS, means_of_held
 from tank2sim.simulation.rows import RowFunction
@@ -35,9 +36,6 @@ from tank2sim.simulation.scheme import runge_kutta_step
 LENGTH = 24.0
 """Length of a test, L/u0: a turn with 35 deg goes round once and a half, a zigzag reverses four times (project
 choice)."""
-
-DECIDES = 10.0
-"""Gain of the score that decides, as for naming an effect."""
 
 AS_GOOD = 0.9
 """The first listed manoeuvre with this share of the best score is chosen: standard ones are listed first (project
@@ -203,7 +201,7 @@ def _from_rivals(predictions: Sequence[WindowPrediction]) -> Array:
 
 def _decides(each: Array) -> bool:
     """True if a manoeuvre distinguishes the first explanation from every other (rivals, c)."""
-    return bool((each.min(axis=0) >= DECIDES).any())
+    return bool((each.min(axis=0) >= PRICE).any())
 
 
 def _best_and_least(scores: Array) -> tuple[int, int]:
@@ -260,13 +258,13 @@ def _why(best: Candidate, names: Sequence[str], each: Array, least: tuple[float,
     """Reason for a manoeuvre: the root of a score is a difference in standard deviations of the noise."""
     first, *rivals = ("the card alone" if name == "none" else name.replace("_", " ") for name in names)
     apart = " and ".join(f"{math.sqrt(score):.2g} from {name}" for score, name in zip(each, rivals, strict=True))
-    if min(each) < DECIDES:
+    if min(each) < PRICE:
         text = f"No manoeuvre considered would distinguish {first} for sure; nearest is {best.name}."
     else:
         text = f"The explanations are distinguished best by {best.name}."
     little = math.sqrt(max(least[0], 0.0))
     text += (
-        f" There the prediction by {first} differs by {apart}; {math.sqrt(DECIDES):.2g} would decide. The unit is the "
+        f" There the prediction by {first} differs by {apart}; {math.sqrt(PRICE):.2g} would decide. The unit is the "
         "standard deviation of the noise of all readings together, beyond the uncertainty of the parameters. The least "
         f"informative manoeuvre, {least[1].name}, would give {f'{little:.2g}' if little > 0.01 else 'less than 0.01'}."
     )

@@ -76,7 +76,7 @@ def gap_notices(
 
 
 def _of_names(card: ManoeuvringCard, judged: Judged, *, held_out: bool) -> list[Notice]:
-    """Of effects that are withheld, fitted to trials held out, or on the card."""
+    """Notices of effects that are withheld, fitted to trials held out, or on the card."""
     notices = []
     if judged.withheld:
         notices.append(

@@ -68,13 +68,11 @@ def _changes(card: ManoeuvringCard, name: str, errors: Mapping[str, float]) -> A
     columns = []
     for amplitude in absent:
         values = {**typical, **absent, amplitude: typical[amplitude]}
-        after = {term: value for term, value, *_ in changed_derivatives(card, name, values, {})}
-        columns.append(
-            [
-                (after.get(term, card.derivatives.get(term, 0.0)) - card.derivatives.get(term, 0.0)) / error
-                for term, error in errors.items()
-            ]
-        )
+        change = {
+            term: after - card.derivatives.get(term, 0.0)
+            for term, after, *_ in changed_derivatives(card, name, values, {})
+        }
+        columns.append([change.get(term, 0.0) / error for term, error in errors.items()])
     return np.array(columns, dtype=float).reshape(len(columns), len(errors)).T
 
 
@@ -131,7 +129,7 @@ def _within_bounds(
 
 
 def _with_masses_held(estimates: CoefficientEstimates) -> CoefficientEstimates:
-    """The estimates of all others where the added masses are those of the card: a conditional normal distribution."""
+    """The other estimates with the card's added masses: a conditional normal distribution."""
     held = np.array([name.removeprefix("derivatives.") in ACCELERATION_TERMS for name in estimates.names])
     change, covariance = estimates.change, estimates.covariance
     gain = covariance[np.ix_(~held, held)] @ np.linalg.pinv(covariance[np.ix_(held, held)])

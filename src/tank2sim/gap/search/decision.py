@@ -13,10 +13,10 @@ probable: where the innovations of the best are not noise, a name would be a gue
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import softmax
 from scipy.stats import chi2, norm
 
 from tank2sim.dynamics.effects import EFFECTS
@@ -97,21 +97,18 @@ def decide(search: Search, false_discovery: float = 1 - LIKELY) -> Decision:
     probabilities = posterior(compared)
     ranked = sorted(compared, key=lambda fit: -probabilities[fit.hypothesis.effects])
     best = ranked[0]
-    sure = Decision(MISSING, best, (), probabilities)
-    if not best.hypothesis.effects:
-        sure = Decision(NO_EFFECT_MISSING, best, (), probabilities)
-    elif sure.probability_of_all(best.hypothesis.effects) < 1 - false_discovery:
+    effects, strange = best.hypothesis.effects, find_strangeness(search.likelihood, best)
+    decision = Decision(MISSING if effects else NO_EFFECT_MISSING, best, (), probabilities, strange)
+    if effects and decision.probability_of_all(effects) < 1 - false_discovery:
         listed = np.cumsum([probabilities[fit.hypothesis.effects] for fit in ranked])
         rivals = ranked[1 : max(int(np.searchsorted(listed, LISTED)) + 1, 2)]
-        sure = Decision(AMBIGUOUS, best, tuple(rivals), probabilities)
-    strange = find_strangeness(search.likelihood, best)
-    return Decision(OUTSIDE_LIBRARY, best, sure.alike, probabilities, strange) if strange else sure
+        decision = replace(decision, verdict=AMBIGUOUS, alike=tuple(rivals))
+    return replace(decision, verdict=OUTSIDE_LIBRARY) if strange else decision
 
 
 def posterior(fits: list[ExplanationFit]) -> dict[tuple[str, ...], float]:
     """Probability of each explanation, by its effects; they sum to 1."""
-    logs = np.array([-0.5 * (fit.score + PRICE * len(fit.hypothesis.effects)) / TEMPER for fit in fits])
-    shares = np.exp(logs - logsumexp(logs))
+    shares = softmax([-0.5 * (fit.score + PRICE * len(fit.hypothesis.effects)) / TEMPER for fit in fits])
     return {fit.hypothesis.effects: float(share) for fit, share in zip(fits, shares, strict=True)}
 
 

@@ -313,7 +313,7 @@ def _polish(fitting: Fitting) -> None:
 
 
 def _at_the_noise_of(best: ExplanationFit, fits: Sequence[ExplanationFit]) -> list[Proposal]:
-    """Each single effect of the best, and all others from their own parameters and from those of the best."""
+    """Each single effect of the best, and all others from their own parameters and from the parameters of the best."""
     best_thetas, each = thetas_of(best), best.hypothesis.each
     begins = [({name: theta}, each) for name, theta in best_thetas.items() if len(best_thetas) > 1]
     for fit in fits:
