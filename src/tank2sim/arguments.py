@@ -103,6 +103,9 @@ Effects = Annotated[int, ArgumentBounds(1, MOST_EFFECTS, whole=True)]
 FalseDiscovery = Annotated[float, ArgumentBounds(0.01, 0.5)]
 """Probability with which an effect that is named alone may be wrong: from the one that even the surest name has
 (:data:`tank2sim.gap.search.decision.SUREST`) to a guess."""
+FALSE_DISCOVERY = 0.2
+"""That probability where none is given. Project choice: a name that is wrong more often than once in five is given with
+what else it could be."""
 Count = Annotated[int, ArgumentBounds(1, whole=True)]
 ENSEMBLE = ArgumentBounds(0, 10_000_000, whole=True)
 """Ships of an ensemble. Project choice: a day of computing."""

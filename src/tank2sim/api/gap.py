@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from tank2sim.api.verbs import Progress, Written, verb
-from tank2sim.arguments import MOST_EFFECTS, Count, Effects, FalseDiscovery
+from tank2sim.arguments import FALSE_DISCOVERY, MOST_EFFECTS, Count, Effects, FalseDiscovery
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,7 +33,7 @@ def find_gap(
     effects: Sequence[str] = (),
     without: Sequence[str] = (),
     max_effects: Effects = MOST_EFFECTS,
-    false_discovery: FalseDiscovery = 0.5,
+    false_discovery: FalseDiscovery = FALSE_DISCOVERY,
     force: bool = False,
     executor: str = "processes",
     workers: Count | None = None,

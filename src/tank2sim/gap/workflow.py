@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from tank2sim.arguments import MOST_EFFECTS
+from tank2sim.arguments import FALSE_DISCOVERY, MOST_EFFECTS
 from tank2sim.cards.card import Card, ManoeuvringCard
 from tank2sim.cards.examination import doubts
 from tank2sim.cards.form import EffectEntry
@@ -48,7 +48,7 @@ from tank2sim.gap.result import (
     Passed,
     Rival,
 )
-from tank2sim.gap.search.decision import LIKELY, PRICE, Decision, decide
+from tank2sim.gap.search.decision import PRICE, Decision, decide
 from tank2sim.gap.search.detection_limit import could_hide
 from tank2sim.gap.search.explanations import CLOSE, Search, search
 from tank2sim.identification.trials.assessment.other_ship import evidence_of_other_ship, not_of_ship
@@ -90,7 +90,7 @@ class GapOptions:
     without: tuple[str, ...] = ()
     max_effects: int = MOST_EFFECTS
     workers: int | None = None
-    false_discovery: float = 1 - LIKELY
+    false_discovery: float = FALSE_DISCOVERY
     force: bool = False
 
 

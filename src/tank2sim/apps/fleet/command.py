@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from tank2sim.api.verbs import Progress, Written, verb
-from tank2sim.arguments import MOST_EFFECTS, Count, Effects, FalseDiscovery
+from tank2sim.arguments import FALSE_DISCOVERY, MOST_EFFECTS, Count, Effects, FalseDiscovery
 from tank2sim.bundled import bundled_cards
 from tank2sim.notices import Notice
 
@@ -39,7 +39,7 @@ def find_gaps(
     effects: Sequence[str] = (),
     without: Sequence[str] = (),
     max_effects: Effects = MOST_EFFECTS,
-    false_discovery: FalseDiscovery = 0.5,
+    false_discovery: FalseDiscovery = FALSE_DISCOVERY,
     force: bool = False,
     again: bool = False,
     executor: str = "processes",

@@ -19,6 +19,7 @@ import numpy as np
 from scipy.special import softmax
 from scipy.stats import chi2, norm
 
+from tank2sim.arguments import FALSE_DISCOVERY
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.diagnosis.residuals import estimates
 from tank2sim.gap.diagnosis.strangeness import Strange, find_strangeness
@@ -83,7 +84,7 @@ class Decision:
         return float(min(sum(p for effects, p in self.probabilities.items() if {*names} <= {*effects}), SUREST))
 
 
-def decide(search: Search, false_discovery: float = 1 - LIKELY) -> Decision:
+def decide(search: Search, false_discovery: float = FALSE_DISCOVERY) -> Decision:
     """Return the verdict that the scores of a search support.
 
     Parameters
