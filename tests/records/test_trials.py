@@ -132,7 +132,7 @@ def test_a_sample_lost_from_a_record_of_marin_is_not_papered_over(write):
     [
         (HSVA.replace("HSVA,", "SSPA,"), "line 1: is not a record of MARIN or HSVA"),
         (HSVA.replace(" 1.5 ", " x "), "line 6, column x_m: 'x' is not a number"),
-        (HSVA.replace(" 1.5 ", " "), "line 6: the number of cells is 11, and that of columns 12"),
+        (HSVA.replace(" 1.5 ", " "), "line 6: there are 11 cells for 12 columns"),
         (HSVA[:100], "has no rows of measured values"),
     ],
 )

@@ -1,8 +1,8 @@
 """Motions and mean drift forces of a hull in regular waves, computed from its mesh by the extra ``tank2sim[waves]``.
 
 Capytaine (Ancellin and Dias 2019, Capytaine: a Python-based linear potential flow solver, Journal of Open Source
-Software 4, 1341) solves diffraction and radiation at rest in deep water; its mean drift is that of the far field, after
-Maruo (1960) and Newman (1967).
+Software 4, 1341) solves diffraction and radiation at rest in deep water; its mean drift is computed in the far field,
+after Maruo (1960) and Newman (1967).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ DIRECTIONS_DEG = tuple(float(angle) for angle in range(0, 181, 15))
 """Directions of a table, deg: drift forces and motions change little within 15 deg. Project choice."""
 
 FREQUENCIES, LONGEST, SHORTEST = 24, 12.0, 0.125
-"""Frequencies of a table, from waves of 12 L to those of L/8 or as short as the mesh can show: project choice."""
+"""Frequencies of a table, from waves of 12 L to L/8 or as short as the mesh can show: project choice."""
 
 ROLL_GYRADIUS, ROLL_DAMPING = 0.375, 0.05
 """Radius of gyration in roll over the beam, and damping of roll by friction and eddies over the critical one, in
@@ -47,9 +47,9 @@ class HullInWaves:
     """What the mesh does not show of a hull, and what is to be computed.
 
     `metacentric_height_m`: GM, m; `roll_gyradius_m`, `pitch_gyradius_m`: radii of gyration about the centre of gravity,
-    m; that of yaw is taken as that of pitch; `roll_damping`: damping of roll over the critical one, in addition to that
-    by waves; `frequencies_radps`: rising; by default :data:`FREQUENCIES` of them; `directions_deg`: from 0 to 180 in
-    equal steps, the direction from which the waves come, clockwise from the bow.
+    m; the yaw radius is taken as the pitch radius; `roll_damping`: damping of roll over the critical one, in addition
+    to that by waves; `frequencies_radps`: rising; by default :data:`FREQUENCIES` of them; `directions_deg`: from 0 to
+    180 in equal steps, the direction from which the waves come, clockwise from the bow.
     """
 
     metacentric_height_m: float

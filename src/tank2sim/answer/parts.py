@@ -205,7 +205,7 @@ def records_table(
     """Return a table with one row a record (a dataclass); its fields are the columns, with units from their names.
 
     `first`: head of the names of records that are a mapping; `fields`: those to show, by default all; a mapping also
-    gives the words of each ("" for those of its name); **options: as of :func:`table`.
+    gives the words of each ("" to use its name); **options: as of :func:`table`.
     """
     values = list(records.values()) if isinstance(records, Mapping) else list(records)
     words = dict(fields) if isinstance(fields, Mapping) else dict.fromkeys(fields, "")

@@ -96,7 +96,7 @@ class Result(ABC, Generic[_S]):
         Raises
         ------
         InputError
-            The values are not those of such a result; the key is named.
+            The values do not make such a result; the key is named.
         """
         from tank2sim.answer.study import read_study
 

@@ -92,7 +92,7 @@ def autopilot(
     course_change_deg : float
         Change of course to try, deg, + to starboard.
     current_mps : float, optional
-        Current towards east, m/s; by default that of a fresh breeze, by Froude's law.
+        Current towards east, m/s; by default as in a fresh breeze, by Froude's law.
     wind_mps : float, optional
         Wind from north-east, m/s; the ship steers north.
     wave_yaw_deg : float, optional

@@ -183,7 +183,7 @@ def _read(
 
 
 def _kinds(path: Path, type_name: str | None, sheet: RunSheet | None) -> list[RunType]:
-    """Types of run to try: the one that is asked for, else that of the campaign."""
+    """Types of run to try: the one asked for, else the campaign's."""
     from tank2sim.records.campaign_form import RUN_TYPES
 
     if type_name is None and sheet is None:

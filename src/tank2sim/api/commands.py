@@ -1,4 +1,4 @@
-"""Commands by name: verbs of the core, and by entry points those of the apps and of other packages."""
+"""Commands by name: verbs of the core, and by entry points commands of the apps and of other packages."""
 
 from __future__ import annotations
 

@@ -198,7 +198,7 @@ def find_influence(
 ) -> InfluenceResult:
     """Find by how many per cent figures of a ship change for 10 % more of each number on its card.
 
-    The coefficients are those of exact slopes and of a difference of 10 %. On the command line the models of a steering
+    The coefficients come from exact slopes and from a difference of 10 %. On the command line the models of a steering
     card (``poznyakov-yudin``) are compared, and a card can be tuned.
 
     Parameters

@@ -21,7 +21,7 @@ SHOWN_ENDINGS = (".html", ".htm", ".svg", ".png")
 
 @verb("one page of any result", page_required=True, name="report")
 def make_report(result: Mapping[str, object] | str | Path) -> Result[Any]:
-    """Read a result back: its page, tables and charts are those of the command that wrote it.
+    """Read a result back: its page, tables and charts equal the output of the command that wrote it.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ from tank2sim.files import schema_command, schema_name
 
 
 def result_classes(command: str) -> list[type[Result[Any]]]:
-    """Return the classes of the results of a command, those of its variants last; empty if it writes none."""
+    """Return the result classes of a command, its variants' last; empty if it writes none."""
     if (verb := VERBS.get(command)) is None:
         return []
     found: dict[type[Result[Any]], None] = {}

@@ -97,7 +97,7 @@ class TrialRecord:
         segment_s: float | None = None,
         filter: str | None = None,
     ) -> Result[Any]:
-        """Statistics and spectra of the columns, and a `filter`; parameters are those of :func:`tank2sim.signals`."""
+        """Statistics and spectra of the columns, and a `filter`; parameters as for :func:`tank2sim.signals`."""
         result: Result[Any] = VERBS["signals"].function(
             self, columns, max_gap_s=max_gap_s, segment_s=segment_s, filter=filter
         )
@@ -209,7 +209,7 @@ def _files(path: Path) -> list[Path]:
 def fitted_and_held(
     trials: TrialPaths, holdout: TrialPaths, card: ManoeuvringCard, *, report_unused: bool = True
 ) -> tuple[Measured, Measured]:
-    """Trials to be fitted and those of `holdout`, at the size of the card's ship.
+    """Trials to be fitted and the trials of `holdout`, at the size of the card's ship.
 
     `report_unused`: whether a notice says that a wind or depth was measured which no effect of the card uses. Raises
     InputError: a file is at fault (:func:`tank2sim.identification.trials.problem.prepare_trials.measured`), or two have

@@ -324,7 +324,7 @@ CROSS_FLOW_AT_RUDDER = (("l_R", "gamma_R_plus", "gamma_R_minus"), ("C_Rv", "C_Rr
 """The keys of either form of the cross flow to the rudder."""
 
 TORQUE_COEFFICIENTS = ("q_0", "q_1", "q_2", "eta_R")
-"""Keys of what the torque alone depends on, of which no motion shows anything."""
+"""Keys that only the torque depends on; no motion shows them."""
 
 PROPELLER_COEFFICIENTS = (
     *("k_0", "k_1", "k_2", "t_P", "w_P0", "x_P"),

@@ -82,7 +82,7 @@ class CoefficientTable:
     speed_scale : str, optional
         As the file states it: ``instantaneous`` or ``nominal``.
     assumed : tuple of str
-        Sizes that the file does not have: those of an ordinary ship of its length.
+        Sizes that the file lacks, taken from an ordinary ship of its length.
     """
 
     source: str
@@ -114,7 +114,7 @@ def read_coefficients(path: str | Path) -> CoefficientTable:
     Raises
     ------
     InputError
-        The file is missing or not of this form, a name is not that of a derivative, or a size is missing.
+        The file is missing or not of this form, a name is not a derivative, or a size is missing.
     """
     source = str(path)
     text = read_text(Path(path)).removeprefix(BYTE_ORDER_MARK)
@@ -183,13 +183,13 @@ def _table(stated: Mapping[str, Any], printed: Mapping[str, Any], source: str, s
         **sizes,
     )
     if not 0.2 <= table.block <= 1.0:
-        problem = f"is that of a block coefficient of {table.block:.3g}"
+        problem = f"means a block coefficient of {table.block:.3g}"
         raise InputError(source, "displacement_kg", problem, "check length_m, beam_m, draught_m and displacement_kg")
     return table
 
 
 def _assume_sizes(sizes: dict[str, Any], water: Environment) -> tuple[str, ...]:
-    """Add the sizes that are lacking, those of an ordinary ship; their keys."""
+    """Add missing sizes from an ordinary ship; return their keys."""
     assumed = tuple(key for key in ("beam_m", "draught_m") if key not in sizes)
     sizes.setdefault("beam_m", sizes["length_m"] / _LENGTH_TO_BEAM)
     sizes.setdefault("draught_m", sizes["beam_m"] / _BEAM_TO_DRAUGHT)

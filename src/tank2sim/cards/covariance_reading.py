@@ -21,7 +21,7 @@ from tank2sim.files import BYTE_ORDER_MARK, named_in, parsed_json, read_text
 from tank2sim.notices import Notice
 
 _ROUNDING = 0.006
-"""Share by which a standard error of the card, three figures, may differ from that of the covariance."""
+"""Share by which a standard error of the card, three figures, may differ from the covariance."""
 
 NEGATIVE = 1e-8
 """Share of the largest eigenvalue of the correlations by which rounding may make one negative (project choice)."""
@@ -82,7 +82,7 @@ def read_covariance(card: Card) -> Covariance | None:
     ------
     InputError
         The file is missing or no covariance (shape, names of the card, symmetric, positive semidefinite up to
-        rounding), or its standard errors are not those of the card.
+        rounding), or its standard errors differ from the card's.
     """
     if card.covariance is not None:
         return card.covariance
@@ -114,7 +114,7 @@ def _form(path: Path) -> tuple[list[str], object, object]:
 
 
 def _samples(path: Path, matrix: Array, rows: object) -> Array:
-    """Samples (n, k) whose variances are those of the covariance, up to their own scatter."""
+    """Samples (n, k) with the variances of the covariance, up to sampling scatter."""
     samples = _table(rows)
     remedy = "write it again with identify, or take the samples out"
     if samples.ndim != 2 or samples.shape[1] != len(matrix) or len(samples) < 2 or not np.isfinite(samples).all():
@@ -242,5 +242,5 @@ def derived_card(card: Card, text: str, source: str) -> tuple[Card, tuple[Notice
     if len(kept.names) == len(known.names):
         return found, ()
     changed = ", ".join(name.removeprefix("derivatives.") for name in known.names if name not in kept.names)
-    notice = f"the covariance of {source} is that of {len(kept.names)} numbers, moved by {HOLDS:g} standard error"
+    notice = f"the covariance of {source} covers {len(kept.names)} numbers, moved by {HOLDS:g} standard error"
     return found, (Notice(f"{notice} at most; errors of the others are independent now: {changed}"),)

@@ -86,7 +86,7 @@ class ShipSection(BodySection):
 
 
 class Environment(CardSection):
-    """``[environment]``: water, air and gravity; the defaults are those of the card format."""
+    """``[environment]``: water, air and gravity; defaults as in the card format."""
 
     water_density_kgpm3: WaterDensity = 1025.0
     air_density_kgpm3: AirDensity = 1.225
@@ -126,7 +126,7 @@ steady turn (a tanker at full rudder keeps 0.35), for its coefficients do not de
 
 
 class MmgModel(ShipModel):
-    """``[model]`` of an MMG card: its conventions are those of the method, except for the scaling."""
+    """``[model]`` of an MMG card: conventions of the method, except for the scaling."""
 
     kind: Literal["mmg"]
     scaling: Literal["prime", "prime_ii", "bis", "dimensional"] = "prime_ii"
@@ -154,7 +154,7 @@ class CraftModel(CardSection):
     ----------
     kind : str
     speed_mps : float
-        Cruising speed, m/s: that of the start and, with ``scaling = "prime"``, V of the prime system.
+        Cruising speed, m/s, at which runs start; and, with ``scaling = "prime"``, V of the prime system.
     scaling : str
         Scaling of ``[rigid_body]``, ``[derivatives]`` and ``[uncertainty]``: ``dimensional`` is SI.
     valid_speed_mps : pair of float, optional
@@ -295,7 +295,7 @@ class MmgRudder(CardSection):
     Parameters
     ----------
     number : int
-        1, or 2 side by side at ``y_R`` to either side; ``ship.rudder_area_m2`` is that of one.
+        1, or 2 side by side at ``y_R`` to either side; ``ship.rudder_area_m2`` is the area of one.
     height_m : float
         H_R.
     aspect_ratio, f_alpha : float, optional

@@ -57,7 +57,7 @@ def si_card(kind: type[_C], section: str) -> Callable[[BaseModel, str, str, Mapp
     Parameters
     ----------
     kind : type of Card
-        Its fields are called as those of the form.
+        Its fields have the names of the form.
     section : str
         The section of coefficients; ``[uncertainty]`` may name them.
     """
@@ -104,7 +104,7 @@ CARD_KINDS: Registry[CardKind] = Registry(
     ),
     CardKind,
 )
-"""Built-in kinds and those of installed packages."""
+"""Built-in kinds, and kinds from installed packages."""
 
 
 def _ship_card(form: ShipCard, text: str, source: str) -> ManoeuvringCard:

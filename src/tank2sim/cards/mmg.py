@@ -216,8 +216,8 @@ def nominal_revolutions(card: MmgCard, stated: float | None) -> float:
 
 
 _SLENDER_WING = (0.3, 8.0)
-"""Y_v' over that of a slender wing, -pi (d/L)^2 (Jones 1946), between which a hull is: Clarke, Gedling and Hine (1983)
-have 1 + 0.4 C_B B/d, 1.5 to 2.5 times it. Prime II taken for prime, or the other way, is a factor of L/d = 8 to 25. The
+"""Range of Y_v' over the value of a slender wing, -pi (d/L)^2 (Jones 1946): Clarke, Gedling and Hine (1983) have
+1 + 0.4 C_B B/d, 1.5 to 2.5 times it. Prime II taken for prime, or the other way, is a factor of L/d = 8 to 25. The
 bounds are a project choice."""
 
 

@@ -25,7 +25,7 @@ LEVERS = (
 on the hull acts forward of it; drift: 0.23 (Mariner) to 0.44 (KVLCC2)."""
 
 YAW_DAMPING = (0.05, 1.0)
-"""Range of N_r' over that of a slender hull, -pi (d/L)^2. Clarke, Gedling and Hine (1983) have 1/4 + 0.039 B/d -
+"""Range of N_r' over the value of a slender hull, -pi (d/L)^2. Clarke, Gedling and Hine (1983) have 1/4 + 0.039 B/d -
 0.56 B/L times it, 0.2 to 0.4; the KVLCC2 0.24 without and 0.29 with its rudder. The bounds, a factor of three and more
 away, are a project choice: a yaw rate r L/U taken for deg/s makes N_r' about ten times as large, one in rad/s five
 times."""

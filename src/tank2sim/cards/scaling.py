@@ -63,7 +63,7 @@ class Scales:
 
 @dataclass(frozen=True)
 class OtherPrime:
-    """A non-dimensional system in which masses are `scale`/`ship_mass` of those of the prime system, lengths in L.
+    """A non-dimensional system whose masses are `scale`/`ship_mass` times the prime system's, lengths in L.
 
     Each velocity takes one of the two powers of `froude` that a force has. Prime system II of the MMG method has L d in
     place of L^2: `scale` is L/d. Norrbin's bis system (1971, SSPA publication 68), with times in sqrt(L/g) and masses

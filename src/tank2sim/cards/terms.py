@@ -2,7 +2,7 @@
 
 The names that a model has are listed next to its equation (:mod:`tank2sim.dynamics.abkowitz`); this is the grammar
 alone: ``Yvvr`` is the coefficient of v^2 r in Y, ``X0`` a constant, ``Y0u`` the coefficient of Du in Y, ``Kvphiphi``
-that of v phi^2 in the rolling moment K, ``Nrdot`` an acceleration derivative.
+the coefficient of v phi^2 in the rolling moment K, ``Nrdot`` an acceleration derivative.
 """
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ class WaveTable:
     """The table by frequency and direction.
 
     `frequencies` (nf,): rising, rad/s. `directions` (nd,): 0 to pi, rad, evenly spaced. `motions`: motion to complex
-    amplitude (nf, nd) over that of the wave: the real part is in phase with the surface at midships, a positive
+    amplitude (nf, nd) over the wave amplitude: the real part is in phase with the surface at midships, a positive
     imaginary one leads it. `drift`: ``X``, ``Y``, ``N`` to mean force over the square of the wave's amplitude, (nf,
     nd), N/m^2 and N/m.
     """
@@ -75,7 +75,7 @@ def wave_table(columns: Sequence[str], rows: Sequence[Sequence[float]]) -> WaveT
     for name, column in {**motions, **drift}.items():
         along = np.max(np.abs(column[:, [0, -1]]))
         if name in MIRRORED and along > MESH_ASYMMETRY * np.max(np.abs(column)):
-            raise ValueError(f"{name} is not zero in head and following waves, as that of a ship alike to both sides")
+            raise ValueError(f"{name} is not zero in head and following waves, as for a ship with two equal sides")
     return WaveTable(frequencies, np.radians(directions), motions, drift)
 
 

@@ -34,7 +34,7 @@ GROUPS = {
     "Export": ("convert", "convention", "export", "check", "serve"),
     "Show": ("ships", "poster", "pilotcard", "steer", "report", "open", "demo"),
 }
-"""Commands by what people do; those of other packages come last."""
+"""Commands by what people do; other packages' come last."""
 
 COMMANDS = tuple(name for names in GROUPS.values() for name in names)
 """Names of the commands of tank2sim."""

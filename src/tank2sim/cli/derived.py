@@ -311,7 +311,7 @@ def _option(names: Sequence[str], *, name: str = "", **settings: Any) -> click.O
 
 
 def _output_parameters(output: Output) -> list[click.Parameter]:
-    """The option of an output, and those of its keyword arguments."""
+    """The option of an output, and options of its keyword arguments."""
     names = [output.option, "--output"] if output.option == "-o" else [output.option]
     where = _option(names, type=OutputFile(output.endings), metavar=output.metavar, help=output.help,
                     required=output.required)  # fmt: skip

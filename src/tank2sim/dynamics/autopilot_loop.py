@@ -16,7 +16,7 @@ AUTOPILOT_STEERS, AUTOPILOT_ORDER = "autopilot.steers", "autopilot.order"
 def closed_loop_model(ship: Model, autopilot: Model) -> Model:
     """One model of both: each input of the one that has the name of the other's state or quantity is joined to it.
 
-    ``heading.command`` stays an input; outputs are those of both. The equations are those of the two models as they
+    ``heading.command`` stays an input; outputs are taken from both. The equations of the two models stay as they
     are: an input that is joined becomes a quantity ``joint.<name>`` whose value is the signal itself.
 
     Raises
@@ -87,7 +87,7 @@ def ship_steered_by_either(ship: Model, autopilot: Model) -> Model:
 def with_yaw_disturbance(ship: Model) -> Model:
     """The ship with an input ``waves.yaw_acceleration``: the first-order yaw moment of waves over the yaw inertia.
 
-    The moment is that of wave frequency, to which hull damping adds little: its coupling into sway is left out.
+    The moment has wave frequency, to which hull damping adds little: its coupling into sway is left out.
     """
     waves = Input(
         YAW_DISTURBANCE,

@@ -154,7 +154,7 @@ def _exact(card: SteeredCard, name: str, place: str, value: float) -> CardParame
 
 
 def _propulsion(card: SteeredCard) -> list[CardParameter]:
-    """Xnn; the nominal revolutions are also those of the order, and have no influence."""
+    """Xnn; at the nominal revolutions ordered, Xnn has no influence."""
     if card.propulsion is None:
         return []
     factor = float(card.file_scales.force) if card.file_scales else 1.0

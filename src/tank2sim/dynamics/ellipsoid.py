@@ -77,7 +77,7 @@ def lamb_coefficients(a_m: float, b_m: float, c_m: float) -> LambCoefficients:
 
 
 def _turning(semi_axis_m: float, other_axis_m: float, own_factor: float, other_factor: float) -> float:
-    """Added inertia about the third axis over that of the displaced fluid, 1/5 M (a^2 + b^2)."""
+    """Added inertia about the third axis over the inertia of the displaced fluid, 1/5 M (a^2 + b^2)."""
     if abs(semi_axis_m / other_axis_m - 1) < _ROUND:
         return 0.0
     p = (semi_axis_m / other_axis_m) ** 2

@@ -23,7 +23,7 @@ order, an order at the largest angle), where the difference itself would change 
 _KINKED = (ca.OP_FMIN, ca.OP_FMAX, ca.OP_LT, ca.OP_LE)
 
 
-@lru_cache(maxsize=4)  # an export asks for those of one model again and again
+@lru_cache(maxsize=4)  # an export asks for one model's again and again
 def kinks(model: Model) -> tuple[Quantity, ...]:
     """Quantities ``kinks.<quantity>[1]`` and on that change sign where the right-hand side of `model` has a kink.
 

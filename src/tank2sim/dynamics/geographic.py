@@ -9,7 +9,7 @@ with M and N the radii of curvature in the meridian and in the prime vertical at
 Torge & Mueller (2012), Geodesy, 4th ed., 4.1 (M and N) and 6.3 (series of the geodetic direct problem), cut after the
 second order. What is left out grows with the cube of the distance: 10 km away from the origin the position is 0.03 m
 wrong at 60 deg of latitude and 1.1 m at the limit of 85 deg (tests/dynamics/test_geographic.py). Headings count from
-the meridian of the origin; that of the ship differs by y tan(phi0)/N, 0.16 deg at 10 km to east and 60 deg of latitude.
+the meridian of the origin; at the ship it differs by y tan(phi0)/N, 0.16 deg at 10 km to east and 60 deg of latitude.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def geographic(north: ca.SX, east: ca.SX) -> tuple[Variable, ...]:
 
 
 def _position(north: ca.SX, east: ca.SX, origin: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Latitude, and longitude from that of the origin, rad."""
+    """Latitude, and longitude relative to the origin, rad."""
     phi0 = ca.fmax(-HIGHEST_LATITUDE, ca.fmin(HIGHEST_LATITUDE, origin))
     sine, cosine = ca.sin(phi0), ca.cos(phi0)
     eccentricity = FLATTENING * (2 - FLATTENING)  # e^2

@@ -36,7 +36,7 @@ Project choice: forces grow with the square of speed, so 20 % of speed is 44 % o
 
 DRIFT_MARGIN, YAW_RATE_MARGIN, RUDDER_MARGIN = 0.5, 1.0, 0.35
 """Beyond the largest abs(v'), abs(r') and abs(delta) (rad) of the card ``validity`` falls from 1 to 0 over these: those
-of v' and r' are what captive tests usually reach, that of the rudder 20 deg. Project choice."""
+of v' and r' are what captive tests usually reach, and 20 deg of rudder. Project choice."""
 
 
 VALIDITY_FACTOR = "validity_by."
@@ -295,21 +295,21 @@ def force_quantities(
         Quantity(
             "force.X",
             "N",
-            f"Surge force except for that of acceleration, {equations}, positive forward",
+            f"Surge force without the part by acceleration, {equations}, positive forward",
             f1,
             nominal=nominal[0],
         ),
         Quantity(
             "force.Y",
             "N",
-            f"Sway force except for that of acceleration, {equations}, positive to starboard",
+            f"Sway force without the part by acceleration, {equations}, positive to starboard",
             f2,
             nominal=nominal[0],
         ),
         Quantity(
             "force.N",
             "N.m",
-            f"Yaw moment about midships without that of acceleration, {equations}, positive to starboard",
+            f"Yaw moment about midships without the part by acceleration, {equations}, positive to starboard",
             f3,
             nominal=nominal[1],
         ),

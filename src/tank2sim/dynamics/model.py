@@ -229,7 +229,7 @@ class Model:
         return tuple(variable.name for variable in self.parameters)
 
     def input_values(self, changed: Mapping[str, float] | None = None) -> Array:
-        """The input vector u: start values, with those of `changed` (by name) in place of their own.
+        """The input vector u: start values, with the values of `changed` (by name) in place.
 
         Raises
         ------
@@ -255,7 +255,7 @@ class Model:
                 raise InputError(self.origin, variable.name, f"cannot be {value:g} {variable.unit}", remedy)
 
     def parameter_values(self, changed: Mapping[str, float] | None = None) -> Array:
-        """The parameter vector p: start values, with those of `changed` (by name) in place of their own."""
+        """The parameter vector p: start values, with the values of `changed` (by name) in place."""
         return _values(self.parameters, changed or {})
 
     def with_values(self, changed: Mapping[str, float]) -> Model:

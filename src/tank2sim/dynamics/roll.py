@@ -38,7 +38,7 @@ ACCELERATIONS_WITH_ROLL = ("Ypdot", "Kvdot", "Kpdot", "Krdot", "Npdot")
 
 
 def roll_terms(card: ManoeuvringCard) -> list[str]:
-    """Derivatives of a card that only a ship that rolls has; of a linear card those of the first order."""
+    """Derivatives of a card that only a ship that rolls has; of a linear card only the first-order ones."""
     terms = [name for name in card.derivatives if known_term(name).of_roll]
     if card.model.kind != "linear":
         return terms
@@ -183,7 +183,7 @@ def _moment(model: Model, hull: Hull, card: ManoeuvringCard, p: ca.SX, phi: ca.S
     return Quantity(
         "force.K",
         "N.m",
-        "Rolling moment about the origin except for that of acceleration, positive to starboard",
+        "Rolling moment about the origin without the part by acceleration, positive to starboard",
         value,
         nominal=1e6,
     )

@@ -111,7 +111,7 @@ KINDS = {"abkowitz": "third-order (Abkowitz)", "linear": "linear", "mmg": "MMG"}
 
 
 def _derivative_names(card: ManoeuvringCard) -> tuple[list[str], list[Notice]]:
-    """Names of the model's derivatives, and notices on those of the card that it does not use."""
+    """Names of the model's derivatives, and notices on derivatives of the card that it does not use."""
     rolling = [name for name in card.derivatives if known_term(name).of_roll]
     mmg = card.model.kind == "mmg"
     every = MMG_TERMS if mmg else ALL_TERMS

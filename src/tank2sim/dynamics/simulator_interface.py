@@ -126,7 +126,7 @@ def with_external_forces(model: Model) -> Model:
     )
     force = float(mass * speed**2 / length) / 100  # the order of a ship's resistance at the speed of expansion
     length = float(length)
-    at, besides = "at external.point_x, external.point_y", "in addition to that of the force at its point"
+    at, besides = "at external.point_x, external.point_y", "in addition to the moment of the force at its point"
     outside = "Point of the external force"
     described = (
         ("external.X", "N", f"External surge force {at}, positive forward", force),

@@ -229,7 +229,7 @@ def revolutions_for(thrust: ca.SX, along: ca.SX, ahead: ca.SX, astern: ca.SX, lo
     """Revolutions n (rad/s, positive ahead) that give a thrust: the inverse of :func:`thrust_of`.
 
     Ahead, k n^2 - l u_T n = T has one root that is not negative, also where the craft moves astern (u_T < 0). A thrust
-    of 0 is that of a propeller at rest, or of one that turns with the water where the craft moves ahead.
+    of 0 means a propeller at rest, or one that turns with the water where the craft moves ahead.
 
     Parameters
     ----------

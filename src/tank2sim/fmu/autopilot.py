@@ -110,7 +110,7 @@ def _opened(stack: ExitStack, path: Path, names: Sequence[str]) -> tuple[Running
     return stack.enter_context(running(unpacked, "CoSimulation")), signals
 
 
-_REMEDY = "give the FMU of a ship, and that of an autopilot for it"
+_REMEDY = "give the FMU of a ship, and the FMU of an autopilot for it"
 
 
 def _lacking(path: Path, name: str) -> InputError:

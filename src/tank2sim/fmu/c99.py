@@ -108,7 +108,7 @@ def code_prefix(name: str) -> str:
 
 
 def _functions(model: Model) -> dict[str, ca.Function]:
-    """Equations of the FMU by their names in the template; outputs are all those of the model, in its order."""
+    """Equations of the FMU by their names in the template; outputs are all of the model's, in its order."""
     equations = {function.name().removeprefix("model_"): function for function in fmu_equations(model)}
     x, u, p = model.x, model.u, model.p
     outputs = ca.Function("outputs", [x, u, p], [ca.densify(model.output_values)], {"cse": True})

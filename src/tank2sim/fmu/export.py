@@ -153,7 +153,7 @@ def make_fmu(
 
 
 def without_coefficients(model: Model) -> Model:
-    """The model with all parameters as numbers in its equations, except for those of the start and of the place."""
+    """The model with all parameters as numbers in its equations, except for start and place."""
     kept = ("initial.", "origin.")
     return model.with_constants(name for name in model.parameter_names if not name.startswith(kept))
 

@@ -31,8 +31,8 @@ class FmuVariable:
 
     `reference`: value reference, which is also its place in the list of all variables. `causality`, `variability`,
     `initial`: as FMI defines them; `initial` empty where FMI wants none. `start`: start value in `unit`; None where it
-    is calculated. `derivative_of`: value reference of the state of which this is the time derivative. `accepted`:
-    lowest and highest value that an input may be set to; None: those of minimum and maximum.
+    is calculated. `derivative_of`: value reference of the state whose time derivative this is. `accepted`:
+    lowest and highest value that an input may be set to; None: minimum and maximum.
     """
 
     name: str

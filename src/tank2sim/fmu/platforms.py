@@ -26,7 +26,7 @@ class Platform:
 # FMI 2 names no folder for Linux on ARM; aarch64-linux is the extension that its later releases recommend. On a Mac
 # the same folder serves both processors.
 #
-# The oldest systems: glibc 2.17 is that of RHEL 7 and of Python's manylinux2014; macOS 11 is the first on ARM, and
+# The oldest systems: glibc 2.17 is in RHEL 7 and Python's manylinux2014; macOS 11 is the first on ARM, and
 # 10.13 the oldest that Apple's tools still build for when macOS 11 came.
 PLATFORMS = (
     Platform("linux64", "x86_64-linux", CompileTarget("x86_64-linux-gnu.2.17", ".so")),

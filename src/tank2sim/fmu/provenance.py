@@ -29,7 +29,7 @@ class ValueOrigin:
     Parameters
     ----------
     source : str
-        The card's source, with that of the equation for an effect.
+        The card's source, with the equation's source for an effect.
     remark : str
         What the card says next to the value (``# ESTIMATED: ...``); may be empty.
     standard_error : float, optional

@@ -86,8 +86,8 @@ def fmu_equations(model: Model) -> tuple[ca.Function, ...]:
     ``model_constants(p) -> c`` and with them ``model_step(x, u, p, c, h) -> x``, ``model_rates(x, u, p) -> xdot``,
     ``model_outputs(x, u, p) -> y`` (of :func:`other_values`), ``model_initial(p) -> x``,
     ``model_trim_step(x, u, p) -> x`` (the identity if the model cannot be trimmed), and their derivatives:
-    ``model_forward`` (tangents of x, u, p to those of xdot, y), ``model_reverse`` (adjoints of xdot, y to those of x,
-    u, p), ``model_initial_forward``, ``model_trim_forward``.
+    ``model_forward`` (tangents of x, u, p to tangents of xdot, y), ``model_reverse`` (adjoints of xdot, y to adjoints
+    of x, u, p), ``model_initial_forward``, ``model_trim_forward``.
     """
     x, u, p = model.x, model.u, model.p
     dx, du, dp = (ca.SX.sym(f"d{name}", vector.numel()) for name, vector in (("x", x), ("u", u), ("p", p)))

@@ -53,7 +53,7 @@ def ship_with_autopilot(
     are connectors of their component with `every_input` alone: FMPy sets a connector that nothing is joined to to zero,
     also the revolutions, where libcosim and SSP 1.0 keep the start values. They are not connectors of the system, which
     the engines of OSP and ecos do not know; but all engines set variables of a component.
-    Platforms and `report` are those of :func:`tank2sim.fmu.export.make_fmu`.
+    Platforms and `report` are as in :func:`tank2sim.fmu.export.make_fmu`.
 
     Raises
     ------

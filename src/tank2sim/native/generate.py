@@ -39,7 +39,7 @@ def generate_c(functions: Sequence[ca.Function], stem: str) -> str:
     """One C file with all `functions`, under their own names, none of them exported from a library.
 
     Each is ``int name(const double **arg, double **res, long long int *iw, double *w, int mem)``, keeps nothing
-    between calls and allocates nothing. `stem` distinguishes the file's other symbols from those of other files.
+    between calls and allocates nothing. `stem` distinguishes the file's other symbols from other files'.
     """
     generator = ca.CodeGenerator(f"{stem}.c", {"with_export": False, "with_header": False})
     for function in functions:

@@ -140,7 +140,7 @@ def _full(folder: Path, error: OSError) -> InputError:
 def cached_library(sources: Mapping[str, str], *, flags: Collection[str] = (), seldom: Collection[str] = ()) -> Path:
     """Path of the shared library of C sources, name to text, for this machine; compiled if it is not kept yet.
 
-    `flags` and `seldom` are those of :func:`tank2sim.native.compiler.compile_shared`.
+    `flags` and `seldom` are as in :func:`tank2sim.native.compiler.compile_shared`.
 
     Raises InputError: There is no compiler that works, or no room for the library.
     """

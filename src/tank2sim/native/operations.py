@@ -23,7 +23,7 @@ FUNCTIONS = {
 class Instruction(NamedTuple):
     """A step of a graph: places of the work vector, or of an argument or result (its number, and the entry).
 
-    `constant` is that of ``OP_CONST``; else 0.
+    `constant` is the value of ``OP_CONST``; else 0.
     """
 
     operation: int

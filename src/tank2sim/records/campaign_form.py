@@ -37,7 +37,7 @@ class ModelSection(CardSection):
     trim_m
         Positive by the stern.
     scale
-        Length of the ship over that of the model, lambda.
+        Length of the ship over the length of the model, lambda.
     z_G_m
         Height of the centre of gravity above the keel.
     """

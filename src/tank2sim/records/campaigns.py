@@ -118,7 +118,7 @@ def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
 
 
 def copied_runs(runs: Sequence[CaptiveRun]) -> tuple[dict[str, InputError], list[Notice]]:
-    """Runs whose forces are those of a run before, as :func:`tank2sim.records.same_record.likeness` finds: name to
+    """Runs that repeat the forces of an earlier run, as :func:`tank2sim.records.same_record.likeness` finds: name to
     fault; and remarks on mirror images.
 
     Noise never repeats itself; records without noise, of a computed campaign or a dead gauge, are not evidence.

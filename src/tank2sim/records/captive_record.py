@@ -47,9 +47,9 @@ class CaptiveRun:
     # `y_m`, `psi_rad`: (rows,): Sideways position in the tank and heading against its axis
     y_m: Array | None = None
     psi_rad: Array | None = None
-    propeller_radps: float | None = None  # Revolutions: the mean of the record, or those of the sheet
+    propeller_radps: float | None = None  # Revolutions: the mean of the record, or from the sheet
     # `thrust_N`, `rudder_normal_force_N`: (rows,): Thrust of the propeller, positive forward; force of the water on the
-    # rudder, positive to port; of two those of the right side, and of the left
+    # rudder, positive to port; with two, right side first, then left
     thrust_N: Array | None = None
     rudder_normal_force_N: Array | None = None
     thrust_left_N: Array | None = None

@@ -56,7 +56,7 @@ def read_craft_trial(path: Path | CsvTable, thrusters: Sequence[ThrusterSection]
     columns, time = table.columns, table.increasing("t_s")
     if len(time) < LEAST_CRAFT_ROWS:
         raise InputError(path, "", f"has {len(time)} rows", f"at least {LEAST_CRAFT_ROWS} are needed")
-    shaft = columns.get("n_radps") if len(thrusters) == 1 else None  # of one, its revolutions may be those of the log
+    shaft = columns.get("n_radps") if len(thrusters) == 1 else None  # of the log, if single
     driven = {f"n_{thruster.name}_radps": columns.get(f"n_{thruster.name}_radps", shaft) for thruster in thrusters}
     orders = {f"order_{thruster.name}_radps": _ordered(path, thruster, columns) for thruster in thrusters}
     names = [name for name, values in driven.items() if not _known(values)]

@@ -422,7 +422,7 @@ def _read_with_care(path: Path, names: Sequence[str], rows: Sequence[str], lines
         place = f"line {lines[row]}"
         cells = _cells(path, place, line)
         if len(cells) != len(names):
-            problem = f"the number of cells is {len(cells)}, and that of columns {len(names)}"
+            problem = f"there are {len(cells)} cells for {len(names)} columns"
             raise InputError(path, place, problem, "give each row one cell a column, empty if it was not recorded")
         for column, cell in enumerate(cells):
             number = _number(cell) if cell else np.nan

@@ -32,7 +32,7 @@ _Rows = Sequence[tuple[int, str]]
 """Line of the file (from 1) and text of each row."""
 
 KVLCC2_SCALE = 45.714
-"""Length of the KVLCC2 (320 m) over that of the models, 7.000 m at HSVA and at MARIN (SIMMAN 2008)."""
+"""Length of the KVLCC2 (320 m) over the length of the models, 7.000 m at HSVA and at MARIN (SIMMAN 2008)."""
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ HEAD_BYTES = 4096
 """Bytes of a file that are read to decide whether it is a trial."""
 
 READERS: Registry[TrialReader] = Registry("tank2sim.trial_readers", (TRIAL_CSV, ESSO_OSAKA, SIMMAN), TrialReader)
-"""All formats of trials, with those of installed packages."""
+"""All formats of trials, installed packages included."""
 
 
 def reader_of(path: Path) -> TrialReader:
@@ -88,12 +88,12 @@ def read_trial_file(path: Path | str | CsvTable, *, rising: bool = True) -> Tria
 
 
 def called_like_a_trial(path: Path) -> bool:
-    """True if the name of a file ends like that of a trial of a known format."""
+    """True if a file's name ends as trials of a known format do."""
     return any(path.suffix.lower() in reader.suffixes for reader in READERS.values())
 
 
 def looks_like_a_trial(path: Path) -> bool:
-    """True if name and beginning of a file are those of a known format of trials: for folders with other files."""
+    """True if name and first lines of a file fit a known format of trials: for folders with other files."""
     if not called_like_a_trial(path):
         return False
     text = first_bytes(path, HEAD_BYTES).decode("latin-1")

@@ -387,7 +387,7 @@ def _tracks(
 
 
 def _shifts(first: TimedSignals, other: TimedSignals, sign: float) -> Iterator[float]:
-    """Times (s) to add to those of the second record: none, by the first rows, and as the timing signal fits best."""
+    """Shifts (s) of the second record's times to try: none, by the first rows, and as the timing signal fits best."""
     time = other.time_s
     yield from dict.fromkeys((0.0, float(first.time_s[0] - time[0])))
     name = next((name for name in _TIMING if name in first.signals and name in other.signals), None)

@@ -51,7 +51,7 @@ def thin_line(columns: Sequence[Array], limit: int) -> Indices:
 def thin_points(columns: Sequence[Array], limit: int) -> Indices:
     """Samples to keep of points that are drawn singly: evenly spread ones, and the extremes of every column.
 
-    Parameters and result are those of :func:`thin_line`; up to two extremes a column come on top of `limit`.
+    Parameters and result as for :func:`thin_line`; up to two extremes a column come on top of `limit`.
     """
     count = len(columns[0])
     if count <= limit:

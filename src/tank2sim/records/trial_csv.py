@@ -24,7 +24,7 @@ def read_trial_csv(path: Path | str | CsvTable) -> Trial:
     """Read a trial such as ``t_s,delta_deg,n_rpm,u_mps,v_mps,r_degps,psi_deg,x_m,y_m``; times unchanged.
 
     Comment lines: ``# rudder_sign: port`` turns rudder angles and orders to positive to starboard; ``# noise: u_mps
-    0.03, psi_deg 0.1`` states standard deviations; ``# scale: 45.714`` the length of the ship over that of the model;
+    0.03, psi_deg 0.1`` states standard deviations; ``# scale: 45.714`` the length of the ship over the model's;
     ``# origin: 54.4 10.3`` latitude and longitude of x = y = 0 (any other text behind ``# origin:`` is free).
     Columns that are not part of the format are left out, and a notice names them.
 

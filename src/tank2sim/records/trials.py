@@ -39,7 +39,7 @@ class Trial:
     time_s : array (n,)
         Rising; begins where the file begins.
     signals : mapping
-        Name to values (n,), SI, rad, nan where nothing was measured. Names are those of the trial format in SI:
+        Name to values (n,), SI, rad, nan where nothing was measured. Names follow the trial format, in SI:
         ``delta_rad`` (angle), ``delta_order_rad`` (order, held until the next), both positive to starboard;
         ``n_radps u_mps v_mps u_ground_mps v_ground_mps sog_mps cog_rad r_radps psi_rad x_m y_m phi_rad wind_speed_mps
         wind_direction_rad wind_rel_speed_mps wind_rel_direction_rad current_speed_mps current_direction_rad``. psi is
@@ -47,7 +47,7 @@ class Trial:
     noise : mapping
         Standard deviation of the measurement by signal, where the file states it, SI.
     scale : float or None
-        Length of the ship over that of the model of this trial, where the file or its format states it.
+        Length of the ship over the length of the model of this trial, where the file or its format states it.
     length_m : float or None
         Length between perpendiculars of what the values belong to, ship or model, where the format states it.
     notices : tuple of Notice

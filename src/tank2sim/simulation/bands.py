@@ -55,7 +55,7 @@ class BandOverTime:
 class TrackBand:
     """Lines between which nine of ten members' tracks lie, independent of time.
 
-    The leading track is that of the member nearest to the median of x and y at equal time. At each time of the bands it
+    The leading track belongs to the member nearest to the median of x and y at equal time. At each time of the bands it
     has a normal, which each member's track passes at some distance to starboard; low, middle and high are the quantiles
     of these distances. A member that is ahead or astern on the same track thus has distance zero, and on a second lap
     each member passes on its second lap.
@@ -99,7 +99,7 @@ def band_of(values: Array) -> Band:
 def history_bands(
     found: Ensemble, times: Array, signals: tuple[str, ...]
 ) -> tuple[Array, dict[str, BandOverTime], TrackBand | None]:
-    """Times (n,) at which enough members still run, the bands of the signals, and that of the track.
+    """Times (n,) at which enough members still run, the bands of the signals, and the band of the track.
 
     `signals` are the names of the rows of the histories; the track needs ``x_m`` and ``y_m``.
     """

@@ -32,7 +32,7 @@ each processor of a machine, so that none waits long for the last, and few again
 
 KEPT = 2000
 """Number of members, the first, whose histories are kept for bands of tracks, 4 bytes a sample. The share below a
-quantile is known to 0.5 %; figures are those of all members (project choice)."""
+quantile is known to 0.5 %; figures use all members (project choice)."""
 
 
 DRAWS = 1000

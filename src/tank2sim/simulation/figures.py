@@ -47,7 +47,7 @@ class Events:
 
 @dataclass(frozen=True, eq=False)
 class KeptRuns:
-    """What the figures of n runs need: of one with all its samples, or of many of which little is kept.
+    """What the figures of n runs need: one run with all its samples, or many with few samples kept.
 
     `length`, `end`, `way` (n,): lengths of the ships, m; times of the ends, s; lengths of the tracks, m.
     `speeds` (n, 4): first, lowest, highest and last, m/s.
@@ -267,7 +267,7 @@ def _zigzag(runs: KeptRuns, zigzag: Zigzag) -> dict[str, Array]:
         shown = np.isfinite(peak)
         overshoots[:, number] = np.where(shown, np.degrees(change - zigzag.headings[number % 2]), np.nan)
         peaks[:, number] = np.where(shown, peak - executes[:, number], np.nan)
-    if zigzag.lag_s or zigzag.course is not None:  # the first heading is not that of the first reversal
+    if zigzag.lag_s or zigzag.course is not None:  # the first heading is not the first reversal's
         reached = runs.crossings("motion.psi", "motion.r", course + side * zigzag.heading, 0)
         first = reached if np.isfinite(reached.times[:, 0]).all() else first
     place = _ahead_and_aside(runs, first.at("motion.x")[:, 0], first.at("motion.y")[:, 0], 1.0)

@@ -1,6 +1,6 @@
 """Figures of turns, zigzags, stops and spirals of many ships, from what their runs in lanes keep.
 
-They are those of :mod:`tank2sim.simulation.figures` for a trajectory with a sample at each step, to rounding: the same
+They equal :mod:`tank2sim.simulation.figures` for a trajectory with a sample at each step, to rounding: the same
 Hermite cubics at crossings, the same cubics through four samples, for all ships at once.
 """
 
@@ -84,7 +84,7 @@ class LaneFigures:
         return np.isfinite(self.left_s) & (np.where(np.isnan(known), np.inf, known) >= self.left_s)
 
     def replaced(self, numbers: NDArray[np.intp], others: LaneFigures) -> LaneFigures:
-        """These figures with those of m ships, by their `numbers` (m,), from `others`; `doubtful` is not changed."""
+        """These figures with m ships, by their `numbers` (m,), taken from `others`; `doubtful` is not changed."""
         figures = {name: values.copy() for name, values in self.figures.items()}
         for name in figures | dict(others.figures):
             values = figures.setdefault(name, np.full(len(self.fine), np.nan))
@@ -118,7 +118,7 @@ class LaneManoeuvres:
 
     `model`: A ship that begins where its parameters say, without a trim. `lanes`, optional: As for
     :class:`tank2sim.simulation.lane_runs.LaneRunner`. `longest`, optional: Longest run without a given duration, L/u0;
-    by default that of the manoeuvre.
+    by default the manoeuvre's.
 
     Raises NoLanesError: The model cannot be run in lanes.
     """
@@ -128,7 +128,7 @@ class LaneManoeuvres:
         if "initial.trim" in model and model.parameter_values()[model.parameter_names.index("initial.trim")]:
             raise NoLanesError("a ship that is trimmed first is not run in lanes")
         if not {*_BEGINS, "motion.u", "motion.v", "motion.r"} <= set(model.state_names):
-            raise NoLanesError("the model is not that of a ship")
+            raise NoLanesError("the model does not describe a ship")
         if "motion.phi" in model.state_names:
             raise NoLanesError("the heel of a ship that rolls is not a figure of lanes")
         self._lanes, self._runner, self._start = lanes, LaneRunner(model, lanes), ArrayFunction(model.initial)

@@ -129,7 +129,7 @@ class LaneRunner:
         self.lanes = widest_lanes() if lanes is None else lanes
         needed = {"motion.x", "motion.y", "motion.r", "rudder.angle"} - set(model.state_names)
         if not self.lanes or needed or "rudder.command" not in model.input_names:
-            raise NoLanesError("there is no C compiler, or the model is not that of a ship")
+            raise NoLanesError("there is no C compiler, or the model does not describe a ship")
         self._run = self._compiled()
 
     def runs(
@@ -137,7 +137,7 @@ class LaneRunner:
     ) -> LaneResults:
         """Runs of n ships by a plan of rudder orders: parameters (n, np), initial states (n, nx), longest times (n,).
 
-        `inputs` (nu,) are those of the model; a rudder order among them holds if the plan has none.
+        `inputs` (nu,) are the model's; a rudder order among them holds if the plan has none.
         """
         model, n, nx = self.model, len(starts), len(self.model.states)
         at = np.ascontiguousarray(kept.times, dtype=float)

@@ -241,7 +241,7 @@ class Stop(SwitchedManoeuvre):
         return "stop" if self.revolutions is None else f"stop:{self.revolutions * 60 / math.tau:.10g}"
 
     def final_speed(self, approach: Array) -> Array:
-        """Surge velocity (m/s) at which the ship has stopped: 0, or :data:`COASTING_END` of that of the approach."""
+        """Surge velocity (m/s) at which the ship has stopped: 0, or :data:`COASTING_END` of the approach speed."""
         return (COASTING_END if self.revolutions == 0 else 0.0) * approach
 
     def orders(self, model: Model) -> dict[str, float]:

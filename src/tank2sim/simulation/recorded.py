@@ -314,7 +314,7 @@ def _state_before(trial: Trial, smooth: dict[str, Array], execute_s: float, ship
 
 
 def drift_over_ground(model: Model, inputs: Array, psi: Array) -> Array:
-    """Velocity over the ground of a ship that rests in the water, north and east (n, 2), m/s: that of the current.
+    """Velocity over the ground of a ship that rests in the water, north and east (n, 2), m/s: the current's.
 
     `model`: With or without a current. `inputs` (n, nu): The model's inputs. `psi` (n,): Heading, rad.
     """

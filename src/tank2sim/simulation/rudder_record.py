@@ -35,7 +35,7 @@ STEEPER = 3.0
 """Factor by which a moving rudder does not accelerate: gears have constant or falling rates (project choice)."""
 
 _ROUNDS = 6
-"""Iterations, each of which halves the error of a record that begins with a moving rudder: project choice."""
+"""Iterations; each halves the error of a record that begins with a moving rudder: project choice."""
 
 _REACHED = 0.9
 """Share of an angle at which the rudder counts as arrived: above the shares that determine its rate, below the slow
@@ -106,8 +106,8 @@ def holds_other_angles(trial: Trial, held: list[HeldAngle]) -> bool:
 def rudder_before(trial: Trial, held: HeldAngle) -> float:
     """The rudder's angle at an execute, rad.
 
-    It is that of the last row before the rudder moves. Where only orders are known, it is the order of the row before,
-    for the rudder moves after its order; amidships in a record that begins at the execute.
+    It is the angle in the last row before the rudder moves. Where only orders are known, it is the order of the row
+    before, for the rudder moves after its order; amidships in a record that begins at the execute.
     """
     rudder = rudder_of(trial)
     if held.rate is not None:

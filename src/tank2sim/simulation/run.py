@@ -64,7 +64,7 @@ def simulate(
     manoeuvre : Manoeuvre
         See :mod:`tank2sim.simulation.manoeuvres`.
     duration_s : float, optional
-        By default that of the manoeuvre.
+        By default the manoeuvre's.
     inputs, parameters : mapping, optional
         Values in place of the model's, by name.
     integrator : Integrator, optional

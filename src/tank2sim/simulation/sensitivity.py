@@ -1,6 +1,6 @@
 """A model's motion under recorded inputs, with its exact derivatives by initial state and by parameters.
 
-The steps are those of :func:`tank2sim.simulation.scheme.runge_kutta_step`. Their derivatives follow from the chain
+The steps are taken by :func:`tank2sim.simulation.scheme.runge_kutta_step`. Their derivatives follow from the chain
 rule over the four slopes of a step, whose Jacobians are by CasADi: small functions, which compile many times faster
 than the Jacobian of the whole step. The loops over time are in ``sensitivity.c``; without a compiler NumPy does the
 same.

@@ -17,10 +17,10 @@ from tank2sim.simulation.running import Running, SwitchedManoeuvre, SwitchingPla
 from tank2sim.units import from_si
 
 SPIN_HEADING = 4 * math.pi
-"""Heading change of a spin: two turns, the second of which is steady. Project choice."""
+"""Heading change of a spin: two turns; the second is steady. Project choice."""
 
 DIFFERENCE_HEADING = math.radians(540.0)
-"""Heading change of a turn by difference: that of a turning circle (ITTC 7.5-04-02-01)."""
+"""Heading change of a turn by difference: as in a turning circle (ITTC 7.5-04-02-01)."""
 
 _LONGEST_LENGTHS = 150.0
 _STRAIGHT_LENGTHS = 30.0
@@ -113,7 +113,7 @@ class DifferenceTurn(SwitchedManoeuvre):
         return f"difference:{from_si('n_rpm', self.difference):.10g}"
 
     def start(self, model: Model) -> dict[str, float]:
-        """Parameters of the start: those of the model, at the cruising speed."""
+        """Parameters of the start: the model's, at the cruising speed."""
         return {}
 
     def plan(self, model: Model, duration_s: float | None = None) -> SwitchingPlan:

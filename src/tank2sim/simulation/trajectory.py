@@ -40,7 +40,7 @@ class EventSamples:
     def crossing(self, name: str, rate: str, level: float | Array) -> Array:
         """Times (...) at which a signal crosses a level (...) between the middle two samples.
 
-        There it is the Hermite cubic by its values and those of its time derivative `rate`.
+        There it is the Hermite cubic by its values and its time derivative `rate`.
         """
         times, slope = self.t, self.signal(rate)
         offset = self.signal(name) - np.asarray(level)[..., None]
@@ -124,7 +124,7 @@ class Trajectory:
         return float(self.samples(self.gap(times)).at(name, times)[0])
 
     def crossings(self, name: str, rate: str, level: float) -> Array:
-        """Times at which a signal crosses a level, from its values and those of its time derivative `rate`.
+        """Times at which a signal crosses a level, from its values and its time derivative `rate`.
 
         Between samples it is the Hermite cubic, whose error is of fourth order in their distance.
         """

@@ -233,7 +233,7 @@ def _usual(reversals: _Reversals, noise: float, rudder_deg: int) -> tuple[_Fit, 
 
 
 def _keeps_to(reversals: _Reversals, fitted: _Fit) -> bool:
-    """True if the reversals are those of a zigzag (:data:`ASTRAY`); a single one needs a known course."""
+    """True if the reversals fit a zigzag (:data:`ASTRAY`); a single one needs a known course."""
     scatter = math.sqrt(fitted.squares / len(reversals.times))
     if len(reversals.times) == 1:
         scatter = reversals.approach[1]

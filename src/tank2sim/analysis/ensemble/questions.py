@@ -266,12 +266,12 @@ def lanes_of(model: Model) -> LaneManoeuvres | None:
 
 
 def _lane_figure(figure: InfluenceFigure) -> str:
-    """Name of a figure of a turning circle or zigzag among those of runs; empty for others."""
+    """A run's name of a figure of a turning circle or zigzag; empty for others."""
     return figure.kind.name if figure.kind.family in (TURN, ZIGZAG) else ""
 
 
 def _joined(parts: Sequence[tuple[Mapping[str, Array], int]]) -> dict[str, Array]:
-    """Figures of ships one part after the other, from those of each part with its number of ships."""
+    """Figures of all ships, joined from parts with their numbers of ships."""
     names = dict.fromkeys(name for figures, _ in parts for name in figures)
     return {
         name: np.concatenate([figures.get(name, np.full(count, np.nan)) for figures, count in parts]) for name in names

@@ -268,7 +268,7 @@ def stability_bands(
     if unseen:
         messages.append(
             Notice(
-                "no probability of stability: the figures of the members are those of slow motions, which "
+                "no probability of stability: the figures of the members describe slow motions, which "
                 f"{', '.join(unseen)} follow at once"
             )
         )

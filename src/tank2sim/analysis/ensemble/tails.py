@@ -55,7 +55,7 @@ LEAST = 200
 """Members without which no tail is sampled. Project choice."""
 
 NAMED = 5
-"""Numbers of the card that are named as those of failing ships. Project choice."""
+"""Numbers of the card that are named as typical of failing ships. Project choice."""
 
 
 @dataclass(frozen=True)

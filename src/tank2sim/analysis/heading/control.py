@@ -16,7 +16,7 @@ SLOWNESS = 0.1
 """The pole of the integral over the natural frequency, so that it does not disturb a course change (Fossen, 12.2)."""
 
 INTEGRAL_BAND_RAD = math.radians(2.0)
-"""Heading error that counts as a change of course, not a disturbance: project choice, twice that of a helmsman."""
+"""Heading error that counts as a change of course, not a disturbance: project choice, twice a helmsman's."""
 
 LARGEST_RUDDER_RAD = math.radians(35.0)
 """Limit without one on the card: the rudder angle that SOLAS II-1, regulation 29 requires of a gear."""

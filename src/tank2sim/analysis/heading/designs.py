@@ -124,7 +124,7 @@ def design_heading(
         ``pd`` and ``pid``: poles placed on Nomoto's model; ``lqr``: the linear quadratic regulator of sway, yaw,
         heading, rudder and integral, with an observer of sway and rudder; ``robust``: mixed sensitivity.
     speed_mps : float, optional
-        Speed of the design; by default that of expansion.
+        Speed of the design; by default the expansion speed.
     weights : LqrWeights, optional
         Weights of the LQR.
     wave_filter_radps : float, optional

@@ -81,7 +81,7 @@ def wave_yaw_acceleration(weather: Weather, step_s: float, count: int) -> Array:
     """Yaw acceleration by waves (count,), rad/s2, each held for a step.
 
     White noise through 2 z w s/(s^2 + 2 z w s + w^2) (Fossen 2011, 8.2), exact for noise held over a step, and
-    stationary from the start. Its standard deviation is w^2 times that of the heading: at wave frequency a ship
+    stationary from the start. Its standard deviation is w^2 times the heading's: at wave frequency a ship
     responds to a moment by its inertia alone.
     """
     w, z = weather.wave_radps, weather.wave_damping

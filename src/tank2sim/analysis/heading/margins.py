@@ -125,7 +125,7 @@ def closed_loop_transfer(ship: Model, autopilot: Model, speed_mps: float | None 
 
 
 def loop_margins(ship: Model, autopilot: Model, speed_mps: float | None = None) -> LoopMargins:
-    """Margins at a speed, by default that of expansion.
+    """Margins at a speed, by default the expansion speed.
 
     Raises InputError: the model is not a ship, or has no straight course.
     """
@@ -193,7 +193,7 @@ def largest_steps(ship: Model, autopilot: Model, speed_mps: float | None = None)
     whole = closed_loop_transfer(ship, autopilot, speed_mps)
     sizes = np.abs(whole.poles())
     peaks = np.zeros(3)
-    for duration in (20 / sizes.max(), 10 / sizes.min()):  # the gear's own answer, and that of the ship
+    for duration in (20 / sizes.max(), 10 / sizes.min()):  # the gear's own answer, and the ship's
         answer = control.step_response(whole, np.linspace(0, duration, 2000)).outputs
         peaks = np.maximum(peaks, np.abs(answer).max(axis=-1).ravel())
     order, moved = (float(peak) for peak in peaks[1:])

@@ -57,7 +57,7 @@ _CHANGE_TIMES = 60
 Project choice: the change has settled then.
 """
 _KEEPING_TIMES = 120
-"""Length of course keeping in 1/w; figures are those of its later half."""
+"""Length of course keeping in 1/w; figures use its later half."""
 
 _WAVES_SHOWN = 40
 """Interval of the histories of course keeping. Project choice: it shows single waves."""
@@ -84,7 +84,7 @@ class StudySettings:
     kind : str
         One of :data:`tank2sim.analysis.heading.designs.DESIGNS`.
     speed_mps : float, optional
-        Speed of the design; by default that of expansion.
+        Speed of the design; by default the expansion speed.
     weights : LqrWeights
         Weights of the LQR.
     wave_filter_radps : float, optional
@@ -408,7 +408,7 @@ def unfinished(tracks: Mapping[str, TrackRun]) -> list[Notice]:
 
 
 def _of_the_gear(ship: Model, design: HeadingDesign, kept: CourseKeeping, weather: Weather) -> list[Notice]:
-    """Notices on the load of the gear in waves, and on limits of the autopilot below those of the gear."""
+    """Notices on the load of the gear in waves, and on limits of the autopilot below the gear's."""
     notices = []
     if kept.rate_limited_percent > _BUSY_PERCENT:
         remedy = f"--wave-filter {weather.wave_radps:.3g}" if design.kind == "pid" else "--design pid --wave-filter"

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 GUIDANCE_STEP_S = 1.0
-"""Interval of heading orders: that of positions from satellite navigation."""
+"""Interval of heading orders: as of positions from satellite navigation."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,7 +1,7 @@
 """Influence coefficients of a ship's card: K % of every number on the card on any manoeuvring figure.
 
 By exact slopes, K = 10 c/F dF/dc, and by the 10 % difference of the paper (:mod:`tank2sim.analysis.influence.percent`),
-side by side; and the standard error of each figure from those of the card, with their covariance if the card has one.
+side by side; and the standard error of each figure from the card's, with their covariance if the card has one.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class CardInfluence:
     def of_errors(self) -> str:
         """Text on the origin of the figures' standard errors."""
         if not self.errors.together:
-            return "standard errors of figures are from those of the card's numbers, as if these were independent"
+            return "standard errors of figures follow from the card's numbers, as if these were independent"
         remainder = "" if len(self.errors.together) == len(self.parameters) else ", others as if independent"
         count = len(self.errors.together)
         return f"standard errors of figures are from the covariance next to the card ({count} numbers{remainder})"

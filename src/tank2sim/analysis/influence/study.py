@@ -36,7 +36,7 @@ PLACE_FELT = 1e-20
 """Squared slopes of the scaled accelerations by position and heading of an unsteady turn: rounding is below."""
 
 SPARE = 1.5
-"""Duration of a manoeuvre over that of the card's ship for its figures; the full one if that is too short."""
+"""Duration of a manoeuvre over the duration of the card's ship for its figures; the full one if that is too short."""
 
 
 class Study:

@@ -54,7 +54,7 @@ NO_RUDDER = "the criteria of IMO MSC.137(76) and the spirals are of a rudder, an
 _MOTION = ("motion.u", "motion.v", "motion.r")
 _RATES = ("motion.udot", "motion.vdot", "motion.rdot")
 _SMALL = 1e-6
-"""Largest rate of a steady motion, over that of its scale: rounding of the search."""
+"""Largest rate of a steady motion over the rate's scale: rounding of the search."""
 
 
 @dataclass(frozen=True)
@@ -218,7 +218,7 @@ class CraftMotions:
     """
 
     def __init__(self, card: SteeredCard) -> None:
-        # Twice the bounds, so that the slopes at the largest revolutions are those of the thrust curve.
+        # Twice the bounds, so that the slopes at the largest revolutions follow the thrust curve.
         free = [
             thruster.model_copy(
                 update={

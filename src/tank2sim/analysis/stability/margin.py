@@ -37,7 +37,7 @@ PAPER_CHANGE = 0.075
 """Change of Y_r or N_r by 1 % of trim (paper 2, section 5)."""
 
 INOUE = {"Yv": 2 / 3, "Yr": 0.80, "Nv": -0.27, "Nr": 0.30}
-"""Relative change by tau/d (Inoue et al. 1981); that of N_v over its lever N_v/Y_v in ship lengths."""
+"""Relative change by tau/d (Inoue et al. 1981); for N_v over its lever N_v/Y_v in ship lengths."""
 
 TRIMS = np.linspace(-0.01, 0.01, 21)
 """Trim by the stern over ship length at which C' is reported."""

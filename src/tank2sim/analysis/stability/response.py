@@ -2,7 +2,7 @@
 
 Of three systems, all by python-control: sway and yaw (with the states of effects that act on them: roll, the memory of
 the flow) with the rudder angle as input, the same behind the steering gear (input the order; its rate limit is not
-linear and neglected), and Nomoto's first-order model K/(1 + T s), that of slow motion.
+linear and neglected), and Nomoto's first-order model K/(1 + T s), for slow motion.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class SteeringResponse:
     """Response of the yaw rate (rad/s) to the rudder (rad), + to starboard.
 
     `label`: the system: :data:`HULL`, :data:`GEAR` or :data:`FIRST_ORDER`; `poles`, `zeros`: 1/s; `gain_per_s`: r/delta
-    at rest, 1/s; for an unstable ship that of an unstable steady turn; `omega_radps`, `response` (n,): frequency, and
+    at rest, 1/s; for an unstable ship about an unstable steady turn; `omega_radps`, `response` (n,): frequency, and
     r/delta (complex, 1/s); `time_s`, `step_per_s` (m,): yaw rate after a step of the rudder, per rad of it.
     """
 

@@ -74,8 +74,8 @@ class CourseCriterion:
     ----------
     C_prime : float
         C' = Y'_v (N'_r - m' x'_G u') - N'_v (Y'_r - m' u'): positive for a ship that is stable on a straight course.
-        Prime system; the slopes are those of the full forces at the operating point, in slow motion: states of effects
-        follow at once (:func:`settled_states`).
+        Prime system; the slopes are taken from the full forces at the operating point, in slow motion: states of
+        effects follow at once (:func:`settled_states`).
     stable : bool
         True if the straight course is stable with the rudder fixed: all modes of steering decay, and none grows.
         C' > 0 alone is not sufficient: it also holds with two growing modes, and with a growing roll.
@@ -229,7 +229,7 @@ def nomoto(steering: control.StateSpace) -> Nomoto:
     """
     with np.errstate(divide="ignore", invalid="ignore"):  # a ship that is neutral has K and T without end
         K, total, product, T3 = (float(constant) for constant in steering_constants(steering.A, steering.B, steering.C))
-    # T1 and T2 are the roots of T^2 - (T1 + T2) T + T1 T2; those of a pair that oscillates are not real.
+    # T1 and T2 are the roots of T^2 - (T1 + T2) T + T1 T2; an oscillating pair's are not real.
     discriminant = total**2 - 4 * product
     T1 = 0.5 * (total + math.copysign(math.sqrt(discriminant), total)) if discriminant >= 0 else None
     return Nomoto(K_per_s=K, T_s=total - T3, T1_s=T1, T2_s=product / T1 if T1 else None, T3_s=T3)

@@ -1,4 +1,4 @@
-"""Stability and manoeuvrability of a ship in one result: that of ``tank2sim stability``."""
+"""Stability and manoeuvrability of a ship in one result, of ``tank2sim stability``."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def _about_speed(model: Model, found: Stability, *, by_speed: bool) -> list[Noti
     messages, speed = [], found.operating_point.speed_mps
     if not by_speed:
         messages.append(
-            f"the forces of this card do not change with speed: a linear card is that of {card_speed:.4g} m/s alone, "
+            f"the forces of this card do not change with speed: a linear card holds at {card_speed:.4g} m/s alone, "
             "C' and the prime numbers are made with that speed, and there is no curve over speed"
         )
     if not slowest <= speed <= fastest:
@@ -169,7 +169,7 @@ def _about_effects(found: Stability) -> list[Notice]:
     messages, judged = [], found.stability_criterion
     if judged.settled_states:
         messages.append(
-            f"C', its margin and Nomoto's K and T are those of slow motions, which {', '.join(judged.settled_states)} "
+            f"C', its margin and Nomoto's K and T describe slow motions, which {', '.join(judged.settled_states)} "
             "follow at once; T1 and T2 are then no time constants of the whole ship: its eigenvalues, the word stable "
             "or unstable, and the response to the rudder are with these states"
         )
@@ -189,7 +189,7 @@ def _about_weather(model: Model) -> list[Notice]:
     return [
         Notice(
             f"the straight course is that in the card's {' and '.join(blowing)}, and so are its eigenvalues, C' and "
-            "Nomoto's numbers; steady turns, spirals and the IMO criteria are those of calm water"
+            "Nomoto's numbers; steady turns, spirals and the IMO criteria hold in calm water"
         )
     ]
 

@@ -19,7 +19,7 @@ from tank2sim.analysis.turning.diagram import SteadyTurning
 from tank2sim.arrays import Array
 
 FITTED_RUDDER = math.radians(20.0)
-"""Largest rudder of the cubic fits, that of a spiral: a cubic does not follow a ship hard over. Project choice."""
+"""Largest rudder of the cubic fits, as in a spiral: a cubic does not follow a ship hard over. Project choice."""
 
 _RATES = 201
 

@@ -51,7 +51,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Bounds:
-    """Bounds of a curve: `least` and `most` (n + 1,), the last entry that of lambda, and a number of steps."""
+    """Bounds of a curve: `least` and `most` (n + 1,), the last entry for lambda, and a number of steps."""
 
     least: Array
     most: Array
@@ -106,7 +106,7 @@ def follow_branch(equations: ContinuationEquations, start: Array, direction: Arr
     """
     curve = _follow(equations, start, tangent(equations(start)[1], direction), direction, bounds)
     if curve.ended == STALLED and len(curve.points) == 1:
-        # A corner: the Jacobian at the point itself may be that of the other side.
+        # A corner: the Jacobian at the point itself may belong to the other side.
         beyond = start + CORNER * direction / np.linalg.norm(direction)
         curve = _follow(equations, start, tangent(equations(beyond)[1], direction), direction, bounds)
     return curve

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from scipy.interpolate import CubicHermiteSpline
 
 _LARGEST_RUDDER = math.radians(35.0)
-"""Largest rudder of the diagram: 35 deg (MSC.137(76)), or that of the gear."""
+"""Largest rudder of the diagram: 35 deg (MSC.137(76)), or the gear's limit."""
 
 _REPORTED_RUDDERS_DEG = (-35, -20, -10, -5, 0, 5, 10, 20, 35)
 """Rudder angles whose steady turns a report lists. Project choice."""
@@ -210,7 +210,7 @@ class TurningDiagram:
 
 
 def hull_states(model: Model, motion: Sequence[str] = _MOTION) -> tuple[str, ...]:
-    """States that move with the hull at a held rudder: u, v, r, and those of effects on which their rates depend.
+    """States that move with the hull at a held rudder: u, v, r, and states of effects on which their rates depend.
 
     With fewer names in `motion`, the remaining ones of u, v, r are constant.
     """

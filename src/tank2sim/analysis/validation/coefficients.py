@@ -189,7 +189,7 @@ def _difference(first: CardCoefficient, second: CardCoefficient) -> Difference:
 
 
 def compare_effects(cards: Sequence[SteeredCard], models: Sequence[Model]) -> tuple[CoefficientRow, ...]:
-    """All parameters of effects of the cards, in SI, in the units of their models; `models` are those of the cards.
+    """All parameters of effects of the cards, in SI, in the units of their models; `models` are the cards'.
 
     Values with a unit (a wind speed, a time) are compared only between ships of the same size.
     """

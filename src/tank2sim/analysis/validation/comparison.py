@@ -98,7 +98,7 @@ class ComparedCard:
 
 @dataclass(frozen=True, kw_only=True)
 class CardSummary:
-    """Coefficients of a card next to those of the reference.
+    """Coefficients of a card next to the reference's.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def labels_of(cards: Sequence[SteeredCard]) -> tuple[str, ...]:
 
 
 def differences_of_size(first: SteeredCard, second: SteeredCard, scale: float = 1.0) -> list[str]:
-    """Length and breadth of two ships that differ by :data:`SAME_SIZE` or more; `scale` is that of `first`.
+    """Length and breadth of two ships that differ by :data:`SAME_SIZE` or more; `scale` belongs to `first`.
 
     Parameters
     ----------

@@ -6,9 +6,9 @@ sign of n errors is binomial:
 
     p = min(1, 2 P(K <= k)),   K ~ B(n, 1/2)
 
-(Conover 1999, Practical Nonparametric Statistics, 3.4). The figures of turns are one family, those of zigzags another:
-their probabilities are those of Holm (1979, Scand. J. Statist. 6) over the figures of the family whose number of trials
-can reach the level at all (Tarone 1990, Biometrics 46).
+(Conover 1999, Practical Nonparametric Statistics, 3.4). The figures of turns are one family, figures of zigzags
+another: their probabilities follow Holm (1979, Scand. J. Statist. 6) over the figures of the family whose number of
+trials can reach the level at all (Tarone 1990, Biometrics 46).
 """
 
 from __future__ import annotations

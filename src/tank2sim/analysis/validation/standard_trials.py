@@ -35,7 +35,7 @@ LEAST_SHARE = 0.9
 """Least share of the members that reach a figure with a spread: fewer are a biased selection."""
 
 _OVERSHOOTS = 2
-"""Number of evaluated overshoots: those of IMO MSC.137(76)."""
+"""Number of evaluated overshoots, as in IMO MSC.137(76)."""
 
 CRAFT_SHARE = 0.5
 """Difference and revolutions of the turns of a craft over the largest. Project choice: the middle of what it does."""
@@ -198,8 +198,8 @@ def robust_deviation(values: Array) -> float:
 def member_spread(runs: Sequence[Mapping[str, float]]) -> Numbers:
     """Standard deviation of each figure over the members' runs (empty where one could not be run).
 
-    Half the distance between the quantiles of 15.87 and 84.13 %, which equals that of normal figures and is robust to a
-    few diverging members. Figures that fewer than :data:`LEAST_SHARE` of them reach have none.
+    Half the distance between the quantiles of 15.87 and 84.13 %, which equals the deviation of normal figures and is
+    robust to a few diverging members. Figures that fewer than :data:`LEAST_SHARE` of them reach have none.
     """
     names = dict.fromkeys(name for run in runs for name in run)
     found = {name: [run[name] for run in runs if name in run] for name in names}

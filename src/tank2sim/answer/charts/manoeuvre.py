@@ -1,7 +1,7 @@
 """The chart of each standard manoeuvre, with its figures drawn where they are read off.
 
-Distances are those of the manoeuvre: ahead along the course at the order, and to starboard of it. An ensemble is a
-shaded band of the motion, and a bar from the 5 to the 95 % quantile of each figure.
+Distances are measured as in the manoeuvre: ahead along the course at the order, and to starboard of it. An ensemble
+is a shaded band of the motion, and a bar from the 5 to the 95 % quantile of each figure.
 """
 
 from __future__ import annotations

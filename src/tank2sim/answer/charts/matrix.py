@@ -24,7 +24,7 @@ LOG_BLUES = {"type": "log", "domain": [1, DARKEST], "scheme": "blues", "clamp": 
 
 @dataclass(frozen=True, kw_only=True)
 class Matrix:
-    """Cells of a matrix, and their numbers; the data are those of the chart that they are in.
+    """Cells of a matrix, and their numbers; the data belong to the chart that they are in.
 
     `colour`: field of the data that colours a cell; `rows`, `columns`: in their order; `shown`: fields of the tooltip;
     `names`: fields of the data with the row and the column; `scale`, `legend`: scale of the colours, and their legend;

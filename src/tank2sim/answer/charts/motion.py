@@ -117,7 +117,7 @@ class HistoryBand:
 class History:
     """Signals of one run over time: `time_s` (n,) in s, `values` by name of signal, (n,) each, in the signal's unit.
 
-    A run need not have every signal; NaN leaves a gap. `bands` are those of an ensemble about it.
+    A run need not have every signal; NaN leaves a gap. `bands` show an ensemble about it.
     """
 
     label: str

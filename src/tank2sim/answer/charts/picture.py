@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import altair as alt
 
 VEGALITE_VERSION = "6.4"
-"""Version of Vega-Lite in which charts are written and drawn: the newest of vl-convert 1.9, and that of Altair 6.3."""
+"""Version of Vega-Lite in which charts are written and drawn: the newest of vl-convert 1.9, and Altair 6.3's."""
 
 CHECKED_AGAINST_SCHEMA = False
 """Whether each chart is compared with the schema of Vega-Lite. No chart's form depends on what a user gives: the tests

@@ -1,6 +1,6 @@
 """How charts look: one palette and one Vega-Lite configuration for light paper, one for a dark screen.
 
-Colours are those of Okabe & Ito (2008), "Color Universal Design: how to make figures and presentations that are
+Colours follow Okabe & Ito (2008), "Color Universal Design: how to make figures and presentations that are
 friendly to colorblind people", https://jfly.uni-koeln.de/color/, in an order that keeps neighbours apart. Their yellow
 is left out on white and their black on dark, where neither is seen. No chart relies on colour alone: lines differ in
 their dashes too, points in their shapes.

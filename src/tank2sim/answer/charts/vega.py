@@ -142,7 +142,7 @@ def layered(
 ) -> ChartSpec:
     """Return layers over each other.
 
-    `size`: width and height, px; a height ``{"step": 19}`` is that of one name; `window`: axes along which a reader
+    `size`: width and height, px; a height ``{"step": 19}`` is for one name; `window`: axes along which a reader
     pans and zooms; **properties: ``title``, ``description``, ``usermeta``, ``data``, ``resolve``.
     """
     found = {**given(**properties), "layer": list(layers), "width": size[0], "height": size[1]}

@@ -91,11 +91,11 @@ EFFECTS: Registry[Effect] = Registry(
     Effect,
     fault=sensor_fault_of,
 )
-"""All effects by the name that cards use, with those of installed packages."""
+"""All effects by the name that cards use, installed packages included."""
 
 
 def acting_variable(model: Model, name: str) -> str:
-    """The variable that acts in a model for one of the steering gear: that of an effect in its place, or itself.
+    """The variable that acts for one of the steering gear: a variable of an effect in its place, or itself.
 
     Parameters
     ----------

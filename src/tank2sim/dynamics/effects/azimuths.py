@@ -101,7 +101,7 @@ def _unit(unit: int) -> tuple[EffectParameter, ...]:
             default,
             input_name=f"azimuth.revolutions_{unit}",
             absent=0.0,
-            typical=rates(200.0),  # those of a merchant ship (project choice)
+            typical=rates(200.0),  # as of a merchant ship (project choice)
         ),
         EffectParameter(
             f"angle_{unit}_rad",

@@ -76,7 +76,7 @@ def _propeller_at_work(model: Model) -> ca.SX:
 def _with_banks(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """Y = 1/2 rho L T u^2 y_B c_Y, N = -1/2 rho L^2 T u^2 y_B c_N, y_B = B/2 (mean(1/y_S) - mean(1/y_P)).
 
-    y_S, y_P are the distances of the banks from the centre line. y_B is that of Ch'ng, Doctors and Renilson (1993),
+    y_S, y_P are the distances of the banks from the centre line. y_B is by Ch'ng, Doctors and Renilson (1993),
     A method of calculating the ship-bank interaction forces and moments in restricted water, International
     Shipbuilding Progress 40, 7-23, which has it at the surface and at half the draught; the split by the propeller is
     that of Vantorre, Delefortrie, Eloot and Laforce (2003), Experimental investigation of ship-bank interaction forces,
@@ -102,7 +102,7 @@ def _with_banks(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mo
     squat = Quantity(
         "squat.bank",
         "m",
-        "Largest sinkage by squat near a bank: that of ICORELS, more by bank and propeller",
+        "Largest sinkage by squat near a bank: by ICORELS, increased by bank and propeller",
         model.symbol("squat.icorels") * (1 + added),
         nominal=0.1 * model_particular(card, "draught_m"),
     )

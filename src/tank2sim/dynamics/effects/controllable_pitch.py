@@ -99,7 +99,7 @@ def pitch_thrust(J: ca.SX, pitch: ca.SX, area: ca.SX, blades: ca.SX, astern: ca.
 
 
 def pitch_torque(J: ca.SX, pitch: ca.SX, area: ca.SX, blades: ca.SX) -> ca.SX:
-    """K_Q at any P/D, positive with either sign of it: linear below that of the series, astern that at rest.
+    """K_Q at any P/D, positive with either sign: linear below the pitches of the series, astern the value at rest.
 
     K_Q(J, P/D) = K_0 + (P/D)/0.5 (K_Q(J, 0.5) - K_0) from 0 to 0.5,   K_Q(J, -P/D) = K_Q(0, P/D)
     K_0 = 1/2 C_D pi/4 A_E/A_0 (0.7 pi)^2 0.35
@@ -115,7 +115,7 @@ def pitch_torque(J: ca.SX, pitch: ca.SX, area: ca.SX, blades: ca.SX) -> ca.SX:
 
 
 def _with_pitch(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
-    """The pitch follows its order, and the thrust changes by that of the series; the revolutions are as ordered:
+    """The pitch follows its order, and the thrust changes as in the series; the revolutions are as ordered:
 
         d(P/D)/dt = sat((order - P/D)/T),   T = T_card + rho n^2 D^4 (K_T(J, P/D) - K_T(J, P_0/D))
 

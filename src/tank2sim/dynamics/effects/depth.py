@@ -80,7 +80,7 @@ def _with_finite_depth(model: Model, given: EffectSymbols, card: ManoeuvringCard
 
     l is the loss of speed by Lackenby (1963), after Schlichting (1934), The effect of shallow water on ship speed, the
     Shipbuilder 70, as in ITTC 7.5-04-01-01.1: the resistance is that at the speed that the same power gives in deep
-    water. R' is that of the card. Barrass (2004), Thirty-two years of research into ship squat, for open shallow
+    water. R' is the card's. Barrass (2004), Thirty-two years of research into ship squat, for open shallow
     water; ICORELS (1980), PIANC Bulletin 35. Both are of the whole ship's largest sinkage, at the bow of full ships.
     The clearance is depth less draught less the larger of the two.
     """

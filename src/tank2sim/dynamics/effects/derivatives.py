@@ -258,7 +258,7 @@ WATER_DEPTH = Effect(
     description="The hull resists drift and turning more as the water under it becomes shallow.",
     source="Kijima, Katsuno, Nakiri and Furukawa (1990), J. Soc. Naval Architects of Japan 168",
     parameters=(
-        # Not sought in trials: what they show of shallow water is one factor, that of SHALLOW_WATER.
+        # Not sought in trials: they show one factor of shallow water, SHALLOW_WATER's.
         EffectParameter("depth_m", "depth of the water", least_depth, 1e4, input_name="water.depth"),
     ),
     equations=at_depth,

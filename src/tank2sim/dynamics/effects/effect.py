@@ -152,7 +152,7 @@ EffectEquations = Callable[[Model, EffectSymbols, ManoeuvringCard], Model]
 
 Readings = Callable[[EffectSymbols, EffectSymbols], Mapping[str, ca.SX]]
 """``readings(motion, given)``: what sensors show, by the name of the variable that they measure; `motion` holds the
-symbols of :data:`MEASURED_BEFOREHAND`, `given` those of the effect's parameters."""
+symbols of :data:`MEASURED_BEFOREHAND`, `given` has the effect's parameters."""
 
 MEASURED_BEFOREHAND = ("motion.u", "motion.v", "motion.r", "motion.psi", "motion.x", "motion.y")
 """Variables that a sensor may show wrongly."""
@@ -226,7 +226,7 @@ class Effect:
         True if a small craft with thrusters can have it: it reads nothing of a card but ``ship`` and ``environment``,
         and nothing of a model that only a hull in the prime system or a rudder has.
     resonant : bool
-        True if it swings at a frequency of its own near that of waves, by which they hide it.
+        True if it swings at a frequency of its own near the waves' frequency, so that waves hide it.
     last : bool
         True if a card's model gets it after all other effects: it changes the mass and draught in their forces.
     terminal : str
@@ -345,7 +345,7 @@ def card_for_effects(card: SteeredCard) -> ManoeuvringCard:
 
 
 def sensor_fault_of(effect: Effect) -> str:
-    """What is wrong with the declarations of an effect, "" if nothing: for those of other packages."""
+    """What is wrong with the declarations of an effect, "" if nothing: for effects from other packages."""
     parameters = {parameter.name for parameter in effect.parameters}
     if effect.acts_on not in ACTIONS:
         return f"acts_on is {effect.acts_on!r}; give one of {', '.join(ACTIONS)}"

@@ -90,7 +90,7 @@ def _with_backlash(model: Model, given: EffectSymbols, card: ManoeuvringCard) ->
 
         d delta/dt = e/T_c,   e what g - delta exceeds half the play b by, either way
 
-    g is the angle of the gear, delta that of the rudder. For T_c to 0 it is the play operator, which lags by b/2 behind
+    g is the gear's angle, delta the rudder's. For T_c to 0 it is the play operator, which lags by b/2 behind
     an angle that rises and by b/2 behind one that falls (Brokate and Sprekels 1996, Hysteresis and Phase Transitions).
     """
     rudder, rate = model["rudder.angle"], model["rudder.rate"]
@@ -192,7 +192,7 @@ TELEMOTOR_LAG = Effect(
             "time constant before the steering gear",
             0.01,
             100.0,
-            typical=time_scale_passages(0.05, 0.025, 0.1),  # half those of the gear itself (project choice)
+            typical=time_scale_passages(0.05, 0.025, 0.1),  # half the values of the gear itself (project choice)
         ),
     ),
     equations=_with_telemotor_lag,

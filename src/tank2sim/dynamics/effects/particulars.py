@@ -1,4 +1,4 @@
-"""Particulars of the ship that effects need: those of the card, or estimates that the model's notices report."""
+"""Particulars of the ship that effects need: from the card, or estimates that the model's notices report."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ BEAMS_IN_DRAUGHT = 0.4
 
 FRONT_IN_BEAMS = 0.6
 SIDE_IN_LENGTHS = 0.055
-"""Areas above the water over B^2 and L^2, between those of a loaded tanker (0.35 and 0.03) and of a container ship
+"""Areas above the water over B^2 and L^2, between a loaded tanker's (0.35 and 0.03) and a container ship's
 (0.95 and 0.1): project choices."""
 
 DIAMETER_IN_DRAUGHTS = 0.6
-"""Diameter of the propeller over the draught, between that of full tankers (0.45) and of container ships (0.75): a
+"""Diameter of the propeller over the draught, between full tankers (0.45) and container ships (0.75): a
 project choice."""
 
 AREA_ERROR = 0.4
-"""Standard error of such an area, relative: the distance from the middle to those of tanker and container ship."""
+"""Standard error of such an area, relative: the distance from the middle to tanker and container ship."""
 
 FULLEST, FINEST = 0.95, 0.3
 """Block coefficients are held within these bounds where mass and an estimated draught disagree (project choice)."""

@@ -149,7 +149,7 @@ def _start(model: Model, order: Input) -> tuple[Parameter, ca.SX]:
     start = Parameter(
         "initial.propeller_speed",
         order.unit,
-        f"Revolutions at the start, positive ahead; at {order.start:g}, where it is not set, those of a "
+        f"Revolutions at the start, positive ahead; at {order.start:g}, where it is not set, the revolutions of a "
         "ship that starts at rest (initial.u = 0) are zero",
         display_unit=order.display_unit,
         nominal=order.nominal,
@@ -176,7 +176,7 @@ def _revolutions_reached(effect: str, order: Input, start: ca.SX) -> State:
 def _with_engine_lag(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
     """dn/dt = (order - n)/T: the engine's gear between telegraph and propeller, of the first order.
 
-    ITTC 7.5-02-06-03 asks for the time constant of the engine next to that of the steering gear. A diesel that must be
+    ITTC 7.5-02-06-03 asks for the time constants of engine and steering gear. A diesel that must be
     stopped before it is reversed takes longer still. The engine of a ship at the berth (``initial.u`` = 0) is stopped,
     unless ``initial.propeller_speed`` is set.
     """

@@ -103,7 +103,7 @@ def _off_centre_antenna(motion: EffectSymbols, given: EffectSymbols) -> dict[str
 ANTENNA_LEVER_ARM = Effect(
     name="antenna_lever_arm",
     acts_on="sensor",
-    description="The position is that of an antenna away from midships, which swings round as the ship turns.",
+    description="The position is measured at an antenna away from midships, which swings round as the ship turns.",
     source="ITTC 7.5-04-02-01, full scale manoeuvring trials: positions are of the antenna; rigid body",
     parameters=(
         EffectParameter(
@@ -180,7 +180,7 @@ def _log_forward(motion: EffectSymbols, given: EffectSymbols) -> dict[str, ca.SX
 LOG_LEVER_ARM = Effect(
     name="log_lever_arm",
     acts_on="sensor",
-    description="The leeway is that of a log away from midships, which the turn carries sideways.",
+    description="The leeway is measured by a log away from midships, which the turn carries sideways.",
     source="kinematics of a rigid body",
     parameters=(
         EffectParameter(
@@ -226,7 +226,7 @@ def correct_reading(
     time_s : array, (rows,)
         Rising.
     signals : mapping
-        Arrays (rows,), SI: those of :data:`_SIGNALS`, ``delta_rad``, ``delta_order_rad``, and any others.
+        Arrays (rows,), SI: :data:`_SIGNALS`, ``delta_rad``, ``delta_order_rad``, and any others.
     effect : Effect
         A sensor's.
     values : mapping

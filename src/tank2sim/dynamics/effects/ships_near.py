@@ -198,7 +198,7 @@ def _with_other_ship(model: Model, given: EffectSymbols, card: ManoeuvringCard) 
         Y = rho sum of (A + a) V_t + c (u V_x - r U)
         N = rho sum of x (A + a) V_t + c (u (V + x V_x) + v U)
 
-    A, a, b are those of :func:`sections`, with the added masses of the model. The equations of Lagrange and Kirchhoff
+    A, a, b as in :func:`sections`, with the added masses of the model. The equations of Lagrange and Kirchhoff
     for L = -rho sum of (A + a)(v + x r) V + (A + b) u U, which is linear in the other's flow; with b = 0 they are the
     forces of Lagally on the own sources and doublets and the rate of their impulse: Landweber and Yih (1956), Forces,
     moments, and added masses for Rankine bodies, J. Fluid Mech. 1, 319-336; of two ships Tuck and Newman (1974),

@@ -145,7 +145,7 @@ WIND = Effect(
             typical=wave_speeds(0.25),  # 10 m/s, a fresh breeze (Beaufort 5), for a ship of 160 m (project choice)
         ),
         bearing("from which the wind comes", "wind.direction"),
-        # Spreads: half the ranges of Fossen (2011) above; that of the centroid is a project choice.
+        # Spreads: half the ranges of Fossen (2011) above; the centroid's spread is a project choice.
         EffectParameter(
             "surge_coefficient",
             "wind force coefficient in surge, on the frontal area",

@@ -95,7 +95,7 @@ def _with_rudders(model: Model, given: EffectSymbols) -> Model:
         angle = rudder_quantity(f"rudder.angle_{side}", f"Angle of the {side} rudder, positive to starboard", total)
         moving = rudder_rate(
             own.derivative,
-            f"Rate of the {side} rudder less that of rudder.angle, positive to starboard",
+            f"Rate of the {side} rudder less the rate of rudder.angle, positive to starboard",
             ca.substitute(expanded, both, ca.vertcat(total, ordered)) - rate.symbol,
         )
         model = model.extend(own, angle, moving)
@@ -124,7 +124,7 @@ def _with_thrust_of_each(model: Model, place: ca.SX) -> Model:
 def _propeller(side: str) -> EffectParameter:
     return EffectParameter(
         f"propeller_{side}_radps",
-        f"revolutions of the {side} propeller in addition to those of both, positive ahead",
+        f"revolutions of the {side} propeller in addition to the revolutions of both, positive ahead",
         -400.0,
         400.0,
         input_name=f"propeller.{side}_offset",
@@ -136,7 +136,7 @@ def _propeller(side: str) -> EffectParameter:
 def _rudder(side: str) -> EffectParameter:
     return EffectParameter(
         f"rudder_{side}_rad",
-        f"order of the {side} rudder in addition to that of both, positive to starboard",
+        f"order of the {side} rudder in addition to the order of both, positive to starboard",
         -math.pi,
         math.pi,
         0.0,

@@ -52,12 +52,12 @@ def components(table: WaveTable) -> Components:
 def amplitudes(chosen: Components, height: ca.SX, period: ca.SX, peakedness: ca.SX) -> ca.SX:
     """Amplitudes (m) of the components, a = sqrt(2 S d_omega), by the JONSWAP spectrum.
 
-    `height` is the significant one Hs (m), `period` that of the peak 2 pi/wp (s), `peakedness` gamma.
+    `height` is the significant height Hs (m), `period` the peak period 2 pi/wp (s), `peakedness` gamma.
 
         S = (1 - 0.287 ln gamma) 5/16 Hs^2 wp^4/w^5 exp(-5/4 (wp/w)^4) gamma^b,   b = exp(-(w/wp - 1)^2/(2 s^2))
 
     s = 0.07 below the peak wp and 0.09 above it: ITTC (2002), 23rd ITTC, Specialist Committee on Waves, vol. II,
-    505-551, and DNV-RP-C205, 3.5.5. With gamma = 1 it is that of Bretschneider (1959), which ITTC 7.5-02-07-01.1 has.
+    505-551, and DNV-RP-C205, 3.5.5. gamma = 1 gives Bretschneider (1959), as in ITTC 7.5-02-07-01.1.
     """
     peak = 2 * math.pi / period
     frequencies, widths = ca.DM(chosen.frequencies), ca.DM(chosen.widths)
@@ -201,7 +201,7 @@ def _with_waves(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mo
     outputs = [quantity.name for quantity in (*shown, *poses)]
     sea = with_forces(model, **forces).extend(clock, rate, *shown, *poses, outputs=outputs)
     sea = with_validity(sea, "waves", "the share of the sea within the frequencies of the table", covering)
-    cause = "the speed in waves, over that of the first order of its effect on the mean drift"
+    cause = "the speed in waves, over the speed up to which its first-order effect on the mean drift holds"
     return with_validity(sea, "wave_speed", cause, slow)
 
 

@@ -57,7 +57,7 @@ DESCRIPTIONS: dict[str, str] = {
     "eta_R": "Relative rotative efficiency: torque in open water over that behind the hull",
     "f_alpha": "Slope of the rudder's normal force by angle, on 1/2 rho A_R U_R^2",
     "t_R": "Steering resistance deduction",
-    "a_H": "Force on the hull by the rudder over that of the rudder",
+    "a_H": "Force on the hull by the rudder over the force of the rudder",
     "x_H": "Where that force acts, over L, positive forward of midships",
     "x_R": "Place of the rudder over L, positive forward of midships",
     "eta": "Share of the rudder in the race of the propeller",
@@ -166,7 +166,7 @@ class MmgShip:
 
     @cached_property
     def drift(self) -> ca.SX:
-        """beta, rad, within a quarter turn: that of the mirror image while going astern."""
+        """beta, rad, within a quarter turn: of the mirror image while going astern."""
         u, v = self.hull["motion.u"], self.hull["motion.v"]
         return -ca.atan2(v, ca.sqrt(u**2 + self.still**2))
 

@@ -38,7 +38,7 @@ class SteeringForm:
     """The equations of one steering model, and what of it is not published.
 
     `name`, `title`: key in the catalogue; words for a reader. `source`: the source of the equations. `coefficients`: in
-    the order of the paper's tables, first those of Y. `rates`: the equations (:data:`Rates`). `static_moment`,
+    the order of the paper's tables, Y first. `rates`: the equations (:data:`Rates`). `static_moment`,
     `damping`: coefficients of the hull's linear static yaw moment and of its linear yaw damping. `rudder`: coefficients
     that are proportional to the force of the rudder. `missing`: what the paper does not print of it; empty if nothing.
     """

@@ -26,7 +26,7 @@ def steering_model(
 ) -> Model:
     """The model of a ship at a constant speed, (1) of paper 4 with the terms of `form`.
 
-    Its variables are named as those of every ship (``motion.beta`` is a state here, and ``motion.u``, ``motion.v``
+    Its variables are named as for every ship (``motion.beta`` is a state here, and ``motion.u``, ``motion.v``
     follow from it), so that manoeuvres, figures and steady turns work on it alike.
 
     `name`: the ship. `form`: the equations. `coefficients`: values by name, parameters ``coefficients.*``; those with a

@@ -95,7 +95,7 @@ class Asymmetry:
 
 
 def asymmetry(campaign: Campaign, selection: Selection) -> Asymmetry:
-    """Terms of the opposite parity in addition to those of the result.
+    """Terms of the opposite parity in addition to the result's.
 
     By the symmetry of a hull to port and starboard X has even terms and Y, N odd ones, except for Y0, N0 and their
     change with speed, which (3.8) has for a single screw. Terms of the opposite parity are not part of a card; the test

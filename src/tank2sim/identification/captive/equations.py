@@ -35,12 +35,12 @@ HEEL_TERMS = {
     "Y": ("Yphi", "Yvvphi", "Yvphiphi", "Yrrphi", "Yrphiphi"),
     "N": ("Nphi", "Nvvphi", "Nvphiphi", "Nrrphi", "Nrphiphi"),
 }
-"""Terms of the heel that steady tests at a heel show: those of Son and Nomoto (1982), Naval Architecture and Ocean
+"""Terms of the heel that steady tests at a heel show, by Son and Nomoto (1982), Naval Architecture and Ocean
 Engineering 20, 73-83."""
 
 
 def candidate_terms(force: str, *, heeled: bool = False) -> tuple[Term, ...]:
-    """Terms of (3.8) and acceleration terms of one force, in their order; with `heeled` last those of the heel."""
+    """Terms of (3.8) and acceleration terms of one force, in their order; with `heeled` the terms of the heel last."""
     names = (*ABKOWITZ_TERMS[force], *(name for name in ACCELERATION_TERMS if name[0] == force))
     names += HEEL_TERMS[force] if heeled else ()
     return tuple(map(known_term, names))

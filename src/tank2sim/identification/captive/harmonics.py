@@ -127,7 +127,7 @@ def _fit(values: Array, basis: Array, inverse: Array, motion: CaptiveMotion) -> 
 
 
 def moderated(runs: Sequence[ReducedRun]) -> tuple[ReducedRun, ...]:
-    """The runs with densities moderated by those of all runs.
+    """The runs with densities moderated by all runs.
 
     A density averaged over a few lines has an uncertainty of a quarter. Each is drawn towards the campaign's usual
     density as far as the runs differ only by chance (Smyth 2004, Statistical Applications in Genetics and Molecular

@@ -36,8 +36,8 @@ _GAIN = 1e-5
 """Variance of the gain from which the search begins: 0.3 %, between good gauges (0.1 %) and poor ones (1 %)."""
 _GAIN_RANGE = (-20.0, 4.5)
 """Natural logarithms of the factor on it: from none to gains that differ by 3 % from run to run. Such gains cost the
-likelihood 1000 a run where a force is not explained at all; with 10 % the cost of 100 would be below that of noise in a
-campaign with a gross error, and all forces would be attributed to errors of gain about zero."""
+likelihood 1000 a run where a force is not explained at all; with 10 % the cost of 100 would be below the cost of
+noise in a campaign with a gross error, and all forces would be attributed to errors of gain about zero."""
 _FEWEST_RUNS = 8
 _CLEARLY = 0.05
 """Probability of the gain in likelihood if all types of run scatter alike, below which each gets its own variance."""
@@ -132,7 +132,7 @@ class Solution:
 
 
 def solve(equations: CampaignEquations, spread: Spread) -> Solution:
-    """Weighted least squares by QR; the covariance is that of `spread`, also with other weights."""
+    """Weighted least squares by QR; the covariance follows from `spread`, also with other weights."""
     weights = spread.weights
     solution = efficient_solution(equations, weights or spread)
     if weights is None or not equations.names:
@@ -156,7 +156,7 @@ def scatters(equations: CampaignEquations, spread: Spread) -> Array:
 
 
 def run_covariances(equations: CampaignEquations, spread: Spread) -> list[Array]:
-    """Covariance of the weighted equations of each run, (rows, rows): unity if the weights are those of the spread."""
+    """Covariance of the weighted equations of each run, (rows, rows): unity if the weights follow from the spread."""
     if spread.weights is None:
         return [np.eye(len(root)) for root in equations.roots]
     # Both are roots of covariances of the same coefficients, one of the weights and one of the spread.

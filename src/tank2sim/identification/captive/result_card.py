@@ -196,7 +196,7 @@ def _notes(reduction: Reduction, card: Contents, scale: float) -> str:
 
 
 def reynolds_ratio(campaign: Campaign, scale: float) -> float:
-    """Reynolds number of the ship over that of the model: lambda^1.5 over the ratio of viscosities, where given."""
+    """Reynolds number of the ship over the model's: lambda^1.5 over the ratio of viscosities, where given."""
     model_water = campaign.test.kinematic_viscosity_m2ps
     if model_water is None or campaign.full_scale is None:
         return FroudeScaling(scale).reynolds

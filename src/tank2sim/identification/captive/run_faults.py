@@ -47,8 +47,9 @@ _GAP = 5.0
 _NO_SMALL_ANGLE = 0.05
 _FEWEST_LEVELS = 8
 _PLATEAU = 5.0
-"""Length of a saturated gauge's plateau, in those of its next level. A sinusoid read coarsely and without noise stays
-at its outermost level up to 1/(sqrt(2) - 1) = 2.4 times as long in all as at the next, and 4.8 times at a stretch."""
+"""Length of a saturated gauge's plateau over the length of the next level. A sinusoid read coarsely and without noise
+stays at its outermost level up to 1/(sqrt(2) - 1) = 2.4 times as long in all as at the next, and 4.8 times at a
+stretch."""
 
 
 def motion_faults(run: CaptiveRun) -> Iterator[InputError]:

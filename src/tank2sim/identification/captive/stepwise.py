@@ -32,7 +32,7 @@ _ALONE = (("static_drift", "v"), ("static_rudder", "d"), ("pure_yaw", "r"))
 """Types of run in one motion alone."""
 
 _LEAST_SPREAD = 0.5
-"""Least standard error of a difference, relative to that of the regression: smaller differences do not matter."""
+"""Least standard error of a difference, relative to the regression's: smaller differences do not matter."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +59,7 @@ def stepwise(equations: CampaignEquations, spread: Spread, test_speed_mps: float
     """The terms of a force in the paper's order, with the weights of the whole campaign.
 
     The steps use the upright runs at the test speed; runs at other speeds give the terms in Du, and runs at a heel
-    those of the heel, last.
+    the terms of the heel, last.
     """
     names: list[str] = []
     found_in: list[str] = []
@@ -118,7 +118,7 @@ def scatter_within_tests(equations: CampaignEquations) -> Spread:
             continue
         column = np.where(kinds == kind, equations.design[:, equations.names.index(name)], 0.0)
         # A type of test that holds all of the term's motion has no linear term of its own: the likelihood of a
-        # dependent column would be that of rounding errors.
+        # dependent column would come from rounding errors.
         if _is_independent(column, np.hstack(columns)):
             columns.append(column[:, None])
             names.append(f"{name} {kind}")

@@ -5,7 +5,7 @@ known inertia of the body the damping then seems to change with omega^2, and the
 distinguishes it from memory of the flow is that its phase grows linearly with the frequency and is common to all
 channels: to Y and N, to sway and yaw, and to the share of the force that is the body's known inertia, which has no
 memory. A delay that sway and yaw both show is taken out, and its standard error goes into the derivatives. A gauge that
-reads more in one kind of run gives derivatives that differ from those of all other kinds of run. Other errors are not
+reads more in one kind of run gives derivatives that differ from all other kinds of run. Other errors are not
 corrected: they are reported first, and the effect of their correction is added to the standard errors.
 
 Errors that the campaign states (Type B, ITTC 7.5-02-06-04) are common to all its runs, whose scatter does not show
@@ -56,7 +56,7 @@ _SUPPORT = 2.0
 """Standard errors of the delay in the motion that shows it less well, from which it is not a memory of the other
 motion alone: by chance once in 20 campaigns with such a memory."""
 USUAL_DELAY_S = 0.03
-"""Standard deviation, s, of a delay of which nothing is known: that of a second-order low-pass filter of 10 Hz, as
+"""Standard deviation, s, of an unknown delay: the delay of a second-order low-pass filter of 10 Hz, as
 gauges of tanks have, is 0.02 to 0.03 s. Project choice; it bounds the uncertainty where the runs hardly show it."""
 _ITERATIONS = 4
 _MOTIONS = {"sway": ("pure_sway",), "yaw": ("pure_yaw", "yaw_with_drift")}
@@ -350,7 +350,7 @@ def _runs_of(equations: CampaignEquations, kinds: Sequence[str]) -> Iterator[tup
 
 
 def _rate(count: int, frequency_radps: float) -> Array:
-    """Matrix from mean and harmonics (count,) of a force to those of its rate of change."""
+    """Matrix from mean and harmonics (count,) of a force to its rate of change."""
     matrix = np.zeros((count, count))
     for place in range(1, count, 2):
         order = (place + 1) // 2

@@ -45,7 +45,7 @@ LARGEST_DEPTH_FROUDE = 0.6
 """U/sqrt(g h) at which the bottom changes the model's waves by 1 %: they have k h = 1/Fn_h^2, and tanh(k h) = 0.99."""
 
 BLOCK_TOLERANCE = 0.05
-"""Relative difference between a stated block coefficient and that of the mass: project choice."""
+"""Relative difference between a stated block coefficient and the one of the mass: project choice."""
 
 BLOCK_COEFFICIENTS = (0.4, 0.9)
 """Mass over rho L B T of ships: 0.45 (destroyers) to 0.87 (tankers); a project choice on either side."""
@@ -84,7 +84,7 @@ class OscillationMotion:
 
 @dataclass(frozen=True)
 class FroudeScaling:
-    """Ship over model at equal Froude number (paper 2, section 5), from the ratio of lengths and that of densities."""
+    """Ship over model at equal Froude number (paper 2, section 5), from the ratios of lengths and densities."""
 
     length: float
     density: float = 1.0
@@ -112,7 +112,7 @@ class FroudeScaling:
 
     @property
     def reynolds(self) -> float:
-        """Reynolds number of the ship over that of the model: lambda^1.5 over the ratio of kinematic viscosities."""
+        """Reynolds number of the ship over the model's: lambda^1.5 over the ratio of kinematic viscosities."""
         return math.pow(self.length, 1.5) / self.viscosity
 
 

@@ -130,7 +130,7 @@ def force_convention(
 def foreign_units(
     derivatives: Mapping[str, float], mass_prime: float, inertia_prime: float | None, removed: bool, model: ModelSection
 ) -> Iterator[Caution]:
-    """Other units of force and moment, with which derivatives that no ship has become those of one, in deep water.
+    """Other units of force and moment, that turn impossible derivatives into a ship's, in deep water.
 
     `derivatives`: Prime values; with a unit that is k newtons Y_v is k times as large, Y_vdot is m' - k (m' - Y_vdot);
     `mass_prime`, `inertia_prime`: m' and J_z', None if unknown; `removed`: The forces were recorded without the inertia
@@ -150,7 +150,9 @@ def foreign_units(
     said = []
     if force:
         shares = ", ".join(f"{name} {value:.2g}" for name, value in hull.forces(factor).items())
-        said.append(f"X and Y are in {force}, 1 {force} = {factor:.4g} N (then {shares} times those of usual hulls)")
+        said.append(
+            f"X and Y are in {force}, 1 {force} = {factor:.4g} N (then {shares} times the values of usual hulls)"
+        )
     if moment:
         said.append(f"N is in {moment}, 1 {moment} = {MOMENT_UNITS[moment]:.4g} N m")
     if said:
@@ -214,7 +216,7 @@ def _of_a_ship(found: Mapping[str, float]) -> bool:
 
 
 def _nearest(candidates: Mapping[str, float], found: Callable[[float], Mapping[str, float]]) -> str:
-    """The unit with which the derivatives are nearest to usual ones; empty if none makes them those of a ship."""
+    """The unit with which the derivatives are nearest to usual ones; empty if no unit makes them a ship's."""
     fitting = {name: found(factor) for name, factor in candidates.items() if _of_a_ship(found(factor))}
     return min(
         fitting,

@@ -29,7 +29,7 @@ _CAUSES = {
 }
 """Beginning of a place on a card to the columns that give what is there; the first that fits."""
 MASS_KEYS = {"Xudot": "mx", "Yvdot": "my", "Nrdot": "Jz"}
-"""Derivative to its name on an MMG card, of which it is the negative."""
+"""Derivative to its name on an MMG card, where it has the opposite sign."""
 
 
 def mmg_card_text(tests: SteadyTests, values: Mapping[str, float], errors: Mapping[str, float], note: str) -> str:
@@ -104,7 +104,7 @@ def _coefficients(
 def tested_card(tests: SteadyTests, values: Mapping[str, float], errors: Mapping[str, float], note: str) -> MmgCard:
     """The card of :func:`mmg_card_text`, with the same `tests`, `values`, `errors` and `note`.
 
-    Raises InputError: The coefficients are not those of a ship; it names the campaign, and the columns that give the
+    Raises InputError: The coefficients do not describe a ship; it names the campaign, and the columns that give the
     one at fault.
     """
     try:

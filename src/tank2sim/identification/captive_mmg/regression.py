@@ -8,12 +8,13 @@ K_Q = q_0 + q_1 J + q_2 J^2 of the open-water test at the J of the thrust, eta_R
     minimise  sum_c sum_i (y_ci - f_c(theta))^2/sigma_c^2 + sum_k (theta_k - m_k)^2/s_k^2
 
 The error sigma_c of a channel is estimated from what is left, sigma_c^2 = RSS_c/(n_c - p_c), p_c the trace of its share
-of the projection (variance components: Förstner 1979). m_k and s_k are those of ordinary ships with one screw, wide
+of the projection (variance components: Förstner 1979). m_k and s_k describe ordinary ships with one screw, wide
 enough that only what the tests leave open takes its value from there; such coefficients are marked. m_x' and m_y',
-which steady tests do not show, have those of a published estimate: its error is in those of Y_r' and X_vr'. The
-covariance is the inverse of the normal matrix, plus Type B errors, which the scatter of the conditions does not show
-(ITTC 7.5-02-06-04): each error of ``[uncertainty]`` is applied to the tests with one standard deviation, the change of
-the misfit moves the coefficients as the linearised regression says, and the outer product of these moves is added.
+which steady tests do not show, are taken from a published estimate: its error is part of the errors of Y_r' and
+X_vr'. The covariance is the inverse of the normal matrix, plus Type B errors, which the scatter of the conditions
+does not show (ITTC 7.5-02-06-04): each error of ``[uncertainty]`` is applied to the tests with one standard
+deviation, the change of the misfit moves the coefficients as the linearised regression says, and the outer product of
+these moves is added.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ ORDINARY: dict[str, tuple[float, float]] = {
     "gamma_R_plus": (0.5, 0.3),
     "gamma_R_minus": (0.5, 0.3),
 }
-"""Mean and standard deviation among ordinary ships with one screw. Project choice: they enclose those of the KVLCC2
+"""Mean and standard deviation among ordinary ships with one screw. Project choice: they enclose the KVLCC2
 (Yasukawa and Yoshimura 2015) within one deviation or about it."""
 _LIMITS: dict[str, tuple[float, float]] = {
     "t_P": (-0.9, 0.9),
@@ -67,11 +68,11 @@ _LIMITS: dict[str, tuple[float, float]] = {
     "kappa": (0.0, 3.0),
     "eta_R": (0.5, 1.5),
 }
-"""Limits in which a coefficient is looked for. Project choice: beyond them it is not that of a ship; the regression
+"""Limits in which a coefficient is looked for. Project choice: beyond them no ship has it; the regression
 would otherwise fit a normal force of the other sign by eps < 0."""
 OPEN = 0.7
-"""Standard error over that of ordinary ships from which a coefficient is called open. Project choice: the tests then
-halve the variance at best."""
+"""Standard error over the spread of ordinary ships from which a coefficient is called open. Project choice: the tests
+then halve the variance at best."""
 OFFSETS = ("Y0", "N0", "rudder_offset")
 """Asymmetries of a model: force and moment straight ahead, and the angle of no rudder force."""
 KEPT_FROM = 3.0
@@ -85,7 +86,7 @@ _QUANTITIES = {
     "T_left": "propeller.thrust_left",
     "F_N_left": "rudder.normal_force_left",
 }
-"""Channel to the quantity of the model that it reads; with two sides that of the right ends in ``_right``."""
+"""Channel to the quantity of the model that it reads; with two sides the right one ends in ``_right``."""
 _MOTION = ("motion.u", "motion.v", "motion.r", "rudder.angle", "propeller.speed")
 _START_X0 = -0.02
 """X_0' (prime II) with which the regression starts: the KVLCC2 has -0.022."""
@@ -106,7 +107,7 @@ class MmgFit:
     """Coefficients of the MMG method from steady tests."""
 
     tests: SteadyTests
-    names: tuple[str, ...]  # Coefficients; those of the hull in prime II; ``rudder_offset`` in rad
+    names: tuple[str, ...]  # Coefficients; the hull's in prime II; ``rudder_offset`` in rad
     values: Array  # (k,)
     covariance: Array  # (k, k): Covariance of both types
     random: Array  # (k,): Standard errors by the scatter alone (Type A)
@@ -131,7 +132,7 @@ class MmgFit:
 
     @property
     def open(self) -> tuple[str, ...]:
-        """Coefficients that the tests leave open: they are those of ordinary ships."""
+        """Coefficients that the tests leave open; they keep the values of ordinary ships."""
         pairs = zip(self.names, self.random, strict=True)
         return tuple(name for name, error in pairs if name in ORDINARY and error > OPEN * ORDINARY[name][1])
 
@@ -231,7 +232,7 @@ def computed_readings(model: Model, names: Sequence[str], units: Array, channels
 
     The torque is among the c channels if its coefficients are among the names.
 
-    `model`: Model of an MMG card; `units` (k,): What one of a coefficient is in the model: L/d of those of the hull.
+    `model`: Model of an MMG card; `units` (k,): A coefficient's unit in the model: L/d for the hull's.
     """
     theta, motion = ca.SX.sym("theta", len(names)), ca.SX.sym("motion", len(_MOTION))
     given = {name: motion[i] for i, name in enumerate(_MOTION)}
@@ -293,7 +294,7 @@ class _Regression:
 
     @cached_property
     def channel(self) -> NDArray[np.int_]:
-        """Channel of each equation: those of the conditions, then K_T and K_Q of the open-water points."""
+        """Channel of each equation: of the conditions, then K_T and K_Q of the open-water points."""
         (count, channels), (points, columns) = self.tests.readings.shape, self.tests.open_water.shape
         curves = channels + np.repeat(np.arange(columns - 1), points)
         return np.concatenate([np.repeat(np.arange(channels), count), curves])

@@ -47,7 +47,7 @@ def _impossible_sizes(form: CampaignFile) -> Iterator[tuple[str, str, str]]:
     model, rudder, propeller = form.model, form.rudder, form.propeller
     assert rudder is not None and model.draught_m and model.rudder_area_m2 and model.propeller_diameter_m
     draught = model.draught_m
-    of_model = "give that of the model"
+    of_model = "give the model's"
     share = model.rudder_area_m2 / (model.length_m * draught)
     if not _RUDDER_AREA[0] <= share <= _RUDDER_AREA[1]:
         problem = f"is {share:.2g} times length_m times draught_m; ships have 0.01 to 0.04"

@@ -178,7 +178,7 @@ def _at_velocities(problem: Problem, found: Estimate) -> CraftFit | None:
     """The fit with the estimate by velocities, with the spread of current and wind that predicts best.
 
     Where the filter loses the motion, the estimate goes only a part of the way from the card (:data:`_WAYS`). None if
-    it loses it still, or if predictions are best with current or wind, of which the estimate does not know.
+    it loses it still, or if predictions are best with current or wind, which the estimate ignores.
     """
     for way in _WAYS:
         values = problem.prior_mean + way * (found.values - problem.prior_mean)
@@ -384,9 +384,9 @@ def predict_free(fit: CraftFit, runs: Sequence[SampledRun]) -> list[FreePredicti
 
 
 def predict_by_card(problem: Problem) -> list[FreePrediction]:
-    """Predictions of each run as :func:`predict_free`, by the numbers of the card; noise levels are those of the runs.
+    """Predictions of each run as :func:`predict_free`, by the numbers of the card; noise levels come from the runs.
 
-    Current and wind of a run are known beforehand by those of the other runs, if there are enough of them.
+    The other runs, if there are enough, give current and wind of a run beforehand.
 
     `problem`: By :func:`.craft_problem`.
     """

@@ -52,7 +52,8 @@ class OrderResponse:
 
     @property
     def dead_band(self) -> tuple[float, float] | None:
-        """Dead band and its standard error, rad/s: the middle of its bounds, and that of a value anywhere between them.
+        """Dead band and its standard error, rad/s: the middle of its bounds, and the deviation of a value anywhere
+        between them.
 
         None where no order left the propeller at rest.
         """

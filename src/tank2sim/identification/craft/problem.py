@@ -1,6 +1,6 @@
 """The problem of a craft with thrusters: what is estimated, what is known before, and the model that is fitted.
 
-The model is that of the card, driven by the revolutions that were measured, with five states that do not
+The model is the card's, driven by the revolutions that were measured, with five states that do not
 change within a trial: the velocity of the current to north and to east, an earth-fixed force to north and to east,
 which is the mean wind's, and the bias of the gyro. So they may differ from trial to trial.
 
@@ -50,7 +50,7 @@ DAMPING_SPREAD = 1.0
 """Standard error of a damping coefficient on the card, over its value, where the card states none (project choice)."""
 
 CROSS_FLOW_SPREAD = 0.5
-"""Standard error of a damping coefficient that the card leaves out, over that of cross-flow drag with C_D = 1 at half
+"""Standard error of a damping coefficient that the card leaves out, over cross-flow drag with C_D = 1 at half
 the length and half the cruising speed (project choice)."""
 
 THRUST_SPREAD = 1.0
@@ -71,7 +71,7 @@ LOSS_SPREAD = 0.5
 speed (project choice)."""
 
 DRAUGHT_OF_CRAFT = 0.06
-"""Draught over length where the card states none: between that of a planing hull and of a displacement one (project
+"""Draught over length where the card states none: between a planing hull and a displacement hull (project
 choice)."""
 
 NEVER_POSITIVE = ("Xudot", "Yvdot", "Nrdot", "Xu", "Xuabsu", "Yv", "Yvabsv", "Nr", "Nrabsr")

@@ -343,7 +343,7 @@ def worse_than_a_mean(r_squared: Mapping[str, float]) -> list[Notice]:
     return [
         caution(
             f"PREDICTS NOTHING: predictions of held-out trials are worse than the mean of their motion (R^2 of "
-            f"{', '.join(bad)}): these coefficients are not those of this craft, whatever their standard errors"
+            f"{', '.join(bad)}): these coefficients are not this craft's, whatever their standard errors"
         )
     ]
 
@@ -357,7 +357,7 @@ def _dead_band_notices(card: SteeredCard, responses: Mapping[str, OrderResponse]
         if response is None or response.dead_band is not None:
             continue
         least = from_si("n_rpm", response.turning_radps)
-        text = f"the dead band of thruster {thruster.name} is that of the card: no order left the propeller at rest"
+        text = f"the dead band of thruster {thruster.name} was taken from the card: no order left the propeller at rest"
         if thruster.dead_band_radps >= response.turning_radps:
             yield caution(f"{text}, and one of {least:.3g} rpm, within it, turned it")
         else:

@@ -112,7 +112,7 @@ class Identification(Fit):
     weights: Mapping[str, float]
     # For comparison with another model of the same trials; None where the velocities were not measured
     criteria: Criteria | None
-    posterior: PosteriorSamples | None  # On request; values and covariance of the estimate are then those of it
+    posterior: PosteriorSamples | None  # On request; values and covariance of the estimate then come from it
     bootstrap: Array | None  # (members, k): Estimates from trials simulated with the estimate, on request
     manoeuvres: Mapping[str, str]  # Trial to a description of the recognised manoeuvre
     forced: tuple[str, ...]  # Evidence that the trials are not of the card's ship, where the fit was forced
@@ -353,7 +353,7 @@ def _in_pieces(problem: Problem, options: IdentificationOptions) -> Estimate:
 
 
 def _start(problem: Problem) -> Array | None:
-    """Start values of output error: those of the weak form, which needs none itself; None without velocities."""
+    """Start values of output error, from the weak form, which needs none itself; None without velocities."""
     found = or_none(equation_error, problem)
     return None if found is None else found.values
 

@@ -61,7 +61,7 @@ class IdentificationOptions:
     hold : tuple of str
         Derivatives (``Xuuu``) and parameters of effects (``wind.yaw_coefficient``) that keep the card's values.
     force : bool
-        Fit trials even if they look like those of another ship (:mod:`.other_ship`).
+        Fit trials even if they look like another ship's (:mod:`.other_ship`).
     posterior : str, optional
         One of :data:`Sampler`.
     draws : int

@@ -345,7 +345,7 @@ class IdentificationStudy:
     manoeuvres : dict
         Trial to its recognised manoeuvre in words.
     derivatives, effects : dict
-        Estimates by name; parameters of effects with that of their effect.
+        Estimates by name; parameters of effects with their effect's name.
     effects_of_card : tuple of str
     misfit : IdentificationMisfit
     yaw_rate_error_over_windows : dict

@@ -29,7 +29,7 @@ PULSE = np.deg2rad(5.0)
 Project choice."""
 
 _ROUNDING = 1e-9
-"""Share of a signal below which its noise is that of the arithmetic: the signal was calculated, not measured."""
+"""Share of a signal below which its noise is rounding of the arithmetic: the signal was calculated, not measured."""
 _SHORT = 0.05
 """Share of a record up to which failed readings of one sensor are noted rather than called its fault: they are left
 out, and nothing is lost. Project choice."""

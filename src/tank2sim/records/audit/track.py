@@ -16,7 +16,8 @@ from tank2sim.records.trials import Trial, with_signals
 from tank2sim.units import KNOT_MPS
 
 CLEARER = 1.5
-"""How many times the misfit as labelled must be that of another reading: more than an error of the fit's own scale."""
+"""Factor by which the misfit as labelled must exceed the misfit of another reading: more than an error of the fit's own
+scale."""
 EVIDENCE = 20.0
 """Gain in twice the log likelihood from which another reading is taken: 10 is "very strong" (Kass & Raftery 1995), and
 some readings are compared."""
@@ -34,7 +35,7 @@ class TrackReading:
 
     Velocity over ground follows from w = u + iv and e = exp(i psi), for x + iy is north + i east; ``mirrored`` if y is
     positive to west. A rotation by a quarter of a turn, found with it, makes it ``quarter_truth`` about
-    ``quarter_wrong``. Names are those of signals, u and v those of the pair of velocities.
+    ``quarter_wrong``. A name is a signal's; u and v name the pair of velocities.
     """
 
     truth: str

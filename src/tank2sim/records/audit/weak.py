@@ -34,7 +34,7 @@ ORDERS = ("delta_order_rad", "n_radps")
 class AuditWindows:
     """Windows of one width, half a width apart, over a uniform time base.
 
-    For a smooth bump g that vanishes at both ends, the mean of dy/dt weighted with g is that of y weighted with the
+    For a smooth bump g that vanishes at both ends, dy/dt weighted with g has the same mean as y weighted with the
     derivative of g (integration by parts): a signal and the rate of another are compared exactly, at any width.
     g is the square of a Hann window, so that second derivatives are smooth as well.
 
@@ -148,7 +148,7 @@ def fit(target: Array | Complex, regressors: Sequence[Array | Complex]) -> WeakF
 
     None if there are too few windows, or the regressors cannot be distinguished.
 
-    Complex ones give two coefficients each, real and imaginary part. Standard errors are those of Newey & West (1987)
+    Complex ones give two coefficients each, real and imaginary part. Standard errors follow Newey & West (1987)
     with residuals correlated over four half-overlapping windows, so that they hold for coloured noise, or the
     ordinary ones where these are larger: where few windows decide (the entry of a turn), the former are too small.
     """

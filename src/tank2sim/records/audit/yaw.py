@@ -18,8 +18,8 @@ from tank2sim.records.trials import Trial, unwrapped
 _DEGREE = np.pi / 180
 _YAW = ("r_radps", "psi_rad")
 UNIT_TOLERANCE = 0.023
-"""How far a factor may be from that of a unit to be taken for it: half the way from 57.3 to the 60 of a time in minutes
-or of a rate per minute. Project choice."""
+"""How far a factor may be from the factor of a unit to be taken for it: half the way from 57.3 to the 60 of
+a time in minutes or of a rate per minute. Project choice."""
 COARSE = 0.3
 """The same for the course of a track over the heading, for the drift angle turns as well."""
 _FACTOR = 0.02
@@ -33,7 +33,7 @@ _BY_CHANCE = 4.0
 choice: p = 6e-5; slow drifts of a straight run reach 3.5, turns and zigzags 3.7 to 15)."""
 
 UNLIKE = 0.44
-"""What a signal leaves of the spread of another that is the same motion: that of a correlation of 0.9."""
+"""Share of a signal's spread that another record of the same motion leaves unexplained: a correlation of 0.9."""
 
 
 def heading_unit_findings(trial: Trial) -> list[Finding]:
@@ -259,17 +259,17 @@ def _factor(trial: Trial, found: _Comparison) -> Finding:
     factor = abs(found.factor)
     evidence = {"factor": factor, "standard_error": float(found.fit.errors[0])}
     what = f"dpsi/dt is {factor:.4g} times r"
-    # noise of r makes the factor of a regression too small, and that of the reverse one, this, too large
+    # noise of r makes the factor of a regression too small, and makes this one, of the reverse regression, too large
     largest = factor / found.correlation**2
     if largest < 1 / (1 + MISCALIBRATED) or factor > 1 + MISCALIBRATED:
-        truth = "one of them is not what its name says, and the factor is that of no unit"
+        truth = "one of them is not what its name says, and the factor belongs to no unit"
         return found_in(trial, _YAW, what, truth, evidence)
     truth = f"r is to be multiplied by {factor:.4g} if the heading is right"
     return noted_in(trial, ["r_radps"], what, truth, evidence, _scaled("r_radps", factor, truth))
 
 
 def _unit(trial: Trial, found: _Comparison) -> Finding | None:
-    """The unit that a factor between dpsi/dt and r indicates, and of which of them, if that can be determined."""
+    """The unit that a factor between dpsi/dt and r indicates, and whose unit it is, if that can be determined."""
     factor = abs(found.factor)
     nearest = min((1.0, 1 / _DEGREE, _DEGREE, 1 / 60), key=lambda unit: abs(np.log(factor / unit)))
     # few or noisy windows determine a factor less well
@@ -288,7 +288,7 @@ def _unit(trial: Trial, found: _Comparison) -> Finding | None:
     if nearest != 1 / 60 and ("deg" in psi) != small and not psi_right:
         readings.append(("psi_rad", 1 / nearest, "psi is in degrees" if small else "psi is in radians"))
     if len(readings) != 1:
-        truth = ", or ".join(truth for *_, truth in readings) or "one of them is in another unit, not that of its name"
+        truth = ", or ".join(truth for *_, truth in readings) or "one of them is not in the unit of its name"
         return found_in(trial, _YAW, what, truth, {"factor": factor})
     ((name, scale, truth),) = readings
     return found_in(trial, [name], what, truth, {"factor": factor}, _scaled(name, scale, truth))

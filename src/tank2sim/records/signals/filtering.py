@@ -128,7 +128,7 @@ def smoothing_spline(series: Series, cutoff_hz: float) -> Filtered:
 def decimate(series: Series, factor: int) -> Filtered:
     """Every `factor`-th sample, after a low pass forwards and backwards that keeps what is above the new Nyquist out.
 
-    The filter is that of scipy.signal.decimate, Chebyshev with 0.05 dB ripple to 0.8 of the new Nyquist frequency, but
+    The filter is as in scipy.signal.decimate, Chebyshev with 0.05 dB ripple to 0.8 of the new Nyquist frequency, but
     of order 7: one of even order has its ripple at zero frequency too, and would take 1 % off a steady heading.
 
     Raises InputError: The factor is below 2 or leaves fewer than 50 samples.
@@ -270,7 +270,7 @@ class FilterEffect:
 
     @property
     def gain(self) -> Array:
-        """Amplitude of the output over that of the input."""
+        """Amplitude of the output over the amplitude of the input."""
         return np.abs(self.response)
 
     @property

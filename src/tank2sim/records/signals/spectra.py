@@ -137,7 +137,7 @@ def spectrum(series: Series, segment_s: float | None = None) -> Spectrum:
     surroundings: the geometric mean of the medians over the octave below and the octave above, which on a spectrum
     that is any power of the frequency is the spectrum itself.
 
-    `series`: What to analyse; `segment_s`: Length of a segment; by default that of which eight cover the record, or
+    `series`: What to analyse; `segment_s`: Length of a segment; by default eight of them cover the record, or
     twenty correlation times if these are longer, but at most half the record.
 
     Raises InputError: The segment is shorter than ten samples or longer than half the record.

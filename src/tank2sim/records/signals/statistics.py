@@ -20,7 +20,7 @@ SIGNIFICANCE = 0.05
 """Probability below which a null hypothesis is rejected, as is usual."""
 
 FEWEST_INDEPENDENT = 20
-"""Independent samples below which no test of normality is made: that of kurtosis is not valid (scipy.stats)."""
+"""Fewest independent samples for a test of normality: with fewer, the test of kurtosis is not valid (scipy.stats)."""
 
 _BLOCKS = (200, 1000)
 _DENSITY_POINTS = 201
@@ -121,7 +121,7 @@ class Normality:
 
 @dataclass(frozen=True, eq=False)
 class Density:
-    """Probability density next to that of a normal distribution of the same mean and standard deviation.
+    """Probability density next to a normal distribution of the same mean and standard deviation.
 
     - `values` (m,): In the signal's unit.
     - `density`, `normal` (m,): In one over that unit.
@@ -139,7 +139,7 @@ class Density:
 def mean_and_deviation(name: str, values: Array) -> tuple[float, float]:
     """Mean and standard deviation of a signal (n,), SI; of a direction those on the circle.
 
-    The mean of a direction is that of the sum of its unit vectors, 0 to 2 pi, and with R the length of their mean its
+    The mean direction is the direction of the sum of unit vectors, 0 to 2 pi, and with R the length of their mean its
     deviation is sqrt(-2 ln R) (Mardia and Jupp 2000, Directional Statistics, 2.3): 350 and 10 deg have the mean 0.
     """
     if name not in DIRECTION_COLUMNS:
@@ -285,7 +285,7 @@ def autocorrelation(series: Series) -> Autocorrelation:
     coefficient = _coefficients(series.values, series.values)[len(series.values) - 1 :]
     kept = len(series.values) // 4 + 1
     before_zero = int(np.argmax(coefficient <= 0.0))  # it sums to -1/2 over all lags, so there is a first zero
-    # The trapezoidal rule: half the value at lag 0, and so half a step for white noise, of which all samples count.
+    # The trapezoidal rule: half the value at lag 0, and so half a step for white noise: all its samples count.
     time = series.step_s * (float(np.sum(coefficient[:before_zero])) - 0.5)
     count = min(float(len(series.values)), series.duration_s / (2.0 * time))
     return Autocorrelation(series.step_s * np.arange(kept, dtype=np.float64), coefficient[:kept], time, count)

@@ -22,7 +22,7 @@ from tank2sim.records.trials import Trial, with_signals
 def with_filtered(trial: Trial, filtered: Filtered, notice: str) -> Trial:
     """The trial with one signal filtered, at its own times; nan where the filtered signal does not reach.
 
-    `notice` is added to those of the trial.
+    `notice` is added to the trial's notices.
     The noise stated of that signal is left out: it does not hold any more.
     """
     series = filtered.series
@@ -39,7 +39,7 @@ def with_filtered(trial: Trial, filtered: Filtered, notice: str) -> Trial:
 def thinned(trial: Trial, filtered: Sequence[Filtered], notice: str) -> Trial:
     """The trial at the fewer times of thinned signals, all of them; orders have their values at these times.
 
-    `notice` is added to those of the trial.
+    `notice` is added to the trial's notices.
 
     Raises
     ------

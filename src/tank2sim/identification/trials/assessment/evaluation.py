@@ -36,7 +36,7 @@ _WINDOW = 5.0
 
 TURN_FIGURE_NAMES = ("advance_m", "transfer_m", "tactical_diameter_m")
 _OVERSHOOTS = 2
-"""Number of compared overshoots: those of IMO MSC.137(76). Later ones repeat the errors of the first."""
+"""Number of compared overshoots, as in IMO MSC.137(76). Later ones repeat the errors of the first."""
 
 _LEAST_NOISE = 1e-3
 """Noise of a signal without stated noise is taken as this share of its standard deviation at least (project choice)."""

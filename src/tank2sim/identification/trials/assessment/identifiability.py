@@ -145,8 +145,9 @@ def _needed(term: Term | None) -> bool:
 
 
 def _large(problem: Problem, values: Array) -> Array:
-    """A large change of each free parameter (k,): its prior error, its value, or that of the largest linear derivative
-    of the same force, whichever is largest. In the prime system terms of one force have coefficients of one size."""
+    """A large change of each free parameter (k,): its prior error, its value, or the value of the largest linear
+    derivative of the same force, whichever is largest. In the prime system terms of one force have coefficients of
+    one size."""
     size = np.maximum(problem.prior_error, np.abs(values))
     model = dict(zip(problem.model.parameter_names, problem.parameters(values), strict=True))
     terms = {name: term for name in model if (term := parse_term(_short(name))) is not None}

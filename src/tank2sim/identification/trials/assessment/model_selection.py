@@ -55,7 +55,7 @@ from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 from tank2sim.simulation.run import simulate
 
 FARTHEST = 4
-"""One in this many runs, those of largest amplitude, is held out to test extrapolation (project choice)."""
+"""One run in this many, of the largest amplitudes, is held out to test extrapolation (project choice)."""
 
 RESAMPLINGS = 1000
 """Random weights of folds over which predictive weights are averaged (project choice: 0.01 of a weight)."""
@@ -177,7 +177,7 @@ def farthest(runs: Sequence[SampledRun]) -> tuple[int, ...]:
 
 
 def simplest(candidates: Mapping[str, CrossValidation]) -> str:
-    """Name of the simplest model whose errors are not significantly larger than those of the best.
+    """Name of the simplest model whose errors are not significantly larger than the best model's.
 
     `candidates`: Name to cross-validation over the same runs, from the simplest model to the one with most parameters.
 
@@ -201,10 +201,10 @@ def simplest(candidates: Mapping[str, CrossValidation]) -> str:
 def predictive_weights(candidates: Mapping[str, CrossValidation], samples: Sequence[float]) -> dict[str, float]:
     """Weight of each model by its predictions of the runs held out one at a time; they add up to 1.
 
-    The predictive log density of fold f is -n_f log(error), up to a constant: that of n_f Gaussian residuals whose
-    variance is what it turns out to be. With few folds a sum over them claims too much, so that the weights (Akaike's)
-    are averaged over random weights of the folds, the Bayesian bootstrap: pseudo-BMA+ of Yao, Vehtari, Simpson and
-    Gelman (2018), Bayesian Analysis 13, (7) to (10).
+    The predictive log density of fold f is -n_f log(error), up to a constant: the density of n_f Gaussian residuals
+    whose variance is what it turns out to be. With few folds a sum over them claims too much, so that the weights
+    (Akaike's) are averaged over random weights of the folds, the Bayesian bootstrap: pseudo-BMA+ of Yao, Vehtari,
+    Simpson and Gelman (2018), Bayesian Analysis 13, (7) to (10).
 
     `candidates`: Name to cross-validation over the same runs. `samples`: n_f, number of independent residuals in each
     run.

@@ -1,9 +1,9 @@
 """Test whether trials are of the ship of the card, by the yaw acceleration that the rudder gives the ship.
 
 Another ship turns several times faster or slower at the same rudder, however well a fit of all coefficients follows it.
-Both the measured mean yaw accelerations (of the weak form) and those of the card's model along the measured motion are
-regressed on rudder and yaw rate. The two coefficients of the rudder are equal for the card's ship, whatever its
-equations, and errors that the card states do not widen the test.
+Both the measured mean yaw accelerations (of the weak form) and the accelerations of the card's model along the
+measured motion are regressed on rudder and yaw rate. The two coefficients of the rudder are equal for the card's
+ship, whatever its equations, and errors that the card states do not widen the test.
 """
 
 from __future__ import annotations

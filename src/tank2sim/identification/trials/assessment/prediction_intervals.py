@@ -192,7 +192,7 @@ def _departure(
 
 
 def _without_span(basis: Array, columns: Array) -> Array:
-    """Columns (n, m) less their projection on those of a basis (n, b), which may be dependent."""
+    """Columns (n, m) less their projection on a basis (n, b), whose columns may be dependent."""
     left, sizes, _ = np.linalg.svd(basis, full_matrices=False)
     span = left[:, sizes > 1e-9 * sizes.max(initial=0.0)]
     return np.asarray(columns - span @ (span.T @ columns), dtype=np.float64)
@@ -387,7 +387,7 @@ def _figures(task: tuple[DrivenShip, Manoeuvre | Recorded, dict[str, float]]) ->
 
 
 def flat(figures: Figures) -> dict[str, float]:
-    """`figures` as single numbers: those of a list with their position in the name, None as nan."""
+    """`figures` as single numbers: list items with their position in the name, None as nan."""
     single: dict[str, float] = {}
     for name, value in figures.items():
         if isinstance(value, list | tuple):

@@ -155,7 +155,7 @@ def task_of(problem: Problem, *, white: bool = False, drifting: bool = False) ->
 
 
 def _first_levels(problem: Problem, disturbed: Disturbed, batch: Batch, white: bool) -> Levels:
-    """Measurement noise from third differences (their variance is 20 times that of white noise); usual pushes."""
+    """Measurement noise from third differences (their variance is 20 times the white noise's); usual pushes."""
     roughness = []
     for column in np.moveaxis(np.where(batch.known, batch.measured, np.nan), 2, 0):
         known = column[~np.isnan(column)]
@@ -291,7 +291,7 @@ class KalmanEstimate(Estimate):
 
     levels: Levels  # As the filter takes them
     process_noise: Mapping[str, CorrelatedNoise] = field(default_factory=dict)  # By state, as ``motion.u``
-    # Standard deviation of the white noise by measured variable (``noise`` holds that of the innovations)
+    # Standard deviation of the white noise by measured variable (``noise`` holds the innovations')
     measurement_noise: Mapping[str, float] = field(default_factory=dict)
     # Drift of each sensor by measured variable; empty without drift
     drift: Mapping[str, CorrelatedNoise] = field(default_factory=dict)

@@ -4,7 +4,7 @@ The Kalman filter's gains along a linearised trajectory, the derivatives of its 
 
 Runs of a batch are padded to the same length, and left at their ends; an instant without a measurement has a row of
 zeros in C, a residual of 0 and a variance of 1, and adds nothing to the likelihood. All functions work on stacks of
-small matrices with any leading axes, of which the last is the run.
+small matrices with any leading axes; the last of them is the run.
 
 A model with random accelerations, and the functions of a filter for it: steps, tangents, observed values.
 
@@ -165,7 +165,7 @@ class Variances:
     process: Array  # (..., runs, nz): Variances of the noise added to the state in a step (diagonal)
     measurement: Array  # (..., runs, n, ny): 1 where not measured
     start: Array  # (..., runs, nz, nz): Covariance of the first state
-    # Instants of each run, of which the rest of the n is padding; by default all have n
+    # Instants of each run; the rest of the n is padding; by default all have n
     lengths: Sequence[int] | None = None
 
 

@@ -8,7 +8,7 @@ Multiple shooting: runs cut into pieces, each with its own initial state, which 
 
 Each piece is compared with its measurements; its end is not tied to the start of the next. The initial states are
 eliminated from the normal equations (a Schur complement), so that these have the size of the parameters. The `noise` of
-the methods is that of each seen variable (ny).
+the methods is per seen variable (ny).
 """
 
 from __future__ import annotations

@@ -1,11 +1,12 @@
 """Samples of the posterior of an output-error estimate, by Hamiltonian or ensemble Monte Carlo.
 
-The density is that of :mod:`.output_error`: the prior, the captive tests, and the sum of squares of whitened residuals.
-The initial states of all pieces are integrated out in their linearisation at the estimate, in which they move by the
-size of the noise alone. One density is one simulation of all pieces; its exact gradient is one adjoint simulation.
+The density is the one of :mod:`.output_error`: the prior, the captive tests, and the sum of squares of whitened
+residuals. The initial states of all pieces are integrated out in their linearisation at the estimate, in which they
+move by the size of the noise alone. One density is one simulation of all pieces; its exact gradient is one adjoint
+simulation.
 
 Residuals with model error are correlated for far longer than the noise model says. The trials' density is therefore
-stretched about the estimate until its curvature is that of the robust covariance (the curvature adjustment of Ribatet,
+stretched about the estimate until its curvature matches the robust covariance (the curvature adjustment of Ribatet,
 Cooley and Davison 2012, Statistica Sinica 22).
 """
 
@@ -52,7 +53,7 @@ DIFFERENCE = 1e-3
 """Step of second derivatives, in standard deviations: their error is far below what a scale needs (project choice)."""
 
 LEAST_CURVATURE = 0.1
-"""Smallest curvature in units of that of the linearised model: a scale of three deviations (project choice)."""
+"""Smallest curvature in units of the linearised model's: a scale of three deviations (project choice)."""
 
 LEAST_LIKELY = 1e8
 """Sum of squares in place of one that is infinite, which ends a Hamiltonian trajectory (project choice)."""

@@ -167,7 +167,7 @@ def _complete_positions(columns: dict[str, Array], missing: set[str], step: floa
 
 
 def _turned(forward: Array, starboard: Array, angle: Array) -> tuple[Array, Array]:
-    """Components (n,) each after turning the axes back by `angle` (n,): those of the earth from those of the body."""
+    """Components (n,) each after turning the axes back by `angle` (n,): earth axes from body axes."""
     north, east = earth_velocity(*(ca.DM(values) for values in (forward, starboard, angle)))  # type: ignore[arg-type]
     return np.array(north).ravel(), np.array(east).ravel()
 

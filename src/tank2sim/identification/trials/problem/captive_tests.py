@@ -1,8 +1,8 @@
 """Captive tests of the same ship as equations in the free parameters of a model, to be fitted together with trials.
 
-Every run's means and harmonics of X, Y and N are compared with those of the model's forces along the measured motion,
+Every run's means and harmonics of X, Y and N are compared with the model's forces along the measured motion,
 Froude-scaled and prime. A tank differs from a free-running ship: a gain of each force, an offset of X (propeller and
-friction are not those of the ship) and the place of the moment's reference point are uncertain parameters, eliminated
+friction differ from the ship's) and the place of the moment's reference point are uncertain parameters, eliminated
 by their priors (Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63: model discrepancy, here of these few forms).
 """
 
@@ -32,7 +32,7 @@ GAIN_ERROR = 0.05
 differ by 5 to 10 % (SIMMAN 2008 and 2014, captive data of the KVLCC2). Project choice within that."""
 
 SURGE_OFFSET = 1e-3
-"""Standard error of a constant X' between tank and ship: resistance and thrust of a model are not those of the ship.
+"""Standard error of a constant X' between tank and ship: resistance and thrust of a model differ from the ship's.
 Project choice: as large as the resistance itself."""
 
 RUDDER_GAIN_ERROR = 0.15

@@ -256,7 +256,7 @@ parameters, and the correction of their scatter would itself be scatter (project
 
 
 def scaled_prior(problem: Problem, scale: Mapping[str, float]) -> Array:
-    """Standard errors before the trials (k,), those of :attr:`Problem.groups` times the scale of their group."""
+    """Standard errors before the trials (k,), with :attr:`Problem.groups` times the scale of their group."""
     return np.array([scale.get(group, 1.0) for group in problem.groups]) * problem.prior_error
 
 

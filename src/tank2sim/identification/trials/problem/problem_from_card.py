@@ -264,7 +264,7 @@ def with_captive(problem: Problem, card: ManoeuvringCard, captive: CaptiveRuns |
     """The problem with the equations of captive tests, with the noise of their best fit alone; unchanged without any.
 
     Fitted together with trials, the noise must not grow until tank and trials agree: it is what the tank's own scatter
-    and the structure of the model leave, with standard errors before the trials :data:`LOOSE` times those of `problem`.
+    and the structure of the model leave, with standard errors before the trials :data:`LOOSE` times those in `problem`.
     Within one tank the uncertain parameters between tank and ship are none. Raises InputError: The campaign is of
     another ship than the `card`.
     """
@@ -292,7 +292,7 @@ def with_correlations(problem: Problem, card: ManoeuvringCard) -> Problem:
     rows = [place for place, name in enumerate(problem.free) if name in known]
     columns = [known[problem.free[place]] for place in rows]
     block = joint.covariance[np.ix_(columns, columns)]
-    sizes = np.sqrt(np.diag(block))  # those of the problem may be wider
+    sizes = np.sqrt(np.diag(block))  # the problem's may be wider
     correlation = np.eye(len(problem.free))
     correlation[np.ix_(rows, rows)] = block / np.outer(sizes, sizes)
     inverse = np.linalg.inv(correlation + NEARLY_SINGULAR * np.eye(len(problem.free)))

@@ -29,7 +29,7 @@ from tank2sim.simulation.rudder_record import is_over, rudder_of
 from tank2sim.simulation.scheme import runge_kutta_step
 
 _SLOWER = 1.5
-"""Step of a signal, as a multiple of that of the grid, from which it is slower than it (project choice: below, most
+"""Step of a signal over the grid's step, from which it counts as slower than the grid (project choice: below, most
 instants have a sample of their own)."""
 
 _BEGINNING = 5
@@ -120,7 +120,7 @@ def prepare(
 
 
 def rudder_at_start(run: SampledRun, order: Array, ship_time: float) -> float:
-    """Angle of the rudder at the first instant of a run of which only the rudder's order (n,) is known, rad.
+    """Angle of the rudder (rad) at the first instant of a run where only its order (n,) is known.
 
     It is the first order; amidships where the run begins at its execute: the order is to put the rudder over, and the
     ship turns to that side later, and not yet.

@@ -100,7 +100,7 @@ STRUCTURES: Registry[ModelStructure] = Registry(
     ModelStructure,
     reserved=(AUTO, AVERAGE, BY_EVIDENCE),
 )
-"""By rising number of parameters, then those of installed packages: the first of equal predictions is taken."""
+"""By rising number of parameters, then structures from installed packages: the first of equal predictions is taken."""
 
 
 def structure_that_adds(card: ManoeuvringCard, effects: Collection[str]) -> str | None:

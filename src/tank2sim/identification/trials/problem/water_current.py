@@ -125,7 +125,7 @@ def current_alone(problem: Problem) -> Problem:
 
 
 def without_current(estimate: Estimate, card: ManoeuvringCard) -> tuple[Estimate, WaterCurrent]:
-    """An estimate with a free current as that of the other parameters (current eliminated), and the current.
+    """An estimate with a free current, split into the other parameters (current eliminated) and the current.
 
     `card`: Card of the problem; its current is added.
     """
