@@ -84,7 +84,7 @@ def _short(value: object) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-# What a number is, in the annotations of functions; its unit is that of the parameter's name.
+# What a number is, in the annotations of functions; its unit is in the parameter's name.
 NumberArgument = Annotated[float, ArgumentBounds()]
 PositiveArgument = Annotated[float, ArgumentBounds(0, above=True)]
 NonNegativeArgument = Annotated[float, ArgumentBounds(0)]

@@ -89,7 +89,7 @@ def write_together(
 
 
 def refuse_doubled(outputs: Iterable[Path | None]) -> None:
-    """Refuse outputs, None for those left out, of which two are one file; asked before work that takes long.
+    """Refuse outputs (None: not written) if two are the same file; called before long work.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Effects, commands, kinds of cards, readers and structures of apps and other packages, found by entry points.
 
 Each kind has a :class:`Registry`: a mapping from name to value that holds the built-in values and, read once when it is
-first used, those of installed packages. An entry point has the name of its value::
+first used, values from installed packages. An entry point has the name of its value::
 
     [project.entry-points."tank2sim.effects"]
     bow_thruster = "my_package:BOW_THRUSTER"
@@ -92,7 +92,7 @@ def _itself(value: Any) -> Any:
 
 
 class Registry(Mapping[str, _Value]):
-    """Built-in values and those of installed packages, by name, the built-in ones first.
+    """Built-in values and values from installed packages, by name, the built-in ones first.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class Registry(Mapping[str, _Value]):
         What an entry point must give: a frozen dataclass. What its functions raise, in the value itself and in the
         parts that its tuples hold, is turned into an InputError that names the package.
     reserved : iterable of str
-        Names that no package may take, in addition to those of `builtin`.
+        Names that no package may take, in addition to the names in `builtin`.
     fault : callable, optional
         ``fault(value) -> str``: what is wrong with the value of a package, "" if nothing.
     value_of : callable, optional
@@ -162,7 +162,7 @@ class Registry(Mapping[str, _Value]):
         return sum(1 for _ in self)
 
     def names(self) -> tuple[str, ...]:
-        """All names, with those of entry points that cannot be used: asking for such a value says why."""
+        """All names, also of entry points that cannot be used: asking for such a value says why."""
         plugins = self._plugins()
         return (*self._builtin, *(name for name in plugins if name not in self.reserved))
 
@@ -232,7 +232,7 @@ def entry_points(group: str) -> Iterable[EntryPoint]:
 
 
 def _guarded(value: Any, origin: Origin) -> Any:
-    """A value whose functions are :meth:`Origin.guarded`, and those of the values in it."""
+    """A value whose functions, and the functions of values in it, are :meth:`Origin.guarded`."""
     if isinstance(value, type):
         return value
     if isinstance(value, tuple):

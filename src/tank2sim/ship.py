@@ -122,7 +122,7 @@ class Ship(Vessel):
     def turn(self, rudder_deg: AngleArgument = 35.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
         """Simulate a turning circle: the rudder is put over at t = 0 and held for 540 deg of heading.
 
-        Options are those of :meth:`simulate`.
+        Options as for :meth:`simulate`.
         """
         return self.simulate(f"turn:{rudder_deg:.10g}", **options)
 
@@ -132,7 +132,7 @@ class Ship(Vessel):
     ) -> ManoeuvreResult:
         """Simulate a zigzag: the rudder (negative begins to port) is reversed at each `heading_deg` off the course.
 
-        Options are those of :meth:`simulate`.
+        Options as for :meth:`simulate`.
         """
         return self.simulate(f"zigzag:{rudder_deg:.10g}/{heading_deg:.10g}", **options)
 
@@ -145,7 +145,7 @@ class Ship(Vessel):
     def spiral(self, rudder_deg: AngleArgument = 20.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
         """Simulate a direct (Dieudonne) spiral, from `rudder_deg` to the other side and back.
 
-        Options are those of :meth:`simulate`.
+        Options as for :meth:`simulate`.
         """
         return self.simulate(f"spiral:{rudder_deg:.10g}", **options)
 
@@ -155,7 +155,7 @@ class Ship(Vessel):
     ) -> ManoeuvreResult:
         """Simulate a stop with revolutions astern (rpm, negative or 0), by default full astern.
 
-        Options are those of :meth:`simulate`.
+        Options as for :meth:`simulate`.
         """
         return self.simulate("stop" if revolutions_rpm is None else f"stop:{revolutions_rpm:.10g}", **options)
 

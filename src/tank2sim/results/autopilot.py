@@ -226,7 +226,7 @@ class ResultWithController(Result[_S]):
 class AutopilotResult(ResultWithController[AutopilotStudy]):
     """A heading controller of a ship: gains, margins at several speeds, course changes, weather, tracks.
 
-    Parameters are those of :class:`ResultWithController`, with the study :class:`.AutopilotStudy`.
+    Parameters as for :class:`ResultWithController`, with the study :class:`.AutopilotStudy`.
     """
 
     subject: ClassVar[str] = "heading autopilot"
@@ -430,7 +430,7 @@ _MARGINS = {
 class CraftAutopilotResult(ResultWithController[CraftAutopilotStudy]):
     """The autopilot of a craft with fixed thrusters: gains, poles, a change of course and one of speed.
 
-    Parameters are those of :class:`ResultWithController`, with the study :class:`.CraftAutopilotStudy`.
+    Parameters as for :class:`ResultWithController`, with the study :class:`.CraftAutopilotStudy`.
     """
 
     subject: ClassVar[str] = "autopilot of heading and speed"

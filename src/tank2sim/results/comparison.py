@@ -204,7 +204,7 @@ class ComparisonResult(Result[CardComparison]):
         return [Section("Tracks", charts=charts)] if charts else []
 
     def _figures(self) -> list[Section]:
-        """Differences of the figures from those of the reference, all manoeuvres in one chart."""
+        """Differences of the figures from the reference's, all manoeuvres in one chart."""
         percents = self._percents()
         if not percents:
             return []

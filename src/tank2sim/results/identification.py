@@ -59,7 +59,7 @@ _T = TypeVar("_T")
 FITTED, HELD_OUT = "fitted", "held out"
 
 MOST_TRIALS = 12
-"""Trials of which tracks and histories are shown: those with the largest error of yaw rate. More are hard to look at,
+"""Trials of which tracks and histories are shown: the largest errors of yaw rate. More are hard to look at,
 and make the page slow (project choice)."""
 
 _PER_SHEET = 6

@@ -446,7 +446,7 @@ def variance_chart(result: InfluenceStudy) -> ChartSpec:
         ).layers,
         size=(_WIDTH, 28 * len(figures)),
         data={"values": rows},
-        title="Standard errors behind those of the figures",
+        title="Standard errors that the figures' errors follow from",
         description=f"Shares of {len(names)} parameters in the variances of {len(figures)} figures.",
     )
 

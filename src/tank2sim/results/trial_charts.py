@@ -293,7 +293,7 @@ def _figure_panels(rows: list[ChartRecord], words: str, unit: str, error_unit: s
 
 
 def _series(trial: TrialMotions, names: Sequence[str]) -> dict[str, dict[str, Array]]:
-    """Label to time and those of the columns that it has; what ran away is left out.
+    """Label to time and the columns that it has, without values that ran away.
 
     Of what was measured the part that was simulated: after a turn, a model or ship may have sailed on for long.
     """

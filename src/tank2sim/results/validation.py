@@ -416,7 +416,7 @@ def _digits(value: float | None, digits: int = 4) -> str | None:
 def _comparison_error_chart(figures: Sequence[Validated], numbers: Mapping[str, int]) -> ChartSpec:
     """E of each figure next to plus and minus U_val, in per cent of D.
 
-    `numbers` are those of the trials by name.
+    `numbers` of the trials by name.
     """
     rows = [
         {

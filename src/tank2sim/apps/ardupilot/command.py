@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from tank2sim.dynamics.vessel import Vessel
 
 FIRST_PORT, PORTS_APART = 9002, 10
-"""Port to which the first instance of SITL sends, and the distance to that of the next."""
+"""Port to which the first instance of SITL sends, and the distance to the next instance's."""
 
 _PARAMETERS = Written((".parm",), "BOAT.parm", by_function=True)
 Instance = Annotated[int, ArgumentBounds(0, 100, whole=True)]

@@ -14,7 +14,7 @@ CRUISE_PERCENT = 50
 """Throttle of the cruise, per cent: ArduPilot's own default of CRUISE_THROTTLE."""
 
 _SETTLING = 60.0
-"""Time in which speed and rate of turn settle, L/u0. Project choice: that of a pull-out."""
+"""Time in which speed and rate of turn settle, L/u0. Project choice: as in a pull-out."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -81,7 +81,7 @@ class SitlFrame:
 class SitlShip:
     """A ship that moves by the frames of SITL.
 
-    Channels are those of a Rover of the frame class boat: 1 is the left thruster and 3 the right one (skid steering),
+    Channels as for a Rover of the frame class boat: 1 is the left thruster and 3 the right one (skid steering),
     or 1 the rudder and 3 the throttle.
 
     Parameters

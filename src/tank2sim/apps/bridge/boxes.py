@@ -82,7 +82,7 @@ def draughts(bridge: Bridge, ballast: Bridge | None) -> Box:
     cards = [condition.card if condition else None for condition in (bridge, ballast)]
     bases = [condition.basis if condition else None for condition in (bridge, ballast)]
     means = [mean_draught(card) if card else None for card in cards]
-    # Displacement and block coefficient of a card are those of its own draught.
+    # Displacement and block coefficient of a card hold at its own draught.
     ships = [
         card.ship if card and mean == card.ship.draught_m else None for card, mean in zip(cards, means, strict=True)
     ]
@@ -295,7 +295,7 @@ def squat(bridge: Bridge) -> Box:
 
 
 def thrusters() -> Box:
-    """Of the poster; no card has them."""
+    """Boxes of the poster that no card fills."""
     heads = ("kW (HP)", "delay to full thrust", "turning rate at zero speed", "delay to reverse", "no effect above, kn")
     rows = tuple(Row(where, (None,) * len(heads)) for where in ("Bow", "Stern", "Combined"))
     return Box("Thruster effect at trial conditions", rows, heads)
@@ -315,7 +315,7 @@ def overboard() -> Box:
 
 
 def visibility() -> Box:
-    """Of the poster; no card knows the wheelhouse."""
+    """The poster's data of the wheelhouse, which no card has."""
     labels = ("Blind distance ahead, loaded", "Blind distance ahead, ballast", "Height of eye")
     return Box("Visibility", tuple(Row(label, (None,)) for label in labels))
 

@@ -122,7 +122,7 @@ class BridgeResult(Result[BridgeStudy]):
 class PosterResult(BridgeResult):
     """The wheelhouse poster of a ship (A3, landscape).
 
-    Parameters are those of :class:`BridgeResult`.
+    Parameters as for :class:`BridgeResult`.
     """
 
     command: ClassVar[str] = "poster"
@@ -138,7 +138,7 @@ class PosterResult(BridgeResult):
 class PilotCardResult(BridgeResult):
     """The pilot card of a ship (A4).
 
-    Parameters are those of :class:`BridgeResult`.
+    Parameters as for :class:`BridgeResult`.
     """
 
     command: ClassVar[str] = "pilotcard"

@@ -42,7 +42,7 @@ SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
 """Revolutions over nominal ones of the reported speeds without given telegraph orders: project choice."""
 
 UNDER_KEEL, SQUAT_SPEED = (0.2, 0.5), 0.75
-"""Water under the keel over the draught, and speed over that of the card, of the table of squat: project choice, about
+"""Water under the keel over the draught, and speed over the card's, in the table of squat: project choice, about
 what a channel has, and a speed that a ship makes in one; more rows leave no room on the poster."""
 
 ORDERS_AHEAD = ("Full sea speed", "Full ahead", "Half ahead", "Slow ahead", "Dead slow ahead")
@@ -191,7 +191,7 @@ class ZigzagStudy:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BridgeStudy:
-    """Data of a bridge as numbers; fields are those of :class:`Bridge`, `ballast` is the other condition."""
+    """Data of a bridge as numbers; fields as in :class:`Bridge`, `ballast` is the other condition."""
 
     ship: str
     source: str

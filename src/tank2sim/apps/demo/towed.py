@@ -30,7 +30,7 @@ WELL_POSED = ("B3",)
 NAME = "Wilinski-Zellman underwater vehicle"
 SOURCE = "Table 1 of Wilinski and Zellman (1984), M and B3 by output error (tank2sim demo)"
 LENGTH_M = 3.8
-"""Of the vehicle, paper 1."""
+"""Number of the vehicle, paper 1."""
 
 
 def towed_vehicle(workshop: Workshop) -> DemoOutcome:

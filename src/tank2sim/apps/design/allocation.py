@@ -36,7 +36,7 @@ in the plan with whole numbers."""
 
 @dataclass(frozen=True, eq=False)
 class InformationBlock:
-    """Coefficients that are estimated together, independent of those of other blocks (a force of the captive tests).
+    """Coefficients that are estimated together, independent of other blocks (a force of the captive tests).
 
     `prior` (k, k): information before any test, positive definite; `tests` (n, k, k): information of each test;
     `targets` (m, k, k): L of each target, for the coefficients of this block.
@@ -204,7 +204,7 @@ def least_time(
     """Least time (s), to 2 % of all, of a plan with no target above 1; None without one.
 
     `plans`: share of the time to counts; `plan`: makes one of a share, None where that has no room for a test;
-    `lowest`: share below those of `plans`, by default half of the least that is good.
+    `lowest`: share below the shares in `plans`, by default half of the least that is good.
     """
     good = [share for share, counts in plans.items() if targets.variances(counts).max() <= 1.0]
     if not good:

@@ -202,7 +202,7 @@ class CaptiveDesigner:
         every = self.tank_runs.candidates()
         candidates = self._within_gauges(every)
         self.too_strong = len(every) - len(candidates)
-        # Every check that a plan may need: those of no plan at all.
+        # Every check that a plan may need, as without any plan.
         checks = self._within_gauges(self.tank_runs.check_runs(())) if settings.check_runs else ()
         self.groups = (*candidates, *checks, *self.usual)
         self.places = {
@@ -216,7 +216,7 @@ class CaptiveDesigner:
         self.information = self.planned.information(self.groups)
 
     def _with_gauges(self, usual: Sequence[RunGroup]) -> PlannedCampaign:
-        """The campaign with errors of the gauges, whose ranges are those of the usual matrix where none is stated."""
+        """The campaign with errors of the gauges, whose ranges follow from the usual matrix where none is stated."""
         tank, runs = self.tank_runs.tank, self.tank_runs
         density, body = tank.model.water_density_kgpm3, self.card.rigid_body
         mass = 0.5 * density * runs.length_m**3

@@ -38,7 +38,7 @@ _READINGS, _CYCLES = 24, 6
 over whole periods information grows with their number."""
 
 _UNKNOWN = 10.0
-"""Standard deviation of coefficients of which nothing is known, over the largest linear one of the ship. Project
+"""Standard deviation of unknown coefficients, over the largest linear one of the ship. Project
 choice: in the prime system coefficients are of one size, and ten times as much is as good as unknown; it only keeps the
 information of a plan without such runs invertible."""
 
@@ -62,7 +62,7 @@ class PlannedCampaign:
 
     @property
     def campaign(self) -> Campaign:
-        """The campaign without runs, its forces those of the gauges."""
+        """The campaign without runs, with forces as the gauges read them."""
         return Campaign(
             path=Path("design"),
             model=self.model,

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tank2sim.dynamics.vessel import Vessel
 
 DESIGN_FIGURES = ("advance_m@35", "tactical_diameter_m@35", "overshoot_1_deg@10/10", "overshoot_1_deg@20/20")
-"""Figures where none is given: those of IMO MSC.137(76) that have slopes."""
+"""Figures where none is given: figures of IMO MSC.137(76) that have slopes."""
 
 Hours = Annotated[float, ArgumentBounds(0, 1000, above=True)]
 Minutes = Annotated[float, ArgumentBounds(0, 60_000, above=True)]
@@ -82,7 +82,7 @@ def design_trial(
     figures : str or sequence of str
         As of :func:`design_campaign`.
     minutes : float, optional
-        Time of the trial with all approaches; by default that of the usual set.
+        Time of the trial with all approaches; by default as long as the usual set.
     sensors : mapping, optional
         Column of a trial to the standard deviation of one reading a second: ``{"r_degps": 0.02, "x_m": 1.0}``, on the
         command line ``r_degps=0.02 x_m=1``; columns that are not listed are not measured.
@@ -145,7 +145,7 @@ def design_campaign(
     Among static drift and rudder, both, pure sway, pure yaw and yaw with drift, at the levels, frequencies and lengths
     that the tank allows, those are chosen, with repeats, that make the worst variance of the figures smallest, measured
     by what the usual matrix leaves in the same hours: a c-optimal design for several figures. The information of a run
-    is that of the regression of :func:`.reduce` with the stated errors of the gauges.
+    is as in the regression of :func:`.reduce` with the stated errors of the gauges.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def design_campaign(
     figures : str or sequence of str
         As of :meth:`.Ship.influence`.
     hours : float, optional
-        Time in the tank; by default that of the usual matrix once.
+        Time in the tank; by default as long as the usual matrix once.
     tank : path or TankFile, optional
         ``tank.toml``.
     carriage_length_m : float, optional
@@ -166,13 +166,13 @@ def design_campaign(
         A ``campaign.toml`` whose runs are compared, in place of the usual matrix; or a tank's own matrix as a CSV table
         with columns of drift (``beta_deg``), rudder (``delta_deg``), ``v_prime`` and ``r_prime``, a row for each run.
     largest : tuple, optional
-        Largest drift (deg), rudder (deg) and r'; by default those of the manoeuvres of the figures. On the command line
+        Largest drift (deg), rudder (deg) and r'; by default as in the manoeuvres of the figures. On the command line
         ``12/35/0.6``.
     check_runs : bool
         Also plan runs that could contradict the polynomial.
     one_side : bool
         Figures to the side of the given rudder, in place of the mean over both sides, as trials are reported: a single
-        side depends on Y0 and N0, of which every run shows as much as any other.
+        side depends on Y0 and N0, which every run shows equally well.
     draws : int
         Ships drawn from the errors of the card, for which the plan is to be good as well.
     seed : int

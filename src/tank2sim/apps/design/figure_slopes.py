@@ -23,7 +23,7 @@ from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.run import simulate
 
 _LEAST_RANGE = TestedRange(np.radians(4.0), np.radians(10.0), 0.2)
-"""Range of the tests where the figures are those of a straight course. Project choice: the smallest angles that gauges
+"""Range of the tests where the figures describe a straight course. Project choice: the smallest angles that gauges
 measure well."""
 
 _UNLISTED = 1e-12
@@ -62,7 +62,7 @@ class FigureSlopes:
 
 
 def both_sides(figure: InfluenceFigure) -> tuple[InfluenceFigure, ...]:
-    """The figure and that of the manoeuvre to the other side; itself alone on a straight course."""
+    """The figure, and the same to the other side; itself alone on a straight course."""
     if not figure.angles:
         return (figure,)
     return figure, replace(figure, angles=(-figure.angles[0], *figure.angles[1:]))

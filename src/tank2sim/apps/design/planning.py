@@ -43,7 +43,7 @@ _HARDLY_CERTAIN = 0.1
 a fifth of the value wide in each direction, as wide as the margins of many ships to the limits of IMO."""
 _FAR_BEYOND_USE = 100.0
 """Range of a gauge over the largest force of the usual matrix from which it is named. Project choice: its errors are
-then more than a tenth of every force, as those of a usual gauge are stated (0.1 % of the range)."""
+then more than a tenth of every force, as usual gauges are specified (0.1 % of the range)."""
 _SENSOR_BOUNDS = (1e-3, 1e3)
 """Least and largest standard deviation of a sensor, over the assumed one. Project choice: a thousandth is beyond any
 sensor aboard, and with much less the sums lose their digits; a thousand times as much shows nothing."""
@@ -58,7 +58,7 @@ def planned_campaign(
     usual: str | Path | None = None,
     largest: tuple[float, float, float] | None = None,
 ) -> tuple[CampaignStudy, CaptiveDesign]:
-    """The campaign as numbers, and its design. Arguments and errors are those of :func:`.design_campaign`.
+    """The campaign as numbers, and its design. Arguments and errors as in :func:`.design_campaign`.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def _planned_figures(design: CaptiveDesign | TrialDesign, **more: Array) -> dict
 
 
 def _kinds(design: CaptiveDesign) -> tuple[PlannedKind, ...]:
-    """Runs by kind, those of the figures first."""
+    """Runs by kind, runs for the figures first."""
     found = []
     for test in sorted(design.tests, key=lambda test: (test.check, test.runs[0].type)):
         run = test.runs[0]

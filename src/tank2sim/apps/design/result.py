@@ -353,8 +353,8 @@ _TRIAL = (
 
 
 def run_planes(study: CampaignStudy) -> list[ChartSpec]:
-    """Runs in the plane of drift and rudder, and oscillations in that of frequency and amplitude; areas are numbers of
-    runs."""
+    """Runs in the plane of drift and rudder, and oscillations in the plane of frequency and amplitude; areas are
+    numbers of runs."""
     steady, swinging = Counter[tuple[float, ...]](), Counter[tuple[object, ...]]()
     for run in study.runs:
         if run.frequency_radps is None:

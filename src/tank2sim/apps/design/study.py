@@ -123,7 +123,7 @@ class GaugeStudy:
 
 @dataclass(frozen=True, kw_only=True)
 class CampaignStudy:
-    """A designed captive campaign; `hours_for_usual_certainty` is None if no plan reaches that of the usual matrix."""
+    """A designed captive campaign; `hours_for_usual_certainty` is None if no plan is as certain as the usual matrix."""
 
     ship: str
     kind: str = "campaign"

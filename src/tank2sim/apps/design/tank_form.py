@@ -121,9 +121,9 @@ class TestedModelSection(CardSection):
     Parameters
     ----------
     length_m
-        By default 4 m, or that of the ship if it is shorter.
+        By default 4 m, or the ship's length if it is shorter.
     speed_mps
-        Test speed; by default that of the card at the same Froude number.
+        Test speed; by default the card's at the same Froude number.
     """
 
     length_m: Annotated[float, Field(gt=0.1, le=100)] | None = None

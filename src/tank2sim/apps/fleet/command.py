@@ -46,7 +46,7 @@ def find_gaps(
     workers: Count | None = None,
     report: Progress = lambda _: None,
 ) -> FleetResult | GapResult:
-    """Find the missing effects of the ships of a fleet, as :func:`find_gap` finds those of one ship.
+    """Find the missing effects of the ships of a fleet, as :func:`find_gap` does for one ship.
 
     The results of each ship are written as soon as they exist; a search that was stopped goes on where it was.
 

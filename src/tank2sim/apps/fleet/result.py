@@ -43,7 +43,7 @@ class FleetResult(Result[FleetStudy]):
     inputs : tuple of Path
         Cards and trials.
     written : tuple of Path
-        Files of the fleet; those of the ships are listed in their ``gap.json``.
+        Files of the fleet; the ships' files are listed in their ``gap.json``.
     """
 
     study: FleetStudy

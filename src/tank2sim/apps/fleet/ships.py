@@ -149,7 +149,7 @@ def ship_alone(folder: Path) -> ShipFolder | None:
 
 
 def _folders_in(folder: Path) -> list[Path]:
-    """Sub-folders in the order of their names, without those of results."""
+    """Sub-folders in the order of their names, without folders of results."""
     return [path for path in sorted(_visible(folder)) if path.is_dir() and not _is_of_results(path)]
 
 

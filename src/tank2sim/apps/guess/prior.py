@@ -1,6 +1,6 @@
 """What is known of a ship by its main dimensions alone: a card of published estimates with wide standard errors.
 
-Linear and acceleration derivatives are those of :mod:`tank2sim.cards.estimates`. The rudder is one of the
+Linear and acceleration derivatives come from :mod:`tank2sim.cards.estimates`. The rudder is one of the
 area that rules of classification require, in the slipstream of its propeller. For all other numbers there is no
 regression that would hold here: their means and standard errors enclose what was identified or measured on the bundled
 KVLCC2, Esso Osaka and Mariner, three ships, and so are uncertain themselves.
@@ -28,10 +28,10 @@ _RUDDER_SLOPE = 6.13 * 1.5 / (1.5 + 2.25)
 Yasukawa and Yoshimura (2015), J. Mar. Sci. Technol. 20, 37-52."""
 
 _HULL_FORCE = 1.3
-"""1 + a_H: side force of rudder and hull by that of the rudder (KVLCC2 1.31, Yasukawa and Yoshimura 2015)."""
+"""1 + a_H: side force of rudder and hull over the rudder's (KVLCC2 1.31, Yasukawa and Yoshimura 2015)."""
 
 _SLIPSTREAM, _SLIPSTREAM_ERROR = 1.4, 0.35
-"""Square of the inflow speed of the rudder by that of the ship, and its relative standard error: the cards of KVLCC2,
+"""Square of the inflow speed of the rudder over the ship's, and its relative standard error: the cards of KVLCC2,
 Esso Osaka and Mariner have 1.2, 2.0 and 1.2 of the force at the ship's speed. Project choice."""
 
 _ARM, _ARM_ERROR = 0.45, 0.4
@@ -104,7 +104,7 @@ class ShipDimensions:
     Raises
     ------
     InputError
-        A number is not one of a ship or model, or the numbers are not those of one ship.
+        A number is not one of a ship or model, or the numbers do not fit one ship.
     """
 
     length_m: float
@@ -133,7 +133,7 @@ class ShipDimensions:
 
     @property
     def scale(self) -> float:
-        """Length of the ship by that of its model, assumed (:data:`SHIP_OF_MODEL_M`); 1 for a ship."""
+        """Length of the ship over the model's, assumed (:data:`SHIP_OF_MODEL_M`); 1 for a ship."""
         return SHIP_OF_MODEL_M / self.length_m if self.length_m < SHORTEST_SHIP_GUESSED_M else 1.0
 
     @property
@@ -151,7 +151,7 @@ def rudder_by_rules(length_m: float, beam_m: float, draught_m: float, area_m2: f
 
 
 def prior_card(ship: ShipDimensions, name: str) -> ManoeuvringCard:
-    """The card of a ship of which the dimensions are known alone, with standard errors of all that is estimated."""
+    """The card of a ship whose dimensions alone are known, with standard errors of all estimates."""
     x_G = _TRIM_SLOPE * (ship.block - _BLOCK_OF_EVEN_TRIM)
     particulars = Particulars(
         length_m=ship.length_m,

@@ -7,7 +7,7 @@ the figures enlarged so that all steps together take each figure once. In each s
     p <- p + C_py (C_yy + a R)^-1 (y + sqrt(a) e - f(p)),   e ~ N(0, R),
 
 with the covariances of the members themselves. Figures are positive, and y and f are their logarithms. For a linear f
-and a normal prior the members are then those of the posterior.
+and a normal prior the members are then drawn from the posterior.
 """
 
 from __future__ import annotations
@@ -377,7 +377,7 @@ class PosterFigures:
 
 
 def conditioned(card: ManoeuvringCard, given: Sequence[GivenFigure], members: int, seed: int) -> GuessMembers:
-    """Ships of a prior card, of which `members` are drawn with `seed`, moved to the figures that are given.
+    """Ships of a prior card (`members` drawn with `seed`), moved to the given figures.
 
     Raises
     ------

@@ -80,7 +80,7 @@ def read_ardupilot_bin(path: Path) -> VesselLog:
     """Read a dataflash log.
 
     Orders to servos (RCOU) become shares of their range by the parameters SERVOn_FUNCTION, _MIN, _TRIM, _MAX and
-    _REVERSED. Times are those of the board, set to UTC by the GPS with the least delay; a GPS fix has the time of the
+    _REVERSED. Times are the board's, set to UTC by the GPS with the least delay; a GPS fix has the time of the
     receiver.
 
     Raises InputError: The file is not such a log, or no message of it is understood.

@@ -25,7 +25,7 @@ HEADINGS_APART_DEG = 5.0
 a compass that was swung)."""
 
 _TWINS = ("rudder_angle", "rudder_order", "rpm", "rpm_order")
-"""Quantities of which a vessel may have two, each of its own."""
+"""Quantities that a vessel may have twice, each with a name of its own."""
 
 STATED = {"format": 0.95, "name": 0.75, "": 0.6}
 """Confidence by what states a quantity, before its content is tested."""

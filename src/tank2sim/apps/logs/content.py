@@ -38,7 +38,7 @@ _SIDEWAYS = 0.35
 angle that has nothing to do with the motion; small craft in turns reach 0.3."""
 
 UNIT_SLACK = 0.2
-"""Relative difference of a scale from that of a unit that is taken for it. Project choice: units are factors of 1.85
+"""Relative difference of a scale from the unit that is taken for it. Project choice: units are factors of 1.85
 and more apart, scales of sensors are off by some per cent."""
 
 FEW_SAMPLES = 30
@@ -183,7 +183,7 @@ def rate_evidence(
 
 
 def speed_evidence(time_s: Array, values: Array, motion: ReferenceMotion, quantity: str) -> ContentEvidence:
-    """Compare a speed (n,), in an unknown unit, with that of the positions: unit, and whether it follows it."""
+    """Compare a speed (n,), in an unknown unit, with the speed of the positions: its unit, and whether it follows."""
     speed = motion.speed_mps
     other = interpolated(motion.time_s, time_s, values, 5 * max(usual_step(time_s), 1.0))
     good = np.isfinite(other) & motion.moving

@@ -3,7 +3,7 @@
 The gear follows an order d(t - T), T late, at a constant rate R: it starts when the rudder is further off than its dead
 band b, and stops on the order (the drive of an autopilot that switches a pump or motor). R, T, b and a constant offset
 are those with the least squares of simulated less recorded angles, found by grids that narrow. Standard errors are
-those of the jackknife that leaves out one of :data:`_BLOCKS` parts of the record after another (Efron and Tibshirani
+from the jackknife that leaves out one of :data:`_BLOCKS` parts of the record after another (Efron and Tibshirani
 1993, An Introduction to the Bootstrap, chapter 11).
 """
 

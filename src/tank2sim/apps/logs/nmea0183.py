@@ -407,7 +407,7 @@ class _Reader:
         numbers = {name[len("RPM.S") :] for name in sources}
         if len(numbers) != 1 or numbers == {"0"}:
             return
-        shaft = max(sources)  # that of the shaft (S), if that of the engine (E) is there, too
+        shaft = max(sources)  # the shaft's (S), even if the engine's (E) is there
         self.stated |= {name: ("rpm", "rpm" if name == shaft else "", "format") for name in sources}
         side = "starboard" if int(*numbers) % 2 else "port"
         findings.append(note(f"{shaft} is the only shaft: it counts as a single propeller, not as a {side} one", shaft))

@@ -92,8 +92,8 @@ def _bare(line: bytes) -> str:
 def read_nmea2000(path: Path) -> VesselLog:
     """Read a text log of NMEA 2000: headings, rates of turn, rudders, engines, speeds, positions and wind.
 
-    Times are those of the recorder, set to UTC by the system time (PGN 126992) where the log holds it; without a time
-    stamp of the recorder they are those of the system times before and after. Time stamps without a date and without a
+    Times are the recorder's, set to UTC by the system time (PGN 126992) where the log holds it; without a time
+    stamp of the recorder they follow the system times before and after. Time stamps without a date and without a
     system time give a log without a date.
 
     Raises InputError: The file cannot be read, no message is understood, or there is no time.
@@ -248,12 +248,12 @@ class _Reader:
             late = ahead[chosen] - by
             if abs(late) > _CLOCKS_APART_S:
                 word = "behind" if late > 0 else "ahead of"
-                text = f"the clock of source {source} is {abs(late):.2g} s {word} that of {chosen}, which is used"
+                text = f"the clock of source {source} is {abs(late):.2g} s {word} the clock of {chosen}, which is used"
                 findings.append(note(text, behind_s=late))
         return self.clocks[chosen], findings
 
     def _stream(self, key: _Key, time: Array) -> LogStream:
-        """A column under a name of its own; engines by their instance, of which a single one has no side."""
+        """A column under a name of its own; engines by their instance; a single one has no side."""
         pgn, source, name, quantity, instance = key
         alike = [other for other in self.columns if (other[0], *other[2:]) == (pgn, *key[2:])]
         instances = {other[4] for other in self.columns if (other[0], other[2]) == (pgn, name)}
@@ -282,14 +282,14 @@ def _pace(stamps: Array, clock: Array) -> tuple[float, list[LogFinding]]:
     pace = float(theilslopes(clock[good], stamps[good])[0])
     if abs(pace - 1) < _PACE_OFF or pace <= 0:
         return 1.0, []
-    text = f"the clock of the satellites runs {pace:.3g} times as fast as that of the recorder, and is used"
+    text = f"the clock of the satellites runs {pace:.3g} times as fast as the recorder's, and is used"
     return pace, [fault(text, pace=pace)]
 
 
 def _recorder_off(ahead_s: float) -> list[LogFinding]:
     """A note on a recorder's clock that differs by more than the steps of the system time."""
     word = "behind" if ahead_s > 0 else "ahead of"
-    text = f"the clock of the recorder is {abs(ahead_s):.3g} s {word} that of the satellites, which is used"
+    text = f"the clock of the recorder is {abs(ahead_s):.3g} s {word} the satellites' clock, which is used"
     return [note(text, behind_s=ahead_s)] if abs(ahead_s) > _CLOCKS_APART_S else []
 
 

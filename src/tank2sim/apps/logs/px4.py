@@ -29,7 +29,7 @@ _AIRFRAME_ROVER_DIFFERENTIAL = 6
 
 
 def read_px4_ulog(path: Path) -> VesselLog:
-    """Read a ULog. Times are those of the board, set to UTC by the GPS with the least delay; without a GPS that
+    """Read a ULog. Times are the board's, set to UTC by the GPS with the least delay; without a GPS that
     has a UTC the log has no date.
 
     ``actuator_motors`` and ``actuator_servos`` are orders as shares of their range: the one servo is the rudder, one
@@ -44,7 +44,7 @@ def read_px4_ulog(path: Path) -> VesselLog:
     except Exception as error:
         raise unreadable(path, error, "give a whole ULog") from None
     topics = {(topic.name, topic.multi_id): topic.data for topic in log.data_list}
-    if any(name == "vehicle_gps_position" for name, _ in topics):  # the same fixes, or those of all receivers as one
+    if any(name == "vehicle_gps_position" for name, _ in topics):  # the same fixes, or all receivers' as one
         topics = {(name, instance): data for (name, instance), data in topics.items() if name != "sensor_gps"}
     receivers = [data for (name, _), data in topics.items() if name in _RECEIVERS]
     gps = next((data for data in receivers if _utc_of(data).any()), None)

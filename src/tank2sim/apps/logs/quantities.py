@@ -55,11 +55,11 @@ QUANTITIES: dict[str, LogQuantity] = {
     )
     for name, entry in _DECLARED["quantities"].items()
 }
-"""Every quantity of a channel. Signs are those of the trial format: starboard, ahead and clockwise are positive."""
+"""Every quantity of a channel. Signs follow the trial format: starboard, ahead and clockwise are positive."""
 
 
 def _compiled(words: str) -> re.Pattern[str]:
-    """Pattern of words, of which names in braces are groups; no words are in no name."""
+    """Pattern of words; names in braces are its groups. Without words it fits no name."""
     return re.compile(words.format(**_WORDS) or r"(?!)")
 
 

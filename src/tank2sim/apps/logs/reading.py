@@ -52,7 +52,7 @@ def _is_ardupilot(head: bytes) -> bool:
     return head.startswith(b"\xa3\x95\x80") or bool(re.search(rb"(?m)^FMT,\s*\d+,\s*\d+,\s*\w+,", head))
 
 
-# First bytes of binary formats are those of their specifications.
+# First bytes of binary formats, from their specifications.
 LOG_READERS: Registry[LogReader] = Registry(
     "tank2sim.log_readers",
     (
@@ -65,7 +65,8 @@ LOG_READERS: Registry[LogReader] = Registry(
     ),
     LogReader,
 )
-"""Built-in readers of logs and those of installed packages; a text that none of them knows is read as a CSV table."""
+"""Built-in readers of logs and readers from installed packages; a text that none of them knows is read as a CSV
+table."""
 
 
 def _known() -> str:

@@ -137,7 +137,7 @@ def rest_of(stream: LogStream) -> float | None:
 
 
 def pulses_of(stream: LogStream) -> tuple[LogStream, PulseScale | None]:
-    """A stream of pulses without those of 0, which are none, and their scale; any other as it is, and None.
+    """A stream of pulses without zeros, which are no pulses, and its scale; any other as it is, and None.
 
     Pulses are within :data:`SHORTEST_US` and :data:`LONGEST_US`, and the unit or the name says so (``pwm_left``,
     ``servo1_raw``), or its quantity is an order.

@@ -60,8 +60,8 @@ def read_ros_bag(path: Path) -> VesselLog:
     """Read a ROS 1 bag, a ROS 2 bag (its folder or file) or an MCAP file.
 
     Each number of each message becomes a stream, arrays of more than :data:`LONGEST_VECTOR` entries excepted, which are
-    named. Times are those of the headers where there are any, and of the recording elsewhere; where the headers run at
-    another pace, as those of a simulation do, theirs are taken for all, and the log has no date. Fixes without a status
+    named. Times come from the headers where there are any, and from the recording elsewhere; where the headers run at
+    another pace, as in a simulation, theirs are taken for all, and the log has no date. Fixes without a status
     of a fix hold no value.
 
     Raises InputError: The file is cut off or is not a bag, or no message of it has a number.

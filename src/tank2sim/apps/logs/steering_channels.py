@@ -41,15 +41,15 @@ _HOLDS, _MOVES = 0.5, 0.2
 (project choice)."""
 
 _CLEARLY, _CLEARLY_REVERSED = 0.05, 0.2
-"""By how much the agreement of a rudder with the turn is above that of all other streams, and of the speed with the
+"""By how much a rudder agrees better with the turn than all other streams, and of the speed with the
 difference of two orders above that with their sum, where one controller is reversed (project choices)."""
 
 _LITTLE, _TURNED_RAD = 0.4, math.pi / 2
-"""Size of the sum of two orders over that of their difference, and change of heading, rad, below which a vessel goes
+"""Size of the sum of two orders over their difference's, and change of heading, rad, below which a vessel goes
 straight although its orders are opposite (project choice)."""
 
 _DOUBTED = 0.85
-"""Largest confidence of a stream of which one thing is open: whether it is measured or ordered, or its unit."""
+"""Largest confidence of a stream with one open question: whether it is measured or ordered, or its unit."""
 
 _ASTERN_SHARE, _ASTERN_S = 0.15, 8.0
 """Shares of the usual speed and of the usual revolutions, and a time, s, from which a vessel goes astern against them.

@@ -391,7 +391,7 @@ def _is_movement(signals: _Signals, last: _Piece, piece: _Piece) -> bool:
 
 
 def _without_splinters(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
-    """Pieces of a craft of which none that excites it is a splinter next to another such piece: both are steps."""
+    """Pieces of a craft; a short one next to another that excites the craft joins it: both are steps."""
     out: list[_Piece] = []
     for piece in pieces:
         last = out[-1] if out else None

@@ -428,7 +428,7 @@ def _calendar_days(values: Array) -> Array | None:
 
 
 def _clock(column: pd.Series[Any]) -> Array:
-    """Seconds (rows,) of times of day, of which some may end with AM or PM."""
+    """Seconds (rows,) of times of day; some may end with AM or PM."""
     import pandas as pd
 
     text = _of_24_hours(column.astype(str).str.strip().str.replace(",", ".", regex=False))
@@ -472,7 +472,7 @@ def _dates(path: Path, name: str, column: pd.Series[Any]) -> pd.Series[Any]:
 
 
 def _of_24_hours(clock: pd.Series[Any]) -> pd.Series[Any]:
-    """Times of day of which some may end with AM or PM."""
+    """Times of day; some may end with AM or PM."""
     import pandas as pd
 
     parts = clock.str.extract(r"^\s*(\d{1,2})(:\S*)\s*([AaPp])\.?\s?[Mm]\.?\s*$")

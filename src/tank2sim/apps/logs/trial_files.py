@@ -62,7 +62,7 @@ class TrialCut:
     trial : Trial
         Times from its begin; signals in SI.
     begins_s : float
-        Time of its first row in that of the voyage.
+        Time of its first row on the voyage's clock.
     text : str
         The file.
     steered : bool
@@ -79,7 +79,7 @@ class TrialCut:
 def cut_trials(voyage: Voyage, stretches: tuple[Stretch, ...]) -> list[TrialCut]:
     """Cut the stretches that excite the vessel into trials, in the order of time.
 
-    The rows of a trial have an even step, that of the heading between :data:`SHORTEST_STEP_S` and
+    The rows of a trial have an even step, the heading's between :data:`SHORTEST_STEP_S` and
     :data:`LONGEST_STEP_S`. Each sample of a slower stream is in the nearest row, by a straight line to its neighbour at
     the time of the row; rows without a sample are empty. Orders hold. Nothing is bridged over gaps.
 
@@ -127,7 +127,7 @@ def _cut(voyage: Voyage, stretches: tuple[Stretch, ...], begin: float, number: i
     if rows < LEAST_TRIAL_ROWS:
         return None
     at = first + step * np.arange(rows)
-    if "rpm" in series:  # revolutions that are ordered are those of the format
+    if "rpm" in series:  # the format has ordered revolutions
         series.setdefault("rpm_order", series["rpm"])
     columns = {name: quantity.column for name, quantity in QUANTITIES.items() if quantity.column} | {"rpm": ""}
     columns |= {"rpm_order": QUANTITIES["rpm"].column} | dict.fromkeys(_redundant(series), "")
@@ -208,7 +208,7 @@ def _sampled(entry: QuantitySeries, at: Array, step: float, name: str) -> Array:
 def remove_earlier_trials(folder: Path, written: Iterable[Path]) -> list[str]:
     """Remove the trials that an earlier run cut into a folder and this one did not write; return their names.
 
-    Only files that say in their comments that they were cut by tank2sim are removed; those of this run, `written`,
+    Only files that say in their comments that they were cut by tank2sim are removed; files of this run, `written`,
     stay.
     """
     removed = []

@@ -111,7 +111,8 @@ def _held(model: Model, speed: float, revolutions: float | None) -> Running:
 
 
 def straight_runs_of_card(model: Model) -> Runs:
-    """Figures of straight runs of a card and the change of heading in its crash stop; with an engine only, those of it.
+    """Figures of straight runs of a card and the change of heading in its crash stop; with an engine only, the
+    engine's figures.
 
     A lever is a share of the thrust: the order of the engine goes with its root.
 

@@ -104,7 +104,7 @@ def _rewritten(
     for name, value, error in zip(names, values, errors, strict=True):
         if name in card.derivatives or value:
             changes[places[name]] = _written(value * factor(name))
-        # Where no standard error is stated, that of the sum is not known either: 2 % is taken, as before.
+        # Where no standard error is stated, the sum's is unknown too: 2 % is taken, as before.
         if error > 0:
             changes[places[name].replace("derivatives", "uncertainty", 1)] = _written(error * abs(factor(name)))
     text = _without_other_spellings(card, changed_text(not_referring(card.text), card.source, changes))
@@ -121,8 +121,8 @@ def _rewritten(
 def roll_in_file(roll: Roll, inertia: float, length: float) -> dict[str, float]:
     """``[roll]`` by dotted key, as a file has it.
 
-    `roll`: In the prime system; `inertia`, `length`: A number of the file over that of the prime system: of inertias
-    and of lengths.
+    `roll`: In the prime system; `inertia`, `length`: A number of the file over the same in the prime system: of
+    inertias and of lengths.
     """
     heights = {key: getattr(roll, key) for key in ("z_G", "z_R", "l_x")}
     written = {f"roll.{key}": _written(value * length) for key, value in heights.items() if value}
@@ -187,7 +187,7 @@ def shift_matrix(names: Sequence[str], ahead: float) -> tuple[tuple[str, ...], A
 
     `names`: The k derivatives about the old origin; `ahead`: The new origin forward of it, in lengths.
 
-    Returns the n names, those of the card first, and the matrix (n, k).
+    Returns the n names, the card's first, and the matrix (n, k).
     """
     columns = [shifted_terms(name, ahead) for name in names]
     every = tuple(dict.fromkeys([*names, *(name for column in columns for name in column)]))

@@ -58,7 +58,7 @@ def shipmmg_values(card: MmgCard) -> tuple[dict[str, float], dict[str, float]]:
 def mmgdynamics_values(card: MmgCard) -> dict[str, float]:
     """The dictionary of a vessel of mmgdynamics: SI, and Prime II where a name ends in ``_dash``.
 
-    Its moment of the rudder is (-L/2 + a_H x_H) F_N cos(delta): x_H is such that the sum is that of the card.
+    Its moment of the rudder is (-L/2 + a_H x_H) F_N cos(delta): x_H makes the sum equal to the card's.
 
     Raises InputError: As :func:`shipmmg_values`, or the card has no beam, or x_R is not -0.5 and a_H is 0.
     """

@@ -1,8 +1,8 @@
 """An MMG ship as a third-order polynomial: least squares over the motions of standard manoeuvres, scattered.
 
-The polynomial is that of (3.8) with ``speed_scale = "instantaneous"`` and ``yaw_rate_terms = "hydrodynamic"``. Each of
+The polynomial is (3.8) with ``speed_scale = "instantaneous"`` and ``yaw_rate_terms = "hydrodynamic"``. Each of
 X, Y, N without the ship's own inertia, over 1/2 rho L^2 U^2 (and L), is fitted by all its terms in v', r', delta, Du'
-at nominal revolutions. Added masses are those of the card, X_nn is half the slope of X by n/n0 on the straight course.
+at nominal revolutions. Added masses are the card's, X_nn is half the slope of X by n/n0 on the straight course.
 In linear terms it is then Y_r' - m_x', X_vr' + m_y', and the rudder's share of Y_v to N_r, as derived from the method;
 a kink (gamma_R, C_2) and X_vvvv have no term of their own and are fitted into others.
 
@@ -66,7 +66,7 @@ def manoeuvre_motions(model: Model) -> Array:
 def scattered_motions(
     model: Model, motions: Array, scatter: float = SCATTER, samples: int = SCATTERED_MOTIONS
 ) -> Array:
-    """Motions about those of manoeuvres, within the rudder's limits and ahead of rest.
+    """Motions near the motions of manoeuvres, within the rudder's limits and ahead of rest.
 
     `motions` (n, 4): u, v, r, rudder, SI; `scatter`: Over :data:`SPREADS`; `samples`: Number of motions to return.
     """

@@ -22,7 +22,7 @@ from tank2sim.native.operations import COMPARISONS, FUNCTIONS, OPERATORS, instru
 
 _RENAMED = {"fabs": "abs", "fmin": "min", "fmax": "max", "fmod": "rem"}
 _CALLED = {op: _RENAMED.get(word, word) for op, word in FUNCTIONS.items()} | {ca.OP_SIGN: "sign"}
-"""Operations of CasADi to functions of MATLAB; those of Python are the same or in :data:`_PYTHON`."""
+"""Operations of CasADi to functions of MATLAB; Python's are the same or in :data:`_PYTHON`."""
 
 _PYTHON = {word: f"math.{word}" for word in _CALLED.values() if word not in ("abs", "min", "max")}
 _PYTHON |= {"rem": "math.fmod", "sign": "_sign", "~=": "!="}
@@ -104,7 +104,7 @@ def _listed(variables: Iterable[Variable], mark: str, first: int) -> list[str]:
 def mss_function(card: ManoeuvringCard, model: Model) -> str:
     """A function ``[xdot, U] = ship(x, ui, p)`` for MATLAB or Octave, as the ships of MSS are.
 
-    SI and rad, rudder positive to starboard; without `ui` and `p` those of the card.
+    SI and rad, rudder positive to starboard; without `ui` and `p` the card's.
     """
     values = {"ui": model.input_values().tolist(), "p": model.parameter_values().tolist()}
     start = [float(value) for value in model.initial(model.parameter_values()).full().ravel()]

@@ -44,7 +44,7 @@ class PolynomialFit:
 
     derivatives: Mapping[str, float]  # Name to prime value, rudder positive to starboard
     Xnn: float  # Effect of revolutions, prime
-    residuals: Mapping[str, float]  # Force to the root mean square of the residual over that of the force
+    residuals: Mapping[str, float]  # Force to the root mean square of the residual over the force's
     # ``u`` (over u0), ``drift_deg``, ``yaw_rate_prime``, ``rudder_deg`` to lowest and highest value that was fitted
     ranges: Mapping[str, tuple[float, float]]
     # (k, k): Covariance of `derivatives`, in their order, by the errors of the MMG card; None if it states none

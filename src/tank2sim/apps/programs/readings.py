@@ -2,11 +2,11 @@
 
 A reading is a scaling, a sign of the rudder, whether the terms in yaw rate hold the inertia of the ship, and the
 origin. It turns the printed numbers t into the derivatives theta of a ship about midships, in the prime system, without
-inertia and with the rudder to starboard. Its weight is p(reading) p(t | reading), the densities being those of ships:
+inertia and with the rudder to starboard. Its weight is p(reading) p(t | reading), with densities taken from ships:
 
 - linear and acceleration derivatives about the regressions of Clarke, Gedling and Hine (1983), with p(t) =
-  p(theta) |d theta/d t|; mass and yaw inertia about displacement and 0.25 L; rudder forces about those of the rudder
-  that the rules ask for;
+  p(theta) |d theta/d t|; mass and yaw inertia about displacement and 0.25 L; rudder forces about the forces of the
+  rudder that the rules ask for;
 - the heading after one ship's length by unit of rudder, Norrbin's P, and the growth of an unstable course;
 - where the table has surge too, the tactical diameter at 35 deg;
 - a term that a reading makes vanish to the printed digits: a wrong one does so only by chance.
@@ -60,7 +60,7 @@ _P_MEDIAN, _P_SPREAD = 0.35, 0.5
 tankers (Norrbin 1965, as in Lewis (ed.), Principles of Naval Architecture III, 1989, IX). The spread is a project
 choice."""
 _GROWTH = 0.3
-"""Scale of the growth of an unstable course, by U/L: that of full tankers is up to about 0.3. Project choice."""
+"""Scale of the growth of an unstable course, by U/L: full tankers reach about 0.3. Project choice."""
 _DIAMETER, _DIAMETER_SPREAD = 3.3, 0.35
 """Median of the tactical diameter at 35 deg over L, and standard deviation of its logarithm: 5 is IMO's limit, and
 ships have 2 to 5 (project choice)."""
@@ -135,11 +135,11 @@ _SIGNATURE = {"v": (1.0,), "r": (1.0,), "d": (2.0, 1.0)}
 _LEAST_SIGNATURE = 3
 """Shares from which the scale is judged. Project choice: one or two may agree by chance."""
 _SAME_SHARE = 0.02
-"""Project choice: by how much a share may differ from one, that of terms printed to two digits or more."""
+"""Project choice: by how much a share may differ from one where terms are printed to two digits or more."""
 
 
 def scaled_with_nominal_speed(table: CoefficientTable) -> bool | None:
-    """Whether terms by Du' are those of numbers scaled with u0; None where too few are given.
+    """Whether terms by Du' belong to numbers scaled with u0; None where too few are given.
 
     A lift goes with u v, u r and u^2 delta. Scaled with u0, so that u = u0 (1 + Du'), this is Y_vu = Y_v, Y_ru = Y_r,
     Y_du = 2 Y_d, Y_duu = Y_d, N alike; scaled with the speed at any time, all of these are about zero.

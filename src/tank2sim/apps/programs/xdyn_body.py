@@ -181,7 +181,7 @@ def _planar_forces(model: Model, run: Trajectory, stated: Array, total: Array) -
 
 
 def _needed(model: Model, names: Iterable[str]) -> tuple[list[Quantity], list[Variable]]:
-    """Quantities on which those of `names` depend, each after what it uses, and the other variables."""
+    """Quantities on which `names` depend, each after what it uses, and the other variables."""
     quantities: dict[str, Quantity] = {}
     others: dict[str, Variable] = {}
 
@@ -200,7 +200,7 @@ def _needed(model: Model, names: Iterable[str]) -> tuple[list[Quantity], list[Va
 
 
 def _motion_terms(card: SteeredCard, model: Model) -> dict[str, ca.SX]:
-    """v', r' and Du' of a ship by name, of which its polynomial is made."""
+    """v', r' and Du' of a ship by name, the variables of its polynomial."""
     if not isinstance(card, ManoeuvringCard):
         return {}
     symbols = {variable.name: variable.symbol for variable in model.variables}
@@ -217,7 +217,7 @@ def _clocks(model: Model) -> set[str]:
 def _written(
     card: SteeredCard, model: Model, wanted: Mapping[str, ca.SX], states: dict[str, ca.SX], values: Mapping[str, float]
 ) -> tuple[dict[str, str], dict[str, tuple[Variable, float]], dict[str, Variable]]:
-    """Expressions by name, with the data and commands that they use; `states` are those of a ship that rolls."""
+    """Expressions by name, with the data and commands that they use; `states` belong to a ship that rolls."""
     terms = _motion_terms(card, model)
     beforehand = ("motion.speed", "low_speed.share") if terms else ()
     symbols = ca.symvar(ca.vcat([*terms.values(), *wanted.values()]))

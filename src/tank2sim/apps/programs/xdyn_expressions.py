@@ -149,7 +149,7 @@ class Definitions:
         return XdynTerm(name)
 
     def used_by(self, names: Iterable[str]) -> set[str]:
-        """All words in the expressions of these names, and in those of their words."""
+        """All words in the expressions of these names, and in the expressions of their words."""
         found: set[str] = set()
         waiting = list(names)
         while waiting:

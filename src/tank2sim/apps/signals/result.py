@@ -412,7 +412,7 @@ def effect_chart(label: str, effect: FilterEffect) -> ChartSpec:
     """Gain (dB), phase (deg) and group delay (s) of the filter `label` against frequency."""
     frequency, gain, phase, delay = effect.frequency_hz, effect.gain, effect.phase_rad, effect.group_delay_s
     decibel = np.maximum(20.0 * np.log10(np.maximum(gain, 1e-30)), _LEAST_DECIBEL)
-    # Where nothing passes, the phase is that of rounding.
+    # Where nothing passes, the phase is rounding.
     phase = np.where(decibel > _LEAST_DECIBEL, np.rad2deg(phase), np.nan)
     plots = [
         Plot([PlotSeries(label, x=frequency, y=curve)], up=PlotAxis(up), height_px=130)

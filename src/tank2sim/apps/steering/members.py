@@ -22,7 +22,7 @@ NO_COVARIANCE = "The card has no covariance of its coefficients, so that no ship
 def members_of(card: SteeredCard, model: Model, count: int = PAGE_MEMBERS, seed: int = 0) -> list[dict[str, float]]:
     """Parameters of the members by name, in the model's units; none for a card without a covariance.
 
-    They are drawn as those of an ensemble (:func:`tank2sim.analysis.ensemble.draws.draws_of`): numbers in the
+    They are drawn as in an ensemble (:func:`tank2sim.analysis.ensemble.draws.draws_of`): numbers in the
     covariance together, all others with their own standard errors. What is an input of the model (a current) is set in
     the page instead. A ship without a mass matrix that can be used is left out.
 

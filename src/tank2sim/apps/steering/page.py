@@ -67,7 +67,7 @@ _USUAL_TURNING = 0.5
 """Yaw rate in ship lengths, r L/u0, that the dial shows at first: a hard turn of most ships. Project choice."""
 
 _CRAFT_UNITS = {"knots": "m/s", "deg/min": "deg/s"}
-"""Units of a craft in place of those of a ship."""
+"""Units of a craft, in place of a ship's."""
 
 _DIALS = ("motion.psi", "motion.r", "rudder.angle")
 """Signals with an instrument of their own."""
@@ -84,7 +84,7 @@ _VIEW_3D = ("three.min.js", "view3d.js")
 a single file that a plain script element takes without a warning."""
 
 _BEAM = 1 / 7
-"""Beam over length of the drawn ship where the card states none: that of an ordinary merchant ship."""
+"""Beam over length of the drawn ship where the card states none: an ordinary merchant ship's."""
 
 # signal, what it is called, unit it is shown in, decimals
 _READOUTS = (
@@ -251,7 +251,7 @@ def _ship_data(ship: PageShip, ghost: Ghost | None, scenario: Scenario | None) -
 
 
 def _begin(ghost: Ghost | None, scenario: Scenario | None) -> dict[str, float]:
-    """Start of the ship by parameter: that of a measured trial, or of a scenario."""
+    """Start of the ship by parameter, from a measured trial or a scenario."""
     if scenario is not None:
         speed = {} if scenario.speed is None else {"initial.u": scenario.speed}
         return {"initial.psi": scenario.heading, **speed}

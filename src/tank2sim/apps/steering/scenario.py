@@ -6,7 +6,7 @@ GeoJSON is RFC 7946: positions are longitude and latitude in degrees (WGS 84), p
 =========== ========== ===============================================================================================
 kind        geometry   other properties
 =========== ========== ===============================================================================================
-``start``   Point      ``heading_deg``; ``speed_knots`` (else that of the card)
+``start``   Point      ``heading_deg``; ``speed_knots`` (else the card's)
 ``channel`` LineString ``width_m``; from the start on, its centre line
 ``buoy``    Point      ``side``: ``port`` or ``starboard`` of a ship that follows the channel, or left out
 ``depth``   Polygon    ``depth_m`` of the water; of areas that overlap the last holds
@@ -74,7 +74,7 @@ class Feature:
 
 @dataclass(frozen=True)
 class Scenario:
-    """Waters to steer in. Heading (rad) and speed (m/s; None: that of the card) of the start, which is at x = y = 0."""
+    """Waters to steer in. Heading (rad) and speed (m/s; None: the card's) of the start, which is at x = y = 0."""
 
     name: str
     description: str

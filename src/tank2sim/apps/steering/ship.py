@@ -113,7 +113,7 @@ def levers_of(model: Model) -> list[Control]:
 def telegraph_of(model: Model) -> list[TelegraphOrder]:
     """Orders of the telegraph from full astern to full sea speed; empty without an engine.
 
-    Names and shares of the nominal revolutions are those of the wheelhouse poster; full astern is
+    Names and shares of the nominal revolutions are as on the wheelhouse poster; full astern is
     :data:`tank2sim.simulation.manoeuvres.FULL_ASTERN` of the nominal revolutions, and the orders below it have the
     shares of full astern that those ahead have of full ahead.
     """
@@ -141,7 +141,7 @@ def ship_equations(model: Model) -> str:
     """The equations of a model as JavaScript: an object `EQUATIONS` of functions that fill their last argument.
 
     ``constants(p, c)`` are the terms of the parameters alone, ``rates(x, u, p, c, d)``, ``outputs(x, u, p, y)`` and
-    ``initial(p, x)`` as those of the FMU, and ``trimmed(x, u, p, next)`` is a step of Newton's method to steady motion.
+    ``initial(p, x)`` as in the FMU, and ``trimmed(x, u, p, next)`` is a step of Newton's method to steady motion.
 
     Parameters
     ----------
@@ -259,7 +259,8 @@ def _control(model: Model, variable: Input) -> Control:
 
 
 def _bounds(variable: Input) -> tuple[float | None, float | None]:
-    """Bounds of an input, SI: for what an effect takes from its surroundings those of a card, which the model lacks."""
+    """Bounds of an input, SI: for inputs that an effect takes from its surroundings, the bounds of a card, which the
+    model lacks."""
     known = [
         parameter
         for effect in EFFECTS.values()

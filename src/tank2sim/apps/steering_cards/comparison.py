@@ -1,6 +1,6 @@
 """Comparison of the models of a steering card: steady turns, manoeuvres, influence, and missing data.
 
-The tables are those of paper 4 (Poznyakov and Yudin 2007). K of a coefficient is the change of the steady radius in per
+The tables follow paper 4 (Poznyakov and Yudin 2007). K of a coefficient is the change of the steady radius in per
 cent when it grows by 10 %; Kc is the change of a coefficient in per cent when the draught grows by 1 %
 (:mod:`tank2sim.analysis.influence.percent`).
 """
@@ -325,7 +325,7 @@ class SteeringComparison:
 
 
 def compare_steering_models(card: SteeringCard, rudder_deg: float | None = None) -> SteeringComparison:
-    """Compare the models of a card at a rudder angle, by default that of its ``[influence]``, else 20 deg.
+    """Compare the models of a card at a rudder angle, by default from its ``[influence]``, else 20 deg.
 
     Raises
     ------

@@ -184,7 +184,7 @@ class SteeringModelsResult(Result[SteeringComparison]):
         text = (
             f"K: change of the radius in % at {study.rudder_deg:g} deg of rudder when one coefficient grows by 10 %. "
             "C_y are coefficients of the lateral force, C_m of the yaw moment, by powers of drift angle b, yaw rate w "
-            "and rudder angle d: C_m_wwb is that of b w²."
+            "and rudder angle d: C_m_wwb belongs to b w²."
         )
         return Section(
             "Influence on the steady radius",

@@ -55,9 +55,9 @@ def trial_office(
         TOML file of the trial master's notes; its keys are the arguments below, and those of
         :class:`~tank2sim.apps.trial_office.notes.TrialNotes`.
     draught_fore_m, draught_aft_m : float, optional
-        Draughts of the trial, m; by default that of the card, on even keel.
+        Draughts of the trial, m; by default the card's, on even keel.
     full_load_draught_m : float, optional
-        Draught at full load, m; by default that of the card.
+        Draught at full load, m; by default the card's.
     depth_m : float, optional
         Depth of the water, m.
     wind_speed_mps, wind_from_deg : float, optional

@@ -158,7 +158,7 @@ def trial_conditions(state: TrialState, notes: TrialNotes, trials: Sequence[Trie
 
 @dataclass(frozen=True)
 class _judged:
-    """A condition of which the value is known or not."""
+    """A condition, with its value if known."""
 
     name: str
     required: str

@@ -47,9 +47,9 @@ class TrialNotes(CardSection):
     Parameters
     ----------
     draught_fore_m, draught_aft_m
-        Draughts of the trial; by default that of the card, on even keel.
+        Draughts of the trial; by default the card's, on even keel.
     full_load_draught_m
-        Draught at full load, even keel; by default that of the card.
+        Draught at full load, even keel; by default the card's.
     depth_m
         Depth of the water.
     wind_speed_mps, wind_from_deg

@@ -215,7 +215,7 @@ class TrialOffice:
 
     @property
     def tried(self) -> tuple[CriterionVerdict, ...]:
-        """Criteria of which a trial was made."""
+        """Criteria for which a trial was made."""
         return tuple(one for one in self.criteria if one.as_run is not None)
 
     @property

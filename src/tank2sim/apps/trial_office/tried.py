@@ -22,7 +22,7 @@ from tank2sim.simulation.run import Run, simulate
 from tank2sim.units import from_si
 
 _SMOOTH = 60
-"""Parts of a stop over each of which speed and place are smoothed: noise lengthens a way of single rows. Project
+"""Parts of a stop; speed and place are smoothed over each: noise lengthens a way of single rows. Project
 choice."""
 
 _AT_REST = 0.02

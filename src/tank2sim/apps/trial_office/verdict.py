@@ -49,7 +49,7 @@ class CriterionSide:
 
 @dataclass(frozen=True, kw_only=True)
 class CriterionVerdict:
-    """A criterion of MSC.137(76), as run and at full load; values are those of the worse side.
+    """A criterion of MSC.137(76), as run and at full load; values are of the worse side.
 
     Parameters
     ----------

@@ -21,7 +21,7 @@ class Glider(CardSection):
     """``[glider]``: mass, size and coefficients of an underwater glider, SI, incidence in rad.
 
     C_L = ``lift_slope`` alpha + ``lift_quadratic`` alpha |alpha|; C_D = ``drag_zero`` + ``drag_quadratic`` alpha^2;
-    both with ``reference_area_m2``. ``mass_kg`` is that of hull and ballast, ``buoyancy_kg`` the size of the net
+    both with ``reference_area_m2``. ``mass_kg`` is hull and ballast, ``buoyancy_kg`` the size of the net
     buoyancy (displaced mass less own mass) with which it usually glides.
     """
 

@@ -106,7 +106,7 @@ def steady_glide(
     Raises
     ------
     InputError
-        The angle cannot be flown (the message names the smallest possible), angle or roll is beyond those of glides, or
+        The angle cannot be flown (the message names the smallest possible), angle or roll is beyond any glide, or
         the glider is light in a dive or heavy in a climb.
     """
     buoyancy = _buoyancy(card, path_angle_rad, buoyancy_kg)
@@ -165,9 +165,9 @@ def glide_as_printed(
 ) -> SteadyGlide:
     """The glide by (8), (10), (12) and (13) as the paper prints them, for comparison.
 
-    They balance a drag alpha (C_D0 + C_D alpha), which vanishes without incidence and is not that of (7); the result is
+    They balance a drag alpha (C_D0 + C_D alpha), which vanishes without incidence, unlike (7); the result is
     near the large root of the corrected (8), a slow glide at ten times the incidence. Parameters and exceptions as
-    :func:`steady_glide`, except that the print has no smallest angle above that of zero incidence.
+    :func:`steady_glide`, except that the print has no smallest angle above the one of zero incidence.
     """
     buoyancy = _buoyancy(card, path_angle_rad, buoyancy_kg)
     _check(path_angle_rad, roll_rad)
@@ -192,7 +192,7 @@ def radius_as_printed(card: GliderCard, lift: float, path_angle_rad: float, roll
 def force_residual(card: GliderCard, glide: SteadyGlide) -> tuple[float, float, float]:
     """Residual of the forces along the course, to starboard and up, less the centripetal force, N: 0 in balance.
 
-    Lift and drag are those of (6) and (7) at the glide's incidence and speed, for a glide by any equations.
+    Lift and drag follow (6) and (7) at the glide's incidence and speed, for a glide by any equations.
     """
     section = card.glider
     pressure = 0.5 * card.environment.water_density_kgpm3 * section.reference_area_m2 * glide.speed_mps**2

@@ -202,7 +202,7 @@ SWING_PERIODS_S = (20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0)
 """Periods for :func:`swing_errors`."""
 
 _PIECES = 200  # orders in a period, each held: what is between them the lag of the controls smooths
-_PERIODS = 3  # of which the last is evaluated
+_PERIODS = 3  # the last one is evaluated
 
 _PITCH, _ROLL, _BUOYANCY = math.radians(3.0), math.radians(2.0), 0.2
 """Amplitudes of the oscillations, the last as a share of the net buoyancy: project choice, within small incidences."""

@@ -69,7 +69,7 @@ def tow(
     method : str
         Method whose numbers the card gets.
     name : str, optional
-        Name of the body on the card; by default that of the file.
+        Name of the body on the card; by default the file's.
 
     Raises
     ------

@@ -7,7 +7,7 @@ The mean speed of the tows is fitted by a polynomial v*(t) with derivative a*(t)
 the unknowns are then linear, and the integral (1.6) of the squared error has its least value where the normal
 equations (1.12) hold. The coefficients printed in the paper, (2.3), do not solve its own equations: with its polynomial
 (2.1) the error J is 4.464 at them and 0.515 at the solution M 2776, B1 13033, B2 -4554, B3 557. The text prints (2.1)
-with +0.00493; its printed inner products are those of -0.00493.
+with +0.00493; its printed inner products belong to -0.00493.
 """
 
 from __future__ import annotations

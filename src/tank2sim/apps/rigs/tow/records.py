@@ -83,7 +83,7 @@ def read_tows(path: Path | str | CsvTable) -> Tows:
     ------
     InputError
         The table is at fault (:func:`tank2sim.records.csv_table.read_table`), a column is not a speed in m/s, a tow has
-        no reading or those of another, there are fewer than five times with one, or the time does not rise from 0 or
+        no reading or another's, there are fewer than five times with one, or the time does not rise from 0 or
         later.
     """
     table = read_table(path)

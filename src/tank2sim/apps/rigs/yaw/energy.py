@@ -34,7 +34,7 @@ Speeds = Literal["actual", "reference"]
 
 KNOTS_S = (0.5, 0.35, 0.25, 0.17, 0.1)
 """Candidate distances of the spline's knots: the shortest follows the swings of a closed loop of some 0.1 s, the
-longest smooths more of an encoder's noise. Each interval uses that of least generalised cross-validation (Craven &
+longest smooths more of an encoder's noise. Each interval uses the one of least generalised cross-validation (Craven &
 Wahba 1979), the longest of equals."""
 _CORRELATION = 3.0
 """Sum of the correlations of an encoder's errors. Neighbouring points share a sample, and where the body passes about a
@@ -131,7 +131,7 @@ class YawMethodEstimate:
     bias_from_kgm2 : dict
         Parts of the bias: ``dissipation`` (different in both intervals) and ``speeds`` (w1, w2 differ from w6, w5).
     total_inertia_by_hump_kgm2 : tuple of float
-        J_zz + lambda661 of each pair of intervals by a two-interval formula, of which the estimate is the mean.
+        J_zz + lambda661 of each pair of intervals by a two-interval formula; the estimate is their mean.
     """
 
     added_inertia_kgm2: float | None = None
@@ -334,7 +334,7 @@ def fit_energy(balance: Balance, record: YawRecord, programmed: Balance | None =
     residuals = work - rows @ coefficients
     covariance = float(residuals @ residuals) / freedom * inverse @ inverse.T
     # Errors of neighbouring parts are correlated: they share the speed at their common end. Where it is larger, the
-    # covariance is that of the scatter of whole intervals, each taken as one draw (Liang & Zeger 1986).
+    # covariance follows from the scatter of whole intervals, each taken as one draw (Liang & Zeger 1986).
     count = 2 * len(balance.pairs)
     draws = (inverse * residuals).reshape(len(balance.terms), count, balance.parts).sum(axis=2)
     clustered = count / max(1, count - 1) * draws @ draws.T

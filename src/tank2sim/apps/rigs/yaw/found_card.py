@@ -46,7 +46,7 @@ def nrdot_prime(found: YawIdentification, method: str, length_m: float | None) -
     """N_rdot' = -lambda661 / (1/2 rho L^5) of the body in the tank, and its standard error.
 
     At equal Froude number the ship's is the same: an added inertia does not depend on viscosity. By default the length
-    is that of the records. InputError as :func:`known_added_inertia`, or if the length is not known.
+    is the records'. InputError as :func:`known_added_inertia`, or if the length is not known.
     """
     value, error = known_added_inertia(found, method)
     length = length_m if length_m is not None else _stated(found, "length_m")

@@ -65,7 +65,7 @@ class YawOptions:
 
     J_zz and its standard error are by default from records in air or from the file, k_t (with its relative standard
     error) from the file. `known` has walls, gravity, and differences between accelerating and braking. Terms are by
-    default those of (3) for the medium. `mirror_limit` is the largest accepted difference of the rates of two mirror
+    default the ones of (3) for the medium. `mirror_limit` is the largest accepted difference of the rates of two mirror
     images, over the largest rate.
     """
 

@@ -31,7 +31,7 @@ TORQUE_CONSTANT_NMPA = 0.051
 """k_t of the paper's motor."""
 
 UNKNOWN_RIG = YawRig(inertia_kgm2=1.0, torque_constant_NmpA=1.0)
-"""A rig of which nothing is known: the first two numbers are placeholders for those that are to be found."""
+"""A rig before its identification: the first two numbers are placeholders for the estimates."""
 
 
 def friction(rate: ca.SX, coulomb: ca.SX, viscous: ca.SX, quadratic: ca.SX) -> ca.SX:
@@ -150,7 +150,7 @@ def _mechanics(
 
     speeding = motor + gravity - resistance(p["friction.quadratic"])
     # The body accelerates if it does so with the coefficients of accelerating. Where it would brake with these and
-    # accelerate with those of braking, it does neither.
+    # accelerate with the coefficients of braking, it does neither.
     accelerates = sign * speeding >= 0
     slowing = motor + gravity - resistance(p["friction.quadratic_braking"])
     slowing = sign * ca.fmin(0, sign * slowing)

@@ -64,7 +64,7 @@ def fit_angle(
     """Fit (3) to the angle of all humps: the estimate, times (s) and residuals (rad); None if it does not converge.
 
     `rig` has the torque constant and known effects beyond (3), `first` the start values and the terms; the dissipation
-    that is reported is that of the programme's interval `ideal`.
+    reported belongs to the programme's interval `ideal`.
     """
     known = dict(zip(first.balance.terms, first.coefficients.tolist(), strict=True))
     terms = tuple(term for term in (*_NAMES, *_GRAVITY) if term in known)
@@ -127,7 +127,7 @@ def _covariance(residuals: Array, design: Array, humps: list[_Hump], gain: tuple
     noise = _from_current(np.split(inverse, ends, axis=1), humps, gain)
     variances = [np.diag(alone) + noise, *(np.diag(matrix) / (1 - _MEMORY) for matrix in along)]
     if len(humps) > 1:
-        # The free start of a hump absorbs its draw, so that the sums are nearly those of the shared terms alone.
+        # The free start of a hump absorbs its draw, so that the sums nearly equal the shared terms' alone.
         draws = np.array([part.sum(axis=1) for part in parts]).T
         few = float(student.ppf(_SIGMA_LEVEL, len(humps) - 1)) ** 2
         variances.append(few * len(humps) / (len(humps) - 1) * np.sum(draws**2, axis=1))

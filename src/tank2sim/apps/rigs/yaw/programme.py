@@ -4,8 +4,8 @@ One hump has seven segments and a rest. With t1 = t3/6, t2 = 5 t3/6, t4 = 2 t3 a
 t3 it takes 4 t3; between t1 and t2 the acceleration is constant, between t5 and t6 it is as large the other way, and
 w(t4 + x) = w_m - w(x): the braking is the accelerating run backwards.
 
-The energy method: with the work of the motor, W = int M w dt, of which any known part (walls, differences between the
-two intervals) has been taken off already, of an accelerating interval 1-2 and its mirror image 5-6
+The energy method: W = int M w dt is the work of the motor, without any known part (walls, differences between the
+two intervals). In an accelerating interval 1-2 and its mirror image 5-6
 
     W12 = (J + lambda)/2 (w2^2 - w1^2) + (B + D),   W56 = -(J + lambda)/2 (w2^2 - w1^2) + (B + D)
 
@@ -210,7 +210,7 @@ class Similarity:
     ) -> YawProgramme:
         """The programme whose humps (t7) are the ship's motion of `ship_time_s` with the rate `ship_rate_radps`.
 
-        Kind, number and settling are those of the programme `like`; raises as :class:`YawProgramme`.
+        Kind, number and settling are taken from the programme `like`; raises as :class:`YawProgramme`.
         """
         rise_s = ship_time_s / self.rate_ratio / 3
         return replace(like, max_rate_radps=ship_rate_radps * self.rate_ratio, rise_s=rise_s)

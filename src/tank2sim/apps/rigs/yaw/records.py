@@ -178,7 +178,7 @@ def _programme(table: CsvTable, time: Array) -> tuple[YawProgramme, list[str]]:
 
 
 def _rate(table: CsvTable) -> float | None:
-    """The programme's rate in rad/s, from whichever unit it is reported in; its sign is that of the turn."""
+    """The programme's rate in rad/s, from whichever unit it is reported in; with the sign of the turn."""
     for key in ("max_rate_degps", "max_rate_radps"):
         value = table.comment_number(key)
         if value is not None:

@@ -165,7 +165,7 @@ class YawRun:
     """Result of a run, arrays (rows,): the record, with the noise of the current, and the true values, which a rig does
     not measure.
 
-    `gains` are those of each hump, by name; none for a controller without gains. `memory` has the states of the
+    `gains` of each hump, by name; none for a controller without gains. `memory` has the states of the
     controller at the end.
     """
 
@@ -299,8 +299,8 @@ def simulated_record(
 ) -> YawRecord:
     """Simulate the record of a programme on the card's rig, including its encoder, for the file `path`.
 
-    In ``air`` the rig is that of :func:`rig_in_air`. The controller is by default (4), with the true inertia, the
-    programme that of the card; the noise of the recorded current is a standard deviation. InputError if the motor
+    In ``air`` the rig is given by :func:`rig_in_air`. The controller is by default (4), with the true inertia, the
+    programme the card's; the noise of the recorded current is a standard deviation. InputError if the motor
     saturates, or the card lacks a programme.
     """
     wet, programme = card.yaw_rig, programme or programme_of(card)
@@ -320,7 +320,7 @@ def simulated_record(
 def rig_in_air(rig: YawRig) -> YawRig:
     """The rig with its body in air: no added inertia, no f_662, no walls.
 
-    Dry and viscous friction are those of the card, because it does not state the water's part of them. The inertia, the
+    Dry and viscous friction are the card's, because it does not state the water's part of them. The inertia, the
     purpose of a run in air, does not depend on it.
     """
     water = ("added_inertia_kgm2", "quadratic_Nms2", "inertia_accelerating_kgm2", "inertia_braking_kgm2")
