@@ -39,7 +39,7 @@ class ArgumentBounds:
 
     @property
     def words(self) -> str:
-        """What is expected: ``a number above 0``."""
+        """The expected value in words: ``a number above 0``."""
         kind = "a whole number" if self.whole else "a finite number"
         lowest = "" if self.low is None else f" above {self.low:g}" if self.above else f" from {self.low:,.10g}"
         highest = "" if self.high is None else f" up to {self.high:,.10g}"
@@ -263,7 +263,7 @@ _WORDS = {
 
 
 def _in_words(kind: Any) -> list[str]:
-    """What a kind takes, in words: ``a text``, ``a path``, ``a DataFrame``."""
+    """A kind in words: ``a text``, ``a path``, ``a DataFrame``."""
     if get_origin(kind) in (Union, UnionType):
         parts = [part for part in get_args(kind) if part is not type(None)]
         single = [word for part in parts if get_origin(part) is not Sequence for word in _in_words(part)]

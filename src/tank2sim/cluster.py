@@ -50,7 +50,7 @@ _NOT_SENT = ("_bundled/", "cli/", "demo/", "report/")
 
 @cache
 def installed() -> dict[str, str]:
-    """What results depend on and what must be the same on every worker, to its version."""
+    """Packages that results depend on and that every worker must have in the same version."""
     digest = hashlib.sha256()
     folder = Path(__file__).parent
     code = (path for path in folder.rglob("*") if path.suffix in (".py", ".c"))
@@ -88,7 +88,7 @@ def connected(text: str) -> Iterator[Executor]:
 
 
 class Cluster(Executor):
-    """What is submitted is done by any worker, and again by another one if that is lost.
+    """A task is done by any worker, and again by another one if the first is lost.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ class Cluster(Executor):
                     self._settle(promised, partial(promised.set_exception, error))
 
     def _trouble(self) -> str:
-        """What keeps the cluster from working now, if anything."""
+        """The reason why the cluster cannot work now, if any."""
         try:
             workers = self._client.sync(self._client.scheduler.ncores, callback_timeout=ANSWERS_WITHIN_S)
         except Exception:  # whatever a broken connection raises
@@ -272,7 +272,7 @@ def _refuse_other(theirs: Mapping[str, str], versions: Mapping[str, str], addres
 
 
 def _within(seconds: float, make: Callable[[], _Result]) -> _Result:
-    """What `make` returns or raises; TimeoutError if it does neither in that time."""
+    """Result (or error) of `make`; TimeoutError if it does neither in that time."""
     promised: Future[_Result] = Future()
 
     def work() -> None:

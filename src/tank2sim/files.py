@@ -21,7 +21,7 @@ STANDARD_OUTPUT = Path("-")
 """This very object as a target of :func:`write_together` is standard output; any other path called - is refused."""
 
 BYTE_ORDER_MARK = "\ufeff"
-"""What some editors put before UTF-8 text."""
+"""Byte order mark that some editors put before UTF-8 text."""
 
 
 def write_whole(path: Path, content: str | bytes, *, inputs: Iterable[Path] = ()) -> None:

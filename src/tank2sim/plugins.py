@@ -39,7 +39,7 @@ class PluginWarning(UserWarning):
 
 
 class NamedValue(Protocol):
-    """What a registry holds: a frozen dataclass with a name."""
+    """An entry of a registry: a frozen dataclass with a name."""
 
     @property
     def name(self) -> str:
@@ -167,7 +167,7 @@ class Registry(Mapping[str, _Value]):
         return (*self._builtin, *(name for name in plugins if name not in self.reserved))
 
     def remedy(self, name: str) -> str:
-        """What to do about a name that is not there: the nearest one, or all that there are."""
+        """Remedy for an unknown name: the nearest one, or the list of all."""
         if close := difflib.get_close_matches(name, self, n=1):
             return f"did you mean {close[0]}?"
         return f"known are: {', '.join(self)}; or install the package that has it"

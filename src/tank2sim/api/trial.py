@@ -56,7 +56,7 @@ class TrialRecord:
 
     @property
     def notices(self) -> tuple[Notice, ...]:
-        """What was done to the data on reading."""
+        """Repairs of the data on reading."""
         return self.trial.notices
 
     @cached_property
@@ -85,7 +85,7 @@ class TrialRecord:
         return text
 
     def audit(self) -> AuditResult:
-        """What is wrong with the data, as :func:`tank2sim.audit` finds it."""
+        """Faults of the data, as :func:`tank2sim.audit` finds them."""
         result: AuditResult = VERBS["audit"].function(self)
         return result
 

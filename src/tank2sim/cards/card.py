@@ -1,4 +1,4 @@
-"""What is known of a ship, in the conventions of the program: prime system, starboard positive, SI, radians."""
+"""A ship's data in the conventions of the program: prime system, starboard positive, SI, radians."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ NOT_STEERED = "is not a manoeuvring ship: it has no rudder"
 
 
 class SteeredBy(StrEnum):
-    """What steers a vessel."""
+    """Means of steering a vessel."""
 
     RUDDER = "rudder"
     THRUSTERS = "thrusters"
@@ -170,7 +170,7 @@ class SteeredCard(Card):
 
     @property
     def steered_by(self) -> SteeredBy:
-        """What steers the vessel."""
+        """Means of steering the vessel."""
         return SteeredBy.THRUSTERS if self.thrusters else SteeredBy.RUDDER
 
     @property
@@ -185,7 +185,7 @@ class SteeredCard(Card):
 
     @property
     def file_scales(self) -> FileScales | None:
-        """What the numbers of the card's text are in; None for the prime system."""
+        """System of the numbers in the card's text; None for the prime system."""
         return scales_of_file(self.ship, self.environment, self.model)
 
     @property
@@ -223,7 +223,7 @@ OPPOSITE = {"R0": ("X0", -1.0), "mx": ("Xudot", -1.0), "my": ("Yvdot", -1.0), "J
 
 
 def scales_of_file(ship: ShipSection, environment: Environment, model: ShipModel | CraftModel) -> FileScales | None:
-    """What the numbers of a card's text are in, by its ``scaling``; None for the prime system.
+    """System of the numbers in a card's text, by its ``scaling``; None for the prime system.
 
     Raises
     ------

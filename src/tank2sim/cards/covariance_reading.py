@@ -38,7 +38,7 @@ choice)."""
 
 
 def carried(card: Card, text: str) -> Covariance | None:
-    """What a card's covariance says of another card that was made of it, of `text`: of all numbers that are the same
+    """The part of a card's covariance that holds for a card made from it, `text`: all numbers that are the same
     there, or moved within :data:`HOLDS`, with the same standard error.
 
     What was changed more is a number from elsewhere, and independent then. None if the card refers to none, or nothing

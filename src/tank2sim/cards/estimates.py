@@ -121,7 +121,7 @@ CLARKE_BRACKETS: Mapping[str, Callable[[Any, Any, Any], Any]] = {
     "Nv": lambda bl, bt, cb: 1 / 2 + 2.4 * bl / bt,
     "Nr": lambda bl, bt, cb: 1 / 4 + 0.039 * bt - 0.56 * bl,
 }
-"""What Clarke's regressions multiply by -pi (T/L)^2: functions of B/L, B/T and C_B, numbers or symbols."""
+"""Factors of -pi (T/L)^2 in Clarke's regressions: functions of B/L, B/T and C_B, numbers or symbols."""
 
 CLARKE_COUPLINGS = ("Yrdot", "Nvdot")
 """Those with an absolute error, :data:`COUPLING_ERROR`."""

@@ -186,7 +186,7 @@ def _refuse_body(card: SteeredCard) -> None:
 
 
 def _of_ship(card: ManoeuvringCard) -> Iterator[str]:
-    """What is unusual about a ship with a rudder; most serious first."""
+    """Unusual features of a ship with a rudder; most serious first."""
     hull, errors = _hydrodynamic(card), card.uncertainty
     signs = {caution.fact.split()[0]: caution.fact for caution in unusual_signs(hull, errors)}
     if "Nd" in signs:

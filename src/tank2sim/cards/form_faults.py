@@ -47,7 +47,7 @@ def short(value: object) -> str:
 
 
 def suggestion(key: str, known: list[str]) -> str:
-    """What to do about an unknown key where the `known` ones may be given."""
+    """Remedy for an unknown key where the `known` ones may be given."""
     close = difflib.get_close_matches(key, known, n=1, cutoff=0.6)
     same_stem = [name for name in known if name.partition("_")[0] == key.partition("_")[0]]
     best = close or same_stem

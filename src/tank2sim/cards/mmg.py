@@ -1,4 +1,4 @@
-"""What an MMG card states, checked and completed: revolutions that hold the speed, K_T, f_alpha, both sides' values."""
+"""Content of an MMG card, checked and completed: revolutions that hold the speed, K_T, f_alpha, both sides' values."""
 
 from __future__ import annotations
 

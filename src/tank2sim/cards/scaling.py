@@ -19,7 +19,8 @@ every force of the model stays a number. Project choice: what is beyond is a sli
 
 @dataclass(frozen=True)
 class Scales:
-    """What makes a number of one ship non-dimensional: water density (kg/m3), length (m), speed of the scaling (m/s).
+    """Reference values that make numbers of a ship non-dimensional: water density (kg/m3), length (m), speed of the
+    scaling (m/s).
 
     Numbers, or CasADi expressions: the equations of motion use the same scales.
     """
@@ -102,11 +103,11 @@ class OtherPrime:
 
 
 FileScales = Scales | OtherPrime
-"""What the numbers of a file are in, other than the prime system."""
+"""Systems of a file's numbers, other than the prime system."""
 
 
 def file_factor(term: Term, scales: FileScales | None, *, rudder_to_port: bool) -> float:
-    """What a derivative inside (prime, starboard) is multiplied by before it is written to a file.
+    """Factor of a derivative from inside (prime, starboard) to the file.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ from tank2sim.escaping import one_line
 
 @dataclass(frozen=True)
 class SurgeResult:
-    """What a card of a body that only surges is made of.
+    """Contents of a card of a body that only surges.
 
     `name`, `source`: what it is, and where the numbers come from. `values`, `standard_errors`: keys of ``[surge]``, SI,
     to numbers. `top_speed_mps`: highest speed at which they were measured. `length_m`: length, if known. `notes`:
@@ -57,7 +57,7 @@ def surge_card_text(result: SurgeResult) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class YawRigResult:
-    """What a card of a body on the yaw rig is made of.
+    """Contents of a card of a body on the yaw rig.
 
     `name`, `source`, `notes`: what it is, where the numbers come from, and what a reader should know. `values`,
     `standard_errors`: keys of ``[yaw_rig]``, SI, to numbers. `programme`: keys of ``[programme]``.
@@ -108,7 +108,7 @@ class DerivativeEntry(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class ManoeuvringResult:
-    """What a card of a manoeuvring ship is made of: prime, instantaneous, "hydrodynamic", starboard-positive.
+    """Contents of a card of a manoeuvring ship: prime, instantaneous, "hydrodynamic", starboard-positive.
 
     `particulars`: keys of ``[ship]`` but source and notes; SI. `source`, `notes`: where the numbers come from, and what
     a reader should know. `environment`: keys of ``[environment]``, SI. `speed_mps`: u0, about which the forces are

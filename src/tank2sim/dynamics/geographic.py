@@ -30,7 +30,7 @@ HIGHEST_LATITUDE = math.radians(85.0)
 """Origins nearer to a pole are taken as lying here, where the series is regular: project choice, beyond harbours."""
 
 NOMINAL_ANGLE = 1e-4
-"""What matters of a latitude or longitude, rad: a few ship lengths, 640 m."""
+"""Nominal value of a latitude or longitude, rad: a few ship lengths, 640 m."""
 
 GEOGRAPHIC_OUTPUTS = ("position.latitude", "position.longitude")
 

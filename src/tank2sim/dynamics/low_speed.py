@@ -273,7 +273,7 @@ def _cross_flow_drag(s: Symbols) -> tuple[ca.SX, ca.SX]:
 
 @dataclass(frozen=True)
 class RudderAtU0:
-    """What the polynomial says of the rudder straight ahead, linear in its angle.
+    """The polynomial's rudder forces straight ahead, linear in the angle.
 
     Parameters
     ----------
@@ -288,7 +288,7 @@ class RudderAtU0:
 
 
 def rudder_factors(s: Symbols, X_bound: ca.SX, rudder: RudderAtU0) -> tuple[ca.SX, ca.SX]:
-    """What the rudder's force at low speed has for that at u0: its factors of F_delta(u0) and of F_d(u0)."""
+    """Factors of F_delta(u0) and F_d(u0) in the rudder's force at low speed."""
     u, u0, bound, astern = s["motion.u"], s["ship.speed"], lowest_speed(s), s["low_speed.rudder_astern"]
     thrust = ca.fmax(0, nominal_thrust(s, X_bound)) / (1 - s["low_speed.thrust_deduction"])
     disc = ca.pi / 4 * s["ship.propeller_diameter"] ** 2

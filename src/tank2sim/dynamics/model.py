@@ -78,7 +78,7 @@ class Parameter(Variable):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Input(Variable):
-    """What acts on the model from outside.
+    """Actions on the model from outside.
 
     `accepted` is the largest magnitude of an order that the model itself holds within its bounds, such as a rudder's at
     its stops; None: a value beyond the bounds is refused.

@@ -63,7 +63,7 @@ def rigid_body_accelerations(inertia: Inertia, f1: Scalar, f2: Scalar, f3: Scala
 
 
 def inertial_forces(mass: Scalar, x_G: Scalar, u: Scalar, v: Scalar, r: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-    """What (3.1) leaves on the right next to X, Y, N: m (v r + x_G r^2), -m u r, -m x_G u r (N, N, N m in SI).
+    """Rigid-body terms of (3.1) on the right next to X, Y, N: m (v r + x_G r^2), -m u r, -m x_G u r (N, N, N m in SI).
 
     In the linear equations (3.5) u is the speed of expansion, in (3.8) the instantaneous one.
     """

@@ -95,7 +95,7 @@ def _engine(card: ManoeuvringCard) -> tuple[Variable, ...]:
 
 
 def _limits_of_tests(card: ManoeuvringCard) -> list[Notice]:
-    """What the tests behind a card leave open about yaw and about the sides."""
+    """Notice on what the tests behind a card leave open about yaw and the two sides."""
     notices = []
     if not card.model.valid_yaw_rate_prime > 0:
         text = "no test behind the card had a yaw rate (valid_yaw_rate_prime = 0): its derivatives by r are estimates, "

@@ -1,4 +1,4 @@
-"""What a ship in a simulator has on top of its equations: inputs for external forces, and outputs for displays."""
+"""Interface of a ship in a simulator: inputs for external forces, and outputs for displays."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ def steering_gear(gear: SteeringGear | None, ship_time_s: float) -> tuple[tuple[
 
 
 def assumed_lag_notice(ship_time_s: float) -> Notice:
-    """What a user is reported where a card states no time constant; L/u0 in s."""
+    """Notice where a card states no time constant; L/u0 in s."""
     return Notice(
         "the card states no time constant of the steering gear: "
         f"{UNSTATED_LAG * ship_time_s:.3g} s is taken ({UNSTATED_LAG} L/u0)"

@@ -1,4 +1,4 @@
-"""What an FMU is to be believed by: its reference result replayed in its own library, and its passport."""
+"""Acceptance of an FMU: its reference result replayed in its own library, and its passport."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _TITLES = {"zigzag_20_20": "Zigzag 20/20", "turn_35": "Turning circle, rudder 35
 
 @dataclass(frozen=True)
 class AcceptanceResult:
-    """What the model itself answers to standard manoeuvres.
+    """The model's own answers to standard manoeuvres.
 
     `reference`: None if the motion leaves all bounds. `manoeuvres`: standard manoeuvres of a ship, by name.
     """
@@ -66,7 +66,7 @@ def gather(model: Model) -> AcceptanceResult:
 
 
 def replay_in_fmu(fmu: bytes, reference: ReferenceRun | None, model: Model, fmi: int) -> Replay:
-    """What the library of an FMU, if there is one for this machine, answers to its reference run."""
+    """Answer of the FMU's library to its reference run, if there is a library for this machine."""
     if reference is None:
         return Replay(problem="there is none, because the motion leaves all bounds")
     names: dict[str, tuple[str, ...]] = {"inputs": reference.input_names, "outputs": reference.output_names}

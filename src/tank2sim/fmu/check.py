@@ -31,7 +31,7 @@ LIMITS: dict[FmuType, float] = {"ModelExchange": 1e-6, "CoSimulation": 1e-9}
 """Largest error allowed. Co-Simulation is held against the same scheme, Model Exchange against the exact solution."""
 
 _SECTIONS = ("UnitDefinitions", "DefaultExperiment", "ModelVariables", "ModelStructure")
-"""What the model decides. Names, tokens, dates and capabilities are the FMU's own."""
+"""Attributes that the model decides. Names, tokens, dates and capabilities are the FMU's own."""
 
 _IDENTIFIERS = ("name", "valueReference", "index")
 
@@ -41,7 +41,7 @@ Elements = dict[str, dict[str, str]]
 
 @dataclass(frozen=True, kw_only=True)
 class CheckReport:
-    """What a check found.
+    """Findings of a check.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def _compare(
 
 
 def _repeat_reference(unpacked: UnpackedFmu) -> tuple[list[str], float | None]:
-    """What is wrong when the FMU repeats the reference result it carries, in Co-Simulation, and its largest error."""
+    """Faults when the FMU repeats its reference result in Co-Simulation, and its largest error."""
     try:
         reference = read_reference(unpacked.folder)
     except InputError as error:

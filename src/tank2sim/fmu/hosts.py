@@ -68,7 +68,7 @@ class HostCondition:
 
 @dataclass(frozen=True)
 class _Fmu:
-    """What the conditions look at."""
+    """Data that the conditions look at."""
 
     path: Path
     root: ElementTree.Element

@@ -1,4 +1,4 @@
-"""What an FMU shows of a model: its variables with value references, and what depends on what."""
+"""Interface of an FMU: its variables with value references, and their dependencies."""
 
 from __future__ import annotations
 
@@ -186,7 +186,7 @@ def _rate_names(model: Model) -> list[str]:
 
 
 def _shown(variable: Variable, reference: int, **as_fmi: Any) -> FmuVariable:
-    """What a variable of the model says of itself, and what FMI adds."""
+    """Attributes of a variable, from the model and from FMI."""
     return FmuVariable(
         name=variable.name,
         reference=reference,

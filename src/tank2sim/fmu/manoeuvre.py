@@ -1,4 +1,4 @@
-"""What an FMU is driven through when it is checked: steps of every input over its range."""
+"""Inputs that drive an FMU when it is checked: steps of every input over its range."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ class PassportCoefficient:
 
 @dataclass(frozen=True, kw_only=True)
 class Replay:
-    """What the library of the FMU answered to its own reference run, in Co-Simulation on the machine that wrote it.
+    """Answer of the FMU's library to its own reference run, in Co-Simulation on the machine that wrote it.
 
     `run`: what was done; empty if there is no reference run. `platform`: folder of the library that was run; empty if
     it was not run. `max_error`: largest error of an output, relative to the larger of its range in the run and its

@@ -26,7 +26,7 @@ _ENTRY = "import sys; from tank2sim.fmu.process import drive_in_process; drive_i
 
 @dataclass(frozen=True, kw_only=True)
 class Drive:
-    """What to drive an FMU through, and the names of the inputs, outputs (ny) and parameters (np) to write and read."""
+    """Drive for an FMU, and the names of the inputs, outputs (ny) and parameters (np) to write and read."""
 
     kind: FmuType
     run: InputSequence
@@ -37,7 +37,7 @@ class Drive:
 
 @dataclass(frozen=True, kw_only=True)
 class ProcessResult:
-    """What came of it.
+    """Results of such a run.
 
     `parameters` (np,): their values after instantiation, None if it did not come so far. `outputs` (K + 1, ny): at the
     communication points, None if it did not come so far. `problem`: what went wrong, in one line; empty if nothing.

@@ -117,7 +117,7 @@ def _of_thrusters(card: SteeredCard, document: Mapping[str, Any]) -> Iterator[tu
 
 
 def _of_low_speed() -> dict[str, ValueOrigin]:
-    """What the forces at low speed need and a card need not state: estimates and choices of the program."""
+    """Low-speed data that a card need not state: estimates and choices of the program."""
     estimates = {f"ship.{_stem(key)}": estimated_from(key) for key in ("draught_m", "propeller_diameter_m")}
     return {name: ValueOrigin(f"not in the card: {source}") for name, source in (estimates | SOURCES).items()}
 
@@ -160,7 +160,7 @@ def _line_comment(section: Any, key: str) -> str | None:
 
 @dataclass(frozen=True, kw_only=True)
 class Documents:
-    """What an FMU says of its ship next to the equations.
+    """Data on the ship in an FMU, next to the equations.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What an FMU should answer, from the CasADi model alone: by the same scheme, and as exactly as can be."""
+"""Expected answers of an FMU, from the CasADi model alone: by the same scheme, and as exactly as can be."""
 
 from __future__ import annotations
 

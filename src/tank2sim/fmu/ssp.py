@@ -102,7 +102,7 @@ def _joined(models: Mapping[str, Model], every_input: bool) -> tuple[list[Part],
 
 
 def _documents(ship: Model, autopilot: Model) -> Documents:
-    """What the autopilot's FMU says of itself."""
+    """Description of the autopilot's FMU."""
     found = stability(ship)
     nomoto = found.nomoto.dimensional
     source = (

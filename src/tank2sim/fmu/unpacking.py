@@ -49,7 +49,7 @@ class UnpackedFmu:
 
     @property
     def kinds(self) -> tuple[FmuType, ...]:
-        """What the FMU offers of Model Exchange and Co-Simulation."""
+        """Kinds of the FMU: Model Exchange, Co-Simulation, or both."""
         offers: dict[FmuType, Any] = {
             "ModelExchange": self.description.modelExchange,
             "CoSimulation": self.description.coSimulation,

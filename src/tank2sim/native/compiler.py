@@ -111,7 +111,7 @@ def _named_compiler() -> tuple[str, ...] | None:
 
 @cache
 def _trouble(command: tuple[str, ...]) -> str | None:
-    """What a compiler says when it cannot even make a library of a few words that runs; None if it can."""
+    """Error of a compiler that cannot make the simplest library that runs; None if it can."""
     with tempfile.TemporaryDirectory(prefix="tank2sim-", ignore_cleanup_errors=True) as folder:
         trial = Path(folder, "trial.c")
         trial.write_text(_TRIAL, encoding="utf-8")
@@ -120,7 +120,7 @@ def _trouble(command: tuple[str, ...]) -> str | None:
 
 
 def _trouble_in(library: Path) -> str | None:
-    """What is wrong with the library of the trial, which is loaded here; None if it answers as it should."""
+    """Fault of the trial library, which is loaded here; None if it answers as it should."""
     try:
         trial = ctypes.CDLL(str(library)).trial
     except (OSError, AttributeError) as error:
@@ -132,7 +132,7 @@ def _trouble_in(library: Path) -> str | None:
 def _refusal(
     compiler: list[str], sources: list[Path], library: Path, flags: Iterable[str], seldom: Collection[str] = ()
 ) -> str | None:
-    """What the compiler said when it made no library; None if it made one."""
+    """The compiler's error if it made no library; else None."""
     with tempfile.TemporaryDirectory(prefix="tank2sim-") as name, ThreadPoolExecutor(os.cpu_count()) as pool:
         command, folder = [*compiler, *FLAGS, *flags], sources[0].parent
         # The longest first, so that no processor is idle next to it at the end.
@@ -156,7 +156,7 @@ def _refusal(
 
 
 def _run(command: list[str], folder: Path, made: Path) -> str | None:
-    """What a compiler said when it did not make the file that it should; None if it did."""
+    """A compiler's error if it did not make its file; else None."""
     try:
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace", check=False)
     except OSError as error:

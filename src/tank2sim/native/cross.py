@@ -22,7 +22,7 @@ _LINK_FLAGS_OF = {".so": ("-lm",), ".dylib": ("-Wl,-install_name,@rpath/model.dy
 
 @dataclass(frozen=True)
 class CompileTarget:
-    """What to compile for: processor, system and the oldest version of it, and how the name of a library ends."""
+    """Target of a compilation: processor, system and the oldest version of it, and how the name of a library ends."""
 
     triple: str
     suffix: str

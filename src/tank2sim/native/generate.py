@@ -49,7 +49,7 @@ def generate_c(functions: Sequence[ca.Function], stem: str) -> str:
 
 
 def work_sizes(functions: Sequence[ca.Function]) -> WorkSizes:
-    """What :func:`generate_c` code of these functions needs as `w` and `iw`."""
+    """Sizes of `w` and `iw` that code of :func:`generate_c` needs."""
     return WorkSizes(
         reals=max(function.sz_w() for function in functions), integers=max(function.sz_iw() for function in functions)
     )

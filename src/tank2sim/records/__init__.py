@@ -1,1 +1,1 @@
-"""What was measured: trials, captive campaigns, tows."""
+"""Measurements: trials, captive campaigns, tows."""

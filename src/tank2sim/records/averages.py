@@ -195,7 +195,7 @@ def _averaged_run(
 
 
 def _unit_of_force(form: CampaignFile, scales: Scales) -> float:
-    """What a force of one in the table is, N: by 1/2 rho L^2 U^2 (prime), 1/2 rho L d U^2 (prime II), or itself."""
+    """Newtons of a force of one in the table: by 1/2 rho L^2 U^2 (prime), 1/2 rho L d U^2 (prime II), or itself."""
     assert form.averages is not None
     if form.averages.scaling == "dimensional":
         return 1.0

@@ -85,7 +85,7 @@ class CsvTable:
     counts: str = "line"
 
     def heading(self, name: str) -> str:
-        """What a column is called in the file."""
+        """Name of a column in the file."""
         return self.headings.get(name, name)
 
     def place(self, row: int, name: str) -> str:
@@ -261,7 +261,7 @@ def read_table(path: Path | str | CsvTable) -> CsvTable:
     """Read a CSV table of numbers; a table is returned unchanged.
 
     A byte order mark, CRLF, blank lines, and spaces around names and numbers do not matter. A header with semicolons or
-    tabs and no commas shows the separator; decimals may then have commas. Of a spreadsheet (``.xlsx``) the first sheet
+    tabs and no commas shows the separator; decimals may then have commas. The first sheet of a spreadsheet (``.xlsx``)
     is read, whose rows are the lines of messages.
 
     Raises

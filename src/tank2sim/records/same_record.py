@@ -100,7 +100,7 @@ _LEAST_VALUES = 8
 
 
 class TimedSignals(Protocol):
-    """What two records are compared by: a trial, a captive run, a record of a rig."""
+    """Data by which two records are compared: a trial, a captive run, a record of a rig."""
 
     @property
     def time_s(self) -> Array:
@@ -120,7 +120,7 @@ class Recording:
 
 
 class Likeness(StrEnum):
-    """What two records have in common."""
+    """The part that two records have in common."""
 
     COPY = "copy"
     MIRROR = "mirror image"
@@ -174,7 +174,8 @@ def same_record(first: TimedSignals, second: TimedSignals) -> bool:
 def likeness(
     first: TimedSignals, second: TimedSignals, among: Collection[Likeness] = tuple(Likeness)
 ) -> Likeness | None:
-    """What two records have in common, whatever their clock, heading, origin, digits and rows; None for two runs.
+    """The part that two records have in common, whatever their clock, heading, origin, digits and rows; None for two
+    runs.
 
     A copy has in all signals that both measured the same values at the same times, except for printed digits. A mirror
     image has them with port and starboard exchanged. A run recorded twice differs by no more than the white noise of

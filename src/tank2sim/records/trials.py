@@ -77,7 +77,7 @@ class Trial:
         return f"{self.folder}/{self.path.stem}" if self.folder else self.path.stem
 
     def heading(self, signal: str) -> str:
-        """What the column of a signal is called in the file."""
+        """Name of a signal's column in the file."""
         return self.columns.get(signal, signal)
 
 
@@ -109,7 +109,7 @@ class TrialReader:
 
 
 def fault_of(trial: Trial) -> str:
-    """What of a trial is not as :class:`Trial` says, "" if nothing: for readers of other packages."""
+    """First violation of what :class:`Trial` demands, "" if none: for readers of other packages."""
     if not isinstance(trial, Trial):
         return f"a {type(trial).__name__} was read, and a Trial was expected"
     if unknown := [name for name in trial.signals if name not in TRIAL_SIGNALS]:

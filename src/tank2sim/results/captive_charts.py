@@ -33,7 +33,7 @@ _USUAL_LIMIT = 2.0
 
 @dataclass(frozen=True, kw_only=True)
 class Residual:
-    """What a fit leaves of one force in one run, over its standard error; `kind` is the type of run."""
+    """Residual of a force in one run, over its standard error; `kind` is the type of run."""
 
     run: str
     kind: str
@@ -139,7 +139,7 @@ def harmonic_chart(plot: HarmonicsPlot) -> ChartSpec:
 
 
 def residual_chart(residuals: Sequence[Residual], *, title: str = "") -> ChartSpec:
-    """What the fit leaves, over its standard error, by run: one panel a force, a colour a type of run.
+    """Residuals over their standard errors, by run: one panel a force, a colour a type of run.
 
     Dotted lines mark two standard errors, within which nineteen of twenty should lie.
 

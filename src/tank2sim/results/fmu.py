@@ -91,7 +91,7 @@ class ExportResult(Result[ExportStudy]):
 
     @property
     def sections(self) -> Sequence[Section]:
-        """What the FMU is."""
+        """Kind and contents of the FMU."""
         study = self.study
         values: dict[str, Cell] = {"file": study.fmu, "ssp": study.ssp, "fmi": study.fmi}
         values |= {"model_identifier": study.model_identifier, "token": study.token, "size_bytes": study.size_bytes}
@@ -124,7 +124,7 @@ class CheckResult(Result[CheckReport]):
 
     @property
     def problems(self) -> tuple[str, ...]:
-        """What is wrong with the description or the outputs, one sentence each."""
+        """Faults of the description or the outputs, one sentence each."""
         return (*self.study.validation, *self.study.differences)
 
     @property

@@ -297,7 +297,7 @@ def _in_lengths(name: str) -> str:
 
 
 def _pull_outs(*sides: Mapping[str, Any]) -> str:
-    """What the yaw rates of pull-outs from both sides say of the ship."""
+    """Finding on the ship's stability from pull-outs to both sides."""
     (first, first_left), (second, second_left) = (
         (side["steady_rate_degps"], side["residual_rate_degps"]) for side in sides
     )

@@ -1,8 +1,8 @@
 """Manoeuvres of many ships at once, each in a lane of vector registers, without their tracks.
 
 The runs take the steps of :mod:`tank2sim.simulation.running`: a grid of whole steps, and a sample at each change of the
-rudder order. Of the motion only what figures need is kept: the samples around crossings of watched levels, the changes
-of order, the ends, the way, and on request the states at given times.
+rudder order. Only the parts of the motion that figures need are kept: the samples around crossings of watched levels,
+the changes of order, the ends, the way, and on request the states at given times.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Linear response of the yaw rate to the rudder about the straight course: poles, zeros, Bode, step.
 
-Of three systems, all by python-control: sway and yaw (with the states of effects that act on them: roll, the memory of
-the flow) with the rudder angle as input, the same behind the steering gear (input the order; its rate limit is not
-linear and neglected), and Nomoto's first-order model K/(1 + T s), for slow motion.
+Responses of three systems, all by python-control: sway and yaw (with the states of effects that act on them: roll,
+the memory of the flow) with the rudder angle as input, the same behind the steering gear (input the order; its rate
+limit is not linear and neglected), and Nomoto's first-order model K/(1 + T s), for slow motion.
 """
 
 from __future__ import annotations

@@ -286,7 +286,7 @@ def _trial(
         messages += [notice.of(name).of(label) for notice in (*run.reading.notices, *run.missing)]
         outside.append(set(run.reading.outside_names))
         found.append(_scaled(figure_numbers(run.figures), ratio))
-        # Of each member the numbers alone are kept: the motions of a thousand would fill gigabytes.
+        # Only the numbers of each member are kept: the motions of a thousand would fill gigabytes.
         spread = member_spread([_numbers(ship.run(manoeuvre, {**start, **member})) for member in draws])
         deviations.append(_scaled(spread, ratio))
         tracks.append(_track(label, run.trajectory, ratio))

@@ -63,7 +63,7 @@ class Box:
 
     @property
     def caution(self) -> str:
-        """What the reader must not miss."""
+        """Warnings for the reader."""
         return NOT_FOR_USE if any(OUTSIDE in row.values for row in self.rows) else ""
 
 

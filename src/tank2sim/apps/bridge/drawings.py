@@ -200,7 +200,7 @@ def _sampled(frame: _Frame, circles: Sequence[ShipTrack]) -> list[tuple[float, f
 
 
 def _blocks(words: Sequence[Word], dots: Sequence[tuple[float, float]]) -> list[_Block]:
-    """What numbers of the grid and dots cover."""
+    """Areas covered by numbers of the grid and dots."""
     found = [_Block(x - 1, y - 1, 2, 2) for x, y in dots]
     for word in words:
         width = _CHARACTER_MM * len(word.text)

@@ -1,4 +1,4 @@
-"""What both halves of the demo share: where files go, how progress is reported, and how a checked FMU is made."""
+"""Shared by both halves of the demo: where files go, how progress is reported, and how a checked FMU is made."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tank2sim.fmu.provenance import documents_of
 
 @dataclass(frozen=True)
 class DemoOutcome:
-    """What a half of the demo found: key figures and sections for the page, and the same as plain data."""
+    """Results of a half of the demo: key figures and sections for the page, and the same as plain data."""
 
     figures: Sequence[KeyFigure]
     sections: Sequence[Section]

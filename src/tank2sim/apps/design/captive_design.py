@@ -134,7 +134,7 @@ class CaptiveDesign:
 
 @dataclass(frozen=True, kw_only=True)
 class CaptiveDesignSettings:
-    """What is asked of a design.
+    """Requirements of a design.
 
     Parameters
     ----------

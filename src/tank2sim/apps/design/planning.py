@@ -306,7 +306,8 @@ def _notices(design: CaptiveDesign, draws: int) -> tuple[Notice, ...]:
 
 
 def _checks(design: CaptiveDesign) -> list[Notice]:
-    """What needs a second look: too few hours, figures that are hardly certain, gauges far beyond their forces."""
+    """Points that need a second look: too few hours, figures that are hardly certain, gauges far beyond their
+    forces."""
     found = []
     if design.hours < design.usual_hours * (1 - 1e-9):
         found.append(
@@ -336,7 +337,7 @@ def _checks(design: CaptiveDesign) -> list[Notice]:
 
 
 def _assumptions(design: CaptiveDesign, draws: int) -> list[Notice]:
-    """What neither the tank's file, nor an option, nor the card states."""
+    """Data stated neither by the tank's file, nor an option, nor the card."""
     tank, runs = design.tank_runs.tank, design.tank_runs
     gauges, stated = tank.gauges, tank.gauges.model_fields_set
     lacking = []

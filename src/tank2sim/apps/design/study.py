@@ -1,4 +1,4 @@
-"""What a design found, as numbers: the plan, and its certainty next to the usual programme."""
+"""A design as numbers: the plan, and its certainty next to the usual programme."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is known of a ship by its main dimensions alone: a card of published estimates with wide standard errors.
+"""Prior knowledge of a ship by its main dimensions: a card of published estimates with wide standard errors.
 
 Linear and acceleration derivatives come from :mod:`tank2sim.cards.estimates`. The rudder is one of the
 area that rules of classification require, in the slipstream of its propeller. For all other numbers there is no
@@ -80,7 +80,7 @@ _LIMITS: Mapping[str, tuple[float, float]] = {
     "block": (0.35, 1.0),
     "speed": (1.0, 45.0),
 }
-"""What a merchant ship or its model can be, m, -, and the ship's speed, kn. Project choice: wider than any ship; models
+"""Limits of a merchant ship or its model, m, -, and the ship's speed, kn. Project choice: wider than any ship; models
 below 1 m are toys."""
 
 SHORTEST_SHIP_GUESSED_M, SHIP_OF_MODEL_M = 20.0, 200.0

@@ -58,7 +58,7 @@ _FIX = 2
 """Least status of a GPS fix, in two dimensions (GPS_STATUS of ArduPilot)."""
 
 _UNKNOWN_16_BITS = 65535
-"""What a field of 16 bits holds where nothing is known (mavlink.io)."""
+"""Value of a 16-bit field where nothing is known (mavlink.io)."""
 
 _FRAMES = {0xFE: 8, 0xFD: 12}
 """Bytes of a message of MAVLink 1 and 2 besides its payload, by its first one (mavlink.io, "Packet Serialization")."""

@@ -1,4 +1,4 @@
-"""What the search for channels knows: streams, the channels found among them, their confidence, and the motion."""
+"""Data of the search for channels: streams, the channels found among them, their confidence, and the motion."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ REFUTED = 0.2
 
 @dataclass
 class Judgement:
-    """What a stream is taken for: confidence and its reason, unit, sign and zero of the record."""
+    """A stream's interpretation: confidence and its reason, unit, sign and zero of the record."""
 
     stream: LogStream
     confidence: float

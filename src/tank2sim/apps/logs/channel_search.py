@@ -201,7 +201,7 @@ def _degrees(stream: LogStream) -> Array:
 
 
 def _wrong_axes(search: ChannelSearch) -> tuple[str, ReferenceMotion] | None:
-    """What is wrong with the axes of a track, and the motion without it; None unless all directions show it."""
+    """Fault in the axes of a track, and the motion without it; None unless all directions show it."""
     track, angles = search.motion, [search.angle(stream) for stream in search.named("heading", "cog")]
     north, east = track.v_north_mps, track.v_east_mps
 

@@ -38,7 +38,7 @@ def full_year(year: int) -> int:
 
 
 def rollover_s(ahead_s: float) -> tuple[float, list[LogFinding]]:
-    """What to add to a receiver's clock that is ahead of the recorder's by `ahead_s`, and what to say of it.
+    """Correction of a receiver's clock that is ahead of the recorder's by `ahead_s`, and its notice.
 
     Whole multiples of 1024 weeks are the receiver's fault, for its week number has ten bits; of any other difference
     the receiver is right.

@@ -62,7 +62,7 @@ _NOMOTO_T_S = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0, 60.0)
 
 @dataclass(frozen=True)
 class ContentEvidence:
-    """What the content of a stream says of what it is.
+    """Evidence in a stream's content of what it is.
 
     - `agreement`: 0 to 1; None where the log cannot show it.
     - `sign`: Sign of the values against the convention of trials; 0 where the log cannot show it.

@@ -56,7 +56,7 @@ _FRAME = re.compile(
 can-utils), Vector's ASC, and tables of frames."""
 
 _SIGNAL_K = re.compile(r"^\d{13};[^;]*;")
-"""What Signal K puts before a line that it records."""
+"""Prefix of a line recorded by Signal K."""
 
 _LINES = (
     re.compile(r"^\d{4}-\d\d-\d\d[T-][\d:.]+Z?,\d,\d+,\d+,\d+,\d+,[0-9A-Fa-f]{2},"),

@@ -1,4 +1,4 @@
-"""What recorders write in place of values: marks for missing ones (-999, 511 deg), and pulses (1000 to 2000 us)."""
+"""Substitutes that recorders write for values: marks for missing ones (-999, 511 deg), and pulses (1000 to 2000 us)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a log says of the motion by itself: positions and headings, against which every other stream is judged."""
+"""Reference motion of a log: positions and headings, against which every other stream is judged."""
 
 from __future__ import annotations
 

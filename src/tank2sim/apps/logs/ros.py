@@ -299,7 +299,7 @@ def _numbers_of(message: Any) -> Iterator[str]:
 
 @cache
 def _getter(path: str) -> Callable[[Any], Any]:
-    """What gets the number at a path out of a message."""
+    """Function that gets the number at a path out of a message."""
     name, _, place = path.partition("[")
     get, index = attrgetter(name), int(place.rstrip("]") or 0)
     return (lambda message: get(message)[index]) if place else get

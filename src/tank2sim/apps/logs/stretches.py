@@ -64,7 +64,7 @@ LEAST_TRIAL_ROWS = 30
 
 
 class StretchKind(StrEnum):
-    """What a stretch is."""
+    """Kinds of a stretch."""
 
     ZIGZAG = "zigzag"
     TURN = "turn"
@@ -305,7 +305,7 @@ def _piece(signals: _Signals, begin: int, end: int) -> _Piece:
 
 
 def _kind(signals: _Signals, piece: _Piece) -> StretchKind:
-    """What a piece is by its orders and the speed."""
+    """Kind of a piece by its orders and the speed."""
     speed = signals.speed[piece.begin : piece.end]
     known = speed[np.isfinite(speed)]
     tenth = max(1, len(known) // 10)

@@ -50,7 +50,7 @@ class QuantitySeries:
 
 @dataclass(frozen=True, eq=False)
 class Voyage:
-    """What a vessel recorded, in SI.
+    """Record of a vessel, in SI.
 
     Parameters
     ----------

@@ -221,7 +221,7 @@ def box_mesh(length_m: float, beam_m: float, height_m: float) -> str:
 
 
 def _losses_of_ship(model: Model) -> list[str]:
-    """What Bridge Command does not have of a ship with a rudder, in numbers."""
+    """Parts of a ship with a rudder that Bridge Command lacks, in numbers."""
     # A card without limits of its gear turns with 35 deg, as IMO's turning circle does.
     largest = math.degrees(start_values(model).get("steering.max_angle", math.radians(35.0)))
     turn = simulate(model, Turn(math.radians(min(largest, LARGEST_RUDDER_DEG)))).figures
@@ -249,7 +249,7 @@ def _losses_of_ship(model: Model) -> list[str]:
 
 
 def _losses_of_all(card: SteeredCard) -> list[str]:
-    """What Bridge Command does not have of any vessel."""
+    """Parts of any vessel that Bridge Command lacks."""
     names = {effect.name for effect in card.effects if EFFECTS[effect.name].acts_on != "sensor"}
     lost = sorted(names - {*_TUNNELS, *_WEATHER, TWIN_ORDERS.name})
     return [

@@ -1,4 +1,4 @@
-"""What a table of derivatives with unstated conventions may mean."""
+"""Possible meanings of a table of derivatives with unstated conventions."""
 
 from __future__ import annotations
 

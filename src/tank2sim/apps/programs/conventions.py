@@ -156,7 +156,7 @@ def _written(value: float) -> float:
 
 
 def shifted_terms(name: str, ahead: float) -> dict[str, float]:
-    """What a derivative of value 1 (prime) becomes for an origin `ahead` lengths forward: names to values."""
+    """Derivatives from one of value 1 (prime) for an origin `ahead` lengths forward: names to values."""
     found: dict[str, float] = {}
     for shifted, value in _in_other_velocities(known_term(name), ahead).items():
         found[shifted] = found.get(shifted, 0.0) + value

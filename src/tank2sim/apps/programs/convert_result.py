@@ -125,7 +125,7 @@ class ConversionResult(Result[ConversionStudy]):
             write_together(contents, inputs=[Path(self.source)])
 
     def _readme(self, use: str) -> str:
-        """What the files are, how they are used, and what was lost, in Markdown."""
+        """Description of the files, their use and what was lost, in Markdown."""
         study, source = self.study, one_line("/".join(Path(self.source).parts[-2:]))
         text = (
             f"# {one_line(study.ship)}: {study.to}\n\n{study.made[0].upper()}{study.made[1:]}, written by tank2sim "
@@ -148,7 +148,7 @@ class ConversionResult(Result[ConversionStudy]):
 
     @property
     def headline(self) -> tuple[str, ...]:
-        """What was made of what, and how well a fit follows."""
+        """Source and result of the conversion, and how well a fit follows."""
         line, fit = f"{self.study.ship} ({self.study.from_kind}): {self.study.made}", self.study.fit
         if fit is None:
             return (line,)

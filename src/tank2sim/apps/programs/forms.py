@@ -1,4 +1,4 @@
-"""What a card can be converted to: cards of other kinds and conventions, and files of other programs."""
+"""Forms that a card can be converted to: cards of other kinds and conventions, and files of other programs."""
 
 from __future__ import annotations
 

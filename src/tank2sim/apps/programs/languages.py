@@ -95,7 +95,7 @@ def _of_several_files(
 
 
 def _lost_sensors(card: SteeredCard) -> list[str]:
-    """What no program has of the sensors of a card."""
+    """Notices on sensors of a card, which no program has."""
     names = [entry.name for entry in card.effects if EFFECTS[entry.name].acts_on == "sensor"]
     return [f"faults of sensors are left out: {', '.join(names)}"] if names else []
 
@@ -133,7 +133,7 @@ def _of_craft(card: SteeredCard, to: str, wanted: Conventions, added_mass: Added
 
 
 def _lost_by(card: SteeredCard, to: str, place: AddedMass) -> list[str]:
-    """What the plugin of a simulator does not have of a craft, in sentences."""
+    """Parts of a craft that the plugin of a simulator lacks, in sentences."""
     notices = []
     if card.effects:
         notices.append(f"effects are left out: {', '.join(entry.name for entry in card.effects)}")

@@ -172,7 +172,7 @@ def _hydrodynamic_primes(
 
 
 def _units(card: MmgCard, motions: Array) -> Array:
-    """What X, Y, N, K (4, n) are divided by in the prime system: N, N, N m, N m."""
+    """Divisors of X, Y, N, K (4, n) in the prime system: N, N, N m, N m."""
     length = card.ship.length_m
     unit = 0.5 * card.scales.density * length**2 * (motions[:, 0] ** 2 + motions[:, 1] ** 2)
     return np.outer([1.0, 1.0, length, length], unit)

@@ -53,15 +53,15 @@ class PolynomialFit:
 
 @dataclass(frozen=True, kw_only=True)
 class ProgramFiles:
-    """What a card is in another language."""
+    """A card in another language."""
 
-    text: str = ""  # Of a form that is one file
+    text: str = ""  # For a form of one file
     files: Mapping[str, str | bytes] = field(default_factory=dict)  # Path within the folder of any other to content
     use: str = ""  # How the program takes the files, in Markdown, for the README next to them
     losses: tuple[str, ...] = ()  # What the program does not have of the card, a sentence each
     changes: tuple[FigureChange, ...] = ()  # Figures of standard manoeuvres by the card and in the other language
     card: SteeredCard | None = None  # If it is a card
-    fit: PolynomialFit | None = None  # Of a polynomial in place of an MMG ship
+    fit: PolynomialFit | None = None  # Where a polynomial replaces an MMG ship
 
 
 def standard_manoeuvres(model: Model) -> Iterator[Turn | Zigzag]:

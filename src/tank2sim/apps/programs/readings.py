@@ -1,4 +1,4 @@
-"""What a table of derivatives with unstated conventions may mean: every reading of it, and how probable each is.
+"""Readings of a table of derivatives with unstated conventions, and how probable each is.
 
 A reading is a scaling, a sign of the rudder, whether the terms in yaw rate hold the inertia of the ship, and the
 origin. It turns the printed numbers t into the derivatives theta of a ship about midships, in the prime system, without
@@ -163,7 +163,7 @@ def _speed_scale(table: CoefficientTable) -> str:
 
 
 def file_scales(table: CoefficientTable, scaling: str) -> FileScales | None:
-    """What the table's numbers are in by a scaling; None for the prime system."""
+    """System of the table's numbers by a scaling; None for the prime system."""
     ship = ShipSection(
         name="table",
         source=table.source,

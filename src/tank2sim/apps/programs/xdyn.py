@@ -79,7 +79,7 @@ def _runs(card: SteeredCard, model: Model) -> dict[str, Trajectory]:
 
 
 def _losses(model: Model, after: Model, body: XdynBody, run: Trajectory) -> Iterator[str]:
-    """What xdyn does not have of a card."""
+    """Parts of a card that xdyn lacks."""
     lagging = [one.name for one in body.commands.values() if isinstance(one, State)]
     if lagging:
         yield (

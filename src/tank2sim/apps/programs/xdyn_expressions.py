@@ -23,7 +23,7 @@ _INLINE = 3
 """Operations up to which a term used twice is repeated and not named (project choice: v' r'^2 stays readable)."""
 
 _TINY = "1e-200"
-"""What keeps a division by zero away; beyond 1e-184 it changes no digit."""
+"""Added to denominators against division by zero; beyond 1e-184 it changes no digit."""
 
 _WORD = re.compile(r"[A-Za-z]\w*")
 

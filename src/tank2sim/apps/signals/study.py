@@ -261,7 +261,7 @@ REQUEST_FORMS = (
     "lowpass:HZ, highpass:HZ, bandpass:HZ,HZ (each also with ,causal), savgol:SAMPLES,DEGREE, spline:HZ, "
     "detrend:DEGREE, decimate:FACTOR"
 )
-"""What may be asked for."""
+"""Analyses that may be asked for."""
 
 
 @dataclass(frozen=True)

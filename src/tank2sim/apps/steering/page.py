@@ -102,7 +102,7 @@ _READOUTS = (
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PageShip:
-    """What sails in a page.
+    """The vessel of a page.
 
     Parameters
     ----------
@@ -259,7 +259,7 @@ def _begin(ghost: Ghost | None, scenario: Scenario | None) -> dict[str, float]:
 
 
 def _controls(model: Model, ghost: Ghost | None) -> list[Control]:
-    """What the user sets: at first as the card has it, or as the trial was."""
+    """Settings of the user: at first as on the card, or as in the trial."""
     held = ghost.held if ghost else {}
     return [dataclasses.replace(control, start=held.get(control.name, control.start)) for control in controls(model)]
 

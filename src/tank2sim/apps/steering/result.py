@@ -71,7 +71,7 @@ class SteeringPageResult(Result[SteeringStudy]):
 
     @property
     def sections(self) -> Sequence[Section]:
-        """What the page holds."""
+        """Contents of the page."""
         study = self.study
         values: dict[str, Cell] = {"measured trial": study.ghost, "autopilot": study.autopilot}
         values |= {"waters": study.scenario, "ships": study.members + 1}

@@ -83,7 +83,7 @@ class Scenario:
     features: tuple[Feature, ...]
 
     def as_data(self) -> dict[str, Any]:
-        """What the page knows of it."""
+        """Its data for the page."""
         features = [{"kind": feature.kind, "points": feature.points, **feature.properties} for feature in self.features]
         return {"name": self.name, "description": self.description, "features": features}
 

@@ -113,7 +113,7 @@ def _data_rows(study: TrialOffice) -> list[Row]:
 
 
 def _remarks(study: TrialOffice) -> list[Row]:
-    """What the form has no row for: current, wind, correction, and uncertainty."""
+    """Data without a row in the form: current, wind, correction, and uncertainty."""
     rows, state = [], study.state
     if state.draughts_recorded:
         fore, aft = (format_number(draught, 4) for draught in state.draughts_at_ends_m)

@@ -55,7 +55,8 @@ def hydrodynamic(model: Model, name: str, card: ManoeuvringCard) -> ca.SX:
 
 
 def inertial_parts(model: Model, mass: ca.SX, x_G: ca.SX, card: ManoeuvringCard) -> dict[str, ca.SX]:
-    """What derivatives of a "total" card hold of a mass (kg) whose centre is x_G (m) forward; prime, none of others."""
+    """Rigid-body parts in derivatives of a "total" card, of a mass (kg) whose centre is x_G (m) forward; prime, none
+    of others."""
     if card.model.yaw_rate_terms == "hydrodynamic":
         return {}
     mass, x_G = mass / scales(model, model.symbol("ship.speed")).mass, x_G / model.symbol("ship.length")

@@ -1,4 +1,4 @@
-"""What an effect is: a function from model to model, with what it needs to know."""
+"""An effect: a function from model to model, with its declarations."""
 
 from __future__ import annotations
 
@@ -164,7 +164,7 @@ def unchanged(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mode
 
 
 ACTIONS = ("force", "mass", "force and mass", "actuator", "propulsion", "kinematics", "sensor")
-"""What an effect may act on."""
+"""Things that an effect may act on."""
 
 
 @dataclass(frozen=True)
@@ -345,7 +345,7 @@ def card_for_effects(card: SteeredCard) -> ManoeuvringCard:
 
 
 def sensor_fault_of(effect: Effect) -> str:
-    """What is wrong with the declarations of an effect, "" if nothing: for effects from other packages."""
+    """First fault in the declarations of an effect, "" if none: for effects from other packages."""
     parameters = {parameter.name for parameter in effect.parameters}
     if effect.acts_on not in ACTIONS:
         return f"acts_on is {effect.acts_on!r}; give one of {', '.join(ACTIONS)}"

@@ -1,4 +1,4 @@
-"""What effects add forces with: the scales of the prime system, and the sum."""
+"""Adding forces of effects: the scales of the prime system, and the sum."""
 
 from __future__ import annotations
 

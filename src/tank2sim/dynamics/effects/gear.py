@@ -76,7 +76,7 @@ RUDDER_LAG = Effect(
 
 
 def _beyond(value: ca.SX, limit: ca.SX) -> ca.SX:
-    """What `value` exceeds +-`limit` by, 0 between them; continuous."""
+    """Excess of `value` over +-`limit`, 0 between them; continuous."""
     return value - _limited(value, limit)
 
 

@@ -1,4 +1,4 @@
-"""What moves a ship in a harbour: tunnel thrusters at bow and stern, and tugs."""
+"""Manoeuvring aids in a harbour: tunnel thrusters at bow and stern, and tugs."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ def waterplane_inertia(block: float) -> float:
 def _ratios(
     model: Model, ratio: ca.SX, beam: float, block: float, card_draught: float, card: ManoeuvringCard
 ) -> dict[str, ca.SX]:
-    """What multiplies the hydrodynamic part of each derivative at `ratio` times the `card_draught` (m)."""
+    """Factors of the hydrodynamic part of each derivative at `ratio` times the `card_draught` (m)."""
     bl, bt, volume = beam / card.ship.length_m, beam / card_draught, volume_exponent(block)
 
     def regression(name: str) -> ca.SX:

@@ -256,7 +256,7 @@ def correct_reading(
 
 
 def _measured(signals: _Columns, effect: Effect, values: Mapping[str, float]) -> dict[str, NDArray[np.float64]]:
-    """What sensors measured where they show `signals`: the readings s = A x + b, solved for x."""
+    """True values behind `signals`: the readings s = A x + b, solved for x."""
     assert effect.readings is not None
     motion = {name: ca.SX.sym(name) for name in MEASURED_BEFOREHAND}
     given = {parameter.stem: ca.SX(values[parameter.name]) for parameter in effect.parameters}

@@ -4,7 +4,7 @@
     (m + m_y) v' + (m + m_x) u r + x_G m r'                 = Y_H + Y_R
     (I_zG + x_G^2 m + J_z) r' + x_G m (v' + u r)            = N_H + N_P + N_R
 
-about midships; N_P is of two propellers. Of two propellers and rudders the right one has the numbers of the card, and
+about midships; N_P is of two propellers. With two propellers and rudders the right one has the numbers of the card, and
 the left one their mirror image: what is beta_P > 0 for one is beta_P < 0 for the other. Each meets the surge velocity
 u - y r of its own place y.
 """

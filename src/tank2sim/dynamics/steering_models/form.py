@@ -1,4 +1,4 @@
-"""What a steering model is: two equations in drift angle and yaw rate at a constant speed, and its coefficients.
+"""A steering model: two equations in drift angle and yaw rate at a constant speed, and its coefficients.
 
 All models of paper 4 (Poznyakov & Yudin 2007) have one form:
 

@@ -191,7 +191,7 @@ def _alignment(reduction: Reduction) -> Iterator[Notice]:
 
 
 def _effect_of_delay(reduction: Reduction) -> str:
-    """What an unknown delay of 10 ms would do to accelerations, in % of them."""
+    """Error of accelerations by an unknown delay of 10 ms, in %."""
     moved = []
     for name in ("Yvdot", "Nrdot"):
         result = reduction.forces[name[0]]

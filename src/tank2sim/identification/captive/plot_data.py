@@ -195,7 +195,7 @@ def _coefficient(reduction: Reduction, force: str, run: ReducedRun) -> tuple[flo
 
 
 def _regressors(result: ForceResult, v: Array, r: Array, rudder: Array) -> Array:
-    """What each term of a force gives per unit of its coefficient, (samples, terms), at the test speed."""
+    """Force per unit of each term's coefficient, (samples, terms), at the test speed."""
     columns = []
     for name in result.solution.names:
         term = known_term(name.partition(" ")[0])

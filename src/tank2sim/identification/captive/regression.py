@@ -283,7 +283,7 @@ class _ZeroLikelihood:
         system = np.vstack([self.along / np.sqrt(variances)[:, None], self.across / math.sqrt(noise), self.prior])
         q, residual, restricted = _restricted(system[:, :-1], system[:, -1])
         determinant = self.count * math.log(noise) + float(np.sum(np.log(variances)))
-        # Of each row: 1 less its leverage less its squared residual.
+        # For each row: 1 less its leverage less its squared residual.
         free = np.sum(q**2, axis=1) + residual**2
         by_run = (1.0 - free[:runs]) / variances
         rest = (self.count - float(np.sum(free[runs : runs + across]))) / noise

@@ -243,7 +243,7 @@ def _refuse_missing(form: CampaignFile, path: Path) -> None:
 
 
 def _needed_of_two(form: CampaignFile, path: Path) -> dict[str, tuple[object, str]]:
-    """What two propellers and rudders need: place to what is given there and a remedy."""
+    """Missing data of two propellers and rudders: place, content, remedy."""
     if form.averages is None:
         raise InputError(path, "propeller.number", "is 2, and there are [[runs]]", "give their means in [averages]")
     columns = form.averages.columns
@@ -262,7 +262,7 @@ def _needed_of_two(form: CampaignFile, path: Path) -> dict[str, tuple[object, st
 
 
 def _lacking(run: CaptiveRun) -> Iterator[InputError]:
-    """What a steady run must have for the MMG method and does not."""
+    """Data that a steady run lacks for the MMG method."""
     remedy = "record it, or name its column in [columns]"
     needed = {"thrust_N": run.thrust_N, "rudder_normal_force_N": run.rudder_normal_force_N}
     for column, values in needed.items():

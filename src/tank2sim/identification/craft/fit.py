@@ -88,7 +88,7 @@ AXES |= {"motion.x": "position to north", "motion.y": "position to east"}
 
 
 class CoefficientVerdict(StrEnum):
-    """What the trials say of a coefficient."""
+    """Estimate of a coefficient from the trials."""
 
     IDENTIFIED = "identified"
     BOUNDED = "bounded"

@@ -283,7 +283,7 @@ def deviates(estimate: Estimate) -> bool:
 
 
 def craft_driven_by(card: SteeredCard, trials: Sequence[Trial]) -> str:
-    """What drives the model in all trials: ``revolutions``, which were measured, or else ``orders``.
+    """Inputs of the model in all trials: ``revolutions``, which were measured, or else ``orders``.
 
     Raises InputError: Some trials have revolutions and no orders, others orders alone.
     """

@@ -158,7 +158,7 @@ def identify_trials(
 
 @dataclass(frozen=True, eq=False)
 class _Asked:
-    """What is fitted, and how."""
+    """The problem that is fitted, and the options."""
 
     trials: Measured
     options: IdentificationOptions

@@ -51,7 +51,7 @@ standard errors are rare by chance)."""
 
 
 def remarks(result: Identification) -> Iterator[Notice]:
-    """What the result shows: manoeuvres, the structure, errors that grew, and the limits of the card."""
+    """Notices on the result: manoeuvres, the structure, errors that grew, and the limits of the card."""
     if result.manoeuvres:
         text = "; ".join(f"{name}: {words}" for name, words in result.manoeuvres.items())
         yield Notice(f"recognised, to starboard positive: {text}")

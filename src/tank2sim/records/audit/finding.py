@@ -1,4 +1,4 @@
-"""What the audit finds: a column that does not say what its name says, and what it says instead."""
+"""A finding of the audit: a column whose content contradicts its name, and what it holds instead."""
 
 from __future__ import annotations
 

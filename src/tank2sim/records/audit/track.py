@@ -22,7 +22,7 @@ EVIDENCE = 20.0
 """Gain in twice the log likelihood from which another reading is taken: 10 is "very strong" (Kass & Raftery 1995), and
 some readings are compared."""
 SCALE, OFFSET, CURRENT = 0.01, np.deg2rad(0.3), 0.01
-"""What is worth a word: a log or a current to 1 % of the speed, a compass to 0.3 deg. Project choices."""
+"""Smallest errors worth reporting: a log or a current of 1 % of the speed, a compass by 0.3 deg. Project choices."""
 FASTEST = 0.5
 """Current, as a share of the speed over ground, from which it is none. Project choice: no trial is run in such."""
 
@@ -312,7 +312,7 @@ class _Scale:
     factor: float
     error: float
     unexplained: float = 0.0
-    """What a current and this factor leave of the velocity over ground, as a share of it."""
+    """Share of the velocity over ground that a current and this factor leave unexplained."""
 
     @property
     def known(self) -> bool:

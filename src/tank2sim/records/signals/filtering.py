@@ -26,7 +26,7 @@ HIGHEST_DEGREE = 10
 
 
 class FilterType(StrEnum):
-    """What a filter lets through."""
+    """Pass band of a filter."""
 
     LOW = "lowpass"
     HIGH = "highpass"

@@ -27,7 +27,7 @@ _DENSITY_POINTS = 201
 
 
 class Stationary(StrEnum):
-    """What the two tests say together: their null hypotheses are opposite, so there are four outcomes.
+    """The two tests combined: their null hypotheses are opposite, so there are four outcomes.
 
     The fourth is parted in two by the same tests about a straight line.
     """
@@ -232,7 +232,7 @@ def _verdict(level: UnitRootTests, trend: UnitRootTests) -> Stationary:
 
 
 def _shape(skewness: float, kurtosis: float) -> str:
-    """What is most unlike a normal distribution."""
+    """The strongest deviation from a normal distribution."""
     # Of skewed distributions such as gamma and lognormal the kurtosis is 1.5 to 2 times the square of the skewness.
     if 3.0 * skewness**2 > abs(kurtosis):
         return "skewed to high" if skewness > 0 else "skewed to low"

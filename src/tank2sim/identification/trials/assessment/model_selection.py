@@ -1,6 +1,6 @@
 """Model selection by information criteria, and by the prediction of manoeuvres held out of the fit.
 
-Of models that predict alike the simplest is taken: the rule of one standard error (Breiman et al. 1984,
+Among models that predict alike the simplest is taken: the rule of one standard error (Breiman et al. 1984,
 Classification and Regression Trees, 3.4.3; Hastie, Tibshirani and Friedman 2009, 7.10).
 
 Choices by the trials: the card's own terms of the hull or cross-flow drag, output error or the Kalman filter.

@@ -91,7 +91,7 @@ def with_polynomial_down_to(card: ManoeuvringCard, speed_mps: float) -> Manoeuvr
 
 
 def lowered_bound_notice(given: ManoeuvringCard, card: ManoeuvringCard) -> tuple[Notice, ...]:
-    """What :func:`polynomial_over_trials` changed of a card, as a notice; empty if nothing.
+    """Notice on the change of a card by :func:`polynomial_over_trials`; empty if none.
 
     `given`, `card`: Before and after.
     """
