@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -104,7 +104,11 @@ class Batch:
         return [new, *rates]
 
 
-def integrate(lanes: Sequence[Lane]) -> dict[str, Array]:
+Watch = Callable[[Batch, float, int, list[Array], Array, Array, Array], None]
+"""Sees the batch, the time (s) and the steps of a tick, the states, order and rudder (rad), and n/n_0, at each tick."""
+
+
+def integrate(lanes: Sequence[Lane], watch: Watch | None = None) -> dict[str, Array]:
     """Histories (ticks, n) at 10 Hz of `RECORDED`: SI and radians, order in degrees to starboard, n in rpm."""
     batch = Batch(lanes)
     helm = Helm([lane.manoeuvre for lane in lanes])
@@ -126,6 +130,8 @@ def integrate(lanes: Sequence[Lane]) -> dict[str, Array]:
         for step in range(steps if tick < ticks - 1 else 0):
             t = tick * TICK_S + step * step_s
             rudder, rudder_next = batch.gear.advance(order, t, step_s)
+            if watch and not step:
+                watch(batch, t, steps, states, order, rudder, rpm_ratio)
             first = batch.rates(t, states, rpm_ratio, rudder)
             guess = [state + step_s * rate for state, rate in zip(states, first, strict=True)]
             second = batch.rates(t + step_s, guess, rpm_ratio, rudder_next)
