@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from gap_truth.gear import Gear
-from gap_truth.integrate import TICK_S, R, U, V, Batch, integrate
+from gap_truth.integrate import TICK_S, Batch, R, Tick, U, V, integrate
 from gap_truth.lane import Lane, Setting, lanes_of
 from gap_truth.ship import WATER_KGPM3, Array, perturbed
 
@@ -22,13 +22,13 @@ class _Watched:
         self._batch, self._gear = Batch(healthy), Gear(healthy)
         self.forces: list[Array] = []
 
-    def __call__(
-        self, true: Batch, t: float, steps: int, states: list[Array], order: Array, rudder: Array, rpm_ratio: Array
-    ) -> None:
+    def __call__(self, true: Batch, tick: Tick) -> None:
         """Store the forces of a tick, and turn the healthy rudders."""
-        healthy = [self._gear.advance(order, t + step * TICK_S / steps, TICK_S / steps)[0] for step in range(steps)][0]
-        more = true.rates(t, states, rpm_ratio, rudder)[0] - self._batch.rates(t, states[:1], rpm_ratio, healthy)[0]
-        b = self._batch
+        b, t, states, step_s = self._batch, tick.t, tick.states, TICK_S / tick.steps
+        healthy, *_ = [self._gear.advance(tick.order, t + step * step_s, step_s)[0] for step in range(tick.steps)]
+        with_effects, *_ = true.rates(t, states, tick.rpm_ratio, tick.rudder)
+        without, *_ = b.rates(t, states[:1], tick.rpm_ratio, healthy)
+        more = with_effects - without
         prime = [b.m11 * more[U], b.m22 * more[V] + b.m23 * self._length * more[R]]
         prime.append((b.m32 * more[V] + b.m33 * self._length * more[R]) * self._length)
         self.forces.append(0.5 * WATER_KGPM3 * self._length**3 * np.array(prime))
@@ -39,7 +39,7 @@ class _Watched:
 
 
 def added_forces(setting: Setting) -> dict[str, Array]:
-    """X, Y (N) and N (N m) (ticks, 3) at 10 Hz by trial that the effects of a set add to the ship as the card has it."""
+    """X, Y (N) and N (N m) that the effects of a set add to the ship of the card: trial to (ticks, 3) at 10 Hz."""
     lanes = lanes_of(setting)
     watched = _Watched(lanes)
     integrate(lanes, watched)

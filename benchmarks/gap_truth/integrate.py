@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -104,11 +105,19 @@ class Batch:
         return [new, *rates]
 
 
-Watch = Callable[[Batch, float, int, list[Array], Array, Array, Array], None]
-"""Sees the batch, the time (s) and the steps of a tick, the states, order and rudder (rad), and n/n_0, at each tick."""
+@dataclass(frozen=True)
+class Tick:
+    """The begin of a tick: time (s), number of steps in it, states, order and rudder (rad), n/n_0."""
+
+    t: float
+    steps: int
+    states: list[Array]
+    order: Array
+    rudder: Array
+    rpm_ratio: Array
 
 
-def integrate(lanes: Sequence[Lane], watch: Watch | None = None) -> dict[str, Array]:
+def integrate(lanes: Sequence[Lane], watch: Callable[[Batch, Tick], None] | None = None) -> dict[str, Array]:
     """Histories (ticks, n) at 10 Hz of `RECORDED`: SI and radians, order in degrees to starboard, n in rpm."""
     batch = Batch(lanes)
     helm = Helm([lane.manoeuvre for lane in lanes])
@@ -131,7 +140,7 @@ def integrate(lanes: Sequence[Lane], watch: Watch | None = None) -> dict[str, Ar
             t = tick * TICK_S + step * step_s
             rudder, rudder_next = batch.gear.advance(order, t, step_s)
             if watch and not step:
-                watch(batch, t, steps, states, order, rudder, rpm_ratio)
+                watch(batch, Tick(t, steps, states, order, rudder, rpm_ratio))
             first = batch.rates(t, states, rpm_ratio, rudder)
             guess = [state + step_s * rate for state, rate in zip(states, first, strict=True)]
             second = batch.rates(t + step_s, guess, rpm_ratio, rudder_next)
