@@ -36,19 +36,20 @@ def gap_options(
     workers: int | None,
     *,
     force: bool = False,
+    black_box: bool = False,
 ) -> GapOptions:
     """Options of the search. Raises ArgumentError for an effect that is not known.
 
     Parameters
     ----------
-    effects, without, max_effects, false_discovery, workers, force
+    effects, without, max_effects, false_discovery, workers, force, black_box
         As of :func:`.find_gap`.
     """
     for argument, names in (("effects", effects), ("without", without)):
         for name in names:
             if EFFECTS.get(name) is None:
                 raise ArgumentError(argument, "", f"{name!r} is not an effect", EFFECTS.remedy(name))
-    return GapOptions(tuple(effects) or None, tuple(without), max_effects, workers, false_discovery, force)
+    return GapOptions(tuple(effects) or None, tuple(without), max_effects, workers, false_discovery, force, black_box)
 
 
 def search_ship(

@@ -84,6 +84,8 @@ class GapOptions:
         Largest probability with which a set that is named alone may hold an effect that is not missing, 0.01 to 0.5.
     force : bool
         Write the improved card in spite of objections.
+    black_box : bool
+        Compare the named effects with a linear black box.
     """
 
     effects: tuple[str, ...] | None = None
@@ -92,6 +94,7 @@ class GapOptions:
     workers: int | None = None
     false_discovery: float = 1 - LIKELY
     force: bool = False
+    black_box: bool = False
 
 
 def nonlinear_card(card: Card) -> ManoeuvringCard:
@@ -165,7 +168,7 @@ def run_gap_workflow(
             judged = replace(judged, proof=prover.refine(judged.proof))
         opened = replace(judged, proof=prover.open_holdout(judged.proof))  # the verdict is fixed
         progress("where and how much")
-        gap = _assemble_gap(prover, found, opened)
+        gap = _assemble_gap(prover, found, opened, with_black_box=options.black_box)
         tried = of_tried_effects(names, candidate_explanations(card, fitted.driven_by))
         progress("trying the improved card")
         return replace(
@@ -210,12 +213,12 @@ def _processes(options: GapOptions, executor: Executor | None) -> Iterator[Execu
         yield pool
 
 
-def _assemble_gap(prover: Prover, found: Search, judged: Judged) -> Gap:
+def _assemble_gap(prover: Prover, found: Search, judged: Judged, *, with_black_box: bool) -> Gap:
     """The results that follow from the decision."""
     card, (fitted, held), replays = prover.card, prover.trials, prover.replays
     decision, proof = judged.decision, judged.proof
     estimated = proof.named.estimated
-    box = _begin_black_box(card, proof, replays)
+    box = _begin_black_box(card, proof, replays) if with_black_box else None
     hidden = could_hide(found, decision.best, PRICE)
     sensors = sensor_faults(estimated)
     force = force_lacking(found.likelihood, found.none)
