@@ -85,8 +85,11 @@ def find_gap(
         A file is at fault, a trial is too short, an effect is not known or cannot be tried on this card, or the folder
         cannot be written.
     """
-    from tank2sim.api.gap_search import gap_options, search_ship
+    from tank2sim.executors import executing_beside
 
-    options = gap_options(effects, without, max_effects, false_discovery, workers, force=force, black_box=black_box)
-    folder = None if output is None else Path(output)
-    return search_ship(ship.card, trials, holdout, folder, options, executor, report)
+    with executing_beside(executor, workers, "tank2sim.gap.workflow") as pool:  # it starts while this process imports
+        from tank2sim.api.gap_search import gap_options, search_ship
+
+        options = gap_options(effects, without, max_effects, false_discovery, workers, force=force, black_box=black_box)
+        folder = None if output is None else Path(output)
+        return search_ship(ship.card, trials, holdout, folder, options, pool, report)

@@ -48,7 +48,7 @@ ASTERN = 0.2
 
 @dataclass(frozen=True, eq=False)
 class InputRecord:
-    """A trial on its own rows, thinned where they are closer than a step of the model.
+    """A trial on its own rows, thinned to :data:`COARSEST` steps of the model.
 
     Parameters
     ----------
@@ -451,7 +451,7 @@ def difference_slopes(function: Callable[[Array], Array], at: Array, value: Arra
 
 
 def input_record(replayer: Replayer, trial: Trial) -> InputRecord:
-    """A trial on its own rows, thinned where they are closer than a step of the model; each order keeps its row.
+    """A trial on its own rows, thinned to :data:`COARSEST` steps of the model; each order keeps its row.
 
     Raises
     ------
@@ -471,7 +471,8 @@ def input_record(replayer: Replayer, trial: Trial) -> InputRecord:
     nearest = np.clip(np.searchsorted(time, wanted - 0.5 * sampling), 0, len(time) - 1)
     seen = np.abs(time[nearest] - wanted) <= 0.5 * sampling
     moved = np.flatnonzero((np.diff(record.inputs[:, record.orders], axis=0) != 0).any(axis=1)) + 1
-    bins = np.floor((time - time[0]) / step + 1e-6)
+    longest = max(1, int(COARSEST * model.step_s / sampling + 1e-6)) * sampling
+    bins = np.floor((time - time[0]) / longest + 1e-6)
     kept = np.flatnonzero(np.diff(bins, prepend=-1.0) > 0)
     kept = np.union1d(np.concatenate([kept, moved, moved - 1, nearest[seen]]), len(time) - 1)
     instants = np.union1d(time[kept], wanted[~seen])  # times without a row stay gaps
