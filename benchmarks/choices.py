@@ -49,7 +49,7 @@ COMMANDS = {
         "simulate effects.toml --manoeuvre zigzag:20/20",
     ],
     "gap": [
-        f"gap current.toml {ZIGZAG} {TURN} --holdout {HELD} -o gap"
+        f"gap current.toml {ZIGZAG} {TURN} --holdout {HELD} --black-box -o gap"
         " --effects current --effects wind --effects rudder_bias",
     ],
     "identification.captive": ["reduce campaign/campaign.toml"],

@@ -5,6 +5,7 @@ Both are a :class:`concurrent.futures.Executor`; what is computed does not depen
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import multiprocessing
 import os
@@ -62,6 +63,34 @@ def executing(text: str = PROCESSES, workers: int | None = None) -> Iterator[Exe
     """
     making = _processes(workers) if check_executor(text) == PROCESSES else connected(text)
     with making as executor:
+        yield executor
+
+
+@contextmanager
+def executing_beside(text: str, workers: int | None, module: str) -> Iterator[Executor | None]:
+    """As :func:`executing`, for work next to this process; None where all of it is to be done in this one.
+
+    Parameters
+    ----------
+    text : str
+        One of :data:`EXECUTOR_FORMS`.
+    workers : int, optional
+        Processes, as in :func:`processes_to_begin`.
+    module : str
+        Name of a module that the processes of this machine import while they wait for work.
+
+    Raises
+    ------
+    InputError
+        As :func:`executing`.
+    """
+    local, number = check_executor(text) == PROCESSES, processes_to_begin(workers)
+    if local and number == 1:
+        yield None
+        return
+    with executing(text, number) as executor:
+        for _ in range(number if local else 0):
+            executor.submit(importlib.import_module, module)
         yield executor
 
 

@@ -48,7 +48,7 @@ def prover(
         none=SimpleNamespace(model=None),
         coefficients_with=lambda found: None,
     )
-    return Prover(CARD, trials, likelihood, SimpleNamespace(by_cards=by_cards, noise={}))
+    return Prover(CARD, trials, likelihood, SimpleNamespace(begin=lambda *_: [], by_cards=by_cards, noise={}))
 
 
 NAMED = NamedEffects([("rudder_lag", {}, {})])

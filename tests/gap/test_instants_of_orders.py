@@ -128,8 +128,7 @@ def test_slopes_in_start_and_instants_are_difference_quotients_of_the_whole_moti
     order = record.inputs[:, replayer.model.input_names.index("rudder.command")]
     rows = np.flatnonzero(np.abs(np.diff(order)) > 0.01) + 1
     start = replayer.guess_initial_state(record, np.array(list(noise_of("model").values())), p)
-    shares, reach = np.linspace(0.3, 0.7, len(rows)), np.append(np.full(len(start), 1e-4), np.full(len(rows), 0.05))
-    found = replayer._slopes_of_motion(record, rows, shares, start, p, reach)
+    shares, reach = np.linspace(0.3, 0.7, len(rows)), np.append(np.full(len(start), 1e-6), np.full(len(rows), 1e-5))
 
     def moved(place: int) -> np.ndarray:
         values = np.append(start, shares)
@@ -140,22 +139,23 @@ def test_slopes_in_start_and_instants_are_difference_quotients_of_the_whole_moti
 
     instants = np.full(len(record.inputs), 0.5)
     instants[rows] = shares
-    still = replayer.motion(replace(record, instants=instants), start, p)
+    timed = replace(record, instants=instants)
+    found, still = replayer._slopes_of_motion(timed, start, p, rows), replayer.motion(timed, start, p)
     for place, step in enumerate(reach):
-        np.testing.assert_allclose(found[..., place], (moved(place) - still) / step, rtol=1e-6, atol=1e-6)
+        np.testing.assert_allclose(found[..., place], (moved(place) - still) / step, rtol=1e-3, atol=2e-3)
     assert np.abs(found).max(axis=(0, 1)).min() > 1e-3
 
 
-def test_a_start_from_which_the_motion_exceeds_all_bounds_counts_as_no_change(tmp_path: Path) -> None:
+def test_a_motion_that_exceeds_all_bounds_counts_as_one_without_change(tmp_path: Path) -> None:
     card, trials, _ = written(tmp_path, "model", 1)
     replayer = Replayer(card, trials.driven_by, list(noise_of("model")))
     p, record = replayer.model.parameter_values(), input_record(replayer, trials.trials[0])
     start = replayer.guess_initial_state(record, np.array(list(noise_of("model").values())), p)
-    reach = np.where(np.arange(len(start)) == replayer.model.state_names.index("motion.r"), 1e9, 1e-4)
-    found = replayer._slopes_of_motion(record, np.zeros(0, dtype=np.intp), np.zeros(0), start, p, reach)
-    assert np.isnan(replayer.motion(record, start + 1e9 * (reach > 1), p)).any()
+    turning = start + 1e9 * (np.arange(len(start)) == replayer.model.state_names.index("motion.r"))
+    found = replayer._slopes_of_motion(record, turning, p, np.zeros(0, dtype=np.intp))
+    assert np.isnan(replayer.motion(record, turning, p)).any()
     assert np.isfinite(found).all()
-    assert np.abs(found[..., replayer.model.state_names.index("motion.psi")]).max() > 0.5
+    assert np.abs(found[0, :, replayer.model.state_names.index("motion.psi")]).max() > 0.5
 
 
 @pytest.mark.slow

@@ -93,6 +93,14 @@ def least_squares(likelihood: Likelihood, base: ExplanationFit, chosen: list[Var
     return float(np.sum((whole @ found - target) ** 2)), found[held.shape[1] :]
 
 
+def allowed(variant: Variant, shares: np.ndarray) -> bool:
+    """Whether the bounds allow the signs of the amplitudes."""
+    places = list(variant.amplitudes)
+    sizes = variant.theta[places] * shares[: len(places)]
+    low, high = (bound[places] for bound in variant.hypothesis.bounds)
+    return bool(np.all((sizes >= 0) | (low < 0)) and np.all((sizes <= 0) | (high > 0)))
+
+
 def check(screen: Screen, base: ExplanationFit, places: list[int]) -> None:
     likelihood, chosen = screen.likelihood, [screen.every[place] for place in places]
     before, _ = least_squares(likelihood, base, [])
@@ -100,7 +108,7 @@ def check(screen: Screen, base: ExplanationFit, places: list[int]) -> None:
     asked = sum(len(variant.theta) for variant in chosen)
     gain, found = screen.of(places)
     ends = np.cumsum([variant.driving.shape[-1] for variant in chosen])[:-1]
-    if all(variant.allowed(part) for variant, part in zip(chosen, np.split(shares, ends), strict=True)):
+    if all(allowed(variant, part) for variant, part in zip(chosen, np.split(shares, ends), strict=True)):
         assert found == pytest.approx(shares, rel=1e-4, abs=1e-6)
         assert gain == pytest.approx(before - after - asked * np.log(likelihood.count / COUNTED), rel=1e-6, abs=1e-4)
     else:

@@ -114,3 +114,18 @@ def test_without_parameters_the_derivatives_are_those_by_the_initial_state(first
     by = without.derivatives(states, inputs, p, 0.1)[1]
     assert by.shape == (1, 21, 2, 1)
     np.testing.assert_array_equal(by, with_gain.derivatives(states, inputs, p, 0.1)[1][..., :1])
+
+
+def test_a_change_of_a_state_fades_as_the_closed_form_does(first_order, compiler):
+    sensitivity = Sensitivity(first_order, (), ("double", "rate"))
+    h, n, p = 0.1, 40, first_order.parameter_values()
+    inputs = np.full((n, 1), 0.2)
+    states = sensitivity.motion(np.array([0.1]), inputs, p, h)
+    by = np.zeros((n + 1, 1, 2))
+    by[0, 0, 0], by[15, 0, 1] = 1.0, 3.0
+    sensitivity.propagate(by, sensitivity.tangents(states[:-1], inputs, p, h))
+    time = h * np.arange(n + 1)
+    assert by[:, 0, 0] == pytest.approx(np.exp(-time / LAG))
+    assert by[:, 0, 1] == pytest.approx(3 * np.where(time >= 1.45, np.exp(-(time - 1.5) / LAG), 0.0))
+    assert sensitivity.rates(states[:-1], inputs, p)[:, 0] == pytest.approx((GAIN * 0.2 - states[:-1, 0]) / LAG)
+    assert sensitivity.shown_by_states(states[:-1], inputs, p) == pytest.approx(np.tile([[2.0], [1.0]], (n, 1, 1)))

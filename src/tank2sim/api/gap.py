@@ -35,6 +35,7 @@ def find_gap(
     max_effects: Effects = MOST_EFFECTS,
     false_discovery: FalseDiscovery = FALSE_DISCOVERY,
     force: bool = False,
+    black_box: bool = False,
     executor: str = "processes",
     workers: Count | None = None,
     report: Progress = lambda _: None,
@@ -69,6 +70,8 @@ def find_gap(
     force : bool
         Write the improved card even if it cannot do a turn or zigzag that the given card does, or follows a held-out
         trial clearly worse.
+    black_box : bool
+        Fit as many linear coefficients as the effect has parameters, for comparison, and replay the trials with them.
     executor : str
         Where explanations are fitted: ``processes``, or ``dask://host:port``.
     workers : int, optional
@@ -82,8 +85,11 @@ def find_gap(
         A file is at fault, a trial is too short, an effect is not known or cannot be tried on this card, or the folder
         cannot be written.
     """
-    from tank2sim.api.gap_search import gap_options, search_ship
+    from tank2sim.executors import executing_beside
 
-    options = gap_options(effects, without, max_effects, false_discovery, workers, force=force)
-    folder = None if output is None else Path(output)
-    return search_ship(ship.card, trials, holdout, folder, options, executor, report)
+    with executing_beside(executor, workers, "tank2sim.gap.workflow") as pool:  # it starts while this process imports
+        from tank2sim.api.gap_search import gap_options, search_ship
+
+        options = gap_options(effects, without, max_effects, false_discovery, workers, force=force, black_box=black_box)
+        folder = None if output is None else Path(output)
+        return search_ship(ship.card, trials, holdout, folder, options, pool, report)

@@ -7,6 +7,7 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TypeVar
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -62,6 +63,8 @@ from tank2sim.notices import Notice
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 
+_Result = TypeVar("_Result")
+
 RIVALS = 12
 """Explanations that are reported at most, besides none (project choice)."""
 
@@ -84,6 +87,8 @@ class GapOptions:
         Largest probability with which a set that is named alone may hold an effect that is not missing, 0.01 to 0.5.
     force : bool
         Write the improved card in spite of objections.
+    black_box : bool
+        Compare the named effects with a linear black box.
     """
 
     effects: tuple[str, ...] | None = None
@@ -92,6 +97,7 @@ class GapOptions:
     workers: int | None = None
     false_discovery: float = FALSE_DISCOVERY
     force: bool = False
+    black_box: bool = False
 
 
 def nonlinear_card(card: Card) -> ManoeuvringCard:
@@ -165,7 +171,7 @@ def run_gap_workflow(
             judged = replace(judged, proof=prover.refine(judged.proof))
         opened = replace(judged, proof=prover.open_holdout(judged.proof))  # the verdict is fixed
         progress("where and how much")
-        gap = _assemble_gap(prover, found, opened)
+        gap = _assemble_gap(prover, found, opened, with_black_box=options.black_box)
         tried = of_tried_effects(names, candidate_explanations(card, fitted.driven_by))
         progress("trying the improved card")
         return replace(
@@ -210,16 +216,18 @@ def _processes(options: GapOptions, executor: Executor | None) -> Iterator[Execu
         yield pool
 
 
-def _assemble_gap(prover: Prover, found: Search, judged: Judged) -> Gap:
+def _assemble_gap(prover: Prover, found: Search, judged: Judged, *, with_black_box: bool) -> Gap:
     """The results that follow from the decision."""
     card, (fitted, held), replays = prover.card, prover.trials, prover.replays
     decision, proof = judged.decision, judged.proof
     estimated = proof.named.estimated
-    box = _begin_black_box(card, proof, replays)
+    box = _begin_black_box(card, proof, replays) if with_black_box else None
+    sensors, every = sensor_faults(estimated), (*fitted.trials, *held.trials)
+    figures_before = _begun(replays, figures, card, every, proof.results, "before")
+    corrected_trials = _after(every, fitted, held, sensors)
+    figures_after = _begun(replays, figures, proof.improved, corrected_trials, proof.results, "after")
     hidden = could_hide(found, decision.best, PRICE)
-    sensors = sensor_faults(estimated)
     force = force_lacking(found.likelihood, found.none)
-    every = (*fitted.trials, *held.trials)
     agreement = each_trial(found.likelihood, decision.best) if estimated else {}
     waves = found.likelihood.belief.waves
     results = _with_black_box(proof, box().card, replays) if box else proof.results
@@ -241,8 +249,8 @@ def _assemble_gap(prover: Prover, found: Search, judged: Judged) -> Gap:
         noise=_noise(found, decision.best, fitted),
         waves=waves,
         passed=tuple(results),
-        figures_before=figures(card, every, results, "before"),
-        figures_after=figures(proof.improved, _after(every, fitted, held, sensors), results, "after"),
+        figures_before=figures_before(),
+        figures_after=figures_after(),
         missing_force=force,
         at_work=effects_at_work(found.likelihood, decision.best) if estimated else (),
         could_hide=hidden,
@@ -259,9 +267,14 @@ def _begin_black_box(card: ManoeuvringCard, proof: Proof, replays: TrialReplays)
         return None
     count = max(sum(len(errors) for *_, errors in proof.named.estimated), 1)
     arguments = card, proof.trials[0], dict(replays.noise), count
+    return _begun(replays, black_box, *arguments)
+
+
+def _begun(replays: TrialReplays, function: Callable[..., _Result], *arguments: object) -> Callable[[], _Result]:
+    """A function that waits for a result, which is computed apart if possible."""
     if replays.executor is None:
-        return partial(black_box, *arguments)
-    return replays.executor.submit(black_box, *arguments).result
+        return partial(function, *arguments)
+    return replays.executor.submit(function, *arguments).result
 
 
 def _with_black_box(proof: Proof, box: ManoeuvringCard, replays: TrialReplays) -> list[Passed]:

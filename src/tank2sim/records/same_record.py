@@ -198,12 +198,16 @@ def likeness(
         signals = {name: second.signals[name] * (sign if name in _MIRRORED else 1.0) for name in names}
         return _together(first, second.time_s + shift, signals, precision)
 
+    @cache
+    def shifts_of(sign: float) -> tuple[float, ...]:
+        return tuple(_shifts(first, second, sign))
+
     for alike, sign in ((Likeness.COPY, 1.0), (Likeness.MIRROR, -1.0)):
-        if alike in among and any(_copied(together(shift, sign)) for shift in _shifts(first, second, sign)):
+        if alike in among and any(_copied(together(shift, sign)) for shift in shifts_of(sign)):
             return alike
     if Likeness.TWICE not in among:
         return None
-    shifts = list(_shifts(first, second, 1.0))
+    shifts = list(shifts_of(1.0))
     shifts.append(_nearest(together, shifts[-1], first.time_s))
     return Likeness.TWICE if any(_recorded_twice(together(shift)) for shift in shifts) else None
 
@@ -402,9 +406,11 @@ def _shifts(first: TimedSignals, other: TimedSignals, sign: float) -> Iterator[f
     if any(len(each) < LEAST_ROWS or not np.ptp(each) > 0 for each in (a, b)):  # short, unknown or without a change
         return
     a, b = a - np.mean(a), b - np.mean(a)
-    energy = correlate(a**2, np.ones_like(b), method="fft") + correlate(np.ones_like(a), b**2, method="fft")
-    rows = correlate(np.ones_like(a), np.ones_like(b), method="fft")
-    enough = rows >= max(COMMON * min(len(a), len(b)), LEAST_ROWS) - 0.5
+    behind = np.arange(len(a) + len(b) - 1) - (len(b) - 1)  # rows of the first before the second begins
+    begin, end = np.maximum(behind, 0), np.minimum(behind + len(b), len(a))
+    sums = [np.append(0.0, np.cumsum(each**2)) for each in (a, b)]
+    energy = sums[0][end] - sums[0][begin] + sums[1][end - behind] - sums[1][begin - behind]
+    enough = end - begin >= max(COMMON * min(len(a), len(b)), LEAST_ROWS)
     match = np.where(enough, 2 * correlate(a, b, method="fft") / np.maximum(energy, 1e-12 * np.max(energy)), -1.0)
     best = int(np.argmax(match))
     if match[best] < _IN_STEP:

@@ -61,6 +61,17 @@ EXPORT void tangents(long n, const double *states, const double *inputs, const d
   }
 }
 
+/* by (n + 1, NX, columns): to each row is added the tangent (NX, NC) of the step before times the row before. */
+EXPORT void propagate(long n, long columns, const double *tangents, double *restrict by) {
+  for (long k = 0; k < n; ++k, tangents += NX * NC, by += NX * columns)
+    for (int i = 0; i < NX; ++i)
+      for (int j = 0; j < NX; ++j) {
+        const double factor = tangents[i * NC + j];
+        if (factor != 0.0)
+          for (long c = 0; c < columns; ++c) by[(NX + i) * columns + c] += factor * by[j * columns + c];
+      }
+}
+
 EXPORT void derivatives(long pieces, long rows, const double *states, const double *inputs, const double *p, double h,
                         double *seen, double *seen_by, double *end_by) {
   double by_state[NY * NX + 1], by_theta[NY * NK + 1];

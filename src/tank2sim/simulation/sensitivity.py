@@ -46,6 +46,15 @@ class Sensitivity:
         """Observed values (n, ny) at `states` (n, nx) with `inputs` (n, nu)."""
         return self._shown(states, inputs, p)[0]
 
+    def rates(self, states: Array, inputs: Array, p: Array) -> Array:
+        """Rates (n, nx) of `states` (n, nx) with `inputs` (n, nu)."""
+        return self._slopes(states, inputs, p)[0]
+
+    def shown_by_states(self, states: Array, inputs: Array, p: Array) -> Array:
+        """Derivatives (n, ny, nx) of observed values by states; arguments as of :meth:`shown`."""
+        by_state = self._shown(states, inputs, p)[1]
+        return by_state.reshape(len(states), -1, len(self.seen)).swapaxes(1, 2)
+
     def derivatives(self, states: Array, inputs: Array, p: Array, h: float) -> tuple[Array, Array, Array]:
         """Observed values and final states, with their derivatives by initial state and parameters.
 
@@ -83,6 +92,19 @@ class Sensitivity:
         by = C.reshape(pieces, rows, nx, ny).transpose(0, 1, 3, 2) @ S
         by[..., nx:] += D.reshape(pieces, rows, k, ny).transpose(0, 1, 3, 2)
         return seen.reshape(pieces, rows, ny), by, S[:, -1]
+
+    def propagate(self, by: Array, tangents: Array) -> None:
+        """Add to each of `by` (n + 1, nx, columns) the tangent of the step before times the one before it.
+
+        `by` holds derivatives of the first state, and the changes of later states from outside. `tangents` (n, nx, nx
+        + k): From :meth:`tangents`.
+        """
+        if self._library is not None and by.flags.c_contiguous:
+            sizes = ctypes.c_long(len(tangents)), ctypes.c_long(by.shape[2])
+            self._library.propagate(*sizes, *_places([np.ascontiguousarray(tangents), by]))
+            return
+        for step, tangent in enumerate(tangents):
+            by[step + 1] += tangent[:, : by.shape[1]] @ by[step]
 
     def tangents(self, states: Array, inputs: Array, p: Array, h: float | Array) -> Array:
         """State after a step from each of `states` (n, nx), with derivatives by it and by the parameters, (n, nx, nx +

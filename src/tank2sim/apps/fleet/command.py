@@ -41,6 +41,7 @@ def find_gaps(
     max_effects: Effects = MOST_EFFECTS,
     false_discovery: FalseDiscovery = FALSE_DISCOVERY,
     force: bool = False,
+    black_box: bool = False,
     again: bool = False,
     executor: str = "processes",
     workers: Count | None = None,
@@ -57,7 +58,7 @@ def find_gaps(
         ``holdout``. A folder that holds a card itself is one ship.
     output : path
         Folder for ``fleet.json``, ``fleet.html``, and the results of each ship in a sub-folder of its name.
-    effects, without, max_effects, false_discovery, force
+    effects, without, max_effects, false_discovery, force, black_box
         As of :func:`find_gap`.
     again : bool
         Compute all ships of a folder, also those with valid results of an earlier search.
@@ -79,7 +80,7 @@ def find_gaps(
 
     alone = ship_alone(Path(fleet))
     if alone is None:
-        options = gap_options(effects, without, max_effects, false_discovery, workers, force=force)
+        options = gap_options(effects, without, max_effects, false_discovery, workers, force=force, black_box=black_box)
         return search_fleet(FleetRequest(Path(fleet), Path(output), options, executor, again), report)
     found = find_gap(
         as_vessel(alone.card),
@@ -91,6 +92,7 @@ def find_gaps(
         max_effects=max_effects,
         false_discovery=false_discovery,
         force=force,
+        black_box=black_box,
         executor=executor,
         workers=workers,
         report=report,

@@ -259,6 +259,7 @@ def fleet_run_record(ship: ShipFolder, options: GapOptions) -> dict[str, object]
             "effects": None if options.effects is None else list(options.effects),
             "without": list(options.without),
             "force": options.force,
+            "black_box": options.black_box,
             "max_effects": options.max_effects,
             "false_discovery": options.false_discovery,
         },

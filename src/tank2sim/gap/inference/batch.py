@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -138,11 +139,16 @@ class MeasuredBatch:
         times: Array = self.begin_s[:, None] + middle
         return times
 
-    @property
+    @cached_property
     def block_states(self) -> Array:
         """Mean of the states from the middle of a block to that of the next (R, T - 1, 6)."""
         middles = 0.5 * (self.states[:, 1:] + self.states[:, :-1])
         return self.over_blocks(middles)
+
+    @cached_property
+    def states_in_blocks(self) -> Array:
+        """Means of the states over each block (R, T, 6)."""
+        return self.in_blocks(self.states)
 
     @property
     def block_inputs(self) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from functools import partial
 from threading import Lock
 from uuid import uuid4
 
@@ -48,6 +49,10 @@ class Proposal:
     def effects(self) -> tuple[str, ...]:
         """Names in the order of the library: the same set is the same explanation."""
         return tuple(sorted(self.thetas, key=list(EFFECTS).index))
+
+
+Begun = tuple[Proposal, Callable[[], ExplanationFit]]
+"""A proposal, and the function that waits for its fit."""
 
 
 class HypothesisCache:
@@ -125,15 +130,21 @@ class Fitting:
 
     def fit(self, proposals: Sequence[Proposal]) -> None:
         """Fit the proposals, and keep the better of each and of any earlier fit of the same effects."""
+        self.finish(self.begin(proposals))
+
+    def begin(self, proposals: Sequence[Proposal]) -> list[Begun]:
+        """Hand the proposals to the executor, if there is one."""
         if self.executor is None:
-            for proposal in proposals:
-                self.progress(" and ".join(proposal.effects) or "the card as it is")
-                self._keep(proposal, _fit(self.likelihood, self.hypotheses, proposal))
-            return
-        waiting = [(proposal, self.executor.submit(_fit_in_worker, self._parts, proposal)) for proposal in proposals]
-        for proposal, future in waiting:
+            return [(proposal, partial(_fit, self.likelihood, self.hypotheses, proposal)) for proposal in proposals]
+        return [
+            (proposal, self.executor.submit(_fit_in_worker, self._parts, proposal).result) for proposal in proposals
+        ]
+
+    def finish(self, begun: Sequence[Begun]) -> None:
+        """Wait for the fits, and keep the better of each and of any earlier fit of the same effects."""
+        for proposal, fitted in begun:
             self.progress(" and ".join(proposal.effects) or "the card as it is")
-            self._keep(proposal, future.result())
+            self._keep(proposal, fitted())
 
     def _keep(self, proposal: Proposal, found: ExplanationFit) -> None:
         before = self.found.get(proposal.effects)

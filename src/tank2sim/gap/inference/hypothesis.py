@@ -6,8 +6,8 @@ motion from the recorded inputs; the rates of the measured states, and the readi
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import casadi as ca
@@ -88,6 +88,21 @@ class TrialSurroundings:
     runs: int = 0
 
 
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """Values along a motion at some parameters, kept for the next question at the same ones."""
+
+    motion: MeasuredBatch | None = None
+    theta: bytes = b""
+    values: Array = field(default_factory=lambda: np.zeros(0))
+
+    def at(self, motion: MeasuredBatch, theta: Array, compute: Callable[[MeasuredBatch, Array], Array]) -> _Kept:
+        """These values, or others where the motion or the parameters differ."""
+        if self.motion is motion and self.theta == theta.tobytes():
+            return self
+        return _Kept(motion, theta.tobytes(), compute(motion, theta))
+
+
 def directed(effects: Iterable[str]) -> bool:
     """Whether one of the effects comes from a direction of the compass."""
     return any(parameter.name == "direction_rad" for effect in effects for parameter in EFFECTS[effect].parameters)
@@ -153,6 +168,8 @@ class Hypothesis:
         self.estimated = tuple(estimated)
         self.unmeasured = tuple(name for name in model.state_names if name not in MEASURED_STATES)
         self._chains: dict[float, Chain] = {}
+        self._kept_inputs = self._kept_unmeasured = _Kept()
+        self._functions: dict[tuple[str, ...], tuple[ArrayFunction, ...]] = {}
 
     @property
     def directed(self) -> bool:
@@ -251,6 +268,12 @@ class Hypothesis:
 
     def inputs(self, motion: MeasuredBatch, theta: Array, late_s: float = 0.0) -> Array:
         """Inputs of this model at every fine step (R, n - 1, nu), the rudder's order later by `late_s`."""
+        if late_s:
+            return self._inputs(motion, theta, late_s)
+        self._kept_inputs = kept = self._kept_inputs.at(motion, theta, self._inputs)
+        return kept.values
+
+    def _inputs(self, motion: MeasuredBatch, theta: Array, late_s: float = 0.0) -> Array:
         known = motion.inputs
         names = self.model.input_names
         runs, steps, count = known.shape
@@ -302,6 +325,14 @@ class Hypothesis:
         `late_s` is a delay of the rudder's order."""
         if not self.unmeasured:
             return np.zeros((*motion.states.shape[:2], 0))
+        if p is not None or late_s:
+            return self._unmeasured_states(motion, theta, p, late_s)
+        self._kept_unmeasured = kept = self._kept_unmeasured.at(motion, theta, self._unmeasured_states)
+        return kept.values
+
+    def _unmeasured_states(
+        self, motion: MeasuredBatch, theta: Array, p: Array | None = None, late_s: float = 0.0
+    ) -> Array:
         inputs, p = self.inputs(motion, theta), self.parameters(theta) if p is None else p
         x, first, chain = motion.states, inputs[:, 0].copy(), self._chain(motion.step_s)
         if motion.at_execute.any():
@@ -338,13 +369,13 @@ class Hypothesis:
 
     def readings(self, motion: MeasuredBatch, theta: Array, unmeasured: Array | None = None) -> Array:
         """Readings of noiseless sensors in the middle of each block (R, T, ny)."""
-        function = self._function("readings", self._shown(motion.seen))
+        function, _ = self._sensors(motion.seen)
         return _rowwise(function, *self._in_blocks(motion, theta, unmeasured), self.parameters(theta))
 
     def slopes(self, motion: MeasuredBatch, theta: Array) -> tuple[Array, Array]:
         """Rates by states (R, T - 1, 6, 6), and readings by states (R, T, ny, 6)."""
         unmeasured, p = self.unmeasured_states(motion, theta), self.parameters(theta)
-        reading_slopes = self._function("reading_slopes", ca.jacobian(self._shown(motion.seen), self._symbols[0]))
+        _, reading_slopes = self._sensors(motion.seen)
         return (
             _matrices(_rowwise(self._state_slopes, *self._along(motion, theta, unmeasured), p), 6),
             _matrices(_rowwise(reading_slopes, *self._in_blocks(motion, theta, unmeasured), p), 6),
@@ -357,8 +388,7 @@ class Hypothesis:
         along, p = self._along(motion, theta, None), self.parameters(theta)
         columns, base = np.zeros((*along[0].shape, len(names))), _rowwise(self._rates, *along, p)
         if direct:
-            slopes = ca.jacobian(self._known_rates, ca.vcat([self.model.symbol(name) for name in direct]))
-            by_name = _matrices(_rowwise(self._function("coefficient_slopes", slopes), *along, p), len(direct))
+            by_name = _matrices(_rowwise(self._parameter_slopes(tuple(direct)), *along, p), len(direct))
             columns[..., [names.index(name) for name in direct]] = by_name
         for name in present:
             if name.startswith("steering."):  # through the state of the rudder
@@ -396,8 +426,7 @@ class Hypothesis:
             unmeasured = self.unmeasured_states(motion, theta)
         inputs = self.inputs(motion, theta)
         every = np.concatenate([inputs, inputs[:, -1:]], axis=1)
-        x, xi, u = (motion.in_blocks(values) for values in (motion.states, unmeasured, every))
-        return x, xi, u
+        return motion.states_in_blocks, motion.in_blocks(unmeasured), motion.in_blocks(every)
 
     # -- CasADi functions --------------------------------------------------------------------------------------------
 
@@ -426,6 +455,23 @@ class Hypothesis:
     @cached_property
     def _state_slopes(self) -> ArrayFunction:
         return self._function("state_slopes", ca.jacobian(self._known_rates, self._symbols[0]))
+
+    def _sensors(self, seen: tuple[str, ...]) -> tuple[ArrayFunction, ...]:
+        """Readings of the variables `seen`, and their slopes by measured states."""
+        key = "readings", *seen
+        if key not in self._functions:
+            shown = self._shown(seen)
+            slopes = ca.jacobian(shown, self._symbols[0])
+            self._functions[key] = self._function("readings", shown), self._function("reading_slopes", slopes)
+        return self._functions[key]
+
+    def _parameter_slopes(self, names: tuple[str, ...]) -> ArrayFunction:
+        """Slopes of the rates by parameters of the model."""
+        key = "slopes", *names
+        if key not in self._functions:
+            slopes = ca.jacobian(self._known_rates, ca.vcat([self.model.symbol(name) for name in names]))
+            self._functions[key] = (self._function("parameter_slopes", slopes),)
+        return self._functions[key][0]
 
     def _shown(self, seen: Sequence[str]) -> ca.SX:
         names = [f"sensor.{name.partition('.')[2]}" for name in seen]

@@ -172,11 +172,13 @@ class Prover:
             )
             held = with_surroundings(held, named.by_trial)
         faultless = corrected(held, sensor_faults(named.estimated))
-        results = [*proof.results, *self.replays.by_cards(card, improved, held, True, faultless)]
         alone = dict(proof.effect_alone)
+        with_effects = add_effects_to_card(card, named.estimated) if alone else improved
+        for each in (improved, with_effects):
+            self.replays.begin(each, faultless or held)
+        results = [*proof.results, *self.replays.by_cards(card, improved, held, True, faultless)]
         if alone:
-            by_effects = self.replays.by_cards(card, add_effects_to_card(card, named.estimated), held, True, faultless)
-            alone["holdout"] = misfit_of(by_effects, "after")
+            alone["holdout"] = misfit_of(self.replays.by_cards(card, with_effects, held, True, faultless), "after")
         return replace(
             proof,
             trials=(fitted, held),

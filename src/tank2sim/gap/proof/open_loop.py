@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -22,6 +23,7 @@ from tank2sim.records.trials import Trial, sampling_step
 from tank2sim.simulation.motion_record import motion_record
 from tank2sim.simulation.rows import Chain, RowFunction
 from tank2sim.simulation.scheme import step_and_constants
+from tank2sim.simulation.sensitivity import Sensitivity
 
 INSTANTS = 40
 """Instants in L/u0 at which simulated and measured are compared (project choice: the fastest motion lasts a tenth of
@@ -46,7 +48,7 @@ ASTERN = 0.2
 
 @dataclass(frozen=True, eq=False)
 class InputRecord:
-    """A trial on its own rows, thinned where they are closer than a step of the model.
+    """A trial on its own rows, thinned to :data:`COARSEST` steps of the model.
 
     Parameters
     ----------
@@ -107,10 +109,6 @@ _UNSURE_FROM = 0.004
 """Interval between two readings of the order, in L/u0, from which the instants of its steps are estimated (project
 choice: of zigzags read to 0.05 deg of heading, 0.005 is seen)."""
 
-_REACH = 0.02
-"""Change of the instant of an order, as a share of the interval in which it was given, for the derivative in it
-(project choice: the motion is nearly linear in it)."""
-
 _STEP_OF_ORDER = math.radians(1.0)
 """Smallest step of an order whose instant is estimated (project choice: the smallest of a helmsman)."""
 
@@ -161,26 +159,37 @@ class Replayer:
         step, constants = step_and_constants(self.model)
         self._steps, self._constants = Chain(step), constants
         self._shown = shown_by(self.model, seen)
+        self._prepared: tuple[InputRecord, tuple[Array, Array, NDArray[np.intp]]] | None = None
         ordered = driven_by == "order" and _ORDER in self.model.input_names
         self._order = self.model.input_names.index(_ORDER) if ordered else None
         self.passage_s = card.ship.length_m / card.model.speed_mps
         self.nominal = np.array([state.nominal for state in self.model.states])
 
-    def states(self, record: InputRecord, start: Array, p: Array, begin: int = 0) -> Array:
-        """States (n - begin, nx) at the rows of a record, from the state `start` at the row `begin`; nan once out of
-        bounds."""
+    def states(self, record: InputRecord, start: Array, p: Array) -> Array:
+        """States (n, nx) at the rows of a record, from the state `start` at the first; nan once out of bounds."""
         lengths, inputs, places = self._integration_steps(record)
-        first = places[begin]
-        constants = np.array(self._constants(p)).ravel()
         with np.errstate(all="ignore"):
-            steps = self._steps.run(start, inputs[first:], p, constants, lengths[first:, None])
-            states: Array = steps[places[begin:] - first]
+            states: Array = self._between(start, lengths, inputs, p)[places]
             lost = ~(np.abs(states) < _FAR * self.nominal).all(axis=1)
         if lost.any():
             states[int(np.argmax(lost)) :] = np.nan
         return states
 
+    def _between(self, start: Array, lengths: Array, inputs: Array, p: Array) -> Array:
+        """States (k + 1, nx) at the ends of integration steps."""
+        return self._steps.run(start, inputs, p, np.array(self._constants(p)).ravel(), lengths[:, None])
+
+    @cached_property
+    def _sensitivity(self) -> Sensitivity:
+        return Sensitivity(self.model, (), _sensors(self.model, self.seen))
+
     def _integration_steps(self, record: InputRecord) -> tuple[Array, Array, NDArray[np.intp]]:
+        """The integration steps of a record, kept for its next motion."""
+        if self._prepared is None or self._prepared[0] is not record:
+            self._prepared = record, self._steps_between(record)
+        return self._prepared[1]
+
+    def _steps_between(self, record: InputRecord) -> tuple[Array, Array, NDArray[np.intp]]:
         """Lengths (k,), s, and inputs (k, nu) of the integration steps, and the places (n,) of the record's rows.
 
         A step ends where an order is given, on average half an interval before the first row that shows it: a gear at
@@ -257,7 +266,6 @@ class Replayer:
         guess, spread = first_state(self, record, sigma, p)
         known, size = ~np.isnan(record.readings), len(guess)
         unknown = np.append(guess if near is None else near, np.full(len(rows), 0.5))
-        reach = np.append(1e-4 * self.nominal, np.full(len(rows), _REACH))
         steps = [2**power for power in range(len(rows).bit_length()) if 2**power < len(rows)]
         for count in [*steps, len(rows)]:
             last = int(rows[count]) if count < len(rows) else len(record.time_s)
@@ -282,10 +290,8 @@ class Replayer:
                 moved: NDArray[np.intp] = moved,
                 compared: NDArray[np.bool_] = compared,
             ) -> Array:
-                inward = np.where(values > 0.5, -1.0, 1.0)  # of an instant, away from the nearer bound
-                inward[:size] = 1.0
                 begun, shares = values[:size], values[size:]
-                by_value = self._slopes_of_motion(part, moved, shares, begun, p, inward * reach[: len(values)])
+                by_value = self._slopes_of_motion(self._given_at(part, moved, shares), begun, p, moved)
                 of_prior = np.diag(np.append(1 / spread, np.full(len(shares), math.sqrt(12.0))))
                 return np.concatenate([(by_value / sigma[:, None])[compared], of_prior])
 
@@ -303,37 +309,29 @@ class Replayer:
                 return None
         return self._given_at(record, rows, unknown[size:]), unknown[:size], remaining
 
-    def _slopes_of_motion(
-        self,
-        record: InputRecord,
-        rows: NDArray[np.intp],
-        shares: Array,
-        start: Array,
-        p: Array,
-        reach: Array,
-    ) -> Array:
+    def _slopes_of_motion(self, record: InputRecord, start: Array, p: Array, rows: NDArray[np.intp]) -> Array:
         """Derivatives (m, ny, nx + len(rows)) of the compared readings in the initial state and in the instants of the
-        steps of the order at `rows`, by forward differences of `reach`; a step changes nothing before it, and a motion
-        that exceeds all bounds counts as one without change."""
-        timed = self._given_at(record, rows, shares)
-        states = self.states(timed, start, p)
-        shown = self._readings(timed, states, p)
-        slopes = np.zeros((*shown.shape, len(reach)))
-        for place, step in enumerate(reach[: len(start)]):
-            moved = start.copy()
-            moved[place] += step
-            slopes[..., place] = (self.motion(timed, moved, p) - shown) / step
-        for place, (row, step) in enumerate(zip(rows, reach[len(start) :], strict=True)):
-            moved_shares = shares.copy()
-            moved_shares[place] += step
-            begin = _compared_before(record, int(row))
-            first = int(record.compared[begin])
-            changed = self._given_at(record, rows, moved_shares)
-            after = np.full((len(record.time_s), len(start)), np.nan)
-            after[first:] = self.states(changed, states[first], p, first)
-            change = (self._readings(changed, after, p) - shown)[begin:] / step
-            slopes[begin:, :, len(start) + place] = change
-        return np.nan_to_num(slopes)
+        steps of the order at `rows`; a motion that exceeds all bounds counts as one without change.
+
+        An order that is given later by dt keeps the rates before it for so long: the state behind changes by the
+        difference of the rates, times dt.
+        """
+        lengths, inputs, places = self._integration_steps(record)
+        with np.errstate(all="ignore"):
+            states = self._between(start, lengths, inputs, p)
+            tangents = self._sensitivity.tangents(states[:-1], inputs, p, lengths)
+            by = np.zeros((len(states), len(start), len(start) + len(rows)))
+            by[0, :, : len(start)] = np.eye(len(start))
+            instants = record.time_s[0] + np.append(0.0, np.cumsum(lengths))
+            given, spans = record.given_s[rows], np.diff(record.time_s)[rows - 1]
+            at = np.clip(np.searchsorted(instants, given - 1e-9 * spans), 1, len(inputs) - 1)
+            before, after = (self._sensitivity.rates(states[at], inputs[steps], p) for steps in (at - 1, at))
+            by[at, :, np.arange(len(start), by.shape[2])] = (before - after) * spans[:, None]
+            self._sensitivity.propagate(by, tangents)
+            compared = places[record.compared]
+            seen = self._sensitivity.shown_by_states(states[compared], record.inputs[record.compared], p)
+            slopes: Array = seen @ by[compared]
+        return np.nan_to_num(slopes, posinf=0.0, neginf=0.0)
 
     @staticmethod
     def _given_at(record: InputRecord, rows: NDArray[np.intp], shares: Array) -> InputRecord:
@@ -395,7 +393,7 @@ class Replayer:
             beyond = INSTANTS * np.maximum(size**2 - sigma**2, 0) if wrong else 0.0
             weights = np.sqrt(sigma**2 + beyond)
             if turn % 2 == 0:  # the motion is nearly linear in its initial state
-                slopes = difference_slopes(residuals, start, residual, 1e-4 * self.nominal)
+                slopes = self._slopes_of_motion(record, start, p, np.zeros(0, dtype=np.intp))[known]
             if not (np.isfinite(weights).all() and np.isfinite(slopes).all()):
                 break
             if wrong and turn and np.allclose(weights, before, rtol=0.02):
@@ -429,19 +427,17 @@ def _beginning_of(record: InputRecord, rows: int) -> InputRecord:
     )
 
 
-def _compared_before(record: InputRecord, row: int) -> int:
-    """The last of the compared rows, as a place among them, before the interval in which the order of `row` was
-    given; the first one if there is none."""
-    earliest = record.time_s[row - 1] + record.late_s
-    return max(int(np.searchsorted(record.times, earliest, side="right")) - 1, 0)
-
-
 def shown_by(model: Model, seen: Sequence[str]) -> RowFunction:
     """Readings of the variables `seen` (``sensor.psi`` where the model has it) as a function of x, u, p."""
-    pairs = [(name.replace("motion.", "sensor."), name) for name in seen]
-    shown = ca.vcat([model.symbol(sensor if sensor in model else name) for sensor, name in pairs])
+    shown = ca.vcat([model.symbol(name) for name in _sensors(model, seen)])
     arguments = [model.x, model.u, model.p]
     return RowFunction(ca.Function("shown", arguments, [ca.densify(model.expand(shown))], {"cse": True}))
+
+
+def _sensors(model: Model, seen: Sequence[str]) -> tuple[str, ...]:
+    """The variables that sensors of `seen` show."""
+    pairs = [(name.replace("motion.", "sensor."), name) for name in seen]
+    return tuple(sensor if sensor in model else name for sensor, name in pairs)
 
 
 def difference_slopes(function: Callable[[Array], Array], at: Array, value: Array, reach: Array) -> Array:
@@ -455,7 +451,7 @@ def difference_slopes(function: Callable[[Array], Array], at: Array, value: Arra
 
 
 def input_record(replayer: Replayer, trial: Trial) -> InputRecord:
-    """A trial on its own rows, thinned where they are closer than a step of the model; each order keeps its row.
+    """A trial on its own rows, thinned to :data:`COARSEST` steps of the model; each order keeps its row.
 
     Raises
     ------
@@ -475,7 +471,8 @@ def input_record(replayer: Replayer, trial: Trial) -> InputRecord:
     nearest = np.clip(np.searchsorted(time, wanted - 0.5 * sampling), 0, len(time) - 1)
     seen = np.abs(time[nearest] - wanted) <= 0.5 * sampling
     moved = np.flatnonzero((np.diff(record.inputs[:, record.orders], axis=0) != 0).any(axis=1)) + 1
-    bins = np.floor((time - time[0]) / step + 1e-6)
+    longest = max(1, int(COARSEST * model.step_s / sampling + 1e-6)) * sampling
+    bins = np.floor((time - time[0]) / longest + 1e-6)
     kept = np.flatnonzero(np.diff(bins, prepend=-1.0) > 0)
     kept = np.union1d(np.concatenate([kept, moved, moved - 1, nearest[seen]]), len(time) - 1)
     instants = np.union1d(time[kept], wanted[~seen])  # times without a row stay gaps

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
-from weakref import WeakKeyDictionary
+from dataclasses import dataclass, field, replace
+from functools import cache, partial
 
 import numpy as np
 
@@ -37,6 +37,7 @@ class TrialReplays:
 
     noise: Mapping[str, float]
     executor: Executor | None = None
+    _begun: dict[tuple[Trial, str, str], Callable[[], _Followed]] = field(default_factory=dict, repr=False)
 
     def by_cards(
         self,
@@ -47,18 +48,17 @@ class TrialReplays:
         corrected: Measured | None = None,
     ) -> tuple[Passed, ...]:
         """Each trial as measured and as both cards' models simulate it; see :func:`replay_trials`."""
-        given = self._followed(card, measured)
-        same = improved is card and corrected is None
-        after = given if same else self._followed(improved, corrected or measured)
+        given, after = self.begin(card, measured), self.begin(improved, corrected or measured)
         results = []
-        for old, new in zip(given, after, strict=True):
+        for before, then in zip(given, after, strict=True):
+            old, new = before(), then()
             simulated = new.simulated + np.nan_to_num(old.record.readings - new.record.readings)
             results.append(_passed(old.record, old.seen, self.noise, held_out, (old.simulated, simulated)))
         return tuple(results)
 
     def with_black_box(self, results: Sequence[Passed], box: ManoeuvringCard, measured: Measured) -> tuple[Passed, ...]:
         """The same replays with the simulation of each trial by a black box's card."""
-        followed = {each.record.name: each for each in self._followed(box, measured)}
+        followed = {each.record.name: each for each in (wait() for wait in self.begin(box, measured))}
         boxed = []
         for result in results:
             simulated = followed[result.name]
@@ -66,20 +66,17 @@ class TrialReplays:
             boxed.append(replace(result, black_box={name: columns[name] for name in result.noise}))
         return tuple(boxed)
 
-    def _followed(self, card: ManoeuvringCard, measured: Measured) -> list[_Followed]:
-        """Each trial as the card's model simulates it, from the initial state that fits it best."""
-        noise, driven_by = dict(self.noise), measured.driven_by
-        key = card.text, driven_by, tuple(noise.items())
-        known = [_FOLLOWED.setdefault(trial, {}) for trial in measured.trials]
-        waiting = [trial for trial, found in zip(measured.trials, known, strict=True) if key not in found]
-        if self.executor is None or len(waiting) < 2:
-            new = [_follow(card, driven_by, noise, trial) for trial in waiting]
-        else:
-            futures = [self.executor.submit(_follow, card, driven_by, noise, trial) for trial in waiting]
-            new = [future.result() for future in futures]
-        for trial, followed in zip(waiting, new, strict=True):
-            _FOLLOWED[trial][key] = followed
-        return [found[key] for found in known]
+    def begin(self, card: ManoeuvringCard, measured: Measured) -> list[Callable[[], _Followed]]:
+        """Begin to follow each trial, the longest first; return the functions that wait for them.
+
+        The card's model simulates each from the initial state that fits it best, and once.
+        """
+        driven_by, noise = measured.driven_by, dict(self.noise)
+        for trial in sorted(measured.trials, key=lambda trial: -len(trial.time_s)):
+            if (key := (trial, card.text, driven_by)) not in self._begun:
+                follow = partial(_follow, card, driven_by, noise, trial)
+                self._begun[key] = cache(follow) if self.executor is None else self.executor.submit(follow).result
+        return [self._begun[trial, card.text, driven_by] for trial in measured.trials]
 
 
 def replay_trials(
@@ -125,11 +122,6 @@ class _Followed:
     record: InputRecord
     seen: tuple[str, ...]
     simulated: Array
-
-
-_Key = tuple[str, str, tuple[tuple[str, float], ...]]
-_FOLLOWED: WeakKeyDictionary[Trial, dict[_Key, _Followed]] = WeakKeyDictionary()
-"""What was simulated of each trial that still exists: each explanation is compared with the same simulation before."""
 
 
 def _follow(card: ManoeuvringCard, driven_by: str, noise: Mapping[str, float], trial: Trial) -> _Followed:

@@ -123,7 +123,10 @@ def search(
     hypotheses = HypothesisCache(likelihood.none, likelihood.motion)
     believed = likelihood.belief.logs
     rough = Fitting(likelihood, hypotheses, progress, executor)
-    rough.fit([Proposal({}, [believed], ROUNDS_OF_NONE)])
+    chosen = candidate_explanations(likelihood.none.card, likelihood.none.driven_by) if names is None else names
+    begun = rough.begin([Proposal({}, [believed], ROUNDS_OF_NONE)])
+    by_effect = {name: _variants(likelihood, hypotheses, name) for name in chosen}
+    rough.finish(begun)
     for _ in range(WAVES_WITH_NONE):
         likelihood = likelihood.with_waves(fit_waves(likelihood, rough.best()))
         if likelihood.belief.waves is None:
@@ -132,10 +135,9 @@ def search(
         rough.fit([Proposal({}, [believed], ROUNDS_OF_NONE)])
     likelihood = likelihood.with_scale(likelihood.noise_scale(rough.best()))
     rough = Fitting(likelihood, hypotheses, progress, executor, rough.found)
-    chosen = candidate_explanations(likelihood.none.card, likelihood.none.driven_by) if names is None else names
     if likelihood.belief.waves is not None:
         chosen = tuple(name for name in chosen if not EFFECTS[name].resonant) or chosen
-    every = tuple(variant for name in chosen for variant in _variants(likelihood, hypotheses, name))
+    every = tuple(variant for name in chosen for variant in by_effect[name])
     none = rough.best()
     first = Screen(likelihood, none, every)
     proposed = [*first.singles()[:FIRST_SINGLES], *(first.pairs()[:FIRST_PAIRS] if most > 1 else ())]
@@ -159,7 +161,6 @@ def _about_best(fitting: Fitting) -> Fitting:
     likelihood = fitting.likelihood.about(best)
     if likelihood.belief.waves is not None:
         likelihood = likelihood.with_waves(fit_waves(likelihood, best))
-    likelihood = likelihood.with_scale(likelihood.noise_scale(best))
     nearer = likelihood.at_best(best.hypothesis, best.theta, [best.logs], LAST_ROUNDS)
     likelihood = likelihood.with_scale(likelihood.noise_scale(nearer))
     about = Fitting(likelihood, fitting.hypotheses, fitting.progress, fitting.executor)

@@ -7,8 +7,9 @@ any set of columns follows from one Gram matrix.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations, product
 
 import numpy as np
@@ -52,12 +53,14 @@ class Variant:
         """Name of the effect."""
         return self.hypothesis.effects[0]
 
-    def allowed(self, shares: Array) -> bool:
-        """Whether the bounds allow the signs of amplitudes in such shares of their size here (a,)."""
+    @property
+    def signs(self) -> Array:
+        """Size of each column here, and whether the bounds allow less and more than zero (a, 3)."""
         places = list(self.amplitudes)
-        sizes = self.theta[places] * shares[: len(places)]
+        if not places:
+            return np.ones((self.driving.shape[-1], 3))
         low, high = (bound[places] for bound in self.hypothesis.bounds)
-        return bool(np.all((sizes >= 0) | (low < 0)) and np.all((sizes <= 0) | (high > 0)))
+        return np.column_stack([self.theta[places], low < 0, high > 0])
 
     def start(self, shares: Array) -> Array:
         """Parameters to begin a search from, for amplitudes in shares of their size here (a,)."""
@@ -176,29 +179,40 @@ class Screen:
         widths = [variant.driving.shape[-1] for variant in self.every]
         ends = 1 + np.cumsum(widths)
         self.places = [np.arange(end - width, end) for end, width in zip(ends, widths, strict=True)]
+        price = np.log(likelihood.count / COUNTED)
+        self._prices = [np.count_nonzero(variant.hypothesis.prior[1] == 0) * price for variant in self.every]
+        signs = [np.zeros((1, 3))] + [variant.signs for variant in self.every]
+        self._size, negative, positive = np.concatenate(signs).T
+        self._negative, self._positive = negative > 0, positive > 0
 
     def of(self, chosen: Sequence[int]) -> tuple[float, Array]:
         """Gain of some variants together, and the shares of their amplitudes; none where a sign is not allowed."""
-        gram_places = np.concatenate([self.places[place] for place in chosen])
-        block = self.gram[np.ix_(gram_places, gram_places)]
-        size = np.sqrt(np.maximum(np.diag(block), 1e-300))
-        scaled = block / np.outer(size, size) + 1e-9 * np.eye(len(block))
-        pull = -self.gram[gram_places, 0] / size
-        shares = np.linalg.solve(scaled, pull)
-        free_parameters = sum(np.count_nonzero(self.every[place].hypothesis.prior[1] == 0) for place in chosen)
-        price = free_parameters * np.log(self.likelihood.count / COUNTED)
-        found = shares / size
-        ends = np.cumsum([len(self.places[place]) for place in chosen])
-        parts = zip(chosen, np.split(found, ends[:-1]), strict=True)
-        if not all(self.every[place].allowed(part) for place, part in parts):
-            return -float(price), np.zeros(len(found))
-        return float(pull @ shares - price), found
+        return self.of_each([tuple(chosen)])[0]
+
+    def of_each(self, sets: Sequence[tuple[int, ...]]) -> list[tuple[float, Array]]:
+        """Gain and shares as of :meth:`of` for each set of variants, sets of as many columns at once."""
+        columns = [np.concatenate([self.places[place] for place in chosen]) for chosen in sets]
+        found: list[tuple[float, Array]] = [(0.0, np.zeros(0))] * len(sets)
+        for width in {len(each) for each in columns}:
+            rows = [row for row, each in enumerate(columns) if len(each) == width]
+            at = np.array([columns[row] for row in rows])
+            block = self.gram[at[:, :, None], at[:, None, :]]
+            size = np.sqrt(np.maximum(np.diagonal(block, axis1=1, axis2=2), 1e-300))
+            scaled = block / (size[:, :, None] * size[:, None, :]) + 1e-9 * np.eye(width)
+            pull = -self.gram[at, 0] / size
+            shares = np.linalg.solve(scaled, pull[..., None])[..., 0]
+            sizes = self._size[at] * shares / size
+            allowed = np.all(((sizes >= 0) | self._negative[at]) & ((sizes <= 0) | self._positive[at]), axis=1)
+            prices = np.array([sum(self._prices[place] for place in sets[row]) for row in rows])
+            gains = np.where(allowed, np.sum(pull * shares, axis=1), 0.0) - prices
+            for row, gain, each in zip(rows, gains, np.where(allowed[:, None], shares / size, 0.0), strict=True):
+                found[row] = float(gain), each
+        return found
 
     def singles(self) -> tuple[Screened, ...]:
         """Each effect at its best variant, the best first."""
-        found = [(self.of([place])[0], place) for place in range(len(self.every))]
         best: dict[str, tuple[float, int]] = {}
-        for gain, place in found:
+        for place, (gain, _) in enumerate(self._alone):
             name = self.every[place].effect
             if name not in best or gain > best[name][0]:
                 best[name] = gain, place
@@ -208,23 +222,27 @@ class Screen:
         """Each pair of effects at the best of some variants of each, the best first."""
         names = dict.fromkeys(variant.effect for variant in self.every)
         kept: dict[str, list[int]] = {name: [] for name in names}
-        for place in sorted(range(len(self.every)), key=lambda place: -self.of([place])[0]):
+        for place in sorted(range(len(self.every)), key=lambda place: -self._alone[place][0]):
             effect = self.every[place].effect
             if len(kept[effect]) < of_each:
                 kept[effect].append(place)
-        chosen = []
-        for a, b in combinations(names, 2):
-            chosen.append(max(product(kept[a], kept[b]), key=lambda pair: self.of(pair)[0]))
+        tried = [list(product(kept[a], kept[b])) for a, b in combinations(names, 2)]
+        gains = iter([gain for gain, _ in self.of_each([pair for pairs in tried for pair in pairs])])
+        chosen = [max([(next(gains), pair) for pair in pairs], key=lambda found: found[0])[1] for pairs in tried]
         return self._sorted(chosen)
 
-    def _sorted(self, chosen: Iterable[tuple[int, ...]]) -> tuple[Screened, ...]:
+    @cached_property
+    def _alone(self) -> list[tuple[float, Array]]:
+        """Gain and share of each variant by itself."""
+        return self.of_each([(place,) for place in range(len(self.every))])
+
+    def _sorted(self, chosen: Sequence[tuple[int, ...]]) -> tuple[Screened, ...]:
         found = []
-        for places in chosen:
-            gain, shares = self.of(places)
-            begins = np.cumsum([0] + [len(self.places[place]) for place in places])
-            starts = [
-                self.every[place].start(shares[begin : begin + len(self.places[place])])
-                for place, begin in zip(places, begins, strict=False)
-            ]
-            found.append(Screened(dict(zip((self.every[place].effect for place in places), starts, strict=True)), gain))
+        for places, (gain, shares) in zip(chosen, self.of_each(chosen), strict=True):
+            parts = np.split(shares, np.cumsum([len(self.places[place]) for place in places])[:-1])
+            starts = {
+                self.every[place].effect: self.every[place].start(part)
+                for place, part in zip(places, parts, strict=True)
+            }
+            found.append(Screened(starts, gain))
         return tuple(sorted(found, key=lambda screened: -screened.gain))
