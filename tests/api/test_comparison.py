@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import doctest
-
 import pytest
 
 import tank2sim as t2s
-from tank2sim.api import validation as module
 
 
 @pytest.fixture(scope="module")
@@ -38,21 +35,6 @@ def test_the_figures_are_those_of_each_ship(found):
     assert weak["standard_deviation"] > 0
 
 
-def test_the_json_has_the_same_numbers(found):
-    content = found.to_dict()
-    assert content["schema"] == "tank2sim/compare/1" and content["kind"] == "compare"
-    assert [row["name"] for row in content["coefficients"]] == list(found.coefficients["coefficient"])
-    assert [notice["text"] for notice in content["notices"]] == list(found.notices)
-
-
-@pytest.mark.slow
-def test_it_fits_a_screen_and_shows_its_charts(found):
-    assert len(repr(found).splitlines()) <= 24
-    assert '<img alt="' in found._repr_html_()
-    assert {"coefficients", "tracks"} <= set(found.charts())
-    assert found.page().startswith("<!doctype html>")
-
-
 @pytest.mark.parametrize(
     ("cards", "place"), [(["mariner"], ""), ("mariner", ""), (["mariner", "wilinski-zellman"], "model.kind")]
 )
@@ -60,9 +42,3 @@ def test_bad_input_is_refused_with_place_and_remedy(cards, place):
     with pytest.raises(t2s.InputError) as refusal:
         t2s.compare(cards)
     assert refusal.value.place == place and refusal.value.problem and refusal.value.remedy
-
-
-@pytest.mark.slow
-def test_the_examples_run():
-    outcome = doctest.testmod(module)
-    assert outcome.attempted and not outcome.failed

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import subprocess
 import sys
@@ -72,22 +71,6 @@ def test_an_angle_of_no_rudder_is_refused(ship) -> None:
     with pytest.raises(t2s.InputError) as raised:
         ship.turn(120)
     assert "90 deg" in raised.value.remedy
-
-
-@pytest.mark.slow
-def test_results_fit_a_screen_and_a_notebook(ship) -> None:
-    run = ship.turn(35)
-    assert len(repr(run).splitlines()) <= 24 and "tactical diameter" in repr(run)
-    assert "data:image/png;base64" in run._repr_html_()
-    assert len(repr(ship.stability(spirals=False)).splitlines()) <= 24
-
-
-def test_json_names_its_schema_and_is_what_the_object_says(ship, tmp_path) -> None:
-    run = ship.zigzag(20, 20)
-    written = json.loads(run.to_json(tmp_path / "z.json"))
-    assert json.loads((tmp_path / "z.json").read_text()) == written
-    assert written["schema"] == "tank2sim/simulate/1" and written["manoeuvre"] == "zigzag:20/20"
-    assert written["figures"]["overshoots_deg"][0] == run.figures["overshoot_1_deg"]
 
 
 def test_a_run_is_a_trial_for_whoever_reads_it(ship, tmp_path) -> None:

@@ -39,22 +39,6 @@ def test_another_ship_is_refuted(folder):
     assert "not validated" in set(other.figures["outcome"])
 
 
-def test_the_json_has_the_same_numbers(found):
-    content = found.to_dict()
-    assert content["schema"] == "tank2sim/validate/1" and content["kind"] == "validate"
-    assert [row["measured"] for row in content["figures"]] == list(found.figures["measured"])
-    assert [row["trial"] for row in content["replays"]] == ["zigzag"]
-    assert [notice["text"] for notice in content["notices"]] == list(found.notices)
-
-
-@pytest.mark.slow
-def test_it_fits_a_screen_and_shows_its_charts(found):
-    assert len(repr(found).splitlines()) <= 24
-    assert '<img alt="' in found._repr_html_()
-    assert {"validation", "replays", "replays_2"} <= set(found.charts())
-    assert found.page().startswith("<!doctype html>")
-
-
 def test_bad_input_is_refused_with_place_and_remedy(tmp_path):
     with pytest.raises(t2s.InputError) as refusal:
         t2s.validate("wilinski-zellman")

@@ -12,13 +12,6 @@ from tests.cli.command_line import refused, tank2sim
 VEHICLE = "wilinski-zellman"
 
 
-def test_ships_lists_the_bundled_cards(tmp_path) -> None:
-    result = tank2sim("ships", "--json", "ships.json", cwd=tmp_path)
-    assert result.returncode == 0 and "Mariner class" in result.stdout
-    names = {ship["name"] for ship in json.loads((tmp_path / "ships.json").read_text())["ships"]}
-    assert {"mariner", "wilinski-zellman"} <= names
-
-
 def test_simulate_writes_what_is_asked(tmp_path) -> None:
     result = tank2sim(
         *("simulate", "Mariner", "--manoeuvre", "zigzag:20/20", "-o", "run.csv", "--plot", "run.png"),
@@ -31,15 +24,6 @@ def test_simulate_writes_what_is_asked(tmp_path) -> None:
     assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
     again = tank2sim("simulate", "mariner", "--manoeuvre", "file:run.csv", cwd=tmp_path)
     refused(again, "run.csv", "not an order")  # a trial has more than orders, and says which column
-
-
-@pytest.mark.slow
-def test_stability_gives_json(tmp_path) -> None:
-    result = tank2sim("stability", "mariner", "--json", "s.json", cwd=tmp_path)
-    assert result.returncode == 0 and "stable" in result.stdout
-    found = json.loads((tmp_path / "s.json").read_text())
-    assert found["stability_criterion"]["stable"] is True
-    assert {"eigenvalues", "nomoto", "imo"} <= set(found)
 
 
 @pytest.mark.slow
@@ -129,17 +113,3 @@ def test_tow_writes_a_card_that_exports(tmp_path) -> None:
     assert tank2sim("tow", tows, "--terms", "B3", "-o", "v.toml", cwd=tmp_path).returncode == 0
     assert tank2sim("export", "v.toml", "-o", "v.fmu", cwd=tmp_path).returncode == 0
     assert tank2sim("check", "v.fmu", cwd=tmp_path).returncode == 0
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("t_s,speed_1_mps\n0,0\n5,fast\n", ["line 3", "fast"]),
-        ("t_s,speed_1_kn\n0,0\n5,1\n", ["speed_1_kn"]),
-        ("", ["tow.csv"]),
-    ],
-)
-def test_a_faulty_tow_is_refused_with_its_place(tmp_path, text, words) -> None:
-    (tmp_path / "tow.csv").write_text(text)
-    refused(tank2sim("tow", "tow.csv", "--force-N", "1", "--mass-kg", "2", "-o", "v.toml", cwd=tmp_path), *words)
-    assert not (tmp_path / "v.toml").exists()

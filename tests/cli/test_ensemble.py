@@ -31,30 +31,6 @@ def test_bands_of_a_manoeuvre_are_the_same_for_the_same_seed(tmp_path) -> None:
     assert one["usable"] == 20 and one["unusable"] == {}
 
 
-@pytest.mark.slow
-def test_a_picture_has_the_bands(tmp_path) -> None:
-    result = tank2sim(*TURN, "--members", "8", "--plot", "s.png", cwd=tmp_path)
-    assert result.returncode == 0 and (tmp_path / "s.png").read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.mark.slow
-def test_stability_and_influence_tell_chances_and_bands(tmp_path) -> None:
-    more = ("--members", "6", "--json", "s.json")
-    result = tank2sim("stability", "mariner", "--no-spirals", *more, "-o", "s.html", cwd=tmp_path)
-    assert result.returncode == 0, result.stderr
-    found = json.loads((tmp_path / "s.json").read_text())["ensemble"]
-    chances = {one["name"]: one["probability_met"] for one in found["imo"]}
-    assert chances["advance"] == 1 and chances["tactical diameter"] == 0 and found["probability_stable"] == 1
-    assert "P(met)" in (tmp_path / "s.html").read_text()
-    figure = "steady_radius_m@20"
-    result = tank2sim("influence", "mariner", "--figures", figure, *more, "--page", "i.html", cwd=tmp_path)
-    assert result.returncode == 0, result.stderr
-    reported = json.loads((tmp_path / "s.json").read_text())
-    spread = reported["ensemble"]["figures"][figure]["standard_deviation"]
-    assert spread == pytest.approx(reported["figures"][figure]["standard_error"], rel=0.8)
-    assert "Ensemble of 6" in (tmp_path / "i.html").read_text()
-
-
 def test_a_cluster_without_an_ensemble_and_no_executor_are_refused(tmp_path) -> None:
     refused(tank2sim(*TURN, "--executor", "threads", cwd=tmp_path), "--executor", "dask://host:port")
     if importlib.util.find_spec("distributed"):

@@ -9,38 +9,6 @@ import pytest
 from tests.cli.command_line import refused, tank2sim
 
 
-@pytest.mark.slow
-def test_compare_writes_page_and_json(tmp_path) -> None:
-    arguments = ["compare", "mariner", "mariner", "--members", "0", "-o", "c.html", "--json", "c.json"]
-    result = tank2sim(*arguments, cwd=tmp_path)
-    assert result.returncode == 0, result.stderr
-    found = json.loads((tmp_path / "c.json").read_text())
-    assert found["summary"] == [
-        {
-            "card": "mariner (2)",
-            "compared": 0,
-            "same_number": 45,
-            "beyond_two_standard_errors": 0,
-            "rms_standard_errors": None,
-        }
-    ]
-    assert len(found["trials"]) == 4 and len(found["trials"][0]["tracks"]) == 2
-    assert (tmp_path / "c.html").read_text().startswith("<!doctype html>")
-
-
-def test_pilot_card_and_poster_are_written_with_their_blanks_counted(tmp_path) -> None:
-    result = tank2sim("pilotcard", "mariner", "-o", "p.html", "--json", "p.json", cwd=tmp_path)
-    assert result.returncode == 0, result.stderr
-    assert "blanks are to be filled in by hand" in result.stdout and "[propulsion]" in result.stdout
-    found = json.loads((tmp_path / "p.json").read_text())
-    assert found["telegraph"] == [] and len(found["turning_circles_deep"]) == 2
-    orders = ["--order", "Full ahead=600", "--order", "Half ahead=450"]
-    result = tank2sim("poster", "esso-osaka-estimated", *orders, "-o", "w.html", cwd=tmp_path)
-    assert result.returncode == 0, result.stderr
-    page = (tmp_path / "w.html").read_text()
-    assert "Half ahead" in page and "Dead slow ahead" in page
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

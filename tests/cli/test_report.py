@@ -11,14 +11,6 @@ import pytest
 from tests.cli.command_line import refused, tank2sim
 
 
-def test_what_simulate_wrote_becomes_a_page(tmp_path: Path) -> None:
-    assert tank2sim("simulate", "mariner", "--manoeuvre", "turn:35", "--json", "s.json", cwd=tmp_path).returncode == 0
-    result = tank2sim("report", "s.json", "-o", "s.html", cwd=tmp_path)
-    assert result.returncode == 0, result.stderr
-    page = (tmp_path / "s.html").read_text(encoding="utf-8")
-    assert "Mariner class: turning circle, 35° of rudder to starboard" in page and "tactical diameter" in page
-
-
 def test_histories_in_the_json_are_thinned_samples_of_the_run(tmp_path: Path) -> None:
     command = "simulate mariner --manoeuvre turn:35 --duration 300 --json s.json -o s.csv".split()
     assert tank2sim(*command, cwd=tmp_path).returncode == 0

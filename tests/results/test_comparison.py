@@ -34,9 +34,3 @@ def test_the_chart_of_errors_has_a_point_for_each_difference(result) -> None:
     specification = chart_specification(result._charts()["coefficients"])
     points = [row for data in specification["datasets"].values() for row in data if "name" in row]
     assert len(points) == result.study.summary[0].compared > 0
-
-
-@pytest.mark.slow
-def test_a_result_read_from_its_json_has_the_same_page(result) -> None:
-    again = ComparisonResult.read(result.to_dict(), "c.json")
-    assert again.page() == result.page() and again.to_dict() == result.to_dict()

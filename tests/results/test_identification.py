@@ -292,11 +292,6 @@ def test_of_a_record_that_goes_on_after_the_manoeuvre_the_simulated_part_is_show
     assert not rows_of(history_grid([turn]), BEFORE), "a motion that left all bounds is left out"
 
 
-def test_a_result_read_from_its_json_has_the_same_page(found) -> None:
-    again = IdentificationResult.read(found[1].to_dict(), "i.json")
-    assert again.page() == found[1].page() and again.to_dict() == found[1].to_dict()
-
-
 def test_a_forced_result_is_marked_on_its_page(trials, found) -> None:
     none = Measured((), "angle", ())
     forced = replace(found[0], forced=("the rudder's moment differs",))

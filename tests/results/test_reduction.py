@@ -73,14 +73,6 @@ def test_readings_are_drawn_as_computed_over_measured(mmg: MmgReductionResult) -
     assert {(plain(one), plain(other)) for one, other in both} <= drawn
 
 
-@pytest.mark.parametrize("kind", [pytest.param("polynomial", marks=pytest.mark.slow), "mmg"])
-def test_a_result_read_from_its_json_has_the_same_page(kind: str, request: pytest.FixtureRequest) -> None:
-    result = request.getfixturevalue(kind)
-    again = type(result).read(result.to_dict(), "r.json")
-    assert again.to_dict() == result.to_dict() and again.page() == result.page()
-    assert t2s.make_report(result.to_dict()).page() == result.page()
-
-
 def test_measured_derivatives_below_their_standard_errors_are_counted(polynomial: ReductionResult) -> None:
     table = polynomial.derivatives
     measured = table[table["origin"] == "measured"]

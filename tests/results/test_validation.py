@@ -108,12 +108,6 @@ def test_a_criterion_beyond_the_card_has_no_verdict() -> None:
     assert table.rows[0][4] == "beyond the card"
 
 
-def test_a_result_read_from_its_json_has_the_same_page() -> None:
-    result = validation()
-    again = ValidationResult.read(result.to_dict(), "v.json")
-    assert again.page() == result.page() and again.to_dict() == result.to_dict()
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [1440, 1160, 1100])
 def test_the_verdicts_stand_on_the_page_without_scrolling(tmp_path, width) -> None:

@@ -63,28 +63,25 @@ class TestParts:
         for name, series in one.voyage.series.items():
             np.testing.assert_allclose(joined.voyage.series[name].values, series.values, rtol=0, atol=1e-9)
 
-    def test_files_of_the_same_time_stay_apart(self, parts, tmp_path) -> None:
+    def test_files_of_the_same_time_stay_apart(self, parts, saved) -> None:
         table = frame().drop(columns=["heading_deg"])
-        table.to_csv(tmp_path / "other.csv", index=False)
-        result = log([parts[0], tmp_path / "other.csv"])
+        result = log([parts[0], saved(table, "other.csv")])
         assert any(channel.stream.startswith("whole: ") for channel in result.voyage.channels.channels)
 
 
-def test_hours_of_am_and_pm_are_read(tmp_path) -> None:
+def test_hours_of_am_and_pm_are_read(saved) -> None:
     table = frame()
     moments = pd.to_datetime(table["utc"])
     table["utc"] = moments.dt.strftime("%m/%d/%Y %I:%M:%S.%f %p")
-    table.to_csv(tmp_path / "us.csv", index=False)
     expected = ((moments - pd.Timestamp(0, tz="UTC")) / pd.Timedelta(seconds=1)).to_numpy()
-    np.testing.assert_allclose(read_log(tmp_path / "us.csv").streams[0].time_s, expected, rtol=0, atol=1e-5)
+    np.testing.assert_allclose(read_log(saved(table, "us.csv")).streams[0].time_s, expected, rtol=0, atol=1e-5)
 
 
-def test_a_time_that_cannot_be_read_is_named(tmp_path) -> None:
+def test_a_time_that_cannot_be_read_is_named(saved) -> None:
     table = frame()
     table["utc"] = [f"{29}.11.2023 quarter past {k}" for k in range(len(table))]
-    table.to_csv(tmp_path / "odd.csv", index=False)
     with pytest.raises(InputError, match="column"):
-        read_log(tmp_path / "odd.csv")
+        read_log(saved(table, "odd.csv"))
 
 
 class TestSentences:

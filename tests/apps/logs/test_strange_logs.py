@@ -100,10 +100,9 @@ def astern() -> tuple[pd.DataFrame, np.ndarray]:
 
 
 @pytest.mark.parametrize("signed", [True, False])
-def test_revolutions_without_their_sign_are_a_fault_where_the_vessel_backs(tmp_path, signed) -> None:
+def test_revolutions_without_their_sign_are_a_fault_where_the_vessel_backs(saved, signed) -> None:
     made, rpm = astern()
-    path = tmp_path / "back.csv"
-    made.assign(engine_rpm=rpm if signed else np.abs(rpm)).to_csv(path, index=False)
+    path = saved(made.assign(engine_rpm=rpm if signed else np.abs(rpm)), "back.csv")
     faults = [finding.text for finding in log(path).voyage.findings if finding.kind == "fault"]
     assert any("engine_rpm" in text and "astern" in text for text in faults) is not signed
 
@@ -149,19 +148,17 @@ def test_positions_of_unknown_axes_are_not_taken(first, second) -> None:
 
 
 @pytest.mark.parametrize("true", [False, True])
-def test_a_magnetic_heading_alone_is_said_to_give_none(tmp_path, true) -> None:
-    path = tmp_path / "compass.csv"
+def test_a_magnetic_heading_alone_is_said_to_give_none(saved, true) -> None:
     changed = table().assign(compass=(table().heading_deg + 25.0) % 360)
-    (changed if true else changed.drop(columns="heading_deg")).to_csv(path, index=False)
+    path = saved((changed if true else changed.drop(columns="heading_deg")), "compass.csv")
     faults = [finding.stream for finding in log(path).voyage.findings if finding.kind == "fault"]
     assert ("compass" in faults) is not true
 
 
-def test_a_table_of_a_row_a_sample_is_taken_apart_by_its_names(tmp_path) -> None:
+def test_a_table_of_a_row_a_sample_is_taken_apart_by_its_names(saved) -> None:
     made = table().assign(timestamp=T0 + voyage().time).drop(columns="utc")
     rows = made.melt("timestamp", var_name="signal").sort_values("timestamp", kind="stable")
-    path = tmp_path / "long.csv"
-    rows.to_csv(path, index=False)
+    path = saved(rows, "long.csv")
     named = {stream.name: stream for stream in read_log(path).streams}
     assert named.keys() == set(made.columns) - {"timestamp"}
     np.testing.assert_allclose(named["heading_deg"].values, made.heading_deg)
@@ -206,22 +203,19 @@ def test_one_of_several_alike_rudders_without_a_name_is_used(tmp_path) -> None:
     assert found["rudder_angle"].stream in ("column 6", "column 7", "column 8")
 
 
-def test_the_columns_that_vary_and_are_not_understood_are_listed(tmp_path) -> None:
+def test_the_columns_that_vary_and_are_not_understood_are_listed(saved) -> None:
     made = table()
     made["Kwartal"] = np.random.default_rng(3).normal(size=len(made))
     made["constant"] = 4.0
-    path = tmp_path / "voyage.csv"
-    made.to_csv(path, index=False)
+    path = saved(made, "voyage.csv")
     notes = [f for f in log(path).voyage.findings if f.kind == "note" and "Kwartal" in f.text]
     assert [note.evidence["streams"] for note in notes] == [1]
 
 
-def test_a_temperature_that_lies_near_the_course_is_no_heading(tmp_path) -> None:
+def test_a_temperature_that_lies_near_the_course_is_no_heading(saved) -> None:
     """A ship on 78 deg most of the time, and an engine at 78 degC."""
     made = table().rename(columns={"heading_deg": "P3"})
     made["Engine temperature"] = (
         np.degrees(voyage().heading) + np.random.default_rng(3).normal(0, 20, len(made))
     ) % 360
-    path = tmp_path / "voyage.csv"
-    made.to_csv(path, index=False)
-    assert used(log(path))["heading"] == "P3"
+    assert used(log(saved(made)))["heading"] == "P3"

@@ -30,37 +30,6 @@ def test_lift_drag_and_buoyancy_balance_in_degrees(glider: t2s.Ship) -> None:
     np.testing.assert_allclose(glides["lift_N"], q * glides["lift_coefficient"], rtol=1e-12)
 
 
-def test_a_programme_of_one_step_is_a_straight_path(glider: t2s.Ship, tmp_path: Path) -> None:
-    (tmp_path / "p.csv").write_text("duration_s,path_angle_deg\n100,-30\n")
-    found = glider.glide(-30, programme=tmp_path / "p.csv", views=False)
-    speed, last = found.glides["speed_mps"].iloc[0], found.path.iloc[-1]
-    assert last["x_m"] == pytest.approx(100 * speed * math.cos(math.radians(30)))
-    assert last["height_m"] == pytest.approx(-100 * speed * math.sin(math.radians(30)))
-    assert last["y_m"] == pytest.approx(0.0, abs=1e-9)
-
-
-def test_a_range_is_the_way_of_its_cycles(glider: t2s.Ship) -> None:
-    """Each metre down and each metre up takes 1/tan(angle) over the ground."""
-    ranges = glider.glide(budget_kg=50, depth_m=200, views=False).ranges
-    assert len(ranges) == 2
-    way = ranges["cycles"] * 2 * 200 / np.tan(np.radians(ranges["path_angle_deg"].abs()))
-    np.testing.assert_allclose(ranges["range_m"], way, rtol=1e-9)
-
-
-@pytest.mark.slow
-def test_a_result_fits_a_screen_and_has_a_picture(glider: t2s.Ship) -> None:
-    found = glider.glide([25, 30])
-    assert len(repr(found).splitlines()) <= 24
-    assert "data:image/png;base64," in found._repr_html_()
-    assert found.to_dict()["schema"] == "tank2sim/glide/1"
-    assert list(found.charts()) == [
-        "glide_polar",
-        "error_of_the_quasi_steady_motion_swings",
-        "error_of_the_quasi_steady_path_steps",
-    ]
-    assert found.smallest_angle_deg == pytest.approx(abs(float(str(found.best["path_angle_deg"]))))
-
-
 def test_what_cannot_be_asked_is_refused_at_its_place(glider: t2s.Ship, tmp_path: Path) -> None:
     with pytest.raises(t2s.InputError) as refusal:
         t2s.load("mariner").glide(30)

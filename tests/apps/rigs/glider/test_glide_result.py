@@ -43,20 +43,6 @@ def lines(chart, layer=0):
     return specification["datasets"][specification["layer"][layer]["data"]["name"]]
 
 
-def test_the_result_has_the_figures_and_every_chart(result) -> None:
-    assert result.key_figures[0].value == pytest.approx(23.385, abs=5e-4)
-    assert list(result.charts()) == [
-        "glide_polar",
-        "path_from_above",
-        "path_from_the_side_rolled_out",
-        "path_in_isometric_projection",
-        "programme_and_motion",
-        "error_of_the_quasi_steady_motion_swings",
-        "error_of_the_quasi_steady_path_steps",
-    ]
-    assert "12.8 kg" in result.notices[0]
-
-
 def test_tables_hold_the_glides_the_path_and_the_ranges(result) -> None:
     study = result.study
     design, ranges, glides, printed, path, printed_path = (each.df for each in result.tables)
@@ -104,9 +90,3 @@ def test_the_polar_marks_the_glides_it_is_given(result) -> None:
     speeds = np.array([row["x"] for row in lines(chart)])
     assert speeds.max() == pytest.approx(study.design.fastest_glide.horizontal_speed_mps, rel=1e-3)
     assert line(chart, "v", "polar") == pytest.approx(-study.polar["climb_mps"], rel=1e-5)
-
-
-@pytest.mark.slow
-def test_a_result_read_from_its_json_has_the_same_page(result) -> None:
-    again = GlideResult.read(result.to_dict(), "g.json")
-    assert again.page() == result.page() and again.to_dict() == result.to_dict()

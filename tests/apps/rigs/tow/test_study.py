@@ -12,8 +12,7 @@ from tank2sim.apps.rigs.tow import paper as tow_paper
 from tank2sim.apps.rigs.tow.equation_error import discretise, solve_by_qr
 from tank2sim.apps.rigs.tow.identify import identify_tow
 from tank2sim.apps.rigs.tow.output_error import TowOptions, fit_speeds, simulated_speeds
-from tank2sim.apps.rigs.tow.records import Tows, read_tows
-from tank2sim.apps.rigs.tow.result import TowResult
+from tank2sim.apps.rigs.tow.records import Tows
 from tank2sim.apps.rigs.tow.study import (
     SIMPLE,
     SIMPLE_LATE,
@@ -24,13 +23,7 @@ from tank2sim.apps.rigs.tow.study import (
     study_tows,
     towed_body,
 )
-from tank2sim.bundled import bundled
 from tank2sim.errors import InputError
-
-
-@pytest.fixture(scope="module")
-def table_1():
-    return read_tows(bundled("models", "wilinski-zellman", "tows.csv"))
 
 
 @pytest.fixture(scope="module")
@@ -155,20 +148,6 @@ def test_notes_tell_the_range_and_offer_a_way_out(study, table_1):
     posed = study_tows(identify_tow(table_1, terms=("B3",), options=TowOptions(start_delay=True)), table_1)
     assert "--start-delay" not in " ".join(posed.notices) and "--total-mass-kg" not in " ".join(posed.notices)
     assert posed.mass_by_theory == () and posed.drag_coefficients == {}
-
-
-def test_json_keeps_its_keys_and_has_more(study):
-    content = TowResult(study).to_dict()
-    assert set(content["methods"]) == {"paper", "qr", "output_error"}
-    assert [notice["text"] for notice in content["notices"]] == list(study.notices)
-    assert content["mass_range_kg"] == pytest.approx([2547, 3399], abs=1)
-    assert [row["degree"] for row in content["speed_polynomials"]] == [0, 1, 2, 3]
-    by_length = content["drag_coefficients"]["paper"]["by_length_squared"]
-    assert by_length["A3"] == pytest.approx(content["methods"]["paper"]["estimates"]["B3_kgpm"] / 7220)
-    assert content["tow_by_tow"]["output error: M, B3"]["jackknife_standard_errors"] == pytest.approx(
-        [84, 23], rel=0.02
-    )
-    assert [row["k11"] for row in content["mass_by_theory"]] == pytest.approx([0.0946, 0.0755, 0.156], abs=5e-5)
 
 
 def test_one_tow_is_not_compared_tow_by_tow(table_1):

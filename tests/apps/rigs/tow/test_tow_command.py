@@ -7,31 +7,31 @@ from pathlib import Path
 
 import pytest
 
+from tank2sim.cards import read_card
 from tests.cli.command_line import refused, tank2sim
 
 TOWS = str(Path(__file__).parents[4] / "models/wilinski-zellman/tows.csv")
 
 
-def test_tow_by_tow_models_and_page(tmp_path) -> None:
-    arguments = ("--terms", "B3", "--start-delay", "--json", "t.json", "--page", "t.html", "-o", "late.toml")
-    result = tank2sim("tow", TOWS, *arguments, cwd=tmp_path)
-    assert result.returncode == 0, result.stderr
-    assert "M, B3, delay" in result.stdout and "2547 to 3399 kg" in result.stdout
-    found = json.loads((tmp_path / "t.json").read_text())
-    assert found["methods"]["output_error"]["estimates"]["start_delay_s"] == pytest.approx(2.13, abs=0.01)
-    assert len(found["models"]) == 8 and found["notices"]
-    page = (tmp_path / "t.html").read_text()
-    assert "What these tows determine" in page and "Drag coefficient" in page
-    assert "length_m = 3.8" in (tmp_path / "late.toml").read_text()
-
-
 def test_a_force_that_varies_and_a_known_mass(tmp_path) -> None:
-    arguments = ("--force-N", "11.63,0.001", "--total-mass-kg", "2800", "--terms", "B3", "--json", "t.json")
+    arguments = (
+        "--force-N",
+        "11.63,0.001",
+        "--total-mass-kg",
+        "2800",
+        "--terms",
+        "B3",
+        "--json",
+        "t.json",
+        "-o",
+        "body.toml",
+    )
     result = tank2sim("tow", TOWS, *arguments, cwd=tmp_path)
     assert result.returncode == 0 and "T = 11.63 + 0.001 t N" in result.stdout, result.stderr
     found = json.loads((tmp_path / "t.json").read_text())
     assert found["methods"]["qr"]["estimates"]["total_mass_kg"] == 2800
     assert found["force_N"] == pytest.approx(11.655)
+    assert read_card(tmp_path / "body.toml").surge.total_mass_kg == 2800
 
 
 @pytest.mark.parametrize(

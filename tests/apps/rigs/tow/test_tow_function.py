@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import doctest
-
 import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.apps.rigs.tow import command as module
 
 FORCE_N, MASS_KG, TOTAL_KG, B3 = 12.0, 2000.0, 2500.0, 90.0
 
@@ -43,13 +40,6 @@ def test_mass_and_drag_are_those_of_the_analytic_motion(found):
     assert low < TOTAL_KG < high
 
 
-def test_the_json_has_the_same_numbers(found):
-    content = found.to_dict()
-    assert content["schema"] == "tank2sim/tow/1"
-    assert content["methods"]["output_error"]["estimates"]["total_mass_kg"] == found.total_mass_kg
-    assert [notice["text"] for notice in content["notices"]] == list(found.notices)
-
-
 def test_the_card_has_the_numbers_and_simulates(found, tmp_path):
     found.card.save(tmp_path / "body.toml")
     card = t2s.load(tmp_path / "body.toml").card
@@ -66,14 +56,6 @@ def test_a_force_is_a_number_or_a_polynomial(path):
     assert rising.total_mass_kg == TOTAL_KG
 
 
-@pytest.mark.slow
-def test_it_fits_a_screen_and_shows_its_charts(found):
-    assert len(repr(found).splitlines()) <= 24
-    assert '<img alt="' in found._repr_html_()
-    assert {"measured_and_computed_speeds", "drag_coefficient"} <= set(found.charts())
-    assert found.page().startswith("<!doctype html>")
-
-
 @pytest.mark.parametrize(
     ("options", "source"),
     [
@@ -87,9 +69,3 @@ def test_bad_input_is_refused_with_place_and_remedy(path, options, source):
     with pytest.raises(t2s.InputError) as refusal:
         t2s.tow(path, **options)
     assert refusal.value.source == source and refusal.value.problem and refusal.value.remedy
-
-
-@pytest.mark.slow
-def test_the_examples_run():
-    outcome = doctest.testmod(module)
-    assert outcome.attempted and not outcome.failed

@@ -7,16 +7,9 @@ import pytest
 
 from tank2sim.apps.rigs.tow import paper as tow_paper
 from tank2sim.apps.rigs.tow.identify import identify_tow
-from tank2sim.apps.rigs.tow.records import read_tows
 from tank2sim.apps.rigs.tow.result import TowResult, drag_chart, tow_speed_chart
 from tank2sim.apps.rigs.tow.study import TowSpeeds, study_tows, towed_body
-from tank2sim.bundled import bundled
 from tests.answer.drawn import panels, rows_of, whole_panel
-
-
-@pytest.fixture(scope="module")
-def table_1():
-    return read_tows(bundled("models", "wilinski-zellman", "tows.csv"))
 
 
 @pytest.fixture(scope="module")
@@ -99,8 +92,3 @@ def test_residuals_are_readings_less_the_first_fit(table_1):
     found = {(row["run"], row["x"]): row["v"] for row in whole_panel(tow_speed_chart(speeds), 1)}
     assert found["tow 3", 20.0] == pytest.approx(0.078 - 0.07)
     assert found["line", 50.0] == 0
-
-
-def test_a_result_read_from_its_json_has_the_same_page(result):
-    again = TowResult.read(result.to_dict(), "t.json")
-    assert again.page() == result.page() and again.to_dict() == result.to_dict()
