@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.cards.covariance import Covariance, covariance_file, referring
-from tank2sim.cards.covariance_reading import read_covariance
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,5 @@
 """``tank2sim reduce``: files written together or not at all, results on screen and as JSON."""
 
-import json
 import math
 import tomllib
 

@@ -8,39 +8,18 @@ import pytest
 from tank2sim.analysis.influence.card_influence import influence
 from tank2sim.analysis.influence.figures import parse_figure
 from tank2sim.analysis.influence.study import Study
-from tank2sim.cards import CraftCard, parse_card, read_card
+from tank2sim.cards import CraftCard, read_card
 from tank2sim.errors import InputError
+from tests.cards.made_craft import craft_card
 
 # Linear damping, thrust as strong astern as ahead: a spin has neither surge nor sway.
-LINEAR = """format = "tank2sim-ship/1"
-[ship]
-name = "linear craft"
-source = "made up"
-length_m = 2.0
-[model]
-kind = "small_craft"
-speed_mps = 0.5
-[rigid_body]
-mass = 60.0
-yaw_inertia = 15.0
-x_G = 0.0
-[derivatives]
-Xu = -80.0
-Yv = -160.0
-Nr = -90.0
-[[thrusters]]
-name = "port"
-y_m = -0.4
-ahead_Ns2 = 0.01
-astern_Ns2 = 0.01
-max_rpm = 900.0
-[[thrusters]]
-name = "starboard"
-y_m = 0.4
-ahead_Ns2 = 0.01
-astern_Ns2 = 0.01
-max_rpm = 900.0
-"""
+LINEAR = craft_card(
+    *(60.0, 15.0, {"Xu": -80.0, "Yv": -160.0, "Nr": -90.0}),
+    speed_mps=0.5,
+    ahead_Ns2=0.01,
+    astern_Ns2=0.01,
+    max_rpm=900.0,
+)
 RADPS = 600 * np.pi / 30
 
 
@@ -49,7 +28,7 @@ def study_of(card, *texts: str) -> Study:
 
 
 def test_top_speed_and_spin_have_the_influence_of_their_closed_forms() -> None:
-    study = study_of(parse_card(LINEAR, "linear.toml"), "final_speed_mps@straight:600", "final_rate_degps@spin:600")
+    study = study_of(LINEAR, "final_speed_mps@straight:600", "final_rate_degps@spin:600")
     found = influence(study)
     # u = 2 k n^2 / -Xu,  r = 2 k n^2 y / -Nr
     assert found.values == pytest.approx([0.02 * RADPS**2 / 80, np.degrees(0.02 * RADPS**2 * 0.4 / 90)], rel=1e-4)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import math
 import os
@@ -49,16 +48,9 @@ def steered(name: str) -> SteeredCard:
 
 
 @pytest.fixture(scope="module")
-def allocation(data: Path) -> Callable[..., tuple[float, float, float]]:
-    """Forces of the thrusters of the case, written without tank2sim."""
-    path = data / "simulators" / "osp" / "allocation.py"
-    if not path.is_file():
-        pytest.skip(f"the case's sum of thrusts is missing: no file {path}")
-    spec = importlib.util.spec_from_file_location("allocation", path)
-    assert spec and spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.forces  # type: ignore[no-any-return]
+def allocation(simulator: Callable[[str], Any]) -> Callable[..., tuple[float, float, float]]:
+    """Forces of the thrusters of the case."""
+    return simulator("osp/allocation.py").forces  # type: ignore[no-any-return]
 
 
 def at_rest(model: Model) -> dict[str, float]:
