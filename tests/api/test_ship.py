@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 import tank2sim as t2s
+from tank2sim.bundled import bundled_cards
 from tank2sim.simulation.manoeuvres import Orders, Turn, Zigzag
 from tank2sim.simulation.run import simulate
 
@@ -184,3 +185,12 @@ def test_a_script_without_a_guard_may_use_processes(tmp_path) -> None:
     )
     done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=250, check=False)
     assert done.stdout == "once\n80\n", done.stderr
+
+
+def test_every_bundled_ship_is_listed_and_can_be_loaded() -> None:
+    listed = t2s.ships()
+    assert list(listed.index) == list(bundled_cards()) and len(listed) >= 6
+    for name, row in listed.iterrows():
+        card = t2s.load(str(name)).card
+        assert (row["ship"], row["model"], row["source"]) == (card.ship.name, card.model.kind, card.ship.source)
+    assert listed.loc["mariner", "length_m"] == 160.93

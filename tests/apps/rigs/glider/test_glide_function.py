@@ -1,7 +1,8 @@
-"""Glides as a user of the API has them: against the balance of forces and the geometry of a path."""
+"""Glides through the API and the command line: against the balance of forces, and what is refused."""
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
+from tests.cli.command_line import refused, tank2sim
 
 
 @pytest.fixture(scope="module")
@@ -44,3 +46,66 @@ def test_what_cannot_be_asked_is_refused_at_its_place(glider: t2s.Ship, tmp_path
         with pytest.raises(t2s.InputError) as refusal:
             glider.glide(angle, views=False)
         assert refusal.value.remedy
+
+
+PROGRAMME = str(Path(__file__).parents[4] / "models/kulikovsky-velikanov/programme.csv")
+
+
+def test_angles_give_states(tmp_path) -> None:
+    result = tank2sim(
+        *("glide", "--angles", "25", "-45,35", "30", "--as-printed", "--budget-kg", "50"),
+        *("--depth-m", "200", "--no-views", "--json", "g.json"),
+        cwd=tmp_path,
+    )
+    assert result.returncode == 0, result.stderr
+    assert "23.385 deg" in result.stdout and "12.8 kg" in result.stdout and "times the right ones" in result.stdout
+    found = json.loads((tmp_path / "g.json").read_text())
+    assert [state["path_angle_deg"] for state in found["states"]] == pytest.approx([25, -45, 35, 30])
+    assert found["states"][3]["speed_mps"] == pytest.approx(0.2444, abs=6e-5)
+    assert found["as_printed"][3]["speed_mps"] == pytest.approx(0.0972, abs=6e-5)
+    assert max(abs(force) for one in found["states"] for force in one["force_residual_N"]) < 1e-10
+    assert min(abs(one["force_residual_N"][0]) for one in found["as_printed"]) > 0.01
+    assert found["design"]["smallest_angle_deg"] == pytest.approx(23.385, abs=5e-4)
+    assert len(found["design"]["ranges"]) == 6
+
+
+def test_a_programme_gives_a_path_and_the_transient_next_to_it(tmp_path) -> None:
+    result = tank2sim("glide", "--programme", PROGRAMME, "--as-printed", "--no-views", "--json", "g.json", cwd=tmp_path)
+    assert result.returncode == 0 and "transient model" in result.stdout, result.stderr
+    found = json.loads((tmp_path / "g.json").read_text())
+    last = found["path"][-1]
+    assert (last["x_m"], last["y_m"], last["height_m"]) == pytest.approx((119.215, 118.279, -24.432), abs=1e-3)
+    assert len(found["steps"]) == 12 and len(found["path_as_printed"]) == 13
+    assert found["transient"]["distance_m"][6] < 1e-6 < found["transient"]["distance_m"][12] < 10
+
+
+def test_the_reference_area_is_an_option(tmp_path) -> None:
+    arguments = ["glide", "--angles", "30", "--reference-area-m2", "0.0356", "--no-views", "--json", "g.json"]
+    assert tank2sim(*arguments, cwd=tmp_path).returncode == 0
+    (state,) = json.loads((tmp_path / "g.json").read_text())["states"]
+    assert state["speed_mps"] == pytest.approx(0.515, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--angles", "20"], ["20 deg cannot be flown", "23.385 deg"]),
+        (["--angles", "24", "--roll-deg", "30"], ["26.534 deg"]),
+        (["--angles", "thirty"], ["--angles", "thirty"]),
+        (["--angles", "95"], ["95 deg"]),
+        (["mariner"], ["model.kind", "glider"]),
+        (["--programme", "none.csv"], ["none.csv"]),
+        (["--no-views", "--budget-kg", "10"], ["--depth", "missing"]),
+        (["--no-views", "--budget-kg", "10", "--depth-m", "-3"], ["--depth", "-3"]),
+        (["--reference-area-m2", "-1"], ["--reference-area"]),
+        (["--angles", "30", "--json", "missing/g.json"], ["missing/g.json"]),
+    ],
+)
+def test_bad_input_ends_in_one_line_and_exit_2(tmp_path, arguments, words) -> None:
+    refused(tank2sim("glide", *arguments, cwd=tmp_path), *words)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("command", [["simulate", "--manoeuvre", "turn:20"], ["stability"]])
+def test_commands_for_ships_refuse_a_glider(tmp_path, command) -> None:
+    refused(tank2sim(command[0], "kulikovsky-velikanov", *command[1:], cwd=tmp_path), "rudder")
