@@ -11,14 +11,13 @@ from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.analysis.validation.comparison import compare_cards
 from tank2sim.analysis.validation.documentation import model_documentation
 from tank2sim.analysis.validation.study import TURN_FIGURES, ZIGZAG_FIGURES, Validated, Validation, Verified
-from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.answer.parts import Verdict
 from tank2sim.cards import SteeredBy
 from tank2sim.notices import Notice
 from tank2sim.results.comparison import ComparisonResult
 from tank2sim.results.validation import CardValue, TrialReplay, ValidationResult, ValidationStudy
 from tests.answer.browser import measured_in_browser
-from tests.answer.drawn import panels
+from tests.answer.drawn import panels, rows_of
 
 FIGURES = (
     Validated("turn", "turn 35", "advance_m", 500.0, 510.0, 0.001, 8.0, 3.0),
@@ -66,8 +65,7 @@ def test_each_figure_has_its_verdict() -> None:
     assert verdicts == ["validated", "not validated", "not validated"]
     first = result.key_figures[0]
     assert first.value == "1 of 3" and first.verdict is Verdict.FAILED
-    drawn = chart_specification(result._charts()["validation"])["datasets"].values()
-    assert sorted(row["v"] for data in drawn for row in data if "most" in row)[:1] == [2.0]
+    assert min(row["v"] for row in rows_of(result._charts()["validation"]) if "most" in row) == 2.0
     assert tables["Prime system, rudder positive to starboard, times 1000"]["value"].to_list() == [-10.0]
 
 
@@ -144,12 +142,10 @@ def test_the_sections_tell_what_differs_and_draw_both_tracks(result) -> None:
     (row,) = coefficients.tables[1].rows
     assert row[0] == "Nd" and row[5] == pytest.approx(-20.0)  # the file counts its rudder to port: Nd is negative there
     assert str(row[2]).endswith("*") and row[4] == pytest.approx(0.1)
-    drawn = chart_specification(tracks.charts[0].chart)
-    assert {row["run"] for data in drawn["datasets"].values() for row in data if "run" in row} == {"mariner", "trial"}
+    assert {row["run"] for row in rows_of(tracks.charts[0].chart) if "run" in row} == {"mariner", "trial"}
     assert result.title == "Mariner class" and "trial differs from mariner most" in result.headline[1]
 
 
 def test_the_chart_of_errors_has_a_point_for_each_difference(result) -> None:
-    specification = chart_specification(result._charts()["coefficients"])
-    points = [row for data in specification["datasets"].values() for row in data if "name" in row]
+    points = [row for row in rows_of(result._charts()["coefficients"]) if "name" in row]
     assert len(points) == result.study.summary[0].compared > 0

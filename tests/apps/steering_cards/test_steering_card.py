@@ -5,12 +5,10 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from tank2sim.analysis.turning.points import TurnInDegrees
-from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.answer.parts import Verdict
 from tank2sim.apps.steering_cards.card import find_steering_card, parse_steering_card, read_steering_card
 from tank2sim.apps.steering_cards.comparison import SteeringComparison, compare_steering_models
@@ -20,7 +18,7 @@ from tank2sim.apps.steering_cards.two_point_tuning import TwoPointStudy
 from tank2sim.bundled import bundled
 from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.errors import InputError
-from tests.answer.drawn import rows_of
+from tests.answer.drawn import rows_of, rows_of_layer
 from tests.cli.command_line import refused, tank2sim
 
 TEXT = bundled("models", "poznyakov-yudin", "steering.toml").read_text(encoding="utf-8")
@@ -113,19 +111,13 @@ def test_points_that_cannot_be_read_or_met_are_refused(points: tuple[str, ...], 
     refused(tank2sim("influence", "mariner", "--through", *points, cwd=tmp_path), words)
 
 
-def _rows(specification: dict[str, Any], layer: int) -> list[dict[str, Any]]:
-    rows: list[dict[str, Any]] = specification["datasets"][specification["layer"][layer]["data"]["name"]]
-    return rows
-
-
 @pytest.fixture(scope="module")
 def found() -> SteeringComparison:
     return compare_steering_models(read_steering_card("poznyakov-yudin"))
 
 
 def test_the_steering_diagram_shows_models_and_trials(found: SteeringComparison) -> None:
-    specification = chart_specification(steering_diagram_chart(found.diagrams))
-    lines, points = _rows(specification, 0), _rows(specification, -1)
+    lines, points = (rows_of_layer(steering_diagram_chart(found.diagrams), number) for number in (0, -1))
     last = {row["run"]: row for row in lines}
     assert last["Japanese model, 9 m"]["v"] == pytest.approx(84.8, abs=0.1)
     assert last["through the two trial points"]["v"] == pytest.approx(61.0, abs=0.01)
