@@ -5,10 +5,12 @@ from __future__ import annotations
 import contextlib
 import gc
 import importlib
+import importlib.util
 import os
 import shlex
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import ModuleType
 
 # Matrices here are small and the workers of the tests share the cores: threads would only wait for each other.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -50,6 +52,23 @@ def data() -> Path:
     if not DATA.is_dir():
         pytest.skip(f"measured data are missing: no folder {DATA} (set TANK2SIM_DATA)")
     return DATA
+
+
+@pytest.fixture(scope="session")
+def simulator(data: Path) -> Callable[[str], ModuleType]:
+    """Gives another program's equations, written without tank2sim, by their file below ``simulators``; or skips."""
+
+    def loaded(name: str) -> ModuleType:
+        path = data / "simulators" / name
+        if not path.is_file():
+            pytest.skip(f"equations of another program are missing: no file {path}")
+        spec = importlib.util.spec_from_file_location(path.stem, path)
+        assert spec and spec.loader
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+        return module
+
+    return loaded
 
 
 @pytest.fixture(scope="session")

@@ -23,6 +23,7 @@ from tank2sim.answer.parts import Verdict
 from tank2sim.notices import caution
 from tank2sim.results.manoeuvre import ManoeuvreResult
 from tank2sim.simulation.bands import Band
+from tests.answer.drawn import rows
 
 RADIUS, LENGTH, BEAM = 300.0, 100.0, 15.0
 QUARTER = 90.0
@@ -52,10 +53,6 @@ def circle(side=1.0, course=0.0):
 
 
 FIGURES = {"advance_m": RADIUS, "transfer_m": RADIUS, "tactical_diameter_m": 2 * RADIUS, "time_180_s": 180.0}
-
-
-def rows(specification, layer):
-    return specification["datasets"][layer["data"]["name"]]
 
 
 def in_style(specification, style):

@@ -13,13 +13,10 @@ from tank2sim.answer.charts.motion import (
 )
 from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.answer.charts.vega import PlotAxis
+from tests.answer.drawn import rows
 
 TIME = np.arange(0.0, 600.0, 0.1)
 HEADING = Signal("motion.psi", "heading", "rad")
-
-
-def rows(specification, layer):
-    return specification["datasets"][layer["data"]["name"]]
 
 
 def metres_per_px(specification):

@@ -9,7 +9,6 @@ import pandas as pd
 import pytest
 
 import tank2sim as t2s
-from tests.cli.command_line import refused, tank2sim
 
 
 @pytest.fixture(scope="module")
@@ -51,13 +50,6 @@ def test_a_track_is_kept_whatever_form_it_has(pilot: t2s.AutopilotResult, tmp_pa
 
 
 @pytest.mark.slow
-def test_a_result_fits_a_screen_and_has_a_picture(pilot: t2s.AutopilotResult) -> None:
-    assert len(repr(pilot).splitlines()) <= 24
-    assert "data:image/png;base64," in pilot._repr_html_()
-    assert pilot.to_dict()["schema"] == "tank2sim/autopilot/1" and "loop_transfer" in pilot.charts()
-
-
-@pytest.mark.slow
 def test_the_fmu_of_the_controller_is_written(pilot: t2s.AutopilotResult, tmp_path: Path) -> None:
     made = pilot.to_fmu(tmp_path / "pilot.fmu", fmi=2)
     assert made.to_dict()["export"]["fmi"] == "2.0" or made.to_dict()["export"]["fmi"] == 2  # type: ignore[index]
@@ -70,9 +62,6 @@ def test_the_fmu_of_the_controller_is_written(pilot: t2s.AutopilotResult, tmp_pa
         ({"course_change_deg": 0}, "course_change_deg", ""),
         ({"course_change_deg": 171}, "course_change_deg", ""),
         ({"design": "fuzzy"}, "design", ""),
-        ({"speed_mps": -1.0}, "speed_mps", ""),
-        ({"wind_mps": -1.0}, "wind_mps", ""),
-        ({"seed": -1}, "seed", ""),
         ({"track": [[0, 0]]}, "track", ""),
         ({"track": [0, 1]}, "track", "[0]"),
         ({"track": [[0, 0], [0, 0]]}, "track", "waypoint 2"),
@@ -84,10 +73,6 @@ def test_what_cannot_be_asked_is_refused_at_its_place(options, source: str, plac
         t2s.load("mariner").autopilot(**options)
     assert (str(refusal.value.source), refusal.value.place) == (source, place)
     assert refusal.value.remedy
-
-
-def test_a_negative_seed_is_refused_on_the_command_line(tmp_path: Path) -> None:
-    refused(tank2sim("autopilot", "mariner", "--seed", "-1", cwd=tmp_path), "--seed")
 
 
 @pytest.mark.slow

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.cards.covariance import Covariance, covariance_file, referring
-from tank2sim.cards.covariance_reading import read_covariance
 
 
 @pytest.fixture(scope="module")
@@ -47,14 +43,6 @@ def test_shares_of_independent_errors_make_up_the_variance(found: t2s.InfluenceR
 
 
 @pytest.mark.slow
-def test_a_result_fits_a_screen_and_has_a_picture(found: t2s.InfluenceResult) -> None:
-    assert len(repr(found).splitlines()) <= 24
-    assert "data:image/png;base64," in found._repr_html_()
-    assert json.loads(found.to_json())["schema"] == "tank2sim/influence/1"
-    assert all(len(line) <= 80 for table in found.tables for line in ["".join(table.heads)] if table.on_screen)
-
-
-@pytest.mark.slow
 def test_the_tuned_ship_makes_the_turn_that_was_the_target(mariner: t2s.Ship) -> None:
     tuning = mariner.tune("tactical_diameter_m@35=1000", by="fewest")
     assert tuning.reached and len(tuning.moves) == 1
@@ -65,28 +53,6 @@ def test_the_tuned_ship_makes_the_turn_that_was_the_target(mariner: t2s.Ship) ->
     )
 
 
-def test_targets_that_contradict_each_other_are_named_and_their_card_is_refused(mariner: t2s.Ship) -> None:
-    tuning = mariner.tune(["steady_radius_m@20=640", "steady_diameter_m@20=1200"])
-    assert not tuning.reached and tuning.to_dict()["tuned"]["contradiction"] == list(tuning.targets.index)  # type: ignore[index]
-    with pytest.raises(t2s.InputError) as refused:
-        _ = tuning.card
-    assert refused.value.source == "targets" and "within" in refused.value.remedy
-
-
-@pytest.mark.slow
-def test_a_tuned_card_carries_the_covariance_of_what_hardly_moved(tmp_path: Path) -> None:
-    path = tmp_path / "ship.toml"
-    text = t2s.load("mariner").card.text + "\n[uncertainty]\nNd = 4e-5\nYv = 2e-4\nNv = 1e-4\n"
-    path.write_text(referring(text, path))
-    names = ("derivatives.Nd", "derivatives.Yv", "derivatives.Nv")
-    matrix = np.array([[1.6e-9, 2e-9, 0.0], [2e-9, 4e-8, 1e-8], [0.0, 1e-8, 1e-8]])
-    covariance_file(path).write_text(Covariance(names, matrix).as_text())
-    tuning = t2s.load(path).tune("steady_radius_m@20=640", by="fewest")
-    kept = read_covariance(tuning.card)
-    assert kept is not None and kept.names == names[1:]
-    assert any(notice.endswith("independent now: Nd") for notice in tuning.notices)
-
-
 def test_the_scaled_ship_turns_through_both_points(mariner: t2s.Ship) -> None:
     tuning = mariner.tune_through(["35@35", "1400m@3"])
     assert tuning.turns["rate_after_degpmin"].iloc[0] == pytest.approx(35)
@@ -95,7 +61,6 @@ def test_the_scaled_ship_turns_through_both_points(mariner: t2s.Ship) -> None:
     shallow = tuning.tuned_ship.turn(3, duration_s=3000)
     u, v, r = (shallow.df[name].iloc[-1] for name in ("u_mps", "v_mps", "r_degps"))
     assert math.hypot(u, v) / abs(math.radians(r)) == pytest.approx(1400, rel=2e-3)
-    assert len(repr(tuning).splitlines()) <= 24
 
 
 @pytest.mark.slow
@@ -105,7 +70,6 @@ def test_models_of_a_steering_card_turn_as_the_paper_prints() -> None:
     turns = models.turns.set_index(["model", "rudder_deg"])
     assert turns.loc[("inoue-hirano", 20.0), "radius_m"] == pytest.approx(399.6, abs=0.25)
     assert models.coefficients.loc["C_m_w", "inoue-hirano"] == pytest.approx(7.1, abs=0.05)
-    assert len(repr(models).splitlines()) <= 24 and len(models.charts()) == 3
 
 
 @pytest.mark.parametrize(

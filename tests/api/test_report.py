@@ -17,25 +17,8 @@ def turn() -> t2s.ManoeuvreResult:
     return t2s.load("mariner").turn(35)
 
 
-@pytest.mark.slow
-def test_a_result_its_values_and_its_file_give_one_page(turn: t2s.ManoeuvreResult, tmp_path: Path) -> None:
-    turn.to_json(tmp_path / "turn.json")
-    reports = [t2s.make_report(given) for given in (turn.to_dict(), tmp_path / "turn.json")]
-    assert {found.title for found in reports} == {"Mariner class: turning circle, 35° of rudder to starboard"}
-    assert {tuple(found.charts()) for found in reports} == {tuple(turn.charts())}
-    assert all(found.to_dict() == turn.to_dict() for found in reports)
-    assert {found.page() for found in reports} == {turn.page()}
-
-
 def test_the_name_of_the_schema_is_not_a_figure_of_the_page(turn: t2s.ManoeuvreResult) -> None:
     assert "tank2sim/simulate/1" not in t2s.make_report(turn.to_dict()).page().partition("<script")[0]
-
-
-@pytest.mark.slow
-def test_a_report_fits_a_screen_and_has_a_picture(turn: t2s.ManoeuvreResult) -> None:
-    found = t2s.make_report(turn.to_dict())
-    assert len(repr(found).splitlines()) <= 24
-    assert "data:image/png;base64," in found._repr_html_()
 
 
 @pytest.mark.parametrize("schema", ["tank2sim/simulate/2", "tank2sim/dance/1", "simulate", 3])

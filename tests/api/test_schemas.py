@@ -53,8 +53,22 @@ def test_results_follow_their_schemas_and_no_others(result, name) -> None:
 def test_the_command_and_report_give_the_same_page(made, name: str, tmp_path: Path) -> None:
     found = made(name)
     found.to_json(tmp_path / "result.json")
-    assert t2s.make_report(tmp_path / "result.json").page() == found.page()
+    again = t2s.make_report(tmp_path / "result.json")
+    assert again.page() == found.page() and t2s.make_report(found.to_dict()).page() == found.page()
+    assert list(again.charts()) == list(found.charts())
     assert all(section.heading for section in found.layout().sections)
+
+
+@pytest.mark.parametrize("name", marked(RESULTS), scope="module")
+def test_a_result_fits_a_screen(made, name: str) -> None:
+    assert len(repr(made(name)).splitlines()) <= 26  # a screen of 24, and what a headline of several lines takes
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PAGES, scope="module")
+def test_a_notebook_shows_the_first_chart_of_a_result(made, name: str) -> None:
+    found = made(name)
+    assert ("data:image/png;base64," in found._repr_html_()) == bool(found.charts())
 
 
 def test_every_command_but_those_with_long_searches_has_a_result_here() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import subprocess
 import sys
@@ -12,6 +11,7 @@ import pandas as pd
 import pytest
 
 import tank2sim as t2s
+from tank2sim.bundled import bundled_cards
 from tank2sim.simulation.manoeuvres import Orders, Turn, Zigzag
 from tank2sim.simulation.run import simulate
 
@@ -72,22 +72,6 @@ def test_an_angle_of_no_rudder_is_refused(ship) -> None:
     with pytest.raises(t2s.InputError) as raised:
         ship.turn(120)
     assert "90 deg" in raised.value.remedy
-
-
-@pytest.mark.slow
-def test_results_fit_a_screen_and_a_notebook(ship) -> None:
-    run = ship.turn(35)
-    assert len(repr(run).splitlines()) <= 24 and "tactical diameter" in repr(run)
-    assert "data:image/png;base64" in run._repr_html_()
-    assert len(repr(ship.stability(spirals=False)).splitlines()) <= 24
-
-
-def test_json_names_its_schema_and_is_what_the_object_says(ship, tmp_path) -> None:
-    run = ship.zigzag(20, 20)
-    written = json.loads(run.to_json(tmp_path / "z.json"))
-    assert json.loads((tmp_path / "z.json").read_text()) == written
-    assert written["schema"] == "tank2sim/simulate/1" and written["manoeuvre"] == "zigzag:20/20"
-    assert written["figures"]["overshoots_deg"][0] == run.figures["overshoot_1_deg"]
 
 
 def test_a_run_is_a_trial_for_whoever_reads_it(ship, tmp_path) -> None:
@@ -201,3 +185,12 @@ def test_a_script_without_a_guard_may_use_processes(tmp_path) -> None:
     )
     done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, timeout=250, check=False)
     assert done.stdout == "once\n80\n", done.stderr
+
+
+def test_every_bundled_ship_is_listed_and_can_be_loaded() -> None:
+    listed = t2s.ships()
+    assert list(listed.index) == list(bundled_cards()) and len(listed) >= 6
+    for name, row in listed.iterrows():
+        card = t2s.load(str(name)).card
+        assert (row["ship"], row["model"], row["source"]) == (card.ship.name, card.model.kind, card.ship.source)
+    assert listed.loc["mariner", "length_m"] == 160.93

@@ -1,22 +1,15 @@
-"""``tank2sim report`` and ``tank2sim steer``."""
+"""``tank2sim report``, ``steer`` and ``open``, and JSON on the standard output."""
 
 from __future__ import annotations
 
 import json
+import webbrowser
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tests.cli.command_line import refused, tank2sim
-
-
-def test_what_simulate_wrote_becomes_a_page(tmp_path: Path) -> None:
-    assert tank2sim("simulate", "mariner", "--manoeuvre", "turn:35", "--json", "s.json", cwd=tmp_path).returncode == 0
-    result = tank2sim("report", "s.json", "-o", "s.html", cwd=tmp_path)
-    assert result.returncode == 0, result.stderr
-    page = (tmp_path / "s.html").read_text(encoding="utf-8")
-    assert "Mariner class: turning circle, 35° of rudder to starboard" in page and "tactical diameter" in page
 
 
 def test_histories_in_the_json_are_thinned_samples_of_the_run(tmp_path: Path) -> None:
@@ -52,3 +45,56 @@ def test_a_towed_vehicle_has_nothing_to_steer(tmp_path: Path) -> None:
 def test_a_steering_card_is_distinguished_from_a_ship(tmp_path: Path) -> None:
     result = tank2sim("steer", "poznyakov-yudin", "-o", "s.html", cwd=tmp_path)
     refused(result, "poznyakov-yudin", "not as a ship card", "tank2sim influence")
+
+
+@pytest.fixture
+def opened(monkeypatch):
+    """Addresses that the browser was asked to show."""
+    addresses = []
+    monkeypatch.setattr(webbrowser, "open", lambda address: addresses.append(address) or True)
+    return addresses
+
+
+def test_a_page_is_opened_by_its_address(tmp_path, opened):
+    page = tmp_path / "a page.html"
+    page.write_text("<p>", encoding="utf-8")
+    assert tank2sim("open", page.name, cwd=tmp_path).returncode == 0
+    assert opened == [page.as_uri()]
+
+
+@pytest.mark.parametrize("name", ["none.html", "card.toml"])
+def test_what_is_not_a_page_is_refused(tmp_path, opened, name):
+    (tmp_path / "card.toml").write_text("", encoding="utf-8")
+    refused(tank2sim("open", name, cwd=tmp_path), name)
+    assert opened == []
+
+
+def test_without_a_browser_the_address_is_reported(tmp_path, monkeypatch):
+    page = tmp_path / "page.html"
+    page.write_text("<p>", encoding="utf-8")
+    monkeypatch.setattr(webbrowser, "open", lambda address: False)
+    refused(tank2sim("open", page.name, cwd=tmp_path), page.as_uri())
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("ships",),
+        ("simulate", "mariner", "--manoeuvre", "turn:35"),
+        ("influence", "mariner", "--figures", "criterion_C"),
+    ],
+    ids=lambda arguments: arguments[0],
+)
+def test_json_on_standard_output_is_json_alone(tmp_path, arguments) -> None:
+    result = tank2sim(*arguments, "--json", "-", cwd=tmp_path)
+    assert result.returncode == 0 and json.loads(result.stdout)
+    assert result.stderr.strip()  # the summary
+    assert not list(tmp_path.iterdir())
+    again = tank2sim(*arguments, cwd=tmp_path)  # and without it the summary is where it was
+    assert again.stdout.strip() and not again.stderr.strip()
+
+
+@pytest.mark.slow
+def test_no_other_output_goes_there(tmp_path) -> None:
+    refused(tank2sim("export", "mariner", "-o", "-", cwd=tmp_path), "standard output")
+    assert not list(tmp_path.iterdir())

@@ -1,4 +1,4 @@
-"""The equations of the steering models against the paper's own, written out by hand, and their motion in time."""
+"""Steering gears, steering models and the loop of an autopilot, against their equations and other integrators."""
 
 from __future__ import annotations
 
@@ -9,6 +9,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from tank2sim.analysis.heading.designs import design_heading
+from tank2sim.cards import read_card
+from tank2sim.cards.form import SteeringGear
+from tank2sim.dynamics import build
+from tank2sim.dynamics.autopilot_loop import closed_loop_model, ship_steered_by_either
+from tank2sim.dynamics.steering_gear import steering_gear
 from tank2sim.dynamics.steering_models import STEERING_FORMS, steering_model
 from tank2sim.simulation.manoeuvres import Turn
 from tank2sim.simulation.run import simulate
@@ -110,3 +116,61 @@ def test_the_japanese_equations_are_those_of_their_term_list(side: int) -> None:
     sway = -2 * h * b + 3 * r - 5 * h * b * abs(b) - 7 * h * b * abs(r) + 11 * r * abs(r) + 13 * d + inflow
     yaw = 17 * h * b - 19 * r - 23 * r * abs(r) - 29 * h * b * r**2 - 31 * h * b**2 * r + 37 * d + 0.5 * inflow
     assert _rates("inoue-hirano", c, b, r, d) == pytest.approx((sway, yaw))
+
+
+def variables(gear: SteeringGear | None) -> dict:
+    return {variable.name: variable for variable in steering_gear(gear, 20.0)[0]}
+
+
+@pytest.mark.parametrize("gear", [None, SteeringGear(), SteeringGear(max_rate_radps=0.04)])
+def test_a_gear_without_a_largest_angle_takes_orders_to_ninety_degrees_either_way(gear) -> None:
+    found = variables(gear)
+    order = found["rudder.command"]
+    assert (math.degrees(order.minimum), math.degrees(order.maximum)) == pytest.approx((-90, 90))
+    assert "steering.max_angle" not in found
+
+
+def test_orders_are_bounded_by_the_largest_angle_of_the_gear_and_accepted_to_ninety_degrees() -> None:
+    found = variables(SteeringGear(max_angle_rad=math.radians(35)))
+    order = found["rudder.command"]
+    assert (math.degrees(order.minimum), math.degrees(order.maximum)) == pytest.approx((-35, 35))
+    assert math.degrees(order.accepted) == pytest.approx(90)
+    assert math.degrees(found["steering.max_angle"].start) == pytest.approx(35)
+
+
+def test_a_gear_without_a_lag_takes_a_hundredth_of_the_time_of_a_length() -> None:
+    assert variables(None)["steering.time_constant"].start == pytest.approx(0.2)
+    assert variables(SteeringGear(time_constant_s=2.5))["steering.time_constant"].start == 2.5
+    assert len(steering_gear(None, 20.0)[1]) == 1 and not steering_gear(SteeringGear(time_constant_s=2.5), 20.0)[1]
+
+
+def rates(model, states, inputs):
+    """Rates by name of state, of a model at these states and inputs; all else as it starts."""
+    x = [states.get(state.name, 0.0) for state in model.states]
+    u = [inputs.get(variable.name, float(variable.start)) for variable in model.inputs]
+    names = [state.name for state in model.states]
+    return dict(zip(names, np.array(model.rhs(x, u, model.parameter_values())).ravel(), strict=True))
+
+
+def test_the_rudder_goes_to_the_order_of_whoever_steers():
+    ship = build(read_card("mariner"))
+    autopilot = design_heading(ship).autopilot
+    either = ship_steered_by_either(ship, autopilot)
+    states = {"motion.u": 7.5, "motion.v": 0.1, "motion.r": 0.002, "motion.psi": 0.3, "rudder.angle": 0.05}
+    states["autopilot.integral"] = 0.02
+    orders = {"rudder.command": -0.1, "heading.command": 0.4}
+    helm = rates(either, states, {**orders, "autopilot.steers": 0.0})
+    alone = rates(ship, states, orders)
+    assert {name: helm[name] for name in alone} == pytest.approx(alone, rel=1e-12)
+    time = dict(zip(either.parameter_names, either.parameter_values(), strict=True))["autopilot.anti_windup_time"]
+    assert helm["autopilot.integral"] == pytest.approx(-0.02 / time)
+    on = rates(either, states, {**orders, "autopilot.steers": 1.0})
+    assert on == pytest.approx(rates(closed_loop_model(ship, autopilot), states, orders), rel=1e-12)
+    assert on["rudder.angle"] > 0 > helm["rudder.angle"]
+
+
+def test_a_trimmed_start_is_that_of_the_ship_alone():
+    ship = build(read_card("kvlcc2"))
+    either = ship_steered_by_either(ship, design_heading(ship).autopilot)
+    assert either.trim_step is not None
+    assert [state.name for state in either.states][: len(ship.states)] == [state.name for state in ship.states]

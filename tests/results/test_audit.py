@@ -72,9 +72,3 @@ def test_the_fault_comes_first_in_the_table_and_the_headline() -> None:
     assert result.noise.to_dict("records") == [
         {"file": "a/turn.csv", "column": "u_mps", "sigma": pytest.approx(0.02), "stated": False}
     ]
-
-
-def test_a_result_read_from_its_json_has_the_same_page() -> None:
-    result = AuditResult(STUDY)
-    again = AuditResult.read(result.to_dict(), "a.json")
-    assert again.page() == result.page() and again.to_dict() == result.to_dict()

@@ -89,9 +89,3 @@ def test_the_charts_show_the_loop_and_the_course_change() -> None:
 def test_the_margins_are_a_table_with_units() -> None:
     margins = AutopilotResult(STUDY).tables[2].df
     assert margins["phase margin (deg)"].to_list() == [60.0] and margins["stable"].to_list() == [True]
-
-
-def test_a_result_read_from_its_json_has_the_same_page() -> None:
-    result = AutopilotResult(STUDY)
-    again = AutopilotResult.read(result.to_dict(), "a.json")
-    assert again.page() == result.page() and again.to_dict() == result.to_dict()

@@ -1,7 +1,16 @@
+"""Results of captive tests: charts, runs and reductions hold the numbers of their studies."""
+
+from __future__ import annotations
+
+import math
+
 import numpy as np
 import pytest
 
+import tank2sim as t2s
+from tank2sim.answer.charts.parts import plain
 from tank2sim.answer.charts.picture import chart_png, chart_specification
+from tank2sim.answer.parts import Verdict
 from tank2sim.identification.captive.plot_data import (
     ForceLoop,
     ForcePlot,
@@ -17,6 +26,13 @@ from tank2sim.results.captive_charts import (
     loop_chart,
     residual_chart,
 )
+from tank2sim.results.captive_run import CaptiveRunResult
+from tank2sim.results.mmg_reduction import MmgReductionResult
+from tank2sim.results.reduction import ReductionResult
+from tests.answer.drawn import line, panels, rows_of, whole_panel
+from tests.identification.captive.generator import Campaign, write
+from tests.identification.captive.made_runs import oscillation
+from tests.identification.captive_mmg.tank import KVLCC2, write_campaign
 
 
 def against_drift(*series, title=""):
@@ -161,3 +177,113 @@ def test_every_captive_chart_can_be_drawn():
     for chart in charts:
         assert chart_png(chart, scale=1.0).startswith(b"\x89PNG")
         assert chart_specification(chart) == chart_specification(chart)
+
+
+@pytest.fixture(scope="module")
+def yaw(tmp_path_factory: pytest.TempPathFactory) -> CaptiveRunResult:
+    path = write(Campaign(seed=3, size="linear", rate_hz=5.0), tmp_path_factory.mktemp("campaign")).path
+    return t2s.reduce_runs(path.parent / "yaw_00.csv", campaign=path)
+
+
+def test_tables_hold_coefficients_and_derivatives(yaw: CaptiveRunResult) -> None:
+    derivatives, forces, every = yaw.tables
+    (run,) = yaw.runs
+    assert {row[1]: row[2] for row in derivatives.rows} == {
+        name: 1e5 * value for name, value in run.derivatives.values.items()
+    }
+    first = next(row for row in forces.rows if row[1:3] == ["Y (N)", 1])
+    found = run.coefficient("Y_water", 1)
+    assert first[3] == f"{found.cosine:.5g} ± {found.cosine_error:.2g}"
+    row = next(row for row in every.rows if (row[0], row[2]) == ("Y_water", 1))
+    assert row[7] == pytest.approx(math.hypot(found.cosine, found.sine))
+    assert yaw.key_figures[0].value == 1e5 * run.derivatives.values[yaw.key_figures[0].label.partition(",")[0]]
+
+
+def test_charts_hold_the_cycle_and_the_residual(yaw: CaptiveRunResult) -> None:
+    charts = yaw._charts()
+    assert list(charts) == ["cycle", "forces_1", "residual_1"]
+    (run,) = yaw.runs
+    means = [row["v"] for row in whole_panel(charts["cycle"], 1) if "low" in row]
+    assert means[: len(run.cycles["Y"].mean)] == pytest.approx(run.cycles["Y"].mean, rel=1e-4)
+    residual = panels(charts["residual_1"])["Y (N)"]
+    assert {row["v"] for row in residual} <= {float(f"{value:.6g}") for value in run.history["Y_residual_N"]}
+    assert line(charts["forces_1"], "v", "fit")
+
+
+def test_repeats_that_differ_are_marked(tmp_path) -> None:
+    files = [oscillation(tmp_path, "a.csv"), oscillation(tmp_path, "b.csv"), oscillation(tmp_path, "c.csv", change=0.5)]
+    found = t2s.reduce_runs(files, type="pure_yaw")
+    (repeats,) = (each for each in found.tables if each.caption == "3 runs compared")
+    marked = {tuple(row[:3]) for row in repeats.rows if row[-1] is Verdict.CAUTION}
+    assert ("Y", "cos", 1) in marked
+    assert marked == {(row.signal, row.part, row.order) for row in found.repeats if row.chance < 0.01}
+    assert f"in {len(marked)} of 33 coefficients" in found.headline[0]
+    again = CaptiveRunResult.read(found.to_dict(), "r.json")
+    assert again.to_dict() == found.to_dict() and again.page() == found.page()
+
+
+@pytest.fixture(scope="module")
+def polynomial(tmp_path_factory: pytest.TempPathFactory) -> ReductionResult:
+    path = write(Campaign(seed=6, size="linear", rate_hz=5.0), tmp_path_factory.mktemp("campaign")).path
+    return t2s.reduce(path, fill="clarke1983")
+
+
+@pytest.fixture(scope="module")
+def mmg(tmp_path_factory: pytest.TempPathFactory) -> MmgReductionResult:
+    return t2s.reduce_to_mmg(write_campaign(tmp_path_factory.mktemp("mmg"), KVLCC2))
+
+
+def test_every_derivative_of_the_card_is_in_the_table(polynomial: ReductionResult) -> None:
+    shown = {row[0]: (row[1], row[2], row[-1]) for row in polynomial.sections[0].tables[0].rows}
+    entries, estimated = polynomial.contents.entries, polynomial.contents.estimated
+    assert shown == {
+        name: (1e5 * entry.value, 1e5 * entry.standard_error, "estimated" if name in estimated else "measured")
+        for name, entry in entries.items()
+    }
+    assert estimated and dict(polynomial.card.derivatives) == {name: entry.value for name, entry in entries.items()}
+
+
+def test_charts_have_the_stems_of_their_files_and_the_fits(polynomial: ReductionResult) -> None:
+    charts = polynomial._charts()
+    assert list(charts) == ["certainty", *polynomial.study.plots, "residuals"]
+    (series,) = polynomial.study.plots["static_drift_Y"].series
+    assert line(charts["static_drift_Y"], "v")[: len(series.x)]
+    fitted = {row["v"] for row in rows_of(charts["static_drift_Y"])}
+    assert min(abs(value - series.fit_value.max()) for value in fitted) < 1e-5 * abs(series.fit_value.max())
+    against = [section for section in polynomial.sections if "against motion" in section.heading]
+    assert against and all(section.charts and "95 % band" in section.text for section in against)
+
+
+def test_predicted_runs_are_shares_of_their_range(polynomial: ReductionResult) -> None:
+    (predicted,) = (each for each in polynomial.tables if each.caption.startswith("Leave-one-out"))
+    errors = polynomial.study.prediction_errors["static_drift"]
+    shown = {row[0]: row[1:] for row in predicted.rows}["static drift"]
+    assert shown == pytest.approx([100 * errors[force].relative for force in "XYN"])
+    worst = max(row[2] for row in predicted.rows if row[2] is not None)
+    assert f"sway force within {worst:.2g} %" in polynomial.headline[0]
+
+
+def test_coefficients_and_residuals_of_the_mmg_method_are_tables(mmg: MmgReductionResult) -> None:
+    coefficients, residuals, budget = mmg.tables
+    shown = {row[0]: tuple(row[1:]) for row in coefficients.rows}
+    assert shown.pop("x_R + a_H x_H") == (mmg.study.yaw_arm.value, mmg.study.yaw_arm.standard_error, "measured")
+    assert shown == {
+        name: (found.value, found.standard_error, found.origin) for name, found in mmg.coefficients.items()
+    }
+    assert [row[3] for row in residuals.rows[:5]] == pytest.approx([100 * share for share in mmg.unexplained])
+    assert [row[1] for row in budget.rows if row[0] == "w_P0"] == [100.0]  # no error common to the tests is stated
+
+
+def test_readings_are_drawn_as_computed_over_measured(mmg: MmgReductionResult) -> None:
+    points = rows_of(mmg._charts()["sway_force"])
+    readings = mmg.study.readings["Y"]
+    drawn = {(row["x"], row["v"]) for row in points}
+    both = zip(readings.measured.tolist(), readings.computed.tolist(), strict=True)
+    assert {(plain(one), plain(other)) for one, other in both} <= drawn
+
+
+def test_measured_derivatives_below_their_standard_errors_are_counted(polynomial: ReductionResult) -> None:
+    table = polynomial.derivatives
+    measured = table[table["origin"] == "measured"]
+    lost = int((measured["value"].abs() < measured["standard_error"]).sum())
+    assert lost > 1 and f"{lost} of them are smaller than the standard error" in polynomial.headline[0]

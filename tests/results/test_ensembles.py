@@ -10,10 +10,10 @@ from tank2sim.analysis.ensemble.results import Chance, ChanceOfAll, StabilityBan
 from tank2sim.analysis.ensemble.steering import BodeBands, CurveBand, SteeringBands, StepBands, TurningBands
 from tank2sim.analysis.ensemble.tails import Tail
 from tank2sim.analysis.stability.imo import ImoCriterion
-from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.answer.parts import Section
 from tank2sim.results.ensembles import chance_sentences, curve_charts, stability_section, turns_chart
 from tank2sim.simulation.bands import Band
+from tests.answer.drawn import rows_of_layer
 
 X = np.linspace(-0.6, 0.6, 13)
 KNOWN = Tail(4.2, 1.3e-5, 4.5, 4.7, 253.0, "", 2.0e-4, 1.2e-5, 2000, 900, 7, 3, 11, 0.0, {"derivatives.Nd": -2.8})
@@ -37,13 +37,9 @@ def bands(loop: bool) -> SteeringBands:
     return SteeringBands(members=8, steady_turning=turning, bode=bode, step=step)
 
 
-def rows(specification, layer: int):
-    return specification["datasets"][specification["layer"][layer]["data"]["name"]]
-
-
 def test_the_band_is_shaded_between_its_quantiles_around_the_ships_own_line() -> None:
-    specification = chart_specification(turns_chart(bands(loop=False).steady_turning))
-    line, area = rows(specification, 0), rows(specification, 1)
+    chart = turns_chart(bands(loop=False).steady_turning)
+    line, area = rows_of_layer(chart, 0), rows_of_layer(chart, 1)
     assert {row["run"] for row in line} == {"stable turns"} and len(line) == len(area) == 13
     for row in area:
         assert np.isclose(row["low"], row["v"] - 0.1) and np.isclose(row["high"], row["v"] + 0.2)
@@ -51,9 +47,9 @@ def test_the_band_is_shaded_between_its_quantiles_around_the_ships_own_line() ->
 
 
 def test_the_branch_from_port_is_drawn_where_it_differs_alone() -> None:
-    specification = chart_specification(turns_chart(bands(loop=True).steady_turning))
+    chart = turns_chart(bands(loop=True).steady_turning)
     port = np.radians(
-        [row["x"] for row in rows(specification, 0) if row["run"] == "from port turn" and row["v"] is not None]
+        [row["x"] for row in rows_of_layer(chart, 0) if row["run"] == "from port turn" and row["v"] is not None]
     )
     # From -0.2 to 0.2 rad, and one more at either side, where they meet.
     assert np.isclose(port.min(), -0.3) and np.isclose(port.max(), 0.3) and len(port) == 7
@@ -65,9 +61,9 @@ def test_a_gap_of_the_band_is_not_bridged() -> None:
     turning = bands(loop=False).steady_turning
     for each in (turning.yaw_rate_from_starboard_degps, turning.yaw_rate_from_port_degps):
         each.p5[5:8] = each.p95[5:8] = np.nan
-    specification = chart_specification(turns_chart(turning))
-    area = rows(specification, 1)
-    assert sum(row["low"] is not None for row in area) == 10 and len(rows(specification, 0)) == 13
+    chart = turns_chart(turning)
+    area = rows_of_layer(chart, 1)
+    assert sum(row["low"] is not None for row in area) == 10 and len(rows_of_layer(chart, 0)) == 13
 
 
 def ensemble(together: Tail | None, tails: dict[str, Tail | None]) -> StabilityBands:

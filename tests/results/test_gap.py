@@ -17,6 +17,7 @@ from tank2sim.results.gap import NO_TRIALS, GapResult, gap_result
 from tank2sim.results.gap_cause_charts import agreement_chart, rival_chart
 from tank2sim.results.gap_charts import gap_tracks, misfit_chart, shown_places
 from tank2sim.results.gap_text import found_in_words, probabilities_in_words, with_error
+from tests.answer.drawn import rows_of
 from tests.gap import made_up
 from tests.marks import first_fast
 
@@ -36,10 +37,6 @@ def words_of(gap):
 @pytest.fixture(scope="module")
 def charts():
     return charts_of(made_up.missing())
-
-
-def rows_of(chart):
-    return [row for rows in chart_specification(chart)["datasets"].values() for row in rows]
 
 
 def tables_of(gap):

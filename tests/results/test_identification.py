@@ -32,6 +32,7 @@ from tank2sim.records.trials import Trial
 from tank2sim.results import identification as identification_module
 from tank2sim.results.identification import MOST_TRIALS, IdentificationResult
 from tank2sim.results.trial_charts import AFTER, BEFORE, MEASURED, history_grid, track_grid
+from tests.answer import drawn
 from tests.cli.command_line import tank2sim
 from tests.identification.trials import made_up_ship
 
@@ -158,9 +159,7 @@ def test_the_card_before_is_drawn_as_before_and_the_card_found_as_found(found) -
 
 def test_windows_show_the_share_of_each_signal_by_trial(found) -> None:
     result, _, charts = found
-    cells = [
-        row for rows in chart_specification(charts["windows"])["datasets"].values() for row in rows if "share" in row
-    ]
+    cells = [row for row in drawn.rows_of(charts["windows"]) if "share" in row]
     now = {(row["trial"], row["signal"]): row["share"] for row in cells}  # the card found comes last of each trial
     for one in (*result.fit.following, *result.holdout.following):
         assert now[one.name, "r"] == pytest.approx(100 * one.relative("motion.r"), 1e-4)
@@ -199,9 +198,7 @@ def test_overshoots_keep_the_digits_that_their_errors_need(found) -> None:
 
 def test_parameters_are_in_standard_errors_of_the_prior(found) -> None:
     result, _, charts = found
-    rows = [
-        row for rows in chart_specification(charts["parameters"])["datasets"].values() for row in rows if "own" in row
-    ]
+    rows = [row for row in drawn.rows_of(charts["parameters"]) if "own" in row]
     unit = scaled_prior(result.problem, result.estimate.prior_scale)
     for place, name in enumerate(result.estimate.free):
         own, prior = (
@@ -219,9 +216,7 @@ def test_parameters_are_in_standard_errors_of_the_prior(found) -> None:
 
 def test_figures_stand_with_their_errors_in_percent(found) -> None:
     result, _, charts = found
-    rows = [
-        row for rows in chart_specification(charts["figures"])["datasets"].values() for row in rows if "name" in row
-    ]
+    rows = [row for row in drawn.rows_of(charts["figures"]) if "name" in row]
     advance = next(one for one in result.before_holdout.figures if one.name == "advance_m")
     shown, *more = [row for row in rows if row["run"] == BEFORE and row["name"] == "turn · advance"]
     assert all(row["error"] == shown["error"] for row in more)
@@ -290,11 +285,6 @@ def test_of_a_record_that_goes_on_after_the_manoeuvre_the_simulated_part_is_show
     model = half["t_s"]
     assert model[0] <= min(times) and max(times) <= model[-1] < turn.measured["t_s"][-1]
     assert not rows_of(history_grid([turn]), BEFORE), "a motion that left all bounds is left out"
-
-
-def test_a_result_read_from_its_json_has_the_same_page(found) -> None:
-    again = IdentificationResult.read(found[1].to_dict(), "i.json")
-    assert again.page() == found[1].page() and again.to_dict() == found[1].to_dict()
 
 
 def test_a_forced_result_is_marked_on_its_page(trials, found) -> None:

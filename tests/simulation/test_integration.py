@@ -1,10 +1,14 @@
+"""Integration against closed forms, other integrators and the reference trajectories."""
+
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 from tank2sim.cards import parse_card
 from tank2sim.dynamics import build
@@ -13,6 +17,7 @@ from tank2sim.simulation.integrator import NO_COMPILER, Integrator
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.running import Running, SwitchingPlan
+from tank2sim.simulation.trajectory import bracketed_root
 
 
 @pytest.fixture(scope="module")
@@ -142,3 +147,62 @@ def test_what_a_short_run_does_not_show_is_named_in_words(mariner) -> None:
     )
     listed = reported.split(": ")[1].split(", ")
     assert {"advance", "transfer", "tactical diameter", "steady diameter"} <= set(listed)
+
+
+@pytest.mark.parametrize(
+    ("function", "low", "high"),
+    [
+        (math.cos, 1.0, 2.0),
+        (lambda x: x**3 - 2, 0.0, 5.0),
+        (lambda x: math.exp(x) - 1e6, 0.0, 100.0),
+        (lambda x: math.atan(1e6 * (x - 0.3)), -1.0, 1.0),
+        (lambda x: (x - 1) ** 3 + 1e-3 * (x - 1), 0.0, 1.7),
+        (lambda x: 2 - x, 0.0, 3.0),
+    ],
+)
+def test_the_root_is_that_of_scipy(function, low, high):
+    expected = brentq(function, low, high, xtol=1e-15)
+    assert bracketed_root(function, low, high) == pytest.approx(expected, abs=1e-12)
+
+
+def test_an_end_may_be_the_root():
+    assert bracketed_root(lambda x: x, 0.0, 1.0) == 0.0
+    assert bracketed_root(lambda x: x - 1, 0.0, 1.0) == 1.0
+
+
+def test_without_a_change_of_sign_it_refuses():
+    with pytest.raises(ValueError, match="change of sign"):
+        bracketed_root(lambda x: x * x + 1, -1.0, 1.0)
+
+
+@pytest.fixture(scope="module")
+def reference(data):
+    return lambda name: np.genfromtxt(data / "reference" / name, delimiter=",", names=True)
+
+
+def test_the_35_degree_turn_agrees_within_5_cm_over_600_s(mariner, reference) -> None:
+    expected = reference("mariner_turn_35.csv")
+    run = simulate(mariner, parse_manoeuvre("turn:35"), duration_s=600.0).trajectory
+    at = np.searchsorted(run.t, expected["t_s"] - 1e-6)
+    np.testing.assert_allclose(run.t[at], expected["t_s"], atol=1e-6)
+    distance = np.hypot(run["motion.x"][at] - expected["x_m"], run["motion.y"][at] - expected["y_m"])
+    assert distance.max() < 0.05
+    for name, column in (
+        ("motion.u", "u_mps"),
+        ("motion.v", "v_mps"),
+        ("motion.r", "r_radps"),
+        ("motion.psi", "psi_rad"),
+    ):
+        np.testing.assert_allclose(run[name][at], expected[column], atol=1e-6)
+    np.testing.assert_allclose(run["rudder.angle"][at], -expected["delta_state_rad"], atol=1e-9)
+
+
+def test_the_10_10_zigzag_overshoots_agree_within_0_02_deg(mariner, reference) -> None:
+    expected = reference("mariner_zigzag_10_10.csv")
+    figures = simulate(mariner, parse_manoeuvre("zigzag:10/10"), duration_s=float(expected["t_s"][-1])).figures
+    heading = np.degrees(expected["psi_rad"])
+    inner = heading[1:-1]
+    peaks = inner[((inner >= heading[:-2]) & (inner > heading[2:])) | ((inner <= heading[:-2]) & (inner < heading[2:]))]
+    overshoots = np.abs(peaks[np.abs(peaks) > 10]) - 10
+    assert len(figures["overshoots_deg"]) >= len(overshoots) >= 3
+    np.testing.assert_allclose(figures["overshoots_deg"][: len(overshoots)], overshoots, atol=0.02)

@@ -1,4 +1,4 @@
-"""Influence on a ship's figures, against closed forms of a linear ship and against differences of high order."""
+"""Influence on the figures of ships and craft, against closed forms and against differences of high order."""
 
 from __future__ import annotations
 
@@ -8,13 +8,17 @@ import numpy as np
 import pytest
 
 from tank2sim.analysis.influence.card_influence import influence
-from tank2sim.analysis.influence.figures import parse_figure
+from tank2sim.analysis.influence.figures import FIGURE_KINDS, forms, parse_figure
+from tank2sim.analysis.influence.percent import changed_together, combined_percent, difference_percent
 from tank2sim.analysis.influence.study import Study
 from tank2sim.analysis.stability.straight_line import stability
-from tank2sim.cards import linear_card, parse_card, read_card
+from tank2sim.analysis.tuning.targets import parse_target
+from tank2sim.cards import CraftCard, linear_card, parse_card, read_card
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
+from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tests.analysis.symmetric_ship import SYMMETRIC
+from tests.cards.made_craft import craft_card
 
 LINEAR_FIGURES = ("criterion_C", "K_prime", "steady_radius_m@10", "steady_rate_degps@10", "steady_drift_deg@-10")
 SIMULATED = (
@@ -222,3 +226,148 @@ def test_a_figure_that_the_ship_does_not_show_is_reported(changes, text, words) 
     with pytest.raises(InputError) as error:
         study_of(read_card("mariner", SYMMETRIC | changes), text)
     assert words in str(error.value) and text in str(error.value)
+
+
+# Linear damping, thrust as strong astern as ahead: a spin has neither surge nor sway.
+THRUSTER = {"ahead_Ns2": 0.01, "astern_Ns2": 0.01, "max_rpm": 900.0}
+LINEAR = craft_card(60.0, 15.0, {"Xu": -80.0, "Yv": -160.0, "Nr": -90.0}, speed_mps=0.5, **THRUSTER)
+RADPS = 600 * np.pi / 30
+
+
+def test_top_speed_and_spin_have_the_influence_of_their_closed_forms() -> None:
+    study = study_of(LINEAR, "final_speed_mps@straight:600", "final_rate_degps@spin:600")
+    found = influence(study)
+    # u = 2 k n^2 / -Xu,  r = 2 k n^2 y / -Nr
+    assert found.values == pytest.approx([0.02 * RADPS**2 / 80, np.degrees(0.02 * RADPS**2 * 0.4 / 90)], rel=1e-4)
+    names = [parameter.short for parameter in found.parameters]
+    exact = {name: found.exact[:, place] for place, name in enumerate(names)}
+    assert exact["Xu"] == pytest.approx([-10, 0], abs=0.01)
+    assert exact["Nr"] == pytest.approx([0, -10], abs=0.01)
+    assert exact["port.ahead"] == pytest.approx([5, 5], abs=0.01)
+    assert exact["starboard.astern"] == pytest.approx([0, 5], abs=0.01)
+    assert exact["port.y"] == pytest.approx([0, 5], abs=0.01)
+    assert exact["mass"] == pytest.approx([0, 0], abs=0.01)
+
+
+@pytest.mark.slow
+def test_slopes_of_a_turn_are_its_central_differences() -> None:
+    texts = ("advance_m@difference:-200", "steady_diameter_m@difference:-200", "steady_rate_degps@difference:-200")
+    study = study_of(read_card("otter"), *texts)
+    values, slopes = study.slopes_at(study.values)
+    assert values[2] < 0 < values[1]
+    for place, parameter in enumerate(study.parameters):
+        if parameter.name not in ("derivatives.Nrabsr", "thrusters.port.ahead", "ship.x_G"):
+            continue
+        step = np.zeros(len(study.values))
+        step[place] = 1e-4 * parameter.value
+        above, below = study.figures_at(study.values + step), study.figures_at(study.values - step)
+        assert slopes[:, place] * 2 * step[place] == pytest.approx(above - below, rel=2e-3), parameter.name
+
+
+def test_figures_without_a_name_are_of_what_the_craft_can_do() -> None:
+    from tank2sim.api.influence import default_figures
+
+    card = read_card("otter")
+    assert isinstance(card, CraftCard)
+    families = {figure.kind.family for figure in default_figures(card)}
+    assert families == {"straight run", "turn by difference", "spin"}
+
+
+@pytest.mark.parametrize("text", ["criterion_C", "steady_radius_m@20", "advance_m@35", "final_rate_degps@spin:5000"])
+def test_a_figure_that_a_craft_cannot_show_is_refused(text) -> None:
+    with pytest.raises(InputError):
+        study_of(read_card("otter"), text)
+
+
+@pytest.mark.parametrize("text", ["advance_m@spin:400", "final_speed_mps@straight:", "final_speed_mps@straight:0"])
+def test_a_figure_that_does_not_exist_is_refused(text) -> None:
+    with pytest.raises(InputError, match="figures"):
+        parse_figure(text)
+
+
+def test_a_ship_with_a_rudder_does_not_spin() -> None:
+    with pytest.raises(InputError, match="thrusters"):
+        study_of(read_card("mariner"), "final_rate_degps@spin:400")
+
+
+def test_figures_are_read_with_their_rudder_and_heading() -> None:
+    assert parse_figure("steady_radius_m@-20").angles == pytest.approx((-math.radians(20.0),))
+    assert parse_figure("overshoot_2_deg@10/5").manoeuvre == Zigzag(math.radians(10.0), math.radians(5.0))
+    assert parse_figure("advance_m@35").manoeuvre == Turn(math.radians(35.0))
+    assert parse_figure("criterion_C").manoeuvre is None
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("steady_radius", ["did you mean", "steady_radius_m"]),
+        ("nonsense", ["criterion_C", "@20/20"]),
+        ("steady_radius_m", ["steady_radius_m@20"]),
+        ("steady_radius_m@20/20", ["steady_radius_m@20"]),
+        ("overshoot1_deg@20/20", ["did you mean overshoot_1_deg?"]),
+        ("initial_turning_m@20/20", ["did you mean initial_turning_"]),
+        ("overshoot_1_deg@20", ["overshoot_1_deg@20/20"]),
+        ("overshoot_1_deg@20/-20", ["out of bounds"]),
+        ("advance_m@0", ["out of bounds"]),
+        ("advance_m@95", ["out of bounds"]),
+        ("criterion_C@20", ["no argument"]),
+        ("criterion_C@", ["no argument"]),
+        ("advance_m@nan", ["advance_m@35"]),
+    ],
+)
+def test_what_is_no_figure_is_refused_with_what_there_is(text, words) -> None:
+    with pytest.raises(InputError) as error:
+        parse_figure(text)
+    assert all(word in str(error.value) for word in words), error.value
+
+
+def test_the_help_names_every_figure() -> None:
+    assert all(name in forms() for name in FIGURE_KINDS)
+
+
+def test_both_ways_to_write_a_target_mean_the_same() -> None:
+    one, other = parse_target("steady_radius_m=424@20"), parse_target("steady_radius_m@20=424")
+    assert (one.figure.kind, one.figure.angles, one.value) == (other.figure.kind, other.figure.angles, other.value)
+    assert one.text == "steady_radius_m@20=424"
+    limit = parse_target("overshoot_1_deg@20/20<=25")
+    assert (limit.relation, limit.value, limit.figure.text) == ("<=", 25.0, "overshoot_1_deg@20/20")
+
+
+@pytest.mark.parametrize(
+    "text", ["steady_radius_m@20", "steady_radius_m@20=424@20", "T_s=fast", "T_s=nan", "=3", "T_s<3"]
+)
+def test_what_is_no_target_is_refused(text) -> None:
+    with pytest.raises(InputError):
+        parse_target(text)
+
+
+K = {
+    **{"Cyb": 1.85, "Cyw": -1.73, "Cybb": 0.0, "Cyd": -0.8, "Cybw": 0.85, "Cyww": 0.0},
+    **{"Cmb": -5.8, "Cmw": 7.1, "Cmww": 0.85, "Cmd": -3.63, "Cmbbw": 1.8, "Cmbww": 0.3},
+}
+"""Table 3 as printed: change of the radius, %, for 10 % of each coefficient."""
+
+KC = {
+    **{"Cyb": 0.62, "Cyw": -2.153, "Cybb": 20.1529, "Cyd": -0.401, "Cybw": 0.8781, "Cyww": 4.8633},
+    **{"Cmb": 1.6676, "Cmw": 1.356, "Cmww": 5.1959, "Cmd": -0.551, "Cmbbw": -0.737, "Cmbww": 0.4026},
+}
+"""Table 4: change of each coefficient, %, with 1 % of draught."""
+
+
+def test_ten_per_cent_of_a_power_law_changes_it_by_the_power_of_1_1() -> None:
+    found = difference_percent(lambda c: c["a"] ** 2 / c["b"] + 0 * c["idle"], {"a": 3.0, "b": 0.5, "idle": 2.0})
+    assert found == pytest.approx({"a": 21.0, "b": 100 * (1 / 1.1 - 1), "idle": 0.0})
+    assert math.isnan(difference_percent(lambda c: c["a"] - 3.0, {"a": 3.0})["a"])
+
+
+def test_the_agreed_variation_gives_404_m_with_the_right_pairing_and_410_6_with_the_slip_of_the_print() -> None:
+    assert 399.6 * (1 + combined_percent(K, KC) / 100) == pytest.approx(404.0, abs=0.1)
+    slip = K | {"Cybb": 0.85, "Cybw": 0.0}
+    assert combined_percent(slip, KC) == pytest.approx(2.75, abs=0.01)
+    assert 399.6 * (1 + combined_percent(slip, KC) / 100) == pytest.approx(410.6, abs=0.1)
+
+
+def test_coefficients_of_an_agreed_variation_move_together_and_the_others_stay() -> None:
+    assert changed_together({"a": 2.0, "b": -4.0, "c": 1.0}, {"a": 1.0, "b": -5.0}, 2.0) == pytest.approx(
+        {"a": 2.04, "b": -3.6, "c": 1.0}
+    )

@@ -10,52 +10,18 @@ from scipy.stats import norm
 
 import tank2sim as t2s
 from tank2sim.analysis.stability.craft import CraftMotions, craft_stability, keeps_nearly_straight
-from tank2sim.cards import parse_card
 from tank2sim.errors import InputError
 from tank2sim.results.stability import CraftStabilityResult
+from tests.cards.made_craft import craft_card
 
-CARD = """
-format = "tank2sim-ship/1"
-[ship]
-name = "made up"
-source = "made up"
-length_m = 2.0
-[model]
-kind = "small_craft"
-speed_mps = 1.0
-[rigid_body]
-mass = 80.0
-yaw_inertia = 16.0
-x_G = 0.0
-[derivatives]
-Xudot = -5.0
-Yvdot = -40.0
-Nrdot = -10.0
-Xu = -30.0
-Xuabsu = -20.0
-Yv = -60.0
-Nr = -20.0
-Nv = -2.0
-[[thrusters]]
-name = "port"
-y_m = -0.4
-ahead_Ns2 = 0.01
-astern_Ns2 = 0.006
-max_radps = 100.0
-time_constant_s = 0.3
-[[thrusters]]
-name = "starboard"
-y_m = 0.4
-ahead_Ns2 = 0.01
-astern_Ns2 = 0.006
-max_radps = 100.0
-time_constant_s = 0.3
-"""
+DERIVATIVES = {"Xudot": -5.0, "Yvdot": -40.0, "Nrdot": -10.0, "Xu": -30.0, "Xuabsu": -20.0, "Yv": -60.0, "Nr": -20.0}
+DERIVATIVES |= {"Nv": -2.0}
+THRUSTER = {"ahead_Ns2": 0.01, "astern_Ns2": 0.006, "max_radps": 100.0, "time_constant_s": 0.3}
 
 
 @pytest.fixture(scope="module")
 def made_up():
-    return parse_card(CARD, "made_up.toml")
+    return craft_card(80.0, 16.0, DERIVATIVES, **THRUSTER)
 
 
 def test_surge_and_steering_are_those_of_the_equations_written_out(made_up):
@@ -107,7 +73,7 @@ def test_a_speed_beyond_the_thrusters_is_refused(made_up):
 
 
 def test_thrusters_at_one_side_are_refused(made_up):
-    card = parse_card(CARD.replace("y_m = 0.4", "y_m = -0.4"), "made_up.toml")
+    card = craft_card(80.0, 16.0, DERIVATIVES, sides_m=(-0.4, -0.4), **THRUSTER)
     with pytest.raises(InputError, match="both sides"):
         craft_stability(card)
 

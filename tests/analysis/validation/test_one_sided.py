@@ -1,14 +1,19 @@
-"""The sign test of one-sided errors against probabilities by hand, and its rate of false reports."""
+"""The sign test of one-sided errors against probabilities by hand, and rudders of the other sign."""
 
 from __future__ import annotations
 
+import json
 import math
+import sys
+import tomllib
 
 import numpy as np
 import pytest
 
 from tank2sim.analysis.validation.one_sided import one_sided_errors
 from tank2sim.analysis.validation.study import TURN_FIGURES, ZIGZAG_FIGURES, Validated
+from tank2sim.bundled import bundled_cards
+from tank2sim.cli import main
 
 FAMILIES = (TURN_FIGURES, ZIGZAG_FIGURES)
 TIME, FIRST, SECOND = "initial_turning_time_s", "overshoot_1_deg", "overshoot_2_deg"
@@ -74,3 +79,28 @@ def test_errors_without_a_side_are_reported_in_less_than_one_of_twenty_validatio
         drawn = [each for name in ZIGZAG_FIGURES for each in figures(name, random.standard_normal(8).tolist())]
         reports += bool(one_sided_errors(drawn, FAMILIES))
     assert reports / 400 < 0.05 + 2 * math.sqrt(0.05 * 0.95 / 400)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("ship", "other"), [("mariner", "kvlcc2-captive"), ("kvlcc2-captive", "mariner")])
+def test_compare_and_influence_show_the_rudder_derivatives_of_the_card(ship, other, tmp_path, monkeypatch) -> None:
+    stated = tomllib.loads(bundled_cards()[ship].read_text())["derivatives"]
+    runs = {
+        "compare": ["compare", ship, other, "--members", "0"],
+        "influence": ["influence", ship, "--figures", "criterion_C"],
+    }
+    found = {}
+    for name, arguments in runs.items():
+        monkeypatch.setattr(sys, "argv", ["tank2sim", *arguments, "--json", str(tmp_path / "x.json")])
+        with pytest.raises(SystemExit) as end:
+            main()
+        assert end.value.code == 0
+        found[name] = json.loads((tmp_path / "x.json").read_text())
+    rows = {row["name"]: row["cards"] for row in found["compare"]["coefficients"]}
+    for derivative in ("Yd", "Nd", "Nddd", "Ydu", "Xdd", "Nv"):
+        assert rows[derivative][0]["value"] == pytest.approx(stated[derivative])
+        assert found["influence"]["parameters"][f"derivatives.{derivative}"]["value"] == pytest.approx(
+            stated[derivative]
+        )
+    # the other card's file has the other sign: turned to that of the first
+    assert rows["Nd"][1]["value"] * stated["Nd"] > 0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import math
 import re
@@ -16,51 +15,16 @@ import pytest
 import tank2sim as t2s
 from tank2sim.apps.ardupilot.parameters import boat_parameters
 from tank2sim.apps.ardupilot.physics import SitlShip
-from tank2sim.cards import parse_card
-from tests.conftest import DATA
-
-BOAT = """
-format = "tank2sim-ship/1"
-[ship]
-name = "boat"
-length_m = 2.0
-source = "made up"
-[model]
-kind = "small_craft"
-speed_mps = 1.5
-valid_speed_mps = [0.0, 3.0]
-[rigid_body]
-mass = 55.0
-yaw_inertia = 15.0
-x_G = 0.0
-[derivatives]
-Xudot = -5.0
-Yvdot = -82.0
-Nrdot = -24.0
-Xu = -78.0
-Yvabsv = -300.0
-Nr = -41.0
-[[thrusters]]
-name = "port"
-y_m = -0.4
-ahead_Ns2 = 0.006
-astern_Ns2 = 0.006
-max_radps = 100.0
-max_astern_radps = 100.0
-[[thrusters]]
-name = "starboard"
-y_m = 0.4
-ahead_Ns2 = 0.006
-astern_Ns2 = 0.006
-max_radps = 100.0
-max_astern_radps = 100.0
-"""
-"""Masses 60 and 137 kg, inertia 39 kg m2, 60 N of each thruster: the boat of the other program."""
+from tests.cards.made_craft import craft_card
 
 
 @pytest.fixture(scope="module")
 def boat() -> t2s.Ship:
-    return t2s.Ship(parse_card(BOAT, "boat.toml"))
+    """Masses 60 and 137 kg, inertia 39 kg m2, 60 N of each thruster: the boat of the other program."""
+    derivatives = {"Xudot": -5.0, "Yvdot": -82.0, "Nrdot": -24.0, "Xu": -78.0, "Yvabsv": -300.0, "Nr": -41.0}
+    thrust = {"ahead_Ns2": 0.006, "astern_Ns2": 0.006, "max_radps": 100.0, "max_astern_radps": 100.0}
+    more = "valid_speed_mps = [0.0, 3.0]"
+    return t2s.Ship(craft_card(55.0, 15.0, derivatives, speed_mps=1.5, more=more, **thrust))
 
 
 def packet(count: int, left: int, right: int, rate: int = 400, *, wide: bool = False) -> bytes:
@@ -114,15 +78,8 @@ def test_a_disarmed_boat_rests_and_more_thrust_at_port_turns_to_starboard(boat: 
     assert turning["imu"]["gyro"][2] > 0 and turning["attitude"][2] > 0 and turning["position"][1] > 0
 
 
-def test_the_motion_is_that_of_another_programs_boat(boat: t2s.Ship) -> None:
-    file = DATA / "simulators" / "ardupilot" / "boat.py"
-    if not file.exists():
-        pytest.skip(f"needs {file}")
-    found = importlib.util.spec_from_file_location("boat", file)
-    assert found is not None and found.loader is not None
-    other = importlib.util.module_from_spec(found)
-    found.loader.exec_module(other)
-    theirs, ours = other.Boat(), SitlShip(boat.model)
+def test_the_motion_is_that_of_another_programs_boat(boat: t2s.Ship, simulator) -> None:
+    theirs, ours = simulator("ardupilot/boat.py").Boat(), SitlShip(boat.model)
     for count in range(4000):
         left, right = (1.0, 0.5) if count < 2000 else (-0.5, 1.0)
         reply = ours.answer(packet(count, 1500 + round(500 * left), 1500 + round(500 * right)))

@@ -1,12 +1,15 @@
-"""Guessed ships against made-up ones of the same dimensions, and the smoother against exact linear estimation."""
+"""A guess against exact estimation and made-up ships; the command writes a card, or refuses and writes nothing."""
 
 from __future__ import annotations
 
+import json
 import math
 
+import jsonschema
 import numpy as np
 import pytest
 
+import tank2sim as t2s
 from tank2sim.analysis.ensemble.draws import draws_of
 from tank2sim.apps.guess import study
 from tank2sim.apps.guess.prior import ShipDimensions, prior_card
@@ -28,6 +31,8 @@ from tank2sim.native.lanes import widest_lanes
 from tank2sim.notices import foremost
 from tank2sim.simulation.card_range import single_figures
 from tank2sim.simulation.run import simulate
+from tests.cli.command_line import refused, tank2sim
+from tests.marks import first_fast
 
 pytestmark = pytest.mark.skipif(widest_lanes() == 0, reason="needs a C compiler")
 
@@ -167,14 +172,6 @@ def test_impossible_and_contradictory_figures_are_named(values, named) -> None:
     assert named in f"{refusal.value.place} {refusal.value.problem}" and math.isfinite(len(refusal.value.remedy))
 
 
-@pytest.mark.parametrize(
-    "changed", [{"length_m": 3200.0}, {"beam_m": 5.8}, {"draught_m": 208.0}, {"block": 8.1}, {"speed_kn": math.nan}]
-)
-def test_dimensions_of_no_ship_are_refused(changed) -> None:
-    with pytest.raises(InputError):
-        ShipDimensions(**{**vars(TANKER), **changed})
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("key", "value", "error", "word"),
@@ -196,3 +193,36 @@ def test_usual_figures_are_not_marked() -> None:
     )
     study, _ = guess_ship(TANKER, given, "tanker", 150, 1)
     assert not foremost(study.notices)
+
+
+SHIP = ("guess", "--length", "160", "--beam", "23.2", "--draught", "7.5", "--block", "0.6", "--speed", "15")
+
+
+@pytest.mark.essential
+@pytest.mark.slow
+def test_a_guess_writes_card_page_and_json(tmp_path) -> None:
+    files = ("-o", "ship.toml", "--page", "g.html", "--json", "g.json")
+    result = tank2sim(
+        *SHIP, "--turn35", "advance_m=560 tactical_diameter_m=650+-20", "--members", "150", *files, cwd=tmp_path
+    )
+    assert result.returncode == 0, result.stderr
+    found = json.loads((tmp_path / "g.json").read_text())
+    jsonschema.validate(found, t2s.json_schema("guess"))
+    assert found["figures"]["tactical_diameter_m@35"]["standard_error"] == 20.0
+    assert (tmp_path / "ship.covariance.json").exists() and "guess" in (tmp_path / "g.html").read_text()
+    again = tank2sim("simulate", "ship.toml", "--manoeuvre", "turn:35", "--members", "20", cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
+    assert "samples of the posterior" in " ".join(again.stdout.split())
+
+
+@first_fast(
+    "given, named",
+    [
+        ("advance_m=x", "advance_m=x"),
+        ("advance_m=56", "advance_m=56"),
+        ("tactical_diameter_m=6500", "tactical_diameter_m=6500"),
+    ],
+)
+def test_figures_of_no_ship_are_refused_and_nothing_is_written(tmp_path, given: str, named: str) -> None:
+    refused(tank2sim(*SHIP, "--turn35", given, "--members", "150", "-o", "ship.toml", cwd=tmp_path), named)
+    assert not list(tmp_path.iterdir())

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
-
 from tank2sim.apps.guess.result import GuessResult
 from tank2sim.apps.guess.study import GuessedFigure, GuessedNumber, GuessStudy
 from tank2sim.notices import Notice
@@ -65,11 +63,3 @@ def test_the_tables_hold_figures_numbers_and_the_next_figure() -> None:
 def test_the_headline_says_how_much_narrower_the_other_intervals_are() -> None:
     (line,) = GuessResult(STUDY).headline
     assert "Nd" in line and "50 %" in line
-
-
-def test_a_result_read_from_its_json_has_the_same_page() -> None:
-    result = GuessResult(STUDY)
-    again = GuessResult.read(result.to_dict(), "g.json")
-    assert again.page() == result.page() and again.to_dict() == result.to_dict()
-    with pytest.raises(LookupError):
-        again.plot(name="none")

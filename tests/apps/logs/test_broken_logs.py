@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -19,77 +18,74 @@ from tests.marks import first_fast
 
 
 @pytest.fixture
-def written(tmp_path: Path):
-    def write(table: pd.DataFrame, name: str = "voyage.csv") -> Path:
-        table.to_csv(tmp_path / name, index=False)
-        return tmp_path / name
-
-    return write
-
-
-@pytest.fixture
-def nmea(tmp_path: Path):
+def nmea(saved):
     pytest.importorskip("pynmea2")
-
-    def write(lines: list[str]) -> Path:
-        path = tmp_path / "voyage.nmea"
-        path.write_text("\n".join(lines) + "\n", encoding="ascii")
-        return path
-
-    return write
+    return lambda lines: saved(lines, "voyage.nmea")
 
 
 def signals_of(result: LogResult) -> set[str]:
     return {name for cut in result.cuts for name in cut.trial.signals}
 
 
-def test_a_good_log_has_no_mark(written) -> None:
-    result = log(written(frame()))
+def test_a_good_log_has_no_mark(saved) -> None:
+    result = log(saved(frame()))
     assert result.cautions == () and {"heading", "rudder_angle", "yaw_rate", "sog", "latitude"} <= set(used(result))
 
 
-def test_a_heading_that_is_off_by_90_deg_is_marked_and_left_out(written) -> None:
-    table = frame()
-    table["heading_deg"] = (table["heading_deg"] + 90) % 360
-    result = log(written(table))
-    assert "off by 9" in result.cautions[0] and result.cautions[0].startswith("UNCONFIRMED")
-    assert "heading" not in used(result) and "psi_rad" not in signals_of(result)
+def exchanged(table: pd.DataFrame, one: str, other: str) -> pd.DataFrame:
+    return table.assign(**{one: table[other], other: table[one]})
+
+
+def noisy_course(table: pd.DataFrame) -> pd.DataFrame:
+    return table.assign(cog_deg=table.cog_deg + np.random.default_rng(1).normal(0, 1.0, len(table)))
+
+
+FALSE_CHANNELS = {
+    "heading off by 90 deg": (lambda t: t.assign(heading_deg=(t.heading_deg + 90) % 360), "off by 9", {"heading"}),
+    "mirrored heading": (lambda t: t.assign(heading_deg=-t.heading_deg % 360), "", {"heading"}),
+    "latitude for longitude": (lambda t: exchanged(t, "latitude", "longitude"), "", {"latitude", "longitude"}),
+    "longitude of the wrong sign": (
+        lambda t: t.assign(longitude=-t.longitude),
+        "wrong sign of the second",
+        {"longitude"},
+    ),
+    "rate of turn in deg/s": (lambda t: t.assign(rot_deg_min=t.rot_deg_min / 60), "deg/s", {"yaw_rate"}),
+    "speed in m/s": (lambda t: t.assign(sog_kn=t.sog_kn * 1852 / 3600), "m/s", {"sog"}),
+    "rudder against its name": (
+        lambda t: t.rename(columns={"rudder_deg": "rudder (port +) [deg]"}),
+        "contradicts the sign",
+        {"rudder_angle"},
+    ),
+    "heading for course": (
+        lambda t: exchanged(noisy_course(t), "heading_deg", "cog_deg"),
+        "exchanged",
+        {"heading", "cog"},
+    ),
+    "rudder order for its angle": (
+        lambda t: t.assign(rudder_order_deg=t.rudder_deg, rudder_deg=np.degrees(voyage().rudder).round(0)),
+        "as an order does",
+        {"rudder_angle", "rudder_order"},
+    ),
+}
+"""What is wrong: how, words of its mark, and the quantities that are left out."""
+
+
+@pytest.mark.parametrize("wrong", FALSE_CHANNELS)
+def test_a_channel_that_the_motion_contradicts_is_marked_and_left_out(saved, wrong) -> None:
+    change, words, left_out = FALSE_CHANNELS[wrong]
+    result = log(saved(change(frame())))
+    assert any(words in mark for mark in result.cautions) and result.cautions[0].startswith("UNCONFIRMED")
+    assert not left_out & set(used(result))
+    assert "heading" in left_out or "heading" in used(result)
+    signals = {"heading": "psi_rad", "latitude": "x_m"}
+    assert not {signals[name] for name in left_out & signals.keys()} & signals_of(result)
     assert all(cut.text.startswith("# UNCONFIRMED") for cut in result.cuts)
 
 
-def test_a_mirrored_heading_is_left_out(written) -> None:
-    table = frame()
-    table["heading_deg"] = -table["heading_deg"] % 360
-    result = log(written(table))
-    assert result.cautions and "heading" not in used(result)
-
-
-def test_exchanged_latitude_and_longitude_are_marked_and_left_out(written) -> None:
-    table = frame()
-    table[["latitude", "longitude"]] = table[["longitude", "latitude"]].to_numpy()
-    result = log(written(table))
-    assert result.cautions and not {"latitude", "longitude"} & set(used(result)) and "x_m" not in signals_of(result)
-    assert "heading" in used(result)
-
-
-def test_a_rate_of_turn_in_another_unit_than_it_states_is_left_out(written) -> None:
-    table = frame()
-    table["rot_deg_min"] /= 60
-    result = log(written(table))
-    assert any("deg/s" in mark for mark in result.cautions) and "yaw_rate" not in used(result)
-
-
-def test_a_speed_in_another_unit_than_it_states_is_left_out(written) -> None:
-    table = frame()
-    table["sog_kn"] *= 1852 / 3600
-    result = log(written(table))
-    assert any("m/s" in mark for mark in result.cautions) and "sog" not in used(result)
-
-
-def test_a_rudder_that_is_positive_to_port_is_turned(written) -> None:
+def test_a_rudder_that_is_positive_to_port_is_turned(saved) -> None:
     table = frame()
     table["rudder_deg"] = -table["rudder_deg"]
-    result = log(written(table))
+    result = log(saved(table))
     assert any("positive to port" in notice for notice in result.notices)
     rudder = result.voyage.series["rudder_angle"]
     made = voyage()
@@ -97,19 +93,13 @@ def test_a_rudder_that_is_positive_to_port_is_turned(written) -> None:
     assert np.degrees(np.abs(rudder.values - at)).max() < 1.0
 
 
-def test_a_name_with_a_sign_that_the_turn_contradicts_is_left_out(written) -> None:
-    table = frame().rename(columns={"rudder_deg": "rudder (port +) [deg]"})
-    result = log(written(table))
-    assert any("contradicts the sign" in mark for mark in result.cautions) and "rudder_angle" not in used(result)
-
-
 @pytest.mark.parametrize("back_s", [30.0, 3600.0])
-def test_a_clock_set_back_is_marked_and_runs_on(written, back_s) -> None:
+def test_a_clock_set_back_is_marked_and_runs_on(saved, back_s) -> None:
     table = frame()
     moments = pd.to_datetime(table["utc"])
     moments[1000:] -= pd.Timedelta(seconds=back_s)
     table["utc"] = moments.dt.strftime("%Y-%m-%dT%H:%M:%S.%fZ")
-    result = log(written(table))
+    result = log(saved(table))
     assert any("clock falls" in mark for mark in result.cautions)
     assert result.voyage.end_s - result.voyage.begin_s == pytest.approx(voyage().time[-1], abs=1.0)
     assert [stretch.kind.value for stretch in result.found if stretch.kind.excites] == ["zigzag", "turn"]
@@ -141,39 +131,24 @@ def test_half_a_sentence_and_spoilt_ones_are_counted(nmea) -> None:
     assert any("2 of" in finding.text for finding in found.findings)
 
 
-def test_two_receivers_are_two_and_the_result_is_marked(nmea) -> None:
+@pytest.mark.parametrize(("talker", "words"), [("GL", "two receivers"), ("GP", "two instruments in one")])
+def test_two_receivers_are_two_and_the_result_is_marked(nmea, talker, words) -> None:
     table, made = frame(), voyage()
-    lines = []
-    second = -1
+    lines, row = [], -2
     for line in nmea_lines():
         lines.append(line)
         if "RMC" in line:
-            second += 1
-            row = 2 * second
-            lines.append(rmc(made.time[row], table.latitude[row] + 5e-4, table.longitude[row], talker="GL"))
+            row += 2
+            lines.append(rmc(made.time[row], table.latitude[row] + 5e-4, table.longitude[row], talker=talker))
     result = log(nmea(lines))
-    assert any("two receivers" in mark for mark in result.cautions)
-    x = result.voyage.series["x"].values
-    assert np.abs(np.diff(x)).max() < 20  # no leaps between the two, which are 56 m apart
+    assert any(words in mark for mark in result.cautions)
+    if talker == "GL":  # no leaps between the two, which are 56 m apart
+        assert np.abs(np.diff(result.voyage.series["x"].values)).max() < 20
 
 
-def test_two_receivers_of_one_talker_are_marked(nmea) -> None:
-    table, made = frame(), voyage()
-    lines = []
-    second = -1
-    for line in nmea_lines():
-        lines.append(line)
-        if "RMC" in line:
-            second += 1
-            row = 2 * second
-            lines.append(rmc(made.time[row], table.latitude[row] + 5e-4, table.longitude[row]))
-    result = log(nmea(lines))
-    assert any("two instruments in one" in mark for mark in result.cautions)
-
-
-def test_a_pause_of_the_recorder_is_reported_and_nothing_is_bridged(written) -> None:
+def test_a_pause_of_the_recorder_is_reported_and_nothing_is_bridged(saved) -> None:
     table = frame().drop(range(300, 420))
-    result = log(written(table))
+    result = log(saved(table))
     assert any("60.5 s" in notice for notice in result.notices)
     for cut in result.cuts:
         columns = read_values(cut.text)
@@ -188,10 +163,10 @@ def read_values(text: str) -> dict[str, np.ndarray]:
     return dict(zip(lines[0].split(","), np.array(rows).T, strict=True))
 
 
-def test_repeated_rows_are_counted_and_left_out(written) -> None:
+def test_repeated_rows_are_counted_and_left_out(saved) -> None:
     table = frame()
     doubled = pd.concat([table.iloc[:500], table.iloc[480:]])
-    result = log(written(doubled))
+    result = log(saved(doubled))
     assert result.voyage.counts["voyage.csv"]["repeated_rows"] == 20 and result.cautions == ()
 
 
@@ -256,31 +231,6 @@ def test_a_missing_library_is_asked_for_in_one_line(nmea, monkeypatch) -> None:
     monkeypatch.setattr("importlib.import_module", refuse)
     with pytest.raises(InputError, match=r"pip install 'tank2sim\[logs\]'"):
         read_log(path)
-
-
-def test_an_exchanged_heading_and_course_are_left_out(written) -> None:
-    table = frame()
-    table["cog_deg"] += np.random.default_rng(1).normal(0, 1.0, len(table))
-    table[["heading_deg", "cog_deg"]] = table[["cog_deg", "heading_deg"]].to_numpy()
-    result = log(written(table))
-    assert any("exchanged" in mark for mark in result.cautions) and not {"heading", "cog"} & set(used(result))
-
-
-def test_a_longitude_with_the_wrong_sign_is_left_out(written) -> None:
-    table = frame()
-    table["longitude"] = -table["longitude"]
-    result = log(written(table))
-    assert any("wrong sign of the second" in mark for mark in result.cautions)
-    assert "longitude" not in used(result) and "heading" in used(result)
-
-
-def test_an_exchanged_order_and_angle_of_the_rudder_are_left_out(written) -> None:
-    table = frame()
-    table["rudder_order_deg"] = table["rudder_deg"]
-    table["rudder_deg"] = np.degrees(voyage().rudder).round(0)
-    result = log(written(table))
-    assert any("as an order does" in mark for mark in result.cautions)
-    assert not {"rudder_angle", "rudder_order"} & set(used(result))
 
 
 def test_a_log_that_was_encoded_twice_is_refused_without_a_warning(tmp_path, recwarn) -> None:

@@ -96,7 +96,7 @@ def later(values: np.ndarray, delay_s: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("late", "quantity"), [("rot_deg_min", "yaw_rate"), ("heading_deg", "heading"), ("", "")])
-def test_the_later_of_heading_and_rate_is_set_back(tmp_path, late, quantity) -> None:
+def test_the_later_of_heading_and_rate_is_set_back(saved, late, quantity) -> None:
     table, made = frame(), voyage()
     rng = np.random.default_rng(7)
     table["rot_deg_min"] = slope() + rng.normal(0, 0.3, len(made.time))
@@ -104,8 +104,7 @@ def test_the_later_of_heading_and_rate_is_set_back(tmp_path, late, quantity) -> 
     if late:
         table[late] = later(table[late].to_numpy(), 0.9)
     table["heading_deg"] %= 360
-    table.to_csv(tmp_path / "log.csv", index=False)
-    found = t2s.log(tmp_path / "log.csv")
+    found = t2s.log(saved(table, "log.csv"))
     delays = {channel.quantity: channel.delay_s for channel in found.voyage.channels.channels if channel.use}
     for name, delay in delays.items():
         assert delay == (pytest.approx(0.9, abs=0.1) if name == quantity else 0.0), name
@@ -115,15 +114,15 @@ def test_the_later_of_heading_and_rate_is_set_back(tmp_path, late, quantity) -> 
         assert rate.time_s[0] == pytest.approx(heading.time_s[0] - delays["yaw_rate"], abs=1e-6)
 
 
-def test_a_channels_file_without_the_delay_keeps_the_times(tmp_path) -> None:
+def test_a_channels_file_without_the_delay_keeps_the_times(saved, tmp_path) -> None:
     table, made = frame(), voyage()
     table["rot_deg_min"] = later(slope(), 0.9)
     table["heading_deg"] = np.degrees(made.heading) % 360
-    table.to_csv(tmp_path / "log.csv", index=False)
+    path = saved(table, "log.csv")
     folder = tmp_path / "voyage"
-    t2s.log(tmp_path / "log.csv").save(folder)
+    t2s.log(path).save(folder)
     text = (folder / "channels.toml").read_text(encoding="utf-8")
     assert text.count("delay_s = 0.") == 1
     (folder / "channels.toml").write_text(text.replace("delay_s = 0.", "delay_s = 0.0 # "), encoding="utf-8")
-    again = t2s.log(tmp_path / "log.csv", channels=folder / "channels.toml")
+    again = t2s.log(path, channels=folder / "channels.toml")
     assert all(channel.delay_s == 0.0 for channel in again.voyage.channels.channels)

@@ -1,4 +1,4 @@
-"""``tank2sim log``: a folder of trials and a channels file, which makes the next run unattended."""
+"""``tank2sim log``: a folder of trials, a channels file which makes the next run unattended, and a result."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import json
 import tomllib
 from pathlib import Path
 
-import jsonschema
 import numpy as np
 import pandas as pd
 import pytest
@@ -30,7 +29,7 @@ def entries(path: Path) -> list[dict]:
 
 
 def test_a_folder_of_trials_channels_and_json(folder) -> None:
-    found = tank2sim("log", "voyage.csv", "-o", "voyage", "--json", "log.json", "--page", "log.html", cwd=folder)
+    found = tank2sim("log", "voyage.csv", "-o", "voyage", "--json", "log.json", cwd=folder)
     assert found.returncode == 0, found.stderr
     assert {path.name for path in (folder / "voyage").iterdir()} == {
         "01_zigzag_+20.csv",
@@ -38,14 +37,8 @@ def test_a_folder_of_trials_channels_and_json(folder) -> None:
         "channels.toml",
     }
     result = json.loads((folder / "log.json").read_text(encoding="utf-8"))
-    jsonschema.validate(result, t2s.json_schema("log"))
     assert [stretch["kind"] for stretch in result["stretches"]] == ["steady", "zigzag", "steady", "turn", "steady"]
     assert result["begins_utc"] == "2023-11-14T22:13:20.000Z"
-    page = (folder / "log.html").read_text(encoding="utf-8")
-    assert page.startswith("<!doctype html>") and "01_zigzag_+20.csv" in page and "Map" in page
-    again = tank2sim("report", "log.json", "-o", "again.html", cwd=folder)
-    assert again.returncode == 0, again.stderr
-    assert (folder / "again.html").read_text(encoding="utf-8") == page
 
 
 def test_the_page_names_all_trials_however_many(folder) -> None:
@@ -194,3 +187,38 @@ def test_clocks_of_two_logs_that_differ_are_marked(folder, ahead_s) -> None:
     table = table.assign(utc=frame()["utc"])
     table.to_csv(folder / "second.csv", index=False)
     assert not any("clock" in mark for mark in t2s.log([folder / "bridge.nmea", folder / "second.csv"]).cautions)
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> LogResult:
+    path = tmp_path_factory.mktemp("log") / "voyage.csv"
+    frame().to_csv(path, index=False)
+    return t2s.log(path)
+
+
+def test_tables_and_charts_hold_channels_and_stretches(result) -> None:
+    tables = {table.caption: table.df for table in result.tables}
+    assert tables["Stretches"]["stretch"].to_list() == result.stretches["kind"].to_list()
+    assert tables["Stretches"]["file"].dropna().to_list() == ["01_zigzag_+20.csv", "02_turn_+25.csv"]
+    used = result.channels[result.channels["use"]]
+    assert tables["Channels in use"]["stream"].to_list() == used["stream"].to_list()
+    assert list(result.charts()) == ["map", "logged_signals"]
+    assert "2 trials are cut out: zigzag +20, turn +25." in result.headline[1]
+
+
+def test_a_result_read_from_its_json_has_no_trials_to_write(result) -> None:
+    again = LogResult.read(result.to_dict(), "log.json")
+    assert again.files("voyage") == {} and Path("voyage/channels.toml") in result.files("voyage")
+
+
+def test_a_trial_of_several_stretches_of_a_craft_is_one(data, tmp_path) -> None:
+    found = t2s.log(data / "data" / "logs" / "usv_22" / "voyage.csv")
+    files = [path.name for path in found.save(tmp_path) if path.suffix == ".csv"]
+    listed = [one.file for one in found.study.stretches if one.file]
+    assert len(listed) > len(files) == len(set(listed)) and set(listed) == set(files)
+    assert found.key_figures[0].value == len(files)
+    assert found.charts()["map"].to_dict()
+    for name in files:
+        rows = [line for line in (tmp_path / name).read_text().splitlines() if not line.startswith("#")][1:]
+        lasts = sum(one.duration_s for one in found.study.stretches if one.file == name)
+        assert float(rows[-1].split(",")[0]) > lasts - 1.0

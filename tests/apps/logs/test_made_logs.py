@@ -173,12 +173,11 @@ def test_an_order_of_unknown_unit_is_sure_only_where_an_angle_shows_it(tmp_path)
         assert (channel.confidence >= 0.9) is sure
 
 
-def test_of_two_rudders_the_one_that_holds_its_values_is_the_order(tmp_path) -> None:
+def test_of_two_rudders_the_one_that_holds_its_values_is_the_order(saved) -> None:
     made = voyage()
     table = frame().rename(columns={"rudder_deg": "rudder one"})
     table["rudder two"] = np.degrees(made.rudder).round(-1)
-    table.to_csv(tmp_path / "two.csv", index=False)
-    channels = log(tmp_path / "two.csv").voyage.channels
+    channels = log(saved(table, "two.csv")).voyage.channels
     assert channels.used("rudder_angle").stream == "rudder one"
     assert channels.used("rudder_order").stream == "rudder two"
 
@@ -195,21 +194,17 @@ def test_decimal_commas_a_row_of_units_and_a_local_time(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("factor", [1.0, 1e3, 1e6, 1e9])
-def test_epochs_of_any_resolution(tmp_path, factor) -> None:
+def test_epochs_of_any_resolution(saved, factor) -> None:
     table = frame()
     table["utc"] = [f"{round((T0 + t) * factor):d}" for t in voyage().time]
-    path = tmp_path / "epochs.csv"
-    table.to_csv(path, index=False)
-    times = stream_of(read_table_log(path), "heading").time_s
+    times = stream_of(read_table_log(saved(table, "epochs.csv")), "heading").time_s
     assert times[0] == pytest.approx(T0, abs=0.5) and times[-1] - times[0] == pytest.approx(899.5, abs=1.0)
 
 
-def test_seconds_from_the_beginning_give_trials_without_a_date(tmp_path) -> None:
+def test_seconds_from_the_beginning_give_trials_without_a_date(saved) -> None:
     table = frame().drop(columns="utc")
     table.insert(0, "time_s", voyage().time)
-    path = tmp_path / "seconds.csv"
-    table.to_csv(path, index=False)
-    result = log(path)
+    result = log(saved(table, "seconds.csv"))
     assert result.cuts and not any("begins:" in cut.text for cut in result.cuts)
     assert result.to_dict()["begins_utc"] is None
 
@@ -221,11 +216,10 @@ def test_dates_that_may_be_day_or_month_are_refused(tmp_path) -> None:
         read_table_log(path)
 
 
-def test_a_local_time_of_unknown_zone_is_marked(tmp_path) -> None:
+def test_a_local_time_of_unknown_zone_is_marked(saved) -> None:
     table = frame().rename(columns={"utc": "local time"})
     table["local time"] = table["local time"].str.replace("T", " ").str.rstrip("Z")
-    path = tmp_path / "local.csv"
-    table.to_csv(path, index=False)
+    path = saved(table, "local.csv")
     assert any("unknown zone" in mark for mark in log(path).cautions)
 
 
@@ -282,24 +276,21 @@ def test_time_stamps_of_the_recorder_are_used(tmp_path) -> None:
     assert heading.time_s[0] == pytest.approx(T0, abs=0.01)  # the shift of 7.25 s is that of the recorder's clock
 
 
-def test_midnight_passes(tmp_path) -> None:
+def test_midnight_passes(saved) -> None:
     pytest.importorskip("pynmea2")
     midnight = 86400 - T0 % 86400
     lines = []
     for k in range(60):
         lines += [rmc(midnight - 30 + k, 54.3 + 1e-5 * k, 10.2), sentence(f"HEHDT,{k}.0,T")]
-    path = tmp_path / "midnight.nmea"
-    path.write_text("\n".join(lines) + "\n", encoding="ascii")
-    found = read_log(path)
+    found = read_log(saved(lines, "midnight.nmea"))
     times = stream_of(found, "latitude").time_s
     assert times[-1] - times[0] == pytest.approx(59.0) and not found.findings
 
 
-def test_a_talker_that_takes_over_is_the_same_instrument(tmp_path) -> None:
+def test_a_talker_that_takes_over_is_the_same_instrument(saved) -> None:
     pytest.importorskip("pynmea2")
     lines = [rmc(k, 54.3 + 1e-5 * k, 10.2, talker="GP" if k < 100 else "GN") for k in range(200)]
-    path = tmp_path / "talkers.nmea"
-    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+    path = saved(lines, "talkers.nmea")
     latitudes = [stream for stream in read_log(path).streams if stream.quantity == "latitude"]
     assert [len(stream.values) for stream in latitudes] == [200]
 
@@ -383,12 +374,11 @@ def test_a_telemetry_log_holds_what_was_written(tmp_path) -> None:
     assert any("35 deg" in mark for mark in result.cautions)  # the full rudder is not in the log
 
 
-def test_streams_without_names_are_found_by_their_content(tmp_path) -> None:
+def test_streams_without_names_are_found_by_their_content(saved) -> None:
     table = frame()
     table.columns = ["utc", "latitude", "longitude", *(f"ch{k}" for k in range(len(table.columns) - 3))]
     table["ch9"] = np.random.default_rng(2).normal(12.6, 0.1, len(table))  # a battery
-    path = tmp_path / "nameless.csv"
-    table.to_csv(path, index=False)
+    path = saved(table, "nameless.csv")
     channels = {channel.quantity: channel for channel in log(path).voyage.channels.channels if channel.use}
     assert {key: channels[key].stream for key in ("yaw_rate", "rudder_angle")} == {
         "yaw_rate": "ch3",
@@ -399,24 +389,20 @@ def test_streams_without_names_are_found_by_their_content(tmp_path) -> None:
     assert all(channel.confidence < 0.9 for channel in channels.values() if channel.stream.startswith("ch"))
 
 
-def test_position_heading_and_rudder_alone_suffice(tmp_path) -> None:
-    path = tmp_path / "few.csv"
-    frame()[["utc", "latitude", "longitude", "heading_deg", "rudder_deg"]].iloc[::2].to_csv(path, index=False)
-    result = log(path)
+def test_position_heading_and_rudder_alone_suffice(saved) -> None:
+    result = log(saved(frame()[["utc", "latitude", "longitude", "heading_deg", "rudder_deg"]].iloc[::2], "few.csv"))
     assert [stretch.kind.value for stretch in result.found if stretch.kind.excites] == ["zigzag", "turn"]
     assert {"delta_rad", "psi_rad", "x_m", "y_m"} <= set(result.cuts[0].trial.signals)
 
 
 @pytest.mark.slow
-def test_a_log_of_a_day_at_2_hz_is_read_in_seconds(tmp_path) -> None:
+def test_a_log_of_a_day_at_2_hz_is_read_in_seconds(saved) -> None:
     table = pd.concat([frame()] * 90, ignore_index=True)
     table["utc"] = [str(T0 + 0.5 * k) for k in range(len(table))]
-    path = tmp_path / "day.csv"
-    table.to_csv(path, index=False)
     import time
 
     begin = time.monotonic()
-    read_log(path)
+    read_log(saved(table, "day.csv"))
     assert time.monotonic() - begin < 20
 
 

@@ -119,10 +119,9 @@ def test_rows_of_a_coarse_clock_are_spread_between_its_times(written, form, begi
     assert any("spread evenly" in finding.text for finding in found.findings)
 
 
-def test_two_vessels_in_one_table_are_not_spread(tmp_path) -> None:
+def test_two_vessels_in_one_table_are_not_spread(saved) -> None:
     other = table().assign(latitude=table()["latitude"] + 0.01)
-    pd.concat([table(), other]).sort_values("utc", kind="stable").to_csv(tmp_path / "two.csv", index=False)
-    result = log(tmp_path / "two.csv")
+    result = log(saved(pd.concat([table(), other]).sort_values("utc", kind="stable"), "two.csv"))
     assert any("two instruments in one" in mark for mark in result.cautions)
 
 
@@ -187,9 +186,8 @@ def test_orders_of_99_and_courses_of_360_stay() -> None:
 # Rudders, velocities ----------------------------------------------------------------------------------------------
 
 
-def steering(tmp_path, **columns):
-    table().drop(columns="rudder_deg").assign(**columns).to_csv(tmp_path / "log.csv", index=False)
-    return log(tmp_path / "log.csv")
+def steering(saved, **columns):
+    return log(saved(table().drop(columns="rudder_deg").assign(**columns), "log.csv"))
 
 
 def rudder(degrees: bool = True) -> np.ndarray:
@@ -207,8 +205,8 @@ def rudder(degrees: bool = True) -> np.ndarray:
         ("rudder_percent", lambda: 50 + rudder() / 35 * 50, 50.0),
     ],
 )
-def test_a_rudder_with_another_zero_is_taken_from_there_and_marked(tmp_path, name, values, zero) -> None:
-    result = steering(tmp_path, **{name: values()})
+def test_a_rudder_with_another_zero_is_taken_from_there_and_marked(saved, name, values, zero) -> None:
+    result = steering(saved, **{name: values()})
     (channel,) = (channel for channel in result.voyage.channels.channels if "rudder" in channel.quantity)
     assert channel.use and channel.offset == pytest.approx(zero, abs=0.01)
     found = result.voyage.series[channel.quantity]
@@ -219,28 +217,28 @@ def test_a_rudder_with_another_zero_is_taken_from_there_and_marked(tmp_path, nam
 
 
 @first_fast("name", ["rudder_raw", "rudder_adc"])
-def test_counts_of_a_converter_have_a_zero_and_no_unit(tmp_path, name) -> None:
-    result = steering(tmp_path, **{name: np.round(512 + (2 if name == "rudder_raw" else 8) * rudder())})
+def test_counts_of_a_converter_have_a_zero_and_no_unit(saved, name) -> None:
+    result = steering(saved, **{name: np.round(512 + (2 if name == "rudder_raw" else 8) * rudder())})
     assert result.cuts == () and any(name in mark for mark in result.cautions)
 
 
-def test_a_small_helm_stays_and_a_larger_one_is_marked(tmp_path) -> None:
+def test_a_small_helm_stays_and_a_larger_one_is_marked(saved) -> None:
     for helm, marked in ((2.0, False), (6.0, True)):
-        result = steering(tmp_path, rudder_deg=rudder() + helm)
+        result = steering(saved, rudder_deg=rudder() + helm)
         series = result.voyage.series["rudder_angle"]
         assert np.degrees(series.values[0]) == pytest.approx(helm, abs=0.1)
         assert any("straight legs" in mark for mark in result.cautions) == marked
 
 
-def test_an_order_whose_zero_differs_from_that_of_the_angle_follows_the_angle(tmp_path) -> None:
-    result = steering(tmp_path, rudder=rudder(), rudder_command=40 + np.round(rudder()))
+def test_an_order_whose_zero_differs_from_that_of_the_angle_follows_the_angle(saved) -> None:
+    result = steering(saved, rudder=rudder(), rudder_command=40 + np.round(rudder()))
     order = next(channel for channel in result.voyage.channels.channels if channel.quantity == "rudder_order")
     assert order.use and order.offset == 40.0 and order.unit == "deg"
 
 
-def test_the_second_rudder_is_named(tmp_path) -> None:
+def test_the_second_rudder_is_named(saved) -> None:
     columns = {"rudder port [deg]": rudder(), "rudder starboard [deg]": rudder() - 3}
-    notes = steering(tmp_path, **columns).notices
+    notes = steering(saved, **columns).notices
     assert any("rudder starboard [deg]" in note and "3 deg apart" in note for note in notes)
 
 
@@ -264,21 +262,21 @@ def test_a_velocity_is_refused_with_both_components_or_not_at_all(name) -> None:
         assert [found.used(quantity) is not None for quantity in ("u_ground", "v_ground")] == [used, used]
 
 
-def test_revolutions_astern_while_the_vessel_goes_ahead_are_not_used(tmp_path) -> None:
+def test_revolutions_astern_while_the_vessel_goes_ahead_are_not_used(saved) -> None:
     for sign in (1, -1):
-        result = steering(tmp_path, rudder_deg=rudder(), shaft_rpm=sign * table()["shaft_rpm"])
+        result = steering(saved, rudder_deg=rudder(), shaft_rpm=sign * table()["shaft_rpm"])
         used = {channel.quantity for channel in result.voyage.channels.channels if channel.use}
         assert ("rpm" in used) == (sign > 0) and any("shaft_rpm" in mark for mark in result.cautions) == (sign < 0)
         assert [stretch.kind.value for stretch in result.found] == ["steady", "zigzag", "steady", "turn", "steady"]
 
 
-def test_a_vessel_that_makes_way_with_its_engine_stopped_does_not_rest(tmp_path) -> None:
-    result = steering(tmp_path, rudder_deg=rudder(), shaft_rpm=np.zeros(1800))
+def test_a_vessel_that_makes_way_with_its_engine_stopped_does_not_rest(saved) -> None:
+    result = steering(saved, rudder_deg=rudder(), shaft_rpm=np.zeros(1800))
     assert "rest" not in {stretch.kind.value for stretch in result.found}
 
 
-def test_a_speed_that_stays_at_0_while_the_vessel_moves_is_not_used(tmp_path) -> None:
-    result = steering(tmp_path, rudder_deg=rudder(), stw_kn=np.zeros(1800))
+def test_a_speed_that_stays_at_0_while_the_vessel_moves_is_not_used(saved) -> None:
+    result = steering(saved, rudder_deg=rudder(), stw_kn=np.zeros(1800))
     assert any("stw_kn" in mark for mark in result.cautions) and "u_water" not in result.voyage.series
 
 

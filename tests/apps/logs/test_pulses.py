@@ -44,11 +44,10 @@ def test_sides_and_shares_of_two_thrusters_are_found(tmp_path, port, starboard, 
     assert used["thrust_order_port"].offset == 1500 and used["thrust_order_port"].scale == pytest.approx(1 / span)
 
 
-def test_a_rudder_by_pulses_keeps_its_side(tmp_path) -> None:
+def test_a_rudder_by_pulses_keeps_its_side(saved) -> None:
     table = frame().drop(columns=["rudder_deg"])
     table["rudder_pwm"] = np.round(1500 - np.degrees(voyage().rudder) * 400 / 35)  # longer to port
-    table.to_csv(tmp_path / "ship.csv", index=False)
-    found = log(tmp_path / "ship.csv")
+    found = log(saved(table, "ship.csv"))
     assert found.voyage.series["rudder_angle"].values == pytest.approx(voyage().rudder, abs=0.005)
 
 

@@ -1,4 +1,4 @@
-"""Logs of recorders that nobody here wrote: other clocks, one shaft called 1, arrays of thrusters, unsigned engines."""
+"""Logs of recorders that nobody here wrote: other clocks, parts, several receivers, one shaft called 1, odd columns."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ from tank2sim.apps.logs.content import AGREES, direction_evidence
 from tank2sim.apps.logs.quantities import quantity_of_name
 from tank2sim.apps.logs.reading import read_log
 from tank2sim.apps.logs.reference import ReferenceMotion
+from tank2sim.errors import InputError
 from tests.apps.logs.made_logs import T0, craft, frame, motion, nmea_lines, sentence, used, voyage
+from tests.apps.logs.recorders import dataflash
 
 DAY = 86400.0
 
@@ -100,10 +102,9 @@ def astern() -> tuple[pd.DataFrame, np.ndarray]:
 
 
 @pytest.mark.parametrize("signed", [True, False])
-def test_revolutions_without_their_sign_are_a_fault_where_the_vessel_backs(tmp_path, signed) -> None:
+def test_revolutions_without_their_sign_are_a_fault_where_the_vessel_backs(saved, signed) -> None:
     made, rpm = astern()
-    path = tmp_path / "back.csv"
-    made.assign(engine_rpm=rpm if signed else np.abs(rpm)).to_csv(path, index=False)
+    path = saved(made.assign(engine_rpm=rpm if signed else np.abs(rpm)), "back.csv")
     faults = [finding.text for finding in log(path).voyage.findings if finding.kind == "fault"]
     assert any("engine_rpm" in text and "astern" in text for text in faults) is not signed
 
@@ -149,19 +150,17 @@ def test_positions_of_unknown_axes_are_not_taken(first, second) -> None:
 
 
 @pytest.mark.parametrize("true", [False, True])
-def test_a_magnetic_heading_alone_is_said_to_give_none(tmp_path, true) -> None:
-    path = tmp_path / "compass.csv"
+def test_a_magnetic_heading_alone_is_said_to_give_none(saved, true) -> None:
     changed = table().assign(compass=(table().heading_deg + 25.0) % 360)
-    (changed if true else changed.drop(columns="heading_deg")).to_csv(path, index=False)
+    path = saved((changed if true else changed.drop(columns="heading_deg")), "compass.csv")
     faults = [finding.stream for finding in log(path).voyage.findings if finding.kind == "fault"]
     assert ("compass" in faults) is not true
 
 
-def test_a_table_of_a_row_a_sample_is_taken_apart_by_its_names(tmp_path) -> None:
+def test_a_table_of_a_row_a_sample_is_taken_apart_by_its_names(saved) -> None:
     made = table().assign(timestamp=T0 + voyage().time).drop(columns="utc")
     rows = made.melt("timestamp", var_name="signal").sort_values("timestamp", kind="stable")
-    path = tmp_path / "long.csv"
-    rows.to_csv(path, index=False)
+    path = saved(rows, "long.csv")
     named = {stream.name: stream for stream in read_log(path).streams}
     assert named.keys() == set(made.columns) - {"timestamp"}
     np.testing.assert_allclose(named["heading_deg"].values, made.heading_deg)
@@ -206,22 +205,115 @@ def test_one_of_several_alike_rudders_without_a_name_is_used(tmp_path) -> None:
     assert found["rudder_angle"].stream in ("column 6", "column 7", "column 8")
 
 
-def test_the_columns_that_vary_and_are_not_understood_are_listed(tmp_path) -> None:
+def test_the_columns_that_vary_and_are_not_understood_are_listed(saved) -> None:
     made = table()
     made["Kwartal"] = np.random.default_rng(3).normal(size=len(made))
     made["constant"] = 4.0
-    path = tmp_path / "voyage.csv"
-    made.to_csv(path, index=False)
+    path = saved(made, "voyage.csv")
     notes = [f for f in log(path).voyage.findings if f.kind == "note" and "Kwartal" in f.text]
     assert [note.evidence["streams"] for note in notes] == [1]
 
 
-def test_a_temperature_that_lies_near_the_course_is_no_heading(tmp_path) -> None:
+def test_a_temperature_that_lies_near_the_course_is_no_heading(saved) -> None:
     """A ship on 78 deg most of the time, and an engine at 78 degC."""
     made = table().rename(columns={"heading_deg": "P3"})
     made["Engine temperature"] = (
         np.degrees(voyage().heading) + np.random.default_rng(3).normal(0, 20, len(made))
     ) % 360
-    path = tmp_path / "voyage.csv"
-    made.to_csv(path, index=False)
-    assert used(log(path))["heading"] == "P3"
+    assert used(log(saved(made)))["heading"] == "P3"
+
+
+class TestDataflash:
+    @pytest.fixture(autouse=True)
+    def _library(self) -> None:
+        pytest.importorskip("pymavlink")
+
+    def test_a_receiver_without_an_instance_is_one(self, tmp_path) -> None:
+        found = read_log(dataflash(tmp_path / "old.log", statuses=(None,)))
+        assert {"GPS.Lat", "GPS.Lng"} <= {stream.name for stream in found.streams}
+
+    def test_the_clock_is_that_of_the_receiver_with_a_fix(self, tmp_path) -> None:
+        found = read_log(dataflash(tmp_path / "two.log", statuses=(1, 3)))
+        named = {stream.name: stream for stream in found.streams}
+        assert np.isnan(named["GPS[0].Lat"].values).all()
+        assert np.isfinite(named["GPS[1].Lat"].values).all()
+        utc = 315964800 + 2300 * 604800 + 100000 - 18
+        assert named["ATT.Yaw"].time_s[0] == pytest.approx(utc, abs=1e-3)
+
+    @pytest.mark.slow
+    def test_two_speed_controllers_are_a_guess_and_one_is_the_shaft(self, tmp_path) -> None:
+        for escs, expected in ((1, [("rpm", "format")]), (2, [("rpm_port", ""), ("rpm_starboard", "")])):
+            found = read_log(dataflash(tmp_path / f"{escs}.log", escs=escs))
+            speeds = [stream for stream in found.streams if stream.name.startswith("ESC")]
+            assert [(stream.quantity, stream.stated_by) for stream in speeds] == expected
+
+    @pytest.mark.parametrize("reversed_servo", [0, 1])
+    def test_a_reversed_servo_steers_as_the_vessel_does(self, tmp_path, reversed_servo) -> None:
+        found = read_log(dataflash(tmp_path / "servo.log", reversed_servo=reversed_servo))
+        (rudder,) = (stream for stream in found.streams if stream.quantity == "rudder_order")
+        assert rudder.values * 35 == pytest.approx(np.degrees(voyage().rudder), abs=0.1)
+
+
+class TestParts:
+    @pytest.fixture
+    def parts(self, tmp_path) -> list[Path]:
+        table = frame()
+        paths = [tmp_path / "whole.csv", tmp_path / "a.csv", tmp_path / "b.csv"]
+        for path, rows in zip(paths, (table, table[:700], table[700:]), strict=True):
+            rows.to_csv(path, index=False)
+        return paths
+
+    @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+    def test_files_that_follow_each_other_are_one_log(self, parts, order) -> None:
+        whole, *halves = parts
+        one, joined = log(whole), log([halves[place] for place in order])
+        assert len(joined.cuts) == len(one.cuts) == 2
+        for name, series in one.voyage.series.items():
+            np.testing.assert_allclose(joined.voyage.series[name].values, series.values, rtol=0, atol=1e-9)
+
+    def test_files_of_the_same_time_stay_apart(self, parts, saved) -> None:
+        table = frame().drop(columns=["heading_deg"])
+        result = log([parts[0], saved(table, "other.csv")])
+        assert any(channel.stream.startswith("whole: ") for channel in result.voyage.channels.channels)
+
+
+def test_hours_of_am_and_pm_are_read(saved) -> None:
+    table = frame()
+    moments = pd.to_datetime(table["utc"])
+    table["utc"] = moments.dt.strftime("%m/%d/%Y %I:%M:%S.%f %p")
+    expected = ((moments - pd.Timestamp(0, tz="UTC")) / pd.Timedelta(seconds=1)).to_numpy()
+    np.testing.assert_allclose(read_log(saved(table, "us.csv")).streams[0].time_s, expected, rtol=0, atol=1e-5)
+
+
+def test_a_time_that_cannot_be_read_is_named(saved) -> None:
+    table = frame()
+    table["utc"] = [f"{29}.11.2023 quarter past {k}" for k in range(len(table))]
+    with pytest.raises(InputError, match="column"):
+        read_log(saved(table, "odd.csv"))
+
+
+class TestSentences:
+    @pytest.fixture(autouse=True)
+    def _library(self) -> None:
+        pytest.importorskip("pynmea2")
+
+    def test_a_log_without_checksums_is_read_and_says_so(self, tmp_path) -> None:
+        lines = nmea_lines()
+        for name, text in (("with", lines), ("without", [line.split("*")[0] for line in lines])):
+            (tmp_path / f"{name}.nmea").write_text("\n".join(text) + "\n", encoding="ascii")
+        checked, unchecked = (read_log(tmp_path / f"{name}.nmea") for name in ("with", "without"))
+        assert unchecked.counts["corrupted"] == 0
+        assert any("checksum" in finding.text for finding in unchecked.findings)
+        for one, other in zip(checked.streams, unchecked.streams, strict=True):
+            np.testing.assert_array_equal(one.values, other.values)
+
+    def test_a_true_heading_with_a_status_is_a_heading(self, tmp_path) -> None:
+        lines = []
+        for line in nmea_lines():
+            words = line.split("*")[0].split(",")
+            status = "V" if len(lines) < 100 else "A"
+            lines.append(sentence(f"HETHS,{words[1]},{status}") if words[0].endswith("HDT") else line)
+        (tmp_path / "ths.nmea").write_text("\n".join(lines) + "\n", encoding="ascii")
+        (heading,) = (stream for stream in read_log(tmp_path / "ths.nmea").streams if stream.quantity == "heading")
+        valid = [line.split(",")[1] for line in lines[100:] if "THS" in line]
+        np.testing.assert_array_equal(heading.values, np.array(valid, dtype=float))

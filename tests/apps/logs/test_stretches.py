@@ -32,10 +32,8 @@ END_S = 4.0
 
 
 @pytest.fixture
-def made(tmp_path):
-    path = tmp_path / "voyage.csv"
-    frame().to_csv(path, index=False)
-    return log(path)
+def made(saved):
+    return log(saved(frame()))
 
 
 def test_a_zigzag_and_a_turn_are_found_where_they_were(made) -> None:
@@ -66,10 +64,10 @@ IN_A_ROW = {
 
 @first_fast("restless_deg", [0.0, 2.0])
 @pytest.mark.parametrize("case", IN_A_ROW)
-def test_manoeuvres_in_a_row_are_one_trial_each(tmp_path, case, restless_deg) -> None:
+def test_manoeuvres_in_a_row_are_one_trial_each(saved, case, restless_deg) -> None:
     table, known = steered([STEADY, *IN_A_ROW[case], STEADY], restless_deg)
-    table.to_csv(tmp_path / "voyage.csv", index=False)
-    found = [stretch for stretch in log(tmp_path / "voyage.csv").found if stretch.kind.excites]
+    path = saved(table, "voyage.csv")
+    found = [stretch for stretch in log(path).found if stretch.kind.excites]
     assert [stretch.kind.value for stretch in found] == [kind for kind, _, _ in known]
     for stretch, (_, begin, end) in zip(found, known, strict=True):
         assert stretch.begin_s - T0 == pytest.approx(begin, abs=6.0)  # from the helm's last correction on

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
 import re
 from collections.abc import Callable
@@ -35,16 +34,8 @@ def converted(name: str) -> ProgramFiles:
 
 
 @pytest.fixture(scope="module")
-def program(data: Path) -> Any:
-    """The equations of Bridge Command, written without tank2sim."""
-    path = data / "simulators" / "bridge_command" / "own_ship.py"
-    if not path.is_file():
-        pytest.skip(f"Bridge Command's equations are missing: no file {path}")
-    spec = importlib.util.spec_from_file_location("own_ship", path)
-    assert spec and spec.loader
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def program(simulator: Callable[[str], Any]) -> Any:
+    return simulator("bridge_command/own_ship.py")
 
 
 @dataclass

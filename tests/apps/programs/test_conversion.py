@@ -6,6 +6,7 @@ import math
 import shutil
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -167,15 +168,9 @@ def test_in_small_motions_the_fit_is_the_linear_map_of_the_method() -> None:
 
 def test_errors_are_carried_through_the_fit_as_the_linear_map_has_them() -> None:
     """Yd = -(1 + a_H) k and Nd = -(x_R + a_H x_H) k go with a_H; Yv = Yv_hull + Yd gamma_R U/u_R with both."""
-    stated = "".join(
-        f"{key} = 0.0\n" for key in "R0 Xvv Xvr Xrr Xvvvv Yr Yvvv Yvvr Yvrr Yrrr Nv Nr Nvvv Nvvr Nvrr".split()
-    )
-    stated += "".join(
-        f"{key} = 0.0\n" for key in "Nrrr mx my Jz k_0 k_1 k_2 t_P w_P0 x_P C_1 C_2_plus C_2_minus".split()
-    )
-    stated += "".join(
-        f"{key} = 0.0\n" for key in "f_alpha t_R x_H x_R eps kappa l_R gamma_R_plus gamma_R_minus".split()
-    )
+    exact = "R0 Xvv Xvr Xrr Xvvvv Yr Yvvv Yvvr Yvrr Yrrr Nv Nr Nvvv Nvvr Nvrr Nrrr mx my Jz k_0 k_1 k_2 t_P w_P0 "
+    exact += "x_P C_1 C_2_plus C_2_minus f_alpha t_R x_H x_R eps kappa l_R gamma_R_plus gamma_R_minus"
+    stated = "".join(f"{key} = 0.0\n" for key in exact.split())
     card = mmg_ship(f"{ALIKE.replace('C_1 = 2.0', 'C_1 = 0.0')}\n[uncertainty]\nYv = 0.012\na_H = 0.03\n{stated}").card
     assert isinstance(card, MmgCard)
     size, U = 1e-2, 1.179
@@ -280,14 +275,36 @@ def test_an_mss_function_has_the_rates_of_the_model(name: str, tmp_path: Path) -
     assert found[:-1] == pytest.approx(expected, rel=1e-12) and found[-1] == pytest.approx(math.hypot(0.8, 0.2))
 
 
+SAME_EQUATIONS = (
+    TEXT.replace("w_P0 = 0.40", "w_P0 = 0.0")
+    .replace("C_1 = 2.0", "C_1 = 0.0")
+    .replace("x_G = 0.0357143", "x_G = 0.0")
+    .replace("0.0185045", "0.01813444")
+)
+"""A ship without wake and with G midship, for which other programs have the same equations."""
+
+
+def converted_scope(to: str) -> dict[str, Any]:
+    """Names that the file of another program defines for :data:`SAME_EQUATIONS`."""
+    scope: dict[str, Any] = {}
+    exec(compile(t2s.convert(mmg_ship(SAME_EQUATIONS), to=to).text, "converted.py", "exec"), scope)
+    return scope
+
+
+def rates_by_the_model() -> dict[str, float]:
+    """Rates of the states of :data:`SAME_EQUATIONS` in a turn with drift and rudder."""
+    model = mmg_ship(SAME_EQUATIONS).model
+    states = {"motion.u": 1.0, "motion.v": -0.2, "motion.r": 0.05, "rudder.angle": 0.3}
+    x = [states.get(name, 0.0) for name in model.state_names]
+    rates = np.array(model.rhs(x, model.input_values(), model.parameter_values())).ravel()
+    return dict(zip(model.state_names, rates.tolist(), strict=True))
+
+
 def test_shipmmg_sails_the_same_path_where_it_has_the_same_equations() -> None:
-    """Without wake and with G midship, where its own wake law and its mixed velocities do not show."""
+    """Its own wake law and its mixed velocities do not show."""
     shipmmg = pytest.importorskip("shipmmg.mmg_3dof")
-    text = TEXT.replace("w_P0 = 0.40", "w_P0 = 0.0").replace("C_1 = 2.0", "C_1 = 0.0")
-    ship = mmg_ship(text.replace("x_G = 0.0357143", "x_G = 0.0").replace("0.0185045", "0.01813444"))
-    scope: dict[str, object] = {}
-    exec(compile(t2s.convert(ship, to="shipmmg").text, "parameters.py", "exec"), scope)
-    run = ship.turn(25).df
+    scope = converted_scope("shipmmg")
+    run = mmg_ship(SAME_EQUATIONS).turn(25).df
     t = run.t_s.to_numpy()[:: max(1, len(run) // 3000)]
     rudder = np.radians(np.interp(t, run.t_s, run.delta_deg))
     solution = shipmmg.simulate_mmg_3dof(
@@ -314,16 +331,9 @@ def test_mmg_programs_are_in_its_units() -> None:
     assert len(hull) == 20
 
 
-def test_a_vessel_of_mmgdynamics_has_the_forces_of_the_method(tmp_path: Path) -> None:
+def test_a_vessel_of_mmgdynamics_has_the_forces_of_the_method() -> None:
     """Its keys, in its units, put into its formulas: hull, thrust and rudder in a turn, without drift at the screw."""
-    text = (
-        TEXT.replace("C_1 = 2.0", "C_1 = 0.0")
-        .replace("x_G = 0.0357143", "x_G = 0.0")
-        .replace("0.0185045", "0.01813444")
-    )
-    ship = mmg_ship(text.replace("w_P0 = 0.40", "w_P0 = 0.0"))
-    scope: dict[str, object] = {}
-    exec(compile(t2s.convert(ship, to="mmgdynamics").text, "vessel.py", "exec"), scope)
+    scope = converted_scope("mmgdynamics")
     p = scope["vessel"]
     assert isinstance(p, dict) and p["m"] == pytest.approx(3270, rel=1e-5) and p["x_P"] == pytest.approx(-3.36)
     u, v, r, delta, n = 1.0, -0.2, 0.05, 0.3, scope["nps"]
@@ -342,32 +352,17 @@ def test_a_vessel_of_mmgdynamics_has_the_forces_of_the_method(tmp_path: Path) ->
     N = 0.5 * p["rho"] * p["Lpp"] ** 2 * p["d"] * U**2 * hull
     N -= (-p["Lpp"] / 2 + p["a_H"] * p["x_H_dash"] * p["Lpp"]) * F_N * math.cos(delta)
     inertia = p["I_zG"] + p["J_z_dash"] * 0.5 * p["rho"] * p["Lpp"] ** 4 * p["d"]
-    model = ship.model
-    states = {"motion.u": u, "motion.v": v, "motion.r": r, "rudder.angle": delta}
-    x = [states.get(name, 0.0) for name in model.state_names]
-    rates = np.array(model.rhs(x, model.input_values(), model.parameter_values())).ravel()
-    assert rates[model.state_names.index("motion.r")] == pytest.approx(N / inertia, rel=1e-4)
+    assert rates_by_the_model()["motion.r"] == pytest.approx(N / inertia, rel=1e-4)
 
 
 def test_mmgdynamics_has_the_rates_of_the_model_where_it_has_the_same_equations() -> None:
-    """Where it is installed (it is on no package index): without wake and with G midship."""
+    """Where it is installed (it is on no package index)."""
     mmgdynamics = pytest.importorskip("mmgdynamics.dynamics")
-    text = (
-        TEXT.replace("C_1 = 2.0", "C_1 = 0.0")
-        .replace("x_G = 0.0357143", "x_G = 0.0")
-        .replace("0.0185045", "0.01813444")
-    )
-    ship = mmg_ship(text.replace("w_P0 = 0.40", "w_P0 = 0.0"))
-    scope: dict[str, object] = {}
-    exec(compile(t2s.convert(ship, to="mmgdynamics").text, "vessel.py", "exec"), scope)
+    scope = converted_scope("mmgdynamics")
     motion = np.array([1.0, -0.2, 0.05, 0.3, scope["nps"]])
     rates = mmgdynamics.mmg_dynamics(0.0, motion, scope["vessel"], 0.0, None, None, scope["nps"], 0.3)
-    model = ship.model
-    states = {"motion.u": 1.0, "motion.v": -0.2, "motion.r": 0.05, "rudder.angle": 0.3}
-    x = [states.get(name, 0.0) for name in model.state_names]
-    expected = np.array(model.rhs(x, model.input_values(), model.parameter_values())).ravel()
-    for place, name in enumerate(("motion.u", "motion.v", "motion.r")):
-        assert rates[place] == pytest.approx(expected[model.state_names.index(name)], rel=1e-4)
+    expected = rates_by_the_model()
+    assert rates[:3] == pytest.approx([expected[name] for name in ("motion.u", "motion.v", "motion.r")], rel=1e-4)
 
 
 # -- refusals ------------------------------------------------------------------------------------------------------

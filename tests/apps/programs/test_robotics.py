@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-import runpy
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -72,31 +72,32 @@ def largest_root(m: np.ndarray, a: np.ndarray, d: np.ndarray, dt: float) -> floa
     return float((sizes[-1] / sizes[-101]) ** (1 / 100))
 
 
+def matrices(card: CraftCard) -> tuple[np.ndarray, np.ndarray]:
+    """Mass and added mass (3, 3) of surge, sway and yaw by the numbers of the card."""
+    body, d = card.rigid_body, card.derivatives
+    lever = body.mass * body.x_G
+    mass = np.array([[body.mass, 0, 0], [0, body.mass, lever], [0, lever, body.yaw_inertia]])
+    added = np.zeros((3, 3))
+    for term, row, column in (("Xudot", 0, 0), ("Yvdot", 1, 1), ("Yrdot", 1, 2), ("Nvdot", 2, 1), ("Nrdot", 2, 2)):
+        added[row, column] = -d.get(term, 0.0)
+    return mass, added
+
+
 def test_the_growth_of_an_error_is_that_of_the_plugins_step(craft: CraftCard, heavy: CraftCard) -> None:
     otter = t2s.load("otter").card
     assert isinstance(otter, CraftCard)
     for card in (craft, heavy, otter):
-        body, d = card.rigid_body, card.derivatives
-        lever = body.mass * body.x_G
-        mass = np.array([[body.mass, 0, 0], [0, body.mass, lever], [0, lever, body.yaw_inertia]])
-        added = -np.array(
-            [
-                [d.get("Xudot", 0), 0, 0],
-                [0, d.get("Yvdot", 0), d.get("Yrdot", 0)],
-                [0, d.get("Nvdot", 0), d.get("Nrdot", 0)],
-            ]
-        )
-        damping = -np.diag([d.get("Xu", 0.0), d.get("Yv", 0.0), d.get("Nr", 0.0)])
+        mass, added = matrices(card)
+        damping = -np.diag([card.derivatives.get(name, 0.0) for name in ("Xu", "Yv", "Nr")])
         assert growth_per_step(card) == pytest.approx(largest_root(mass, added, damping, 1e-3), rel=0.01)
     assert growth_per_step(otter) == pytest.approx(1.985, abs=0.005)
     assert growth_per_step(heavy) < 1 < growth_per_step(craft)
 
 
 @pytest.mark.parametrize("name", [name for name in bundled_cards() if isinstance(read_card(name), CraftCard)])
-def test_the_growth_of_each_bundled_craft_is_that_of_an_independent_calculation(name: str, data: Path) -> None:
-    path = data / "simulators" / "gazebo" / "stability.py"
-    if not path.is_file():
-        pytest.skip(f"the calculation of a plugin's step is missing: {path}")
+def test_the_growth_of_each_bundled_craft_is_that_of_an_independent_calculation(
+    name: str, simulator: Callable[[str], ModuleType]
+) -> None:
     card = read_card(name)
     assert isinstance(card, CraftCard)
     model = build(replace(card, effects=()))
@@ -105,12 +106,8 @@ def test_the_growth_of_each_bundled_craft_is_that_of_an_independent_calculation(
     def rates(u: float, v: float, r: float) -> np.ndarray:
         return accelerations(model, motion(u, v, r) | nothing)
 
-    d, body = card.derivatives, card.rigid_body
-    lever = body.mass * body.x_G
-    mass = np.array([[body.mass, 0, 0], [0, body.mass, lever], [0, lever, body.yaw_inertia]])
-    added = np.zeros((3, 3))
-    for term, row, column in (("Xudot", 0, 0), ("Yvdot", 1, 1), ("Yrdot", 1, 2), ("Nvdot", 2, 1), ("Nrdot", 2, 2)):
-        added[row, column] = -d.get(term, 0.0)
+    mass, added = matrices(card)
+    lever = mass[1, 2]
     # Damping by the slope of the accelerations, without the inertial forces of a turning craft.
     step, slopes = 1e-5, []
     for axis in range(3):
@@ -124,8 +121,7 @@ def test_the_growth_of_each_bundled_craft_is_that_of_an_independent_calculation(
         ]
     )
     damping = inertial - (mass + added) @ np.array(slopes).T
-    module = runpy.run_path(str(path))
-    expected = module["largest_root"](mass, added, damping, 1e-3)
+    expected = simulator("gazebo/stability.py").largest_root(mass, added, damping, 1e-3)
     assert growth_per_step(card) == pytest.approx(expected, rel=1e-6)
 
 

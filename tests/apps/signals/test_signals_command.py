@@ -1,7 +1,6 @@
 """``tank2sim signals``: table, JSON, page, and filtered trials that never replace the measured ones."""
 
 import json
-import re
 
 import numpy as np
 import pytest
@@ -136,19 +135,6 @@ def test_a_column_with_a_long_gap_is_left_out_with_a_notice_or_refused_by_name(p
     with pytest.raises(InputError, match=r"gappy.csv: column psi_deg: has no value from .* allow it with --max-gap"):
         run(gappy, "--columns", "psi")
     assert "interpolated by straight lines" in run(gappy, "--columns", "psi", "--max-gap", "12").output
-
-
-@pytest.mark.slow
-def test_charts_and_a_page_that_fetches_nothing(path, tmp_path):
-    plots = tmp_path / "plots"
-    run(path, "--columns", "r", "--plot", plots)
-    pictures = {picture.name for picture in plots.glob("*.png")}
-    of_r = {f"steps_r_{name}.png" for name in ("density", "autocorrelation", "spectrum")}
-    assert pictures == {*of_r, "steps_histories.png"}
-    assert all(picture.read_bytes().startswith(b"\x89PNG") for picture in plots.glob("*.png"))
-    page = (plots / "report.html").read_text()
-    assert "yaw rate" in page
-    assert not re.search(r"""(src|href)=["']?(https?:)?//""", page)
 
 
 def test_measured_trials_of_every_kind(data, tmp_path):

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import doctest
-import json
-
 import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.apps.signals import command as module
 
 
 @pytest.fixture(scope="module")
@@ -21,19 +17,6 @@ def path(tmp_path_factory):
     file = tmp_path_factory.mktemp("signals") / "sine.csv"
     np.savetxt(file, rows, delimiter=",", header="t_s,delta_deg,r_degps", comments="", fmt="%.8g")
     return file
-
-
-def test_statistics_are_in_the_units_of_the_file(path):
-    found = t2s.signals(path)
-    rows = found.statistics.set_index("column")
-    assert rows.loc["r_degps", "mean"] == pytest.approx(0.5, abs=0.01)
-    assert rows.loc["r_degps", "standard_deviation"] == pytest.approx(np.hypot(np.sqrt(2), 0.1), rel=0.01)
-    assert rows.loc["r_degps", "peak_hz"] == pytest.approx(0.05, rel=0.1)
-    assert rows.loc["delta_deg", "mean"] == pytest.approx(5.0)
-    assert np.isnan(rows.loc["delta_deg", "correlation_time_s"])  # constant
-    column = json.loads(found.to_json())["trials"][0]["columns"]["r_degps"]
-    assert column["mean"] == pytest.approx(rows.loc["r_degps", "mean"])
-    assert column["unit"] == rows.loc["r_degps", "unit"] == "deg/s"
 
 
 def test_the_spectrum_has_the_variance_of_the_signal(path):
@@ -60,14 +43,6 @@ def test_a_filter_removes_the_sine_and_the_trial_is_written_elsewhere(path, tmp_
     assert t2s.signals(path).filtered is None
 
 
-@pytest.mark.slow
-def test_it_fits_a_screen_and_shows_its_charts(path):
-    found = t2s.signals(path)
-    assert len(repr(found).splitlines()) <= 24
-    assert '<img alt="' in found._repr_html_()
-    assert set(found.charts()) == {"sine_histories", "sine_r_density", "sine_r_autocorrelation", "sine_r_spectrum"}
-
-
 @pytest.mark.parametrize(
     ("options", "source"),
     [
@@ -81,8 +56,3 @@ def test_bad_input_is_refused_with_place_and_remedy(path, options, source):
     with pytest.raises(t2s.InputError) as refusal:
         t2s.signals(path, **options)
     assert refusal.value.source.endswith(source) and refusal.value.problem and refusal.value.remedy
-
-
-def test_the_examples_run():
-    outcome = doctest.testmod(module)
-    assert outcome.attempted and not outcome.failed

@@ -53,8 +53,3 @@ def test_a_trial_whose_name_begins_as_another_keeps_its_own_charts(measured):
     trials = tuple(analyse(replace(measured, path=Path(name)), settings) for name in ("a.csv", "a_b.csv"))
     sections = SignalsResult(SignalsStudy(trials=trials)).sections
     assert [len(section.charts) for section in sections] == [1, 1, 3, 3]
-
-
-def test_a_result_read_from_its_json_has_the_same_page(result):
-    again = SignalsResult.read(result.to_dict(), "s.json")
-    assert again.page() == result.page() and again.to_dict() == result.to_dict()

@@ -6,7 +6,9 @@ import json
 import math
 import re
 import zlib
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import numpy as np
@@ -14,6 +16,8 @@ import pytest
 
 import tank2sim as t2s
 from tank2sim.apps.trial_office.conditions import Met
+from tank2sim.apps.trial_office.form import form_boxes
+from tank2sim.apps.trial_office.result import TrialOfficeResult
 from tank2sim.apps.trial_office.tried import current_removed, tried
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.manoeuvres import Stop
@@ -25,6 +29,18 @@ TRUE = {"starboard": (570.2, 1029.2), "port": (596.7, 1070.3)}
 
 def _figures(found, name, field="without_current"):
     return {one.side: getattr(one, field) for one in found.study.figures if one.name == name}
+
+
+@pytest.fixture
+def office(tmp_path: Path) -> Callable[..., TrialOfficeResult]:
+    """The office's result by the text of notes alone, or with records and options; of the Mariner unless stated."""
+
+    def asked(text: str, records: object = (), ship: object = "mariner", **options: Any) -> TrialOfficeResult:
+        notes = tmp_path / "notes.toml"
+        notes.write_text(text, encoding="utf-8")
+        return t2s.trial_office(records, ship=ship, notes=notes, **options)
+
+    return asked
 
 
 def test_the_generator_gives_the_calm_figures_of_the_document() -> None:
@@ -139,13 +155,9 @@ def bitumen(tmp_path_factory: pytest.TempPathFactory) -> t2s.Ship:
     return t2s.load(path)
 
 
-def test_published_figures_without_records_fill_the_form(bitumen: t2s.Ship, tmp_path: Path) -> None:
+def test_published_figures_without_records_fill_the_form(bitumen: t2s.Ship, office) -> None:
     """FS Bitumen No. 1, full load, 2014: the numbers of its form; what nobody recorded stays blank."""
-    from tank2sim.apps.trial_office.form import form_boxes
-
-    notes = tmp_path / "notes.toml"
-    notes.write_text(BITUMEN, encoding="utf-8")
-    found = t2s.trial_office((), ship=bitumen, notes=notes)
+    found = office(BITUMEN, ship=bitumen)
     study = found.study
     assert study.tested_at_full_load and not study.applies
     assert study.particulars.length_over_speed_s == pytest.approx(13.27, abs=0.01)
@@ -171,12 +183,9 @@ def test_published_figures_without_records_fill_the_form(bitumen: t2s.Ship, tmp_
 
 
 @pytest.mark.slow
-def test_conditions_that_are_not_met_are_said_and_refuse_nothing(tmp_path: Path) -> None:
-    notes = tmp_path / "notes.toml"
-    known = "draught_fore_m = 7.4\ndraught_aft_m = 7.5\n"
-    notes.write_text(f"{known}depth_m = 20.0\nspeed_85_mcr_mps = 8.8\nsea_state = 5\n", encoding="utf-8")
-    records = turns(tmp_path, Mariner())
-    found = t2s.trial_office(records, ship="mariner", notes=notes, members=0, wind_speed_mps=12.0, wind_from_deg=0.0)
+def test_conditions_that_are_not_met_are_said_and_refuse_nothing(office, tmp_path: Path) -> None:
+    known = "draught_fore_m = 7.4\ndraught_aft_m = 7.5\ndepth_m = 20.0\nspeed_85_mcr_mps = 8.8\nsea_state = 5\n"
+    found = office(known, turns(tmp_path, Mariner()), members=0, wind_speed_mps=12.0, wind_from_deg=0.0)
     met = {one.name: one.met for one in found.study.conditions}
     assert {met[name] for name in ("deep water", "wind speed", "sea state", "test speed")} == {Met.NOT_MET}
     assert {met[name] for name in ("draught", "trim by the stern", "turns", "both sides", "approach")} == {Met.MET}
@@ -223,12 +232,10 @@ def test_a_trial_far_from_full_load_certifies_nothing(tmp_path: Path) -> None:
     assert near.study.tested_at_full_load
 
 
-def test_a_ship_that_is_stable_in_ballast_alone_certifies_no_overshoot(tmp_path: Path) -> None:
+def test_a_ship_that_is_stable_in_ballast_alone_certifies_no_overshoot(office) -> None:
     """The KVLCC2 by MMG: C' is positive at 0.7 draughts with a trim by the stern, and negative at full load."""
-    notes = tmp_path / "notes.toml"
     figures = '[figures."zigzag:10/10"]\novershoot_1_deg = 4.0\novershoot_2_deg = 6.0\n'
-    notes.write_text(f"draught_fore_m = 13.5\ndraught_aft_m = 15.6\n{figures}", encoding="utf-8")
-    found = t2s.trial_office((), ship="kvlcc2-mmg", notes=notes, members=10)
+    found = office(f"draught_fore_m = 13.5\ndraught_aft_m = 15.6\n{figures}", ship="kvlcc2-mmg", members=10)
     study = found.study
     assert study.stable_as_tried == 1.0 and study.stable_at_full_load == 0.0
     verdicts = {one.name: one.verdict for one in study.criteria if one.as_run is not None}
@@ -348,25 +355,20 @@ def test_a_copy_of_a_record_is_refused(both_turns: list[Path], tmp_path: Path) -
 
 
 def test_the_test_speed_is_through_the_water_where_only_positions_show_it(
-    both_turns: list[Path], tmp_path: Path
+    both_turns: list[Path], office, tmp_path: Path
 ) -> None:
     """The approach is at 7.72 m/s through the water and at 8.22 over the ground."""
-    notes = tmp_path / "notes.toml"
-    notes.write_text("speed_85_mcr_mps = 8.9\n", encoding="utf-8")
     records = [_changed(path, tmp_path, lambda columns: columns.pop("u_mps")) for path in both_turns]
-    found = t2s.trial_office(records, ship="mariner", notes=notes, members=0)
+    found = office("speed_85_mcr_mps = 8.9\n", records, members=0)
     condition = next(one for one in found.study.conditions if one.name == "test speed")
     assert condition.met is Met.NOT_MET
     assert float(condition.found.removesuffix(" %")) == pytest.approx(100 * 7.7175 / 8.9, abs=2.5)
 
 
-def test_draughts_that_nobody_recorded_are_not_said_to_be_those_of_full_load(tmp_path: Path) -> None:
-    from tank2sim.apps.trial_office.form import form_boxes
-
-    notes = tmp_path / "notes.toml"
-    notes.write_text('[figures."turn:35"]\nadvance_m = 570\n', encoding="utf-8")
-    unknown = t2s.trial_office((), ship="mariner", notes=notes, members=0)
-    known = t2s.trial_office((), ship="mariner", notes=notes, members=0, draught_fore_m=7.4, draught_aft_m=7.5)
+def test_draughts_that_nobody_recorded_are_not_said_to_be_those_of_full_load(office) -> None:
+    notes = '[figures."turn:35"]\nadvance_m = 570\n'
+    unknown = office(notes, members=0)
+    known = office(notes, members=0, draught_fore_m=7.4, draught_aft_m=7.5)
     for found, met, ticks in ((unknown, Met.UNKNOWN, (None, None)), (known, Met.MET, ("[x]", "[ ]"))):
         conditions = {one.name: one.met for one in found.study.conditions}
         assert conditions["draught"] is met and conditions["trim by the stern"] is met
@@ -376,13 +378,9 @@ def test_draughts_that_nobody_recorded_are_not_said_to_be_those_of_full_load(tmp
     assert not any("DRAUGHTS" in notice for notice in known.cautions)
 
 
-def test_the_form_says_in_which_condition_the_ship_was_tried_and_what_is_not_certified(tmp_path: Path) -> None:
-    from tank2sim.apps.trial_office.form import form_boxes
-
-    notes = tmp_path / "notes.toml"
+def test_the_form_says_in_which_condition_the_ship_was_tried_and_what_is_not_certified(office) -> None:
     figures = '[figures."turn:35"]\nadvance_m = 500\ntactical_diameter_m = 700\n'
-    notes.write_text(f"depth_m = 12\n{figures}", encoding="utf-8")
-    found = t2s.trial_office((), ship="mariner", notes=notes, members=0, draught_fore_m=3.4, draught_aft_m=4.2)
+    found = office(f"depth_m = 12\n{figures}", members=0, draught_fore_m=3.4, draught_aft_m=4.2)
     rows = {row.label: row.values for box in form_boxes(found.study) for row in box.rows}
     assert rows["Trim, m by the stern"] == ("0",)  # of the ship at full load, on even keel
     assert rows["Draughts of the trial"] == ("3.4 m forward, 4.2 m aft",)
@@ -394,26 +392,20 @@ def test_the_form_says_in_which_condition_the_ship_was_tried_and_what_is_not_cer
     assert any("without members" in notice for notice in found.cautions)
 
 
-def test_without_a_trial_of_a_criterion_none_is_said_to_be_met(tmp_path: Path) -> None:
-    notes = tmp_path / "notes.toml"
-    notes.write_text('[figures."turn:15"]\nadvance_m = 900\n', encoding="utf-8")
-    found = t2s.trial_office((), ship="mariner", notes=notes, members=0)
+def test_without_a_trial_of_a_criterion_none_is_said_to_be_met(office) -> None:
+    found = office('[figures."turn:15"]\nadvance_m = 900\n', members=0)
     assert found.headline[0] == "No criterion of MSC.137(76) was tried."
 
 
 @pytest.mark.parametrize(("port", "met"), [("zigzag:-20/20", Met.NOT_MET), ("zigzag:-10/10", Met.MET)])
-def test_both_sides_are_of_the_same_manoeuvre(port: str, met: Met, tmp_path: Path) -> None:
-    notes = tmp_path / "notes.toml"
+def test_both_sides_are_of_the_same_manoeuvre(port: str, met: Met, office) -> None:
     figures = "".join(f'[figures."{name}"]\novershoot_1_deg = 5\n' for name in ("zigzag:10/10", port))
-    notes.write_text(figures, encoding="utf-8")
-    found = t2s.trial_office((), ship="mariner", notes=notes, members=0)
+    found = office(figures, members=0)
     assert {one.name: one.met for one in found.study.conditions}["both sides"] is met
 
 
-def test_assumed_errors_of_the_card_are_said(tmp_path: Path) -> None:
-    notes = tmp_path / "notes.toml"
-    notes.write_text('[figures."turn:35"]\nadvance_m = 570\n', encoding="utf-8")
-    assert any("ASSUMED" in one for one in t2s.trial_office((), ship="mariner", notes=notes, members=2).cautions)
+def test_assumed_errors_of_the_card_are_said(office) -> None:
+    assert any("ASSUMED" in one for one in office('[figures."turn:35"]\nadvance_m = 570\n', members=2).cautions)
 
 
 def test_a_zigzag_that_was_reversed_late_is_read_at_its_heading(tmp_path: Path) -> None:
@@ -513,14 +505,12 @@ def _words_of_pdf(content: bytes) -> list[str]:
     return texts
 
 
-def test_the_pdf_has_the_numbers_of_the_form(tmp_path: Path) -> None:
+def test_the_pdf_has_the_numbers_of_the_form(office) -> None:
     from tank2sim.apps.trial_office.form import form_boxes
     from tank2sim.apps.trial_office.paper import report_pdf
 
-    notes = tmp_path / "notes.toml"
     figures = '[figures."turn:35"]\nadvance_m = 511\ntactical_diameter_m = 713\n'
-    notes.write_text(f'place = "Gdańsk – roads"\n{figures}', encoding="utf-8")
-    found = t2s.trial_office((), ship="mariner", notes=notes, members=3, draught_fore_m=5.1, draught_aft_m=5.9)
+    found = office(f'place = "Gdańsk – roads"\n{figures}', members=3, draught_fore_m=5.1, draught_aft_m=5.9)
     words = _words_of_pdf(report_pdf(found))
     data = next(box for box in form_boxes(found.study) if box.title == "Manoeuvring data")
     known = [row for row in data.rows if row.values[1]]
@@ -531,10 +521,8 @@ def test_the_pdf_has_the_numbers_of_the_form(tmp_path: Path) -> None:
     assert any("Gdansk - roads" in text for text in words)
 
 
-def test_long_words_of_the_poster_break_within_their_box(tmp_path: Path) -> None:
-    notes = tmp_path / "notes.toml"
-    notes.write_text('[figures."turn:35"]\nadvance_m = 520\n', encoding="utf-8")
-    found = t2s.trial_office((), ship="mariner", notes=notes, members=3, draught_fore_m=7.0, draught_aft_m=7.2)
+def test_long_words_of_the_poster_break_within_their_box(office, tmp_path: Path) -> None:
+    found = office('[figures."turn:35"]\nadvance_m = 520\n', members=3, draught_fore_m=7.0, draught_aft_m=7.2)
     poster = str(found.files(tmp_path)[tmp_path / "poster.html"])
     assert re.search(r'<td class="long">estimated; \d of \d agree with the trial</td>', poster)
     assert "td.long { white-space: normal; }" in poster
@@ -542,7 +530,7 @@ def test_long_words_of_the_poster_break_within_their_box(tmp_path: Path) -> None
 
 @pytest.mark.parametrize(("factor", "filled"), [(1.0, True), (0.6, False)])
 def test_the_poster_shows_the_ballast_in_which_the_trial_confirmed_the_model(
-    factor: float, filled: bool, tmp_path: Path
+    factor: float, filled: bool, office, tmp_path: Path
 ) -> None:
     """At 0.74 draughts ``validity`` is 0.67: the trial decides, or the panel is left to be filled in by hand."""
     card = CARD.read_text(encoding="utf-8")
@@ -550,9 +538,7 @@ def test_the_poster_shows_the_ballast_in_which_the_trial_confirmed_the_model(
     (tmp_path / "light.toml").write_text(card + loaded, encoding="utf-8")
     own = t2s.load(tmp_path / "light.toml").turn(35).figures
     figures = "\n".join(f"{name} = {factor * own[name]}" for name in ("advance_m", "tactical_diameter_m"))
-    notes = tmp_path / "notes.toml"
-    notes.write_text(f'[figures."turn:35"]\n{figures}\n', encoding="utf-8")
-    found = t2s.trial_office((), ship="mariner", notes=notes, members=8, draught_fore_m=5.1, draught_aft_m=5.9)
+    found = office(f'[figures."turn:35"]\n{figures}\n', members=8, draught_fore_m=5.1, draught_aft_m=5.9)
     assert 0.5 < found.study.loading_validity < 0.8
     poster = str(found.files(tmp_path)[tmp_path / "poster.html"])
     assert ("range of the card ends" not in poster) is filled

@@ -160,12 +160,22 @@ rudder_normal_force = "F"
     return path
 
 
+def read_rows(folder: Path, name: str = "runs.csv") -> tuple[list[str], np.ndarray]:
+    """Heads and numbers of a table."""
+    heads, *rows = (folder / name).read_text().splitlines()
+    return heads.split(","), np.array([[float(cell) for cell in row.split(",")] for row in rows])
+
+
+def write_rows(folder: Path, heads: list[str], table: np.ndarray, name: str = "runs.csv") -> None:
+    """Write a table in the place of the one that was read."""
+    (folder / name).write_text("\n".join(",".join(row) for row in [heads, *(map(repr, r) for r in table.tolist())]))
+
+
 def add_torque(folder: Path, torque: np.ndarray, K_Q: np.ndarray) -> None:
     """A column of torque in the table, and one of 10 K_Q in that of the open-water test."""
     for name, heading, values in (("runs.csv", "Q", torque), ("water.csv", "10K_Q", 10 * K_Q)):
-        rows = (folder / name).read_text().splitlines()
-        cells = [heading, *map(repr, values.tolist())]
-        (folder / name).write_text("\n".join(f"{row},{cell}" for row, cell in zip(rows, cells, strict=True)) + "\n")
+        heads, table = read_rows(folder, name)
+        write_rows(folder, [*heads, heading], np.column_stack([table, values]), name)
 
 
 def hmri_campaign(data: Path, folder: Path) -> Path:
@@ -238,8 +248,7 @@ mass_relative = 0.01
 def with_common_errors(path: Path, seed: int) -> Path:
     """The campaign with errors common to all its rows, of the sizes that it states; the sign of each by chance."""
     random = np.random.default_rng([seed, 5])
-    rows = (path.parent / "runs.csv").read_text().splitlines()
-    table = np.array([[float(cell) for cell in row.split(",")] for row in rows[1:]])
+    heads, table = read_rows(path.parent)
     U, beta, r = table[:, 0].copy(), np.radians(table[:, 1]), table[:, 2].copy()
     u, v, rate = U * np.cos(beta), -U * np.sin(beta), r * U / 7.0
     mass = 3270.0 * 0.01 * random.standard_normal()
@@ -251,7 +260,6 @@ def with_common_errors(path: Path, seed: int) -> Path:
     table[:, 3] += 0.5 * random.standard_normal()
     table[:, 0] *= 1 + np.hypot(0.01, 0.005) * random.standard_normal()
     table[:, 2] = rate * 7.0 / table[:, 0]
-    lines = [rows[0], *(",".join(map(repr, row)) for row in table.tolist())]
-    (path.parent / "runs.csv").write_text("\n".join(lines))
+    write_rows(path.parent, heads, table)
     path.write_text(STATED + path.read_text())
     return path

@@ -1,7 +1,8 @@
-"""Glides as a user of the API has them: against the balance of forces and the geometry of a path."""
+"""Glides through the API and the command line: against the balance of forces, and what is refused."""
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
+from tests.cli.command_line import refused, tank2sim
 
 
 @pytest.fixture(scope="module")
@@ -30,37 +32,6 @@ def test_lift_drag_and_buoyancy_balance_in_degrees(glider: t2s.Ship) -> None:
     np.testing.assert_allclose(glides["lift_N"], q * glides["lift_coefficient"], rtol=1e-12)
 
 
-def test_a_programme_of_one_step_is_a_straight_path(glider: t2s.Ship, tmp_path: Path) -> None:
-    (tmp_path / "p.csv").write_text("duration_s,path_angle_deg\n100,-30\n")
-    found = glider.glide(-30, programme=tmp_path / "p.csv", views=False)
-    speed, last = found.glides["speed_mps"].iloc[0], found.path.iloc[-1]
-    assert last["x_m"] == pytest.approx(100 * speed * math.cos(math.radians(30)))
-    assert last["height_m"] == pytest.approx(-100 * speed * math.sin(math.radians(30)))
-    assert last["y_m"] == pytest.approx(0.0, abs=1e-9)
-
-
-def test_a_range_is_the_way_of_its_cycles(glider: t2s.Ship) -> None:
-    """Each metre down and each metre up takes 1/tan(angle) over the ground."""
-    ranges = glider.glide(budget_kg=50, depth_m=200, views=False).ranges
-    assert len(ranges) == 2
-    way = ranges["cycles"] * 2 * 200 / np.tan(np.radians(ranges["path_angle_deg"].abs()))
-    np.testing.assert_allclose(ranges["range_m"], way, rtol=1e-9)
-
-
-@pytest.mark.slow
-def test_a_result_fits_a_screen_and_has_a_picture(glider: t2s.Ship) -> None:
-    found = glider.glide([25, 30])
-    assert len(repr(found).splitlines()) <= 24
-    assert "data:image/png;base64," in found._repr_html_()
-    assert found.to_dict()["schema"] == "tank2sim/glide/1"
-    assert list(found.charts()) == [
-        "glide_polar",
-        "error_of_the_quasi_steady_motion_swings",
-        "error_of_the_quasi_steady_path_steps",
-    ]
-    assert found.smallest_angle_deg == pytest.approx(abs(float(str(found.best["path_angle_deg"]))))
-
-
 def test_what_cannot_be_asked_is_refused_at_its_place(glider: t2s.Ship, tmp_path: Path) -> None:
     with pytest.raises(t2s.InputError) as refusal:
         t2s.load("mariner").glide(30)
@@ -75,3 +46,66 @@ def test_what_cannot_be_asked_is_refused_at_its_place(glider: t2s.Ship, tmp_path
         with pytest.raises(t2s.InputError) as refusal:
             glider.glide(angle, views=False)
         assert refusal.value.remedy
+
+
+PROGRAMME = str(Path(__file__).parents[4] / "models/kulikovsky-velikanov/programme.csv")
+
+
+def test_angles_give_states(tmp_path) -> None:
+    result = tank2sim(
+        *("glide", "--angles", "25", "-45,35", "30", "--as-printed", "--budget-kg", "50"),
+        *("--depth-m", "200", "--no-views", "--json", "g.json"),
+        cwd=tmp_path,
+    )
+    assert result.returncode == 0, result.stderr
+    assert "23.385 deg" in result.stdout and "12.8 kg" in result.stdout and "times the right ones" in result.stdout
+    found = json.loads((tmp_path / "g.json").read_text())
+    assert [state["path_angle_deg"] for state in found["states"]] == pytest.approx([25, -45, 35, 30])
+    assert found["states"][3]["speed_mps"] == pytest.approx(0.2444, abs=6e-5)
+    assert found["as_printed"][3]["speed_mps"] == pytest.approx(0.0972, abs=6e-5)
+    assert max(abs(force) for one in found["states"] for force in one["force_residual_N"]) < 1e-10
+    assert min(abs(one["force_residual_N"][0]) for one in found["as_printed"]) > 0.01
+    assert found["design"]["smallest_angle_deg"] == pytest.approx(23.385, abs=5e-4)
+    assert len(found["design"]["ranges"]) == 6
+
+
+def test_a_programme_gives_a_path_and_the_transient_next_to_it(tmp_path) -> None:
+    result = tank2sim("glide", "--programme", PROGRAMME, "--as-printed", "--no-views", "--json", "g.json", cwd=tmp_path)
+    assert result.returncode == 0 and "transient model" in result.stdout, result.stderr
+    found = json.loads((tmp_path / "g.json").read_text())
+    last = found["path"][-1]
+    assert (last["x_m"], last["y_m"], last["height_m"]) == pytest.approx((119.215, 118.279, -24.432), abs=1e-3)
+    assert len(found["steps"]) == 12 and len(found["path_as_printed"]) == 13
+    assert found["transient"]["distance_m"][6] < 1e-6 < found["transient"]["distance_m"][12] < 10
+
+
+def test_the_reference_area_is_an_option(tmp_path) -> None:
+    arguments = ["glide", "--angles", "30", "--reference-area-m2", "0.0356", "--no-views", "--json", "g.json"]
+    assert tank2sim(*arguments, cwd=tmp_path).returncode == 0
+    (state,) = json.loads((tmp_path / "g.json").read_text())["states"]
+    assert state["speed_mps"] == pytest.approx(0.515, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--angles", "20"], ["20 deg cannot be flown", "23.385 deg"]),
+        (["--angles", "24", "--roll-deg", "30"], ["26.534 deg"]),
+        (["--angles", "thirty"], ["--angles", "thirty"]),
+        (["--angles", "95"], ["95 deg"]),
+        (["mariner"], ["model.kind", "glider"]),
+        (["--programme", "none.csv"], ["none.csv"]),
+        (["--no-views", "--budget-kg", "10"], ["--depth", "missing"]),
+        (["--no-views", "--budget-kg", "10", "--depth-m", "-3"], ["--depth", "-3"]),
+        (["--reference-area-m2", "-1"], ["--reference-area"]),
+        (["--angles", "30", "--json", "missing/g.json"], ["missing/g.json"]),
+    ],
+)
+def test_bad_input_ends_in_one_line_and_exit_2(tmp_path, arguments, words) -> None:
+    refused(tank2sim("glide", *arguments, cwd=tmp_path), *words)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("command", [["simulate", "--manoeuvre", "turn:20"], ["stability"]])
+def test_commands_for_ships_refuse_a_glider(tmp_path, command) -> None:
+    refused(tank2sim(command[0], "kulikovsky-velikanov", *command[1:], cwd=tmp_path), "rudder")

@@ -8,7 +8,6 @@ from functools import partial
 import numpy as np
 import pytest
 
-from tank2sim.answer.charts.picture import chart_specification
 from tank2sim.apps.rigs.glider import study
 from tank2sim.apps.rigs.glider.path import read_programme
 from tank2sim.apps.rigs.glider.result import GlideResult, elevation_chart, isometric_chart, plan_chart, polar_chart
@@ -16,7 +15,7 @@ from tank2sim.apps.rigs.glider.study import GlideQuestion
 from tank2sim.apps.rigs.glider.transient import swing_errors
 from tank2sim.bundled import bundled
 from tank2sim.cards import read_card
-from tests.answer.drawn import line
+from tests.answer.drawn import line, rows_of_layer
 
 PROBE = read_card("kulikovsky-velikanov")
 
@@ -36,25 +35,6 @@ def result():
     with pytest.MonkeyPatch.context() as patch:  # the long swings take most of the time
         patch.setattr(study, "swing_errors", partial(swing_errors, periods_s=(20.0, 50.0, 100.0)))
         return GlideResult(study.study_glider(PROBE, asked))
-
-
-def lines(chart, layer=0):
-    specification = chart_specification(chart)
-    return specification["datasets"][specification["layer"][layer]["data"]["name"]]
-
-
-def test_the_result_has_the_figures_and_every_chart(result) -> None:
-    assert result.key_figures[0].value == pytest.approx(23.385, abs=5e-4)
-    assert list(result.charts()) == [
-        "glide_polar",
-        "path_from_above",
-        "path_from_the_side_rolled_out",
-        "path_in_isometric_projection",
-        "programme_and_motion",
-        "error_of_the_quasi_steady_motion_swings",
-        "error_of_the_quasi_steady_path_steps",
-    ]
-    assert "12.8 kg" in result.notices[0]
 
 
 def test_tables_hold_the_glides_the_path_and_the_ranges(result) -> None:
@@ -88,9 +68,9 @@ def test_the_error_sweep_is_in_a_study_with_views(result) -> None:
 def test_a_climb_to_the_east_is_drawn_where_it_goes() -> None:
     path = {"x_m": np.zeros(2), "y_m": np.array([0.0, 40.0]), "height_m": np.array([0.0, 30.0])}
     corners = [study.PathPlace(t_s=t, x_m=0.0, y_m=40 * t, height_m=30 * t, heading_deg=90.0) for t in (0.0, 1.0)]
-    (_, plan), (_, side) = lines(plan_chart({"p": path})), lines(elevation_chart({"p": path}))
+    (_, plan), (_, side) = rows_of_layer(plan_chart({"p": path})), rows_of_layer(elevation_chart({"p": path}))
     assert (plan["x"], plan["v"]) == (40, 0) and (side["x"], side["v"]) == (40, 30)
-    rows = lines(isometric_chart("p", path, corners))
+    rows = rows_of_layer(isometric_chart("p", path, corners))
     assert (rows[1]["x"], rows[1]["v"]) == pytest.approx((40 * math.cos(math.pi / 6), -20 + 30), rel=1e-5)
     shadow = rows[3]
     assert shadow["v"] == pytest.approx(-20)
@@ -99,14 +79,8 @@ def test_a_climb_to_the_east_is_drawn_where_it_goes() -> None:
 def test_the_polar_marks_the_glides_it_is_given(result) -> None:
     study = result.study
     chart = polar_chart(study.polar, {"best": study.design.best_glide})
-    marked = lines(chart, 1)
+    marked = rows_of_layer(chart, 1)
     assert math.degrees(math.atan2(marked[0]["v"], marked[0]["x"])) == pytest.approx(23.385, abs=1e-3)
-    speeds = np.array([row["x"] for row in lines(chart)])
+    speeds = np.array([row["x"] for row in rows_of_layer(chart)])
     assert speeds.max() == pytest.approx(study.design.fastest_glide.horizontal_speed_mps, rel=1e-3)
     assert line(chart, "v", "polar") == pytest.approx(-study.polar["climb_mps"], rel=1e-5)
-
-
-@pytest.mark.slow
-def test_a_result_read_from_its_json_has_the_same_page(result) -> None:
-    again = GlideResult.read(result.to_dict(), "g.json")
-    assert again.page() == result.page() and again.to_dict() == result.to_dict()

@@ -5,22 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.polynomial import Polynomial
 from scipy import stats
 from scipy.integrate import solve_ivp
 
-from tank2sim.apps.rigs.tow.output_error import fit_speeds, simulated_speeds, speed_predictor
-from tank2sim.apps.rigs.tow.records import Tows, read_tows
+from tank2sim.apps.rigs.tow.output_error import TowOptions, fit_speeds, simulated_speeds, speed_predictor
+from tank2sim.apps.rigs.tow.records import Tows
 from tank2sim.apps.rigs.tow.surge import SurgeCoefficients
-from tank2sim.bundled import bundled
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import scaled_condition
 
 FORCE_N = 11.63
-
-
-@pytest.fixture
-def table_1():
-    return read_tows(bundled("models", "wilinski-zellman", "tows.csv"))
 
 
 # papers.md 1.7: estimates, their 95 % half-widths, scatter, scaled condition of J'J
@@ -60,10 +55,19 @@ def test_speeds_are_those_of_the_closed_form_at_uneven_times():
     np.testing.assert_allclose(with_start, [0, top * np.tanh(5.0 / time_constant)])
 
 
-def test_sensitivities_are_those_of_differences():
-    terms, point = ("B1", "B2", "B3"), np.array([3000.0, 20000.0, 500.0, 100.0])
-    predict = speed_predictor(np.array([0.0, 5, 20, 50]), FORCE_N, terms)
+@pytest.mark.parametrize(
+    ("terms", "force", "options", "point"),
+    [
+        (("B1", "B2", "B3"), FORCE_N, TowOptions(), [3000.0, 20000.0, 500.0, 100.0]),
+        (("B2", "B3"), Polynomial([12.0, 0.1, -0.0015]), TowOptions(start_delay=True), [3000.0, 500.0, 100.0, 6.3]),
+    ],
+)
+def test_sensitivities_are_those_of_differences(terms, force, options, point):
+    point = np.array(point)
+    predict = speed_predictor(np.array([0.0, 5, 20, 50]), force, terms, options)
     sensitivity = predict(point)[1]
+    at_rest = 2 if options.start_delay else 1
+    assert np.all(sensitivity[:at_rest] == 0)
     for k, value in enumerate(point):
         change = np.zeros(4)
         change[k] = 1e-4 * value

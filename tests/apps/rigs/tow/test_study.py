@@ -1,6 +1,10 @@
-"""What the tows of paper 1 can and cannot tell: papers.md 1.3, 1.5, 1.6 and 1.7."""
+"""What the tows of paper 1 can and cannot tell: papers.md 1.3, 1.5, 1.6 and 1.7, and what its result says of them."""
 
+from __future__ import annotations
+
+import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import printed_tows
@@ -10,27 +14,24 @@ from scipy import stats
 
 from tank2sim.apps.rigs.tow import paper as tow_paper
 from tank2sim.apps.rigs.tow.equation_error import discretise, solve_by_qr
+from tank2sim.apps.rigs.tow.findings import _worst_misfit
 from tank2sim.apps.rigs.tow.identify import identify_tow
 from tank2sim.apps.rigs.tow.output_error import TowOptions, fit_speeds, simulated_speeds
-from tank2sim.apps.rigs.tow.records import Tows, read_tows
-from tank2sim.apps.rigs.tow.result import TowResult
+from tank2sim.apps.rigs.tow.records import Tows
+from tank2sim.apps.rigs.tow.result import TowResult, drag_chart, tow_speed_chart
 from tank2sim.apps.rigs.tow.study import (
     SIMPLE,
     SIMPLE_LATE,
     TowModel,
+    TowSpeeds,
     compare_models,
     mass_range,
     speed_polynomials,
     study_tows,
     towed_body,
 )
-from tank2sim.bundled import bundled
 from tank2sim.errors import InputError
-
-
-@pytest.fixture(scope="module")
-def table_1():
-    return read_tows(bundled("models", "wilinski-zellman", "tows.csv"))
+from tests.answer.drawn import panels, rows_of, whole_panel
 
 
 @pytest.fixture(scope="module")
@@ -157,20 +158,6 @@ def test_notes_tell_the_range_and_offer_a_way_out(study, table_1):
     assert posed.mass_by_theory == () and posed.drag_coefficients == {}
 
 
-def test_json_keeps_its_keys_and_has_more(study):
-    content = TowResult(study).to_dict()
-    assert set(content["methods"]) == {"paper", "qr", "output_error"}
-    assert [notice["text"] for notice in content["notices"]] == list(study.notices)
-    assert content["mass_range_kg"] == pytest.approx([2547, 3399], abs=1)
-    assert [row["degree"] for row in content["speed_polynomials"]] == [0, 1, 2, 3]
-    by_length = content["drag_coefficients"]["paper"]["by_length_squared"]
-    assert by_length["A3"] == pytest.approx(content["methods"]["paper"]["estimates"]["B3_kgpm"] / 7220)
-    assert content["tow_by_tow"]["output error: M, B3"]["jackknife_standard_errors"] == pytest.approx(
-        [84, 23], rel=0.02
-    )
-    assert [row["k11"] for row in content["mass_by_theory"]] == pytest.approx([0.0946, 0.0755, 0.156], abs=5e-5)
-
-
 def test_one_tow_is_not_compared_tow_by_tow(table_1):
     alone = table_1.only(0)
     study = study_tows(identify_tow(alone, terms=("B3",)), alone)
@@ -194,3 +181,123 @@ def test_table_1_is_known_again(table_1):
 def test_a_tow_that_ends_early_is_reported_with_its_polynomial_continued(study):
     (note,) = [note for note in study.notices if note.startswith("Tow ")]
     assert all(words in note for words in ("Tow 4", "45 s", "2682 kg", "50 s", "2687 kg"))
+
+
+SCATTER = 0.01
+
+
+def tows(readings: list[list[float]]) -> Tows:
+    """Readings of two tows at 0, 1, 2 ... s; at rest at first."""
+    table = np.array([[0.0, 0.0], *readings])
+    return Tows(Path("made_up.csv"), ("speed_1_mps", "speed_2_mps"), np.arange(len(table), dtype=float), table)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_misfit_is_distinguished_from_the_95th_percentile_of_f_on_with_one_and_two_degrees_of_freedom(
+    sign: int,
+) -> None:
+    """F(1, 2) is 18.51 at 95 %: two times, one estimate, two tows each."""
+    pair = [[1 - SCATTER, 1 + SCATTER], [2 - SCATTER, 2 + SCATTER]]
+    limit = SCATTER * math.sqrt(18.51)  # lack is 2 e^2, pure error 4 s^2 over 2 degrees of freedom
+    assert _worst_misfit(tows(pair), np.array([0.0, 1.0, 2.0 + 0.99 * sign * limit]), 1) is None
+    assert _worst_misfit(tows(pair), np.array([0.0, 1.0, 2.0 + 1.01 * sign * limit]), 1) == 2
+    assert _worst_misfit(tows(pair), np.array([0.0, 1.0 + 1.01 * sign * limit, 2.0]), 1) == 1
+
+
+def test_a_misfit_is_reported_with_a_single_repetition() -> None:
+    """F(1, 1) is 161.4 at 95 %."""
+    once = [[1 - SCATTER, 1 + SCATTER], [2.0, math.nan]]
+    limit = SCATTER * math.sqrt(2 * 161.45)  # lack is e^2, pure error 2 s^2
+    assert _worst_misfit(tows(once), np.array([0.0, 1.0, 2.0 + 0.99 * limit]), 1) is None
+    assert _worst_misfit(tows(once), np.array([0.0, 1.0, 2.0 + 1.01 * limit]), 1) == 2
+
+
+def test_no_misfit_is_reported_without_freedom_without_repetition_or_without_scatter() -> None:
+    off = np.array([0.0, 1.0, 9.0])
+    pair = [[1 - SCATTER, 1 + SCATTER], [2 - SCATTER, 2 + SCATTER]]
+    assert _worst_misfit(tows(pair), off, 1) == 2
+    assert _worst_misfit(tows(pair), off, 2) is None
+    assert _worst_misfit(tows([[1.0, math.nan], [2.0, math.nan]]), off, 1) is None
+    assert _worst_misfit(tows([[1.0, 1.0], [2.0, 2.0]]), off, 1) is None
+
+
+@pytest.fixture(scope="module")
+def result(table_1):
+    found = identify_tow(table_1)
+    return TowResult(study_tows(found, table_1, towed_body(table_1, found.mass_kg, {})))
+
+
+def table_rows(result, caption):
+    (found,) = (each for each in result.tables if each.caption.startswith(caption))
+    return {row[0]: row for row in found.rows}
+
+
+def test_the_paper_stands_next_to_what_its_tows_give(result):
+    assert [figure.value for figure in result.key_figures[:3]] == [2772, 529, "2.55 to 3.40"]
+    notices = result.layout().sections[-1].notes
+    assert len(notices) == len(result.notices) and not any("e+" in note or "e-0" in note for note in notices)
+    assert "22\u202f000 (qr) and 580\u202f000 (output_error)" in notices[0]
+    polynomials = table_rows(result, "Polynomials")
+    assert polynomials["2, printed"][1:4] == list(tow_paper.TABLE_2[2][0]) and len(polynomials) == 8
+    drags = {row[0]: row for row in result.sections[3].tables[0].rows if row[1] == "L²"}
+    assert drags["as printed"][2:5] == pytest.approx([12.8, -3.6144, 0.27909], rel=3e-5)
+    assert "best usable: M, B3, delay" in drags
+    assert [round(row[3]) for row in result.sections[4].tables[0].rows] == [2357, 2316, 2489]
+
+
+def test_estimates_stand_by_method_with_their_errors(result):
+    estimates = table_rows(result, "Estimates by method, ± one standard error")
+    fit = result.study.methods["output_error"]
+    mass, error = (float(text) for text in estimates["M (kg)"][3].split(" ± "))
+    assert mass == pytest.approx(fit.estimates["total_mass_kg"], abs=0.05)
+    assert error == pytest.approx(fit.standard_errors["total_mass_kg"], abs=5)
+    assert "±" not in estimates["M (kg)"][1]  # the published method gives no error
+
+
+def test_other_tows_are_not_held_next_to_the_paper(table_1):
+    one = replace(table_1.only(0), body={})
+    found = TowResult(study_tows(identify_tow(one, terms=("B3",)), one))
+    assert [section.heading for section in found.sections] == [
+        "Measured and computed speeds",
+        "Estimates by method",
+        "What these tows determine",
+    ]
+    assert len(table_rows(found, "Polynomials")) == 4
+
+
+def test_charts_hold_the_speeds_and_the_models(result):
+    charts, study = result._charts(), result.study
+    assert list(charts) == [
+        "measured_and_computed_speeds",
+        "what_these_tows_determine",
+        "what_these_tows_determine_2",
+        "drag_coefficient",
+    ]
+    speed, left = panels(charts["measured_and_computed_speeds"]).values()
+    first, *_ = study.speeds.simulated_mps
+    drawn = [row["v"] for row in speed if row["run"] == first]
+    assert drawn == pytest.approx(study.speeds.simulated_mps[first], rel=1e-5)
+    assert {row["v"] for row in left if row["run"] == first} == {0.0}
+    models = {row["name"]: row["m"] for row in rows_of(charts["what_these_tows_determine"]) if "name" in row}
+    assert models == {one.label: pytest.approx(one.estimates["M"], rel=1e-5) for one in study.models}
+
+
+def test_drag_chart_has_speed_and_reynolds_number(result):
+    body, drag = result.study.body, result.study.drag_coefficients["qr"].by_length_squared
+    rows = [row for row in rows_of(drag_chart({"qr": drag}, body, 0.176)) if "speed" in row]
+    last = max(rows, key=lambda row: row["speed"])
+    assert last["speed"] == pytest.approx(0.176) and last["re"] == pytest.approx(0.176 * 3.8 / 1.139e-6, rel=1e-5)
+    assert last["cv"] == pytest.approx(8.42716 * last["c"], rel=1e-4)
+    assert last["c"] == pytest.approx(float(drag.at(np.array(0.176))), rel=1e-5)
+
+
+def test_residuals_are_readings_less_the_first_fit(table_1):
+    speeds = TowSpeeds(
+        t_s=table_1.time_s,
+        measured_mps={"tow 3": table_1.speed_mps[:, 2]},
+        simulated_t_s=np.array([0.0, 50.0]),
+        simulated_mps={"line": np.array([0.0, 0.175])},
+    )
+    found = {(row["run"], row["x"]): row["v"] for row in whole_panel(tow_speed_chart(speeds), 1)}
+    assert found["tow 3", 20.0] == pytest.approx(0.078 - 0.07)
+    assert found["line", 50.0] == 0

@@ -1,14 +1,16 @@
-"""Tows through the public API: mass and drag of a body whose equation of motion is known, and its card."""
+"""Tows through the API and the command line: mass and drag of a body of known equation of motion, and its card."""
 
 from __future__ import annotations
 
-import doctest
+import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.apps.rigs.tow import command as module
+from tank2sim.cards import read_card
+from tests.cli.command_line import refused, tank2sim
 
 FORCE_N, MASS_KG, TOTAL_KG, B3 = 12.0, 2000.0, 2500.0, 90.0
 
@@ -43,13 +45,6 @@ def test_mass_and_drag_are_those_of_the_analytic_motion(found):
     assert low < TOTAL_KG < high
 
 
-def test_the_json_has_the_same_numbers(found):
-    content = found.to_dict()
-    assert content["schema"] == "tank2sim/tow/1"
-    assert content["methods"]["output_error"]["estimates"]["total_mass_kg"] == found.total_mass_kg
-    assert [notice["text"] for notice in content["notices"]] == list(found.notices)
-
-
 def test_the_card_has_the_numbers_and_simulates(found, tmp_path):
     found.card.save(tmp_path / "body.toml")
     card = t2s.load(tmp_path / "body.toml").card
@@ -64,14 +59,6 @@ def test_a_force_is_a_number_or_a_polynomial(path):
     assert constant.total_mass_kg == pytest.approx(2 * TOTAL_KG, rel=0.01)  # (1.5) is linear in T, M and B
     rising = t2s.tow(path, force_N=[FORCE_N, 0.0], terms=["B3"], total_mass_kg=TOTAL_KG)
     assert rising.total_mass_kg == TOTAL_KG
-
-
-@pytest.mark.slow
-def test_it_fits_a_screen_and_shows_its_charts(found):
-    assert len(repr(found).splitlines()) <= 24
-    assert '<img alt="' in found._repr_html_()
-    assert {"measured_and_computed_speeds", "drag_coefficient"} <= set(found.charts())
-    assert found.page().startswith("<!doctype html>")
 
 
 @pytest.mark.parametrize(
@@ -89,7 +76,39 @@ def test_bad_input_is_refused_with_place_and_remedy(path, options, source):
     assert refusal.value.source == source and refusal.value.problem and refusal.value.remedy
 
 
-@pytest.mark.slow
-def test_the_examples_run():
-    outcome = doctest.testmod(module)
-    assert outcome.attempted and not outcome.failed
+TOWS = str(Path(__file__).parents[4] / "models/wilinski-zellman/tows.csv")
+
+
+def test_a_force_that_varies_and_a_known_mass(tmp_path) -> None:
+    arguments = (
+        "--force-N",
+        "11.63,0.001",
+        "--total-mass-kg",
+        "2800",
+        "--terms",
+        "B3",
+        "--json",
+        "t.json",
+        "-o",
+        "body.toml",
+    )
+    result = tank2sim("tow", TOWS, *arguments, cwd=tmp_path)
+    assert result.returncode == 0 and "T = 11.63 + 0.001 t N" in result.stdout, result.stderr
+    found = json.loads((tmp_path / "t.json").read_text())
+    assert found["methods"]["qr"]["estimates"]["total_mass_kg"] == 2800
+    assert found["force_N"] == pytest.approx(11.655)
+    assert read_card(tmp_path / "body.toml").surge.total_mass_kg == 2800
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--force-N", "11.63,fast"], ["--force", "fast"]),
+        (["--force-N", "1,-1"], ["--force", "50 s"]),
+        (["--total-mass-kg", "0"], ["--total-mass-kg"]),
+        (["--length-m", "-3"], ["--length-m"]),
+    ],
+)
+def test_bad_input_ends_in_one_line_and_exit_2(tmp_path, arguments, words) -> None:
+    refused(tank2sim("tow", TOWS, *arguments, cwd=tmp_path), *words)
+    assert not list(tmp_path.iterdir())

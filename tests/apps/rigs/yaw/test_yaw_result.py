@@ -26,16 +26,6 @@ def charts(result):
     return result._charts()
 
 
-def test_charts_have_the_names_of_their_files(charts):
-    assert list(charts) == [
-        "estimates_by_method",
-        "energy_balance",
-        "energy_balance_2",
-        "record_and_programme",
-        "nonlinear_least_squares",
-    ]
-
-
 def test_bars_of_the_balance_add_up_to_the_motors_work(found, charts):
     rows = [row for row in rows_of(charts["energy_balance"]) if {"part", "run", "v"} <= set(row)]
     motor = sum(row["v"] for row in rows if row["run"] == "motor")
@@ -69,8 +59,3 @@ def test_tables_hold_the_estimates_and_the_friction(found, result):
     assert float(friction.rows[1][2].split(" ± ")[0]) == pytest.approx(1e4 * best.friction["viscous_Nms"], rel=1e-3)
     assert result.notices == found.estimates.notices
     assert result.key_figures[0].value == pytest.approx(300, rel=0.01)
-
-
-def test_a_result_read_from_its_json_has_the_same_page(result):
-    again = YawResult.read(result.to_dict(), "y.json")
-    assert again.page() == result.page() and again.to_dict() == result.to_dict()
