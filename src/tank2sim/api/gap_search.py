@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tank2sim.api.trial import fitted_and_held, trial_files
-from tank2sim.cards import Card, ManoeuvringCard
+from tank2sim.cards import Card, SteeredBy, SteeredCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import ArgumentError
 from tank2sim.files import folder_made
@@ -91,16 +91,18 @@ def search_ship(
         return result.written_to(output)
 
 
-def identified_from(card: ManoeuvringCard, fitted: Measured) -> list[Notice]:
+def identified_from(card: SteeredCard, fitted: Measured) -> list[Notice]:
     """A notice if the card was identified from some of the fitted trials.
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
     fitted : Measured
         Trials that name the effect.
     """
-    names = [trial.name for trial in fitted.trials if fitted_as(card, trial) is not None]
+    if card.steered_by is SteeredBy.THRUSTERS:
+        return []
+    names = [trial.name for trial in fitted.trials if fitted_as(card.manoeuvring(), trial) is not None]
     if not names:
         return []
     return [

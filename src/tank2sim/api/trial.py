@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tank2sim.answer.result import Result
-    from tank2sim.cards import ManoeuvringCard
+    from tank2sim.cards import SteeredCard
     from tank2sim.cards.form import ThrusterSection
     from tank2sim.identification.trials.problem.prepare_trials import Measured
     from tank2sim.results.audit import AuditResult
@@ -207,7 +207,7 @@ def _files(path: Path) -> list[Path]:
 
 
 def fitted_and_held(
-    trials: TrialPaths, holdout: TrialPaths, card: ManoeuvringCard, *, report_unused: bool = True
+    trials: TrialPaths, holdout: TrialPaths, card: SteeredCard, *, report_unused: bool = True
 ) -> tuple[Measured, Measured]:
     """Trials to be fitted and the trials of `holdout`, at the size of the card's ship.
 
@@ -216,11 +216,18 @@ def fitted_and_held(
     one name or are one record, also where one of them is held out; the card was fitted to one that is held out; or
     there is none to fit.
     """
+    from tank2sim.cards import SteeredBy
+    from tank2sim.identification.craft.problem import measured_of_craft
     from tank2sim.identification.trials.problem.prepare_trials import fitted_as, measured
     from tank2sim.records.same_record import refuse_copies
 
-    groups = distinctly_named(trials_of(trials), trials_of(holdout, "holdout"))
-    fitted, held = (measured(group, card, report_unused=report_unused) for group in groups)
+    of_craft, ship = card.thrusters, None
+    groups = distinctly_named(trials_of(trials, thrusters=of_craft), trials_of(holdout, "holdout", thrusters=of_craft))
+    if card.steered_by is SteeredBy.THRUSTERS:
+        fitted, held = measured_of_craft(card, *groups)
+    else:
+        ship = card.manoeuvring()
+        fitted, held = (measured(group, ship, report_unused=report_unused) for group in groups)
     if not fitted.trials:
         raise InputError("trials", "", "is empty", "give a file of a trial or a folder with trials")
     for trial in held.trials:
@@ -228,7 +235,7 @@ def fitted_and_held(
             raise InputError(trial.path, "", "is both fitted and held out", "hold out what is not fitted")
     held = replace(held, notices=(*refuse_copies(fitted.trials, held.trials), *held.notices))
     for trial in held.trials:
-        if (name := fitted_as(card, trial)) is not None:
+        if ship and (name := fitted_as(ship, trial)) is not None:
             problem = f"is held out, and {card.source} was fitted to it: it is the record of {name}"
             raise InputError(trial.path, "", problem, "hold out what the card was not fitted to")
     return fitted, held

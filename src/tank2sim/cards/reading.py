@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import tomlkit
@@ -137,14 +137,18 @@ def _section_of(document: Any, sections: Sequence[str], source: str, key: str) -
     return table
 
 
+_Steered = TypeVar("_Steered", bound=SteeredCard)
+
+
 def revised(
-    card: ManoeuvringCard,
+    card: _Steered,
     derivatives: Mapping[str, tuple[float, float]],
     others: Mapping[str, object] | None = None,
     *,
     comment: str | None = None,
-) -> ManoeuvringCard:
-    """A card with other derivatives: canonical name to (value, standard error), prime and starboard-positive.
+) -> _Steered:
+    """A card with other derivatives: canonical name to (value, standard error), in the card's scaling, rudder positive
+    to starboard.
 
     They are written in the conventions of the card's own text; `others` are further values at dotted keys of the text;
     `comment` takes the place of the comments of all that is changed.
@@ -155,7 +159,9 @@ def revised(
         key = card.places.get(name, name)
         changes[f"derivatives.{key}"] = value * factor
         changes[f"uncertainty.{key}"] = error * abs(factor)
-    return parse_card(changed_text(card.text, card.source, changes, comment=comment), card.source).manoeuvring()
+    new = parse_card(changed_text(card.text, card.source, changes, comment=comment), card.source)
+    assert isinstance(new, type(card))
+    return new
 
 
 def linear_card(card: Card) -> ManoeuvringCard:

@@ -11,7 +11,7 @@ from tank2sim.cards.examination import doubts
 from tank2sim.cards.form import EffectEntry
 from tank2sim.cards.kinds import CARD_KINDS
 from tank2sim.dynamics.effects import EFFECTS, Effect
-from tank2sim.dynamics.effects.effect import EffectParameter, card_for_effects
+from tank2sim.dynamics.effects.effect import EffectParameter
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.ship import ship_model
 from tank2sim.dynamics.simulator_interface import force_shares
@@ -104,7 +104,7 @@ def _check_values(card: SteeredCard, entry: EffectEntry, place: str, known: dict
             if parameter.default is not None:
                 continue
             raise card.fault(f"{place}.parameters.{name}", "is missing", f"give the {parameter.description}")
-        lowest, highest = parameter.lowest(card_for_effects(card)), parameter.maximum
+        lowest, highest = parameter.lowest(card), parameter.maximum
         if not lowest <= entry.parameters[name] <= highest:
             key, shown = card.in_file(f"{place}.parameters.{name}", entry.parameters[name])
             remedy = f"{from_si(key, lowest):g} to {from_si(key, highest):g} was expected"
@@ -113,7 +113,7 @@ def _check_values(card: SteeredCard, entry: EffectEntry, place: str, known: dict
 
 def _with_effect(model: Model, card: SteeredCard, entry: EffectEntry) -> Model:
     effect = EFFECTS[entry.name]
-    changed = effect.apply(model, entry.parameters, card_for_effects(card))
+    changed = effect.apply(model, entry.parameters, card)
     # One that changes derivatives has no force of its own.
     if effect.acts_on != "force" or effect.reads_derivatives or effect.changes:
         return changed

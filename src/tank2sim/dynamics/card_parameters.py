@@ -18,7 +18,6 @@ from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR, MmgCard, SteeredCard
 from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS
-from tank2sim.dynamics.effects.effect import card_for_effects
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.small_craft import THRUSTER_PARAMETERS
 from tank2sim.errors import ArgumentError
@@ -181,7 +180,7 @@ def _thrusters(card: SteeredCard) -> list[CardParameter]:
 def _effects(card: SteeredCard, model: Model) -> list[CardParameter]:
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
     found = []
-    shared = card_for_effects(card)
+
     for number, entry in enumerate(card.effects):
         effect = EFFECTS[entry.name]
         if effect.acts_on == "sensor":
@@ -195,7 +194,7 @@ def _effects(card: SteeredCard, model: Model) -> list[CardParameter]:
             key = key or f"effects.{number}.parameters.{parameter.name}"
             stated = parameter.name in entry.uncertainty
             error = entry.uncertainty.get(parameter.name, DEFAULT_RELATIVE_ERROR * abs(values[name]))
-            bounds = (parameter.lowest(shared), parameter.maximum)
+            bounds = (parameter.lowest(card), parameter.maximum)
             found.append(CardParameter(name, values[name], error, not stated, key, from_si(key, 1.0), bounds))
     return found
 

@@ -14,7 +14,7 @@ import numpy as np
 import tomlkit
 from numpy.typing import NDArray
 
-from tank2sim.cards.card import OPPOSITE, ManoeuvringCard
+from tank2sim.cards.card import OPPOSITE, SteeredCard
 from tank2sim.cards.reading import changed_text, parse_card
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics import build
@@ -49,12 +49,12 @@ def estimate_in_file(name: str, value: float) -> tuple[str, float]:
     return in_file_units(name, value % (2 * math.pi) if name == "direction_rad" else value)
 
 
-def add_effects_to_card(card: ManoeuvringCard, found: Sequence[Found]) -> ManoeuvringCard:
+def add_effects_to_card(card: SteeredCard, found: Sequence[Found]) -> SteeredCard:
     """The card with effects added; the given card where none of them is of the ship (faults of sensors).
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
     found : sequence of Found
         In the order in which their model was built. None of them may be on the card already.
 
@@ -96,7 +96,7 @@ def at_rest(name: str) -> dict[str, float]:
 
 
 def card_with_effects_text(
-    card: ManoeuvringCard, found: Sequence[Found], trials: Sequence[str], rivals: Sequence[str] = (), refitted: int = 0
+    card: SteeredCard, found: Sequence[Found], trials: Sequence[str], rivals: Sequence[str] = (), refitted: int = 0
 ) -> str:
     """Text of a card with effects added by :func:`add_effects_to_card`, headed by their names and the trials used.
 
@@ -137,7 +137,7 @@ Change = tuple[object, str]
 """New value of a key as the file has it, and the comment next to it."""
 
 
-def _changed(card: ManoeuvringCard, changes: Mapping[str, Change]) -> ManoeuvringCard:
+def _changed(card: SteeredCard, changes: Mapping[str, Change]) -> SteeredCard:
     text = card.text
     for comment, group in groupby(sorted(changes.items(), key=_comment), key=_comment):
         text = changed_text(text, card.source, {key: value for key, (value, _) in group}, comment=comment)
@@ -148,13 +148,12 @@ def _comment(change: tuple[str, Change]) -> str:
     return change[1][1]
 
 
-def _parsed(card: ManoeuvringCard, text: str) -> ManoeuvringCard:
+def _parsed(card: SteeredCard, text: str) -> SteeredCard:
     new = parse_card(text, card.source)
-    assert isinstance(new, ManoeuvringCard)
-    return new
+    return new.steered()
 
 
-def _document(card: ManoeuvringCard) -> tomlkit.TOMLDocument:
+def _document(card: SteeredCard) -> tomlkit.TOMLDocument:
     return tomlkit.parse(card.text.removeprefix(BYTE_ORDER_MARK))
 
 
@@ -169,7 +168,7 @@ def _was(document: tomlkit.TOMLDocument, key: str, name: str) -> str:
 
 
 def _stated(
-    card: ManoeuvringCard, name: str, values: Mapping[str, float], errors: Mapping[str, float]
+    card: SteeredCard, name: str, values: Mapping[str, float], errors: Mapping[str, float]
 ) -> dict[str, Change]:
     """Keys of ``[steering_gear]`` that an effect changes."""
     changes: dict[str, Change] = {}
@@ -186,7 +185,7 @@ def _stated(
 
 
 def _derivatives(
-    card: ManoeuvringCard, name: str, values: Mapping[str, float], errors: Mapping[str, float]
+    card: SteeredCard, name: str, values: Mapping[str, float], errors: Mapping[str, float]
 ) -> dict[str, Change]:
     """Keys of ``[derivatives]`` and ``[uncertainty]`` that an effect changes."""
     document, changes = _document(card), dict[str, Change]()
@@ -205,7 +204,7 @@ def _derivatives(
 
 
 def changed_derivatives(
-    card: ManoeuvringCard, name: str, values: Mapping[str, float], errors: Mapping[str, float]
+    card: SteeredCard, name: str, values: Mapping[str, float], errors: Mapping[str, float]
 ) -> Iterator[tuple[str, float, float, float]]:
     """Derivatives that an effect changes: name, new value (prime), standard error by the effect alone, and in total.
 
@@ -247,9 +246,7 @@ def _values_and_slopes(model: Model, wanted: ca.SX) -> tuple[NDArray[np.float64]
 # -- [[effects]] and [ship] ----------------------------------------------------------------------------------------
 
 
-def _with_entry(
-    card: ManoeuvringCard, name: str, values: Mapping[str, float], errors: Mapping[str, float]
-) -> ManoeuvringCard:
+def _with_entry(card: SteeredCard, name: str, values: Mapping[str, float], errors: Mapping[str, float]) -> SteeredCard:
     """The card with an effect appended to its ``[[effects]]``."""
     parameters, uncertainty = tomlkit.table(), tomlkit.table()
     for parameter in EFFECTS[name].parameters:
@@ -275,7 +272,7 @@ def _with_entry(
     return _parsed(card, mark + tomlkit.dumps(document))
 
 
-def _with_particulars(card: ManoeuvringCard, name: str, values: Mapping[str, float]) -> ManoeuvringCard:
+def _with_particulars(card: SteeredCard, name: str, values: Mapping[str, float]) -> SteeredCard:
     """The card with the particulars that an effect estimated because the card states none."""
     model = build(card)
     notices = [notice for notice in EFFECTS[name].apply(model, values, card).notices if notice not in model.notices]

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tank2sim.arrays import Array, Number, Unbounded
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.gap.inference.wave_band import WaveBand
 from tank2sim.identification.trials.assessment.evaluation import FigureComparison
 from tank2sim.identification.trials.problem.prepare_trials import RecordDoubt
@@ -318,12 +318,12 @@ class Gap:
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
         As given.
-    improved : ManoeuvringCard
+    improved : SteeredCard
         With the effect, and with the coefficients fitted together with it where the trials are then followed better;
         the given card where no effect of the ship was named (nothing, or a sensor's fault) and none was refitted.
-    base : ManoeuvringCard
+    base : SteeredCard
         The card with the refitted coefficients and their covariance, before the effects were added; the given card
         where none was refitted.
     verdict : str
@@ -366,9 +366,9 @@ class Gap:
         Reasons for which the improved card should not replace the given one (:func:`.improvement_objections`).
     """
 
-    card: ManoeuvringCard
-    improved: ManoeuvringCard
-    base: ManoeuvringCard
+    card: SteeredCard
+    improved: SteeredCard
+    base: SteeredCard
     verdict: str
     effects: tuple[Named, ...]
     coefficients: tuple[Refitted, ...]

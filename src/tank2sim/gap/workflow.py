@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -13,7 +14,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from tank2sim.arguments import FALSE_DISCOVERY, MOST_EFFECTS
-from tank2sim.cards.card import Card, ManoeuvringCard
+from tank2sim.cards.card import Card, ManoeuvringCard, SteeredBy, SteeredCard
 from tank2sim.cards.examination import doubts
 from tank2sim.cards.form import EffectEntry
 from tank2sim.errors import ArgumentError, InputError
@@ -100,23 +101,23 @@ class GapOptions:
     black_box: bool = False
 
 
-def nonlinear_card(card: Card) -> ManoeuvringCard:
+def nonlinear_card(card: Card) -> SteeredCard:
     """Return the card, if a missing effect can be sought for it.
 
     Raises
     ------
     InputError
-        It is not of a manoeuvring ship, or its equations are linear.
+        It is not of a ship with a rudder or a craft with thrusters, or its equations are linear.
     """
-    ship = card.manoeuvring()
-    if ship.model.kind == "linear":
+    vessel = card.steered()
+    if vessel.model.kind == "linear":
         remedy = 'set kind = "abkowitz"; its missing third-order terms are then zero'
-        raise ship.fault("model.kind", "is linear, and most effects are not part of such a model", remedy)
-    return ship
+        raise vessel.fault("model.kind", "is linear, and most effects are not part of such a model", remedy)
+    return vessel
 
 
 def run_gap_workflow(
-    card: ManoeuvringCard,
+    card: SteeredCard,
     fitted: Measured,
     held: Measured,
     options: GapOptions | None = None,
@@ -127,7 +128,7 @@ def run_gap_workflow(
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
         The ship as it is known.
     fitted, held : Measured
         Trials that name the effect, and trials that only prove it (may be none).
@@ -144,14 +145,19 @@ def run_gap_workflow(
         forces along the measured motion are not finite.
     """
     options = options or GapOptions()
-    given, card = card, polynomial_over_trials(card, fitted.trials)
-    lowest = polynomial_over_trials(given, (*fitted.trials, *held.trials)).model.low_speed_bound_mps
-    fitted, held = above_low_speed(card, fitted), above_low_speed(card, held)
-    if evidence := evidence_of_other_ship(card, fitted):
-        remedy = "give the card and the trials of one ship, in the same units and signs"
-        raise not_of_ship(card, fitted, evidence, remedy)
-    if card.roll is not None:
-        fitted, held = _without_heel(fitted), _without_heel(held)
+    lowered: tuple[Notice, ...] = ()
+    lowest = math.inf
+    if card.steered_by is SteeredBy.RUDDER:
+        given = card.manoeuvring()
+        card = ship = polynomial_over_trials(given, fitted.trials)
+        lowest = polynomial_over_trials(given, (*fitted.trials, *held.trials)).model.low_speed_bound_mps
+        lowered = (*doubts(given), *lowered_bound_notice(given, ship))
+        fitted, held = _of_ship(ship, fitted), _of_ship(ship, held)
+        if evidence := evidence_of_other_ship(ship, fitted):
+            remedy = "give the card and the trials of one ship, in the same units and signs"
+            raise not_of_ship(ship, fitted, evidence, remedy)
+    elif options.black_box:
+        raise ArgumentError("black_box", "", "is not for a craft with thrusters", "leave it out")
     # Small matrices: threads of the linear algebra library would wait for each other.
     with threadpool_limits(limits=1, user_api="blas"), _processes(options, executor) as pool:
         names = _names(card, fitted, options)
@@ -176,14 +182,15 @@ def run_gap_workflow(
         progress("trying the improved card")
         return replace(
             gap,
-            notices=(*doubts(given), *lowered_bound_notice(given, card), *tried, *gap.notices),
+            notices=(*lowered, *tried, *gap.notices),
             objections=improvement_objections(card, gap.improved, gap.passed),
         )
 
 
-def _without_heel(group: Measured) -> Measured:
-    """Trials without measured heel, whose roll the motion's errors would excite."""
-    if not any("phi_rad" in trial.signals for trial in group.trials):
+def _of_ship(card: ManoeuvringCard, group: Measured) -> Measured:
+    """Trials in the range of a card's polynomial, without heel where the ship rolls: errors of the motion excite it."""
+    group = above_low_speed(card, group)
+    if card.roll is None or not any("phi_rad" in trial.signals for trial in group.trials):
         return group
     trials = tuple(
         replace(trial, signals={name: values for name, values in trial.signals.items() if name != "phi_rad"})
@@ -193,7 +200,7 @@ def _without_heel(group: Measured) -> Measured:
     return replace(group, trials=trials, notices=(*group.notices, Notice(notice)))
 
 
-def _names(card: ManoeuvringCard, fitted: Measured, options: GapOptions) -> tuple[str, ...]:
+def _names(card: SteeredCard, fitted: Measured, options: GapOptions) -> tuple[str, ...]:
     possible = candidate_explanations(card, fitted.driven_by)
     for name in options.effects or ():
         if name not in possible:
@@ -261,7 +268,7 @@ def _assemble_gap(prover: Prover, found: Search, judged: Judged, *, with_black_b
     )
 
 
-def _begin_black_box(card: ManoeuvringCard, proof: Proof, replays: TrialReplays) -> Callable[[], BlackBox] | None:
+def _begin_black_box(card: SteeredCard, proof: Proof, replays: TrialReplays) -> Callable[[], BlackBox] | None:
     """A black box with as many coefficients as the effects have parameters, fitted apart if possible; else none."""
     if not proof.named.estimated:
         return None
@@ -277,7 +284,7 @@ def _begun(replays: TrialReplays, function: Callable[..., _Result], *arguments: 
     return replays.executor.submit(function, *arguments).result
 
 
-def _with_black_box(proof: Proof, box: ManoeuvringCard, replays: TrialReplays) -> list[Passed]:
+def _with_black_box(proof: Proof, box: SteeredCard, replays: TrialReplays) -> list[Passed]:
     """The replays of a proof, and by the card of a black box."""
     boxed: list[Passed] = []
     for group, held_out in zip(proof.trials, (False, True), strict=True):
@@ -324,15 +331,15 @@ def _rivals(found: Search, decision: Decision) -> tuple[Rival, ...]:
     )
 
 
-def _next(card: ManoeuvringCard, found: Search, decision: Decision, noise: Mapping[str, float]) -> NextTest | None:
+def _next(card: SteeredCard, found: Search, decision: Decision, noise: Mapping[str, float]) -> NextTest | None:
     """The manoeuvre that would distinguish the explanations that these trials could not."""
-    if decision.verdict != AMBIGUOUS:
+    if decision.verdict != AMBIGUOUS or card.steered_by is SteeredBy.THRUSTERS:
         return None
     rivals = [_explanation(card, found, fit) for fit in (decision.best, *decision.alike)]
     return next_test(rivals, noise, unsure_s=float(found.likelihood.motion.unsure_s.max()))
 
 
-def _explanation(card: ManoeuvringCard, found: Search, fit: ExplanationFit) -> Explanation:
+def _explanation(card: SteeredCard, found: Search, fit: ExplanationFit) -> Explanation:
     """A card with an explanation's effects, and the covariance of its uncertain parameters."""
     entries = [
         EffectEntry(name=name, parameters={**at_rest(name), **values}, uncertainty=dict(errors))

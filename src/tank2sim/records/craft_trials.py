@@ -78,7 +78,8 @@ def read_craft_trial(path: Path | CsvTable, thrusters: Sequence[ThrusterSection]
     known = np.isfinite(signals["psi_rad"])
     psi = signals["psi_rad"].copy()
     psi[known] = np.unwrap(psi[known])
-    return Trial(path, time, signals | {"psi_rad": psi})
+    headings = {name: table.heading(name) for name in CRAFT_SIGNALS if name in signals}
+    return Trial(path, time, signals | {"psi_rad": psi}, columns=headings)
 
 
 def _held(x: Array, y: Array) -> NDArray[np.bool_]:

@@ -353,7 +353,7 @@ class GapResult(Result[GapStudy]):
             files[folder / NEXT_TEST_FILE] = gap.next_test.orders
         if gap.verdict == MISSING and any(EFFECTS[effect.name].acts_on == "sensor" for effect in gap.effects):
             for trial in trials:
-                corrected = corrected_text(trial.path, trial, self._found)
+                corrected = corrected_text(trial.path, trial, self._found, self._gap.card.thrusters)
                 if corrected is not None:
                     files[folder / CORRECTED / f"{trial.name}.csv"] = corrected
                 new = correct_sensor_faults(trial, self._found).notices[len(trial.notices) :]
@@ -423,7 +423,7 @@ class GapResult(Result[GapStudy]):
             rivals = [joined(names) for names in gap.alternatives]
             names = [trial.name for trial in self.fitted.trials]
             text = card_with_effects_text(gap.improved, self._found, names, rivals, len(gap.coefficients))
-            text = with_fitted_trials(text, source, self.fitted.trials)
+            text = text if gap.card.thrusters else with_fitted_trials(text, source, self.fitted.trials)
         parse_card(text, source)
         return text
 

@@ -12,7 +12,6 @@ from scipy.linalg import expm, solve_discrete_lyapunov
 from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.autopilot_loop import with_yaw_disturbance
-from tank2sim.dynamics.effects.effect import card_for_effects
 from tank2sim.dynamics.effects.surroundings import CURRENT, WIND
 from tank2sim.dynamics.model import Model
 
@@ -67,7 +66,7 @@ def in_weather(ship: Model, card: SteeredCard, weather: Weather) -> tuple[Model,
     """
     for effect in (CURRENT, WIND):
         if f"{effect.name}.speed" not in ship:
-            ship = effect.apply(ship, dict.fromkeys(effect.required(), 0.0), card_for_effects(card))
+            ship = effect.apply(ship, dict.fromkeys(effect.required(), 0.0), card)
     inputs = {
         "current.speed": weather.current_mps,
         "current.direction": weather.current_towards_rad,

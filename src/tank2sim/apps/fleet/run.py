@@ -19,7 +19,7 @@ from tank2sim.apps.fleet.ships import Fleet, ShipFolder, fleet_in
 from tank2sim.apps.fleet.summary import FleetStudy, ShipSummary, fleet_study, ship_summary
 from tank2sim.arguments import PROCESSES
 from tank2sim.cards import read_card
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.executors import check_executor, executing
 from tank2sim.files import folder_made, json_text, parsed_json, read_text, writable_folder, write_together
@@ -326,12 +326,12 @@ class ShipTask:
     Parameters
     ----------
     folder : ShipFolder
-    card : ManoeuvringCard
+    card : SteeredCard
     fitted, held : Measured
     """
 
     folder: ShipFolder
-    card: ManoeuvringCard
+    card: SteeredCard
     fitted: Measured
     held: Measured
 

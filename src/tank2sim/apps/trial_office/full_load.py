@@ -61,7 +61,7 @@ def tried_ships(card: ManoeuvringCard, state: TrialState, count: int) -> tuple[T
             entries.append((LOADING.name, {"mean_draught_m": draught, "trim_m": trim}, {}))
         if name == "tried" and state.wind_speed_mps and state.wind_from_rad is not None and WIND.name not in listed:
             entries.append((WIND.name, {}, {}))
-        cards[name] = add_effects_to_card(card, entries) if entries else card
+        cards[name] = add_effects_to_card(card, entries).manoeuvring() if entries else card
     models = {name: build(steerable(one)) for name, one in cards.items()}
     drawn, messages = members(cards["tried"], models["tried"], count)
     changes = {name: math.hypot(draught / own - 1, trim / own) for name, (draught, trim) in loadings.items()}

@@ -6,7 +6,7 @@ import math
 
 import casadi as ca
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects.controllable_pitch import ADVANCE_SHARE
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, with_steps_for
 from tank2sim.dynamics.effects.forces import with_forces
@@ -22,7 +22,7 @@ AZIMUTH_PLACE, AZIMUTH_SIDE = -0.46, 0.25
 """Place forward of midships over L, and from the centre line over the beam, where a card gives none: project choice."""
 
 
-def _with_azimuths(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_azimuths(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """X, Y = sum of T_i (cos a_i, sin a_i), N = sum of x_i Y_i - y_i X_i; with s = n_i/n_0:
 
         T_i = F s (s - u_i/u_z) for s > 0, else -f F s^2;   u_i = (u - y_i r) cos a_i + (v + x_i r) sin a_i
@@ -89,7 +89,7 @@ def _with_azimuths(model: Model, given: EffectSymbols, card: ManoeuvringCard) ->
 def _unit(unit: int) -> tuple[EffectParameter, ...]:
     default, side = (None, "starboard") if unit == 1 else (0.0, "port")
 
-    def off_the_centre_line(card: ManoeuvringCard) -> float:
+    def off_the_centre_line(card: SteeredCard) -> float:
         return (AZIMUTH_SIDE if unit == 1 else -AZIMUTH_SIDE) * model_particular(card, "beam_m")
 
     return (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
 from tank2sim.dynamics.effects.forces import with_forces, with_validity
 from tank2sim.dynamics.effects.froude_scale import lengths
@@ -73,7 +73,7 @@ def _propeller_at_work(model: Model) -> ca.SX:
     return ca.fmin(ca.fmax(revolutions / speed / AT_WORK, 0), 1)
 
 
-def _with_banks(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_banks(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Y = 1/2 rho L T u^2 y_B c_Y, N = -1/2 rho L^2 T u^2 y_B c_N, y_B = B/2 (mean(1/y_S) - mean(1/y_P)).
 
     y_S, y_P are the distances of the banks from the centre line. y_B is by Ch'ng, Doctors and Renilson (1993),

@@ -11,7 +11,7 @@ from typing import Any
 
 import casadi as ca
 
-from tank2sim.cards.card import ManoeuvringCard, MmgCard
+from tank2sim.cards.card import MmgCard, SteeredCard
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, refuse_given, with_steps_for
 from tank2sim.dynamics.effects.forces import scales, with_forces, with_validity
 from tank2sim.dynamics.hull import inside_range
@@ -114,7 +114,7 @@ def pitch_torque(J: ca.SX, pitch: ca.SX, area: ca.SX, blades: ca.SX) -> ca.SX:
     return ca.SX(idle + ca.fmin(size / LEAST_PITCH, 1) * (inside - idle))
 
 
-def _with_pitch(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_pitch(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """The pitch follows its order, and the thrust changes as in the series; the revolutions are as ordered:
 
         d(P/D)/dt = sat((order - P/D)/T),   T = T_card + rho n^2 D^4 (K_T(J, P/D) - K_T(J, P_0/D))

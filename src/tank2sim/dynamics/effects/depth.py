@@ -6,7 +6,7 @@ from typing import Any
 
 import casadi as ca
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects.derivatives import at_depth, least_depth
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
 from tank2sim.dynamics.effects.forces import scales, with_forces, with_validity
@@ -72,7 +72,7 @@ def icorels_squat(volume_m3: Any, length_m: Any, square: Any) -> Any:
     return 2.4 * volume_m3 / length_m**2 * square / (1 - square) ** 0.5
 
 
-def _with_finite_depth(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_finite_depth(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Derivatives as in ``water_depth``, and with Fr_h = u/sqrt(g H):
 
         X -= 1/2 rho L^2 R' u|u| (1/(1 - l)^2 - 1),   l = 0.1242 (A_M/H^2 - 0.05) + 1 - sqrt(tanh(g H/u^2))

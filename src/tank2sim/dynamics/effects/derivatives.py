@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 
 import casadi as ca
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS
 from tank2sim.dynamics.effects.effect import Effect, EffectEquations, EffectParameter, EffectSymbols
@@ -20,7 +20,7 @@ USUAL_CHANGE = 0.15
 (SIMMAN 2008); project choice. Added masses, which are measured less well, have more."""
 
 
-def with_changes(model: Model, changes: Mapping[str, ca.SX], card: ManoeuvringCard) -> Model:
+def with_changes(model: Model, changes: Mapping[str, ca.SX], card: SteeredCard) -> Model:
     """The model with derivatives changed by so much: name to an expression in the prime system, of the old ones.
 
     Raises
@@ -35,7 +35,7 @@ def with_changes(model: Model, changes: Mapping[str, ca.SX], card: ManoeuvringCa
     return model.substitute_all({full[name]: model.symbol(full[name]) + change for name, change in changes.items()})
 
 
-def hydrodynamic(model: Model, name: str, card: ManoeuvringCard) -> ca.SX:
+def hydrodynamic(model: Model, name: str, card: SteeredCard) -> ca.SX:
     """The hydrodynamic part of a derivative (prime): without the inertia of the ship that "total" cards put into it.
 
     With ``yaw_rate_terms = "total"``, X_vr, X_rr, Y_r, N_r contain m, m x_G, -m, -m x_G of (3.1). Of the terms by speed
@@ -54,10 +54,10 @@ def hydrodynamic(model: Model, name: str, card: ManoeuvringCard) -> ca.SX:
     return symbol * ca.fmin(2.0, ca.fmax(-2.0, part / ca.if_else(whole == 0, 1.0, whole)))
 
 
-def inertial_parts(model: Model, mass: ca.SX, x_G: ca.SX, card: ManoeuvringCard) -> dict[str, ca.SX]:
+def inertial_parts(model: Model, mass: ca.SX, x_G: ca.SX, card: SteeredCard) -> dict[str, ca.SX]:
     """Rigid-body parts in derivatives of a "total" card, of a mass (kg) whose centre is x_G (m) forward; prime, none
     of others."""
-    if card.model.yaw_rate_terms == "hydrodynamic":
+    if card.manoeuvring().model.yaw_rate_terms == "hydrodynamic":
         return {}
     mass, x_G = mass / scales(model, model.symbol("ship.speed")).mass, x_G / model.symbol("ship.length")
     return {"Xvr": mass, "Xrr": mass * x_G, "Yr": -mass, "Nr": -mass * x_G}
@@ -67,7 +67,7 @@ def _magnified(names: Iterable[str]) -> EffectEquations:
     """Equations that magnify derivatives by 1 + ``factor``, and their change by speed where the model has that."""
     always = tuple(names)
 
-    def equations(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+    def equations(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
         factor = given["factor"]
         by_speed = [name for name in _by_speed(always) if f"derivatives.{name}" in model]
         changes = {name: factor * hydrodynamic(model, name, card) for name in (*always, *by_speed)}
@@ -81,7 +81,7 @@ def _by_speed(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(name for base in names for power in ("u", "uu") if (name := base + power) in ALL_TERMS)
 
 
-def _added(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _added(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Derivatives change by the parameters of the same names."""
     return with_changes(model, given, card)
 
@@ -198,7 +198,7 @@ MAGNIFIED_BY_SHALLOW_WATER = (*ACCELERATION_TERMS, *(name for name in ALL_TERMS 
 """Added masses, and the terms of Y and N that are odd in v and r and have no rudder."""
 
 
-def _in_shallow_water(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _in_shallow_water(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Added masses and the odd sway and yaw terms of the hull, times 1 + magnification.
 
     Under a small keel clearance the flow goes round the ends instead of below, and all these rise together, to
@@ -233,12 +233,12 @@ AGROUND = 0.95
 """Largest draught over depth: at 1 the ship is aground, and the fit of the source ends before. Project choice."""
 
 
-def least_depth(card: ManoeuvringCard) -> float:
+def least_depth(card: SteeredCard) -> float:
     """Depth of the water (m) below which no ship of this draught floats with water under it."""
     return model_particular(card, "draught_m") / AGROUND
 
 
-def at_depth(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def at_depth(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Y_v, N_v, N_r times f = 1/(1 - h)^n - h with h = T/H, as input ``water.depth`` says.
 
     n = 0.40 Cb B/T for Y_v, 0.425 Cb B/T for N_v, 1.5 - 14.28 T/L for N_r: Kijima, Katsuno, Nakiri and Furukawa (1990),
@@ -268,7 +268,7 @@ WATER_DEPTH = Effect(
 )
 
 
-def _trimmed(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _trimmed(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Linear derivatives of a hull trimmed by tau at an unchanged mean draught T:
 
         Y_v (1 + 2/3 tau/T), Y_r (1 + 0.80 tau/T), N_v - 0.27 Y_v tau/T, N_r (1 + 0.30 tau/T)
@@ -279,7 +279,7 @@ def _trimmed(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model
     return trimmed(model, given["by_stern"] / draught, card)
 
 
-def trimmed(model: Model, share: ca.SX, card: ManoeuvringCard) -> Model:
+def trimmed(model: Model, share: ca.SX, card: SteeredCard) -> Model:
     """The model with the linear derivatives of a hull trimmed by this share of its draught, as :data:`TRIM` has."""
     changes = {
         "Yv": 2 / 3 * share * hydrodynamic(model, "Yv", card),

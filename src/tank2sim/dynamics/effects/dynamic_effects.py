@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, with_steps_for
 from tank2sim.dynamics.effects.forces import scales, speed_of_scaling, with_forces
@@ -14,7 +14,7 @@ from tank2sim.dynamics.kinematics import heel, rate_of_heel
 from tank2sim.dynamics.model import Model, Quantity, State
 
 
-def _remembering(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _remembering(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """A share of the linear sway damping answers late: v in Y_v v and N_v v is v - share (v - z), dz/dt = (v - z)/tau.
 
     The simplest memory, of one decaying exponential, that vanishes in steady motion: Cummins (1962), The impulse
@@ -69,7 +69,7 @@ TYPICAL_STABILITY = 0.05
 project choice, as are the parameters' defaults."""
 
 
-def _natural_period(card: ManoeuvringCard) -> float:
+def _natural_period(card: SteeredCard) -> float:
     """Roll period (s): 2 pi k / sqrt(g GM) with k = 0.4 B, so 0.80 B/sqrt(GM): near 2 C B/sqrt(GM) of the IMO
     2008 Intact Stability Code, part A, 2.3."""
     beam = model_particular(card, "beam_m")
@@ -78,7 +78,7 @@ def _natural_period(card: ManoeuvringCard) -> float:
     return 2 * math.pi * 0.4 * beam / math.sqrt(card.environment.gravity_mps2 * stable)
 
 
-def _rolling(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _rolling(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Heel drives Y and N, and the turn drives heel, outwards:
 
         d2phi/dt2 + 2 zeta w dphi/dt + w^2 (phi + h u r/g) = 0,   w = 2 pi/T

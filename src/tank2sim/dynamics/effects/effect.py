@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import cast
 
 import casadi as ca
 
-from tank2sim.cards.card import ManoeuvringCard, SteeredCard
+from tank2sim.cards.card import SteeredBy, SteeredCard
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity
@@ -68,13 +67,13 @@ class EffectParameter:
 
     name: str
     description: str
-    minimum: float | Callable[[ManoeuvringCard], float]
+    minimum: float | Callable[[SteeredCard], float]
     maximum: float
-    default: float | Callable[[ManoeuvringCard], float] | None = None
+    default: float | Callable[[SteeredCard], float] | None = None
     input_name: str | None = None
     absent: float | None = field(default=None, kw_only=True)
-    typical: Values | Callable[[ManoeuvringCard], Values] = field(default=(), kw_only=True)
-    spread: float | Callable[[ManoeuvringCard], float] | None = field(default=None, kw_only=True)
+    typical: Values | Callable[[SteeredCard], Values] = field(default=(), kw_only=True)
+    spread: float | Callable[[SteeredCard], float] | None = field(default=None, kw_only=True)
     worse: int = field(default=0, kw_only=True)
     optional: bool = field(default=False, kw_only=True)
 
@@ -84,25 +83,25 @@ class EffectParameter:
         stem, _, suffix = self.name.rpartition("_")
         return stem if stem and suffix in _UNITS else self.name
 
-    def value(self, values: Mapping[str, float], card: ManoeuvringCard) -> float:
+    def value(self, values: Mapping[str, float], card: SteeredCard) -> float:
         """Its value, SI: as given, or the default. Raises KeyError if there is neither."""
         if self.name in values or self.default is None:
             return values[self.name]
         return self.default(card) if callable(self.default) else self.default
 
-    def lowest(self, card: ManoeuvringCard) -> float:
+    def lowest(self, card: SteeredCard) -> float:
         """The lower bound on this ship, SI."""
         return self.minimum(card) if callable(self.minimum) else self.minimum
 
-    def typical_values(self, card: ManoeuvringCard) -> Values:
+    def typical_values(self, card: SteeredCard) -> Values:
         """Values from which a search begins on this ship, SI; none if it is not to be tried."""
         return self.typical(card) if callable(self.typical) else self.typical
 
-    def spread_value(self, card: ManoeuvringCard) -> float | None:
+    def spread_value(self, card: SteeredCard) -> float | None:
         """Standard deviation beforehand on this ship, SI; None if the parameter stays at its default."""
         return self.spread(card) if callable(self.spread) else self.spread
 
-    def variable(self, effect: str, value: float, card: ManoeuvringCard) -> Parameter | Input:
+    def variable(self, effect: str, value: float, card: SteeredCard) -> Parameter | Input:
         """The model's variable that holds it, ``<effect>.<name without its unit>`` if it is not an input."""
         suffix = self.name.removeprefix(self.stem).lstrip("_")
         unit, description = _UNITS.get(suffix, "1"), self.description[0].upper() + self.description[1:]
@@ -148,7 +147,7 @@ def side_force(cause: str, Y: float, N: float) -> tuple[EffectParameter, ...]:
 EffectSymbols = Mapping[str, ca.SX]
 """The symbols of an effect's parameters and inputs, by name without unit (:attr:`EffectParameter.stem`)."""
 
-EffectEquations = Callable[[Model, EffectSymbols, ManoeuvringCard], Model]
+EffectEquations = Callable[[Model, EffectSymbols, SteeredCard], Model]
 
 Readings = Callable[[EffectSymbols, EffectSymbols], Mapping[str, ca.SX]]
 """``readings(motion, given)``: what sensors show, by the name of the variable that they measure; `motion` holds the
@@ -158,7 +157,7 @@ MEASURED_BEFOREHAND = ("motion.u", "motion.v", "motion.r", "motion.psi", "motion
 """Variables that a sensor may show wrongly."""
 
 
-def unchanged(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def unchanged(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """The equations of an effect that does not reach the ship."""
     return model
 
@@ -278,7 +277,7 @@ class Effect:
         """Names of the parameters without a default."""
         return tuple(parameter.name for parameter in self.parameters if parameter.default is None)
 
-    def free(self, card: ManoeuvringCard) -> tuple[str, ...]:
+    def free(self, card: SteeredCard) -> tuple[str, ...]:
         """Names of the parameters that a search estimates: the required ones, and those with a spread."""
         required = self.required()
         return tuple(
@@ -287,8 +286,10 @@ class Effect:
             if parameter.name in required or parameter.spread_value(card) is not None
         )
 
-    def tried(self, card: ManoeuvringCard) -> bool:
+    def tried(self, card: SteeredCard) -> bool:
         """True if a search can begin: this ship's model can have it, and required parameters have typical values."""
+        if card.steered_by is SteeredBy.THRUSTERS and not self.fits_craft:
+            return False
         if not self.sought or (self.in_mmg and card.model.kind == "mmg") or (self.in_roll and card.roll):
             return False
         required = self.required()
@@ -299,7 +300,7 @@ class Effect:
         """Names of the inputs that it adds to a model."""
         return frozenset(parameter.input_name for parameter in self.parameters if parameter.input_name)
 
-    def changes_on(self, card: ManoeuvringCard) -> tuple[str, ...]:
+    def changes_on(self, card: SteeredCard) -> tuple[str, ...]:
         """Derivatives as in `changes`; none where they are the rudder's and the card has an MMG rudder instead."""
         by_rudder = bool(self.changes) and all(known_term(name).d for name in self.changes)
         return () if by_rudder and card.model.kind == "mmg" else self.changes
@@ -310,7 +311,7 @@ class Effect:
             parameter.name: parameter.input_name or f"{self.name}.{parameter.stem}" for parameter in self.parameters
         }
 
-    def apply(self, model: Model, values: Mapping[str, float], card: ManoeuvringCard) -> Model:
+    def apply(self, model: Model, values: Mapping[str, float], card: SteeredCard) -> Model:
         """The model with this effect.
 
         `model`: model of the ship, with or without other effects. `values`: SI, by the names of the parameters; those
@@ -337,11 +338,6 @@ class Effect:
         return with_readings(
             changed, self.readings({name: model.symbol(name) for name in MEASURED_BEFOREHAND}, symbols)
         )
-
-
-def card_for_effects(card: SteeredCard) -> ManoeuvringCard:
-    """The card as effects take it: an effect that fits a craft reads nothing of a card that only ships have."""
-    return cast(ManoeuvringCard, card)
 
 
 def sensor_fault_of(effect: Effect) -> str:
@@ -399,14 +395,14 @@ def with_steps_for_time(model: Model, time_s: float) -> Model:
     return replace(model, step_s=step)
 
 
-def refuse_given(card: ManoeuvringCard, effect: str, parameter: str, remedy: str) -> None:
+def refuse_given(card: SteeredCard, effect: str, parameter: str, remedy: str) -> None:
     """Raise InputError if the card gives a parameter (its name in SI) of an effect that would act on nothing."""
     for number, entry in enumerate(card.effects):
         if entry.name == effect and parameter in entry.parameters:
             raise card.fault(f"effects.{number}.parameters.{parameter}", "acts on nothing on this card", remedy)
 
 
-def card_particular(card: ManoeuvringCard, key: str, remedy: str) -> float:
+def card_particular(card: SteeredCard, key: str, remedy: str) -> float:
     """A number of the card's ``[ship]``; raises InputError that names the key if the card has none."""
     value = getattr(card.ship, key)
     if value is None:

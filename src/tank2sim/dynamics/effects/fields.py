@@ -8,7 +8,7 @@ from collections.abc import Callable
 import casadi as ca
 import numpy as np
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, with_steps_for
 from tank2sim.dynamics.effects.forces import with_forces
 from tank2sim.dynamics.effects.froude_scale import first, speeds, time_scale_passages, wave_speeds
@@ -26,7 +26,7 @@ def _horizontal(
     prefix: str,
     direction: str,
     largest_mps: float,
-    typical: Callable[[ManoeuvringCard], tuple[float, ...]],
+    typical: Callable[[SteeredCard], tuple[float, ...]],
 ) -> tuple[EffectParameter, ...]:
     """Inputs of a horizontal velocity: speed and `direction`, and components that are added to it."""
     return (
@@ -55,7 +55,7 @@ def _horizontal(
     )
 
 
-def _with_changing_current(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_changing_current(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Water that moves over the ground by w, which follows the input w_i in the time T in which the hull comes into it:
 
         dw/dt = (w_i - w)/T,   dx/dt, dy/dt gain w,
@@ -131,7 +131,7 @@ CURRENT_FIELD = Effect(
 )
 
 
-def _with_wind_along_the_side(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_wind_along_the_side(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Wind force with the side area A_L along the ship: a share s at the superstructure's x_s, the rest evenly.
 
         Y = 1/2 rho_air c_Y A_L sum over x of a(x) V(x) v(x),   N = sum of x Y(x) + 1/2 rho_air c_N A_L L * 2 u v

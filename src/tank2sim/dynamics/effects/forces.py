@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import casadi as ca
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.scaling import Scales
 from tank2sim.dynamics.hull import validity_factor
 from tank2sim.dynamics.model import Model
@@ -17,9 +17,9 @@ def scales(model: Model, speed: ca.SX) -> Scales:
     return Scales(model.symbol("ship.water_density"), model.symbol("ship.length"), speed)
 
 
-def speed_of_scaling(model: Model, card: ManoeuvringCard) -> ca.SX:
+def speed_of_scaling(model: Model, card: SteeredCard) -> ca.SX:
     """V with which the card's own coefficients are scaled, m/s: U, or u0 where the card or the linear model says so."""
-    fixed = card.model.kind == "linear" or card.model.speed_scale == "nominal"
+    fixed = card.model.kind == "linear" or card.manoeuvring().model.speed_scale == "nominal"
     return model.symbol("ship.speed" if fixed else "motion.speed")
 
 

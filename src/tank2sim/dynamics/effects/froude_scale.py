@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 
-_Sizes = Callable[[ManoeuvringCard], tuple[float, ...]]
+_Sizes = Callable[[SteeredCard], tuple[float, ...]]
 
 
-def first(sizes: _Sizes) -> Callable[[ManoeuvringCard], float]:
+def first(sizes: _Sizes) -> Callable[[SteeredCard], float]:
     """The first of `sizes`, as a default of a parameter."""
     return lambda card: sizes(card)[0]
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import casadi as ca
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, with_steps_for
 from tank2sim.dynamics.effects.froude_scale import rates, time_scale_passages
 from tank2sim.dynamics.model import Model, Quantity, State
@@ -18,7 +18,7 @@ def _limited(value: ca.SX, limit: ca.SX) -> ca.SX:
     return ca.fmax(-limit, ca.fmin(limit, value))
 
 
-def _with_rate_limit(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_rate_limit(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """abs(d delta/dt) <= k, in place of the card's own limit."""
     limit = given["max_rate"]
     if "steering.max_rate" in model:
@@ -47,7 +47,7 @@ RUDDER_RATE_LIMIT = Effect(
 )
 
 
-def _with_lag(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_lag(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """d delta/dt = (order - delta)/T, with T in place of the card's time constant."""
     assumed = assumed_lag_notice(card.ship.length_m / card.model.speed_mps)
     lagging = model.substitute("steering.time_constant", given["time_constant"])
@@ -85,7 +85,7 @@ CONTACT = 0.005
 second on a ship of 160 m (project choice); the play operator is its limit at 0."""
 
 
-def _with_backlash(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_backlash(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Play between the gear and the rudder: the rudder stays until the gear has crossed the play, then follows.
 
         d delta/dt = e/T_c,   e what g - delta exceeds half the play b by, either way
@@ -129,7 +129,7 @@ RUDDER_BACKLASH = Effect(
 )
 
 
-def _with_dead_band(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_dead_band(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """The gear acts on that part of order - delta which exceeds the band b: it stops b short of its order.
 
     The dead zone of a servo valve with overlap; unlike :data:`RUDDER_BACKLASH` the rudder is not late at first.
@@ -157,7 +157,7 @@ RUDDER_DEAD_BAND = Effect(
 )
 
 
-def _with_telemotor_lag(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_telemotor_lag(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """dq/dt = (order - q)/T, and the gear follows q: the first of the two stages of a steering gear.
 
     van Amerongen (1982): telemotor before rudder servo. In model tests it is the lag of the controller.

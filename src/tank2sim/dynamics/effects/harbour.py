@@ -6,7 +6,7 @@ import math
 
 import casadi as ca
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
 from tank2sim.dynamics.effects.forces import with_forces
 from tank2sim.dynamics.effects.froude_scale import first, lengths, wave_speeds
@@ -33,7 +33,7 @@ TUG_PLACE = 0.45
 choice."""
 
 
-def _with_thruster(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_thruster(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Y = c F/(1 + (u/u_h)^2), N = x Y: c the order, F the largest force, u_h the speed at which half is left.
 
     The jet of a moving ship bends along the hull, whose suction behind the tunnel takes force away: Chislett and
@@ -44,12 +44,12 @@ def _with_thruster(model: Model, given: EffectSymbols, card: ManoeuvringCard) ->
     return with_forces(model, Y=force, N=given["forward"] * force)
 
 
-def largest_force(card: ManoeuvringCard) -> float:
+def largest_force(card: SteeredCard) -> float:
     """Return the largest force of a usual tunnel thruster, N.
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
         Card of the ship; the value goes with its weight of water L^2 T.
     """
     weight = card.environment.water_density_kgpm3 * card.environment.gravity_mps2 * card.ship.length_m**2
@@ -103,7 +103,7 @@ STERN_THRUSTER = Effect(
 )
 
 
-def _with_tugs(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_tugs(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """X, Y = sum of F_i (cos a_i, sin a_i), N = sum of x_i Y_i - y_i X_i: each tug pulls or pushes at a point.
 
     What a tug has left at speed, and how fast it comes to a force, is for whoever orders it.

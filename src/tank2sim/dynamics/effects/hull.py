@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
 from tank2sim.dynamics.effects.forces import scales, with_forces
 from tank2sim.dynamics.effects.froude_scale import speeds
@@ -17,7 +17,7 @@ _STRIPS = 12
 the largest the same end speed can give (tests compare with the integral in closed form)."""
 
 
-def _with_cross_flow_drag(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_cross_flow_drag(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Y, N = -1/2 rho T C_D integral of (1, x) abs(v + x r) (v + x r) dx from -L/2 to L/2.
 
     Norrbin (1971), Theory and observations on the use of a mathematical model for ship manoeuvring, SSPA 68; Faltinsen
@@ -60,7 +60,7 @@ CROSS_FLOW_DRAG = Effect(
 )
 
 
-def _with_fouling(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_fouling(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """X = 1/2 rho L^2 X' u abs(u), X' negative: growth and roughness, as the allowance of ITTC 7.5-02-03-01.4."""
     u = model.symbol("motion.u")
     return with_forces(model, X=scales(model, ca.SX(1)).force * given["X"] * u * ca.fabs(u))
@@ -85,7 +85,7 @@ HULL_FOULING = Effect(
 )
 
 
-def _with_hump(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_hump(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """X = 1/2 rho L^2 u^2 X' exp(-1/2 ((u - u_h)/w)^2), X' negative: a hump of the resistance by waves at u_h.
 
     The waves of bow and stern add up at some speeds and cancel at others: Havelock (1909); Faltinsen (2005),
@@ -131,7 +131,7 @@ HUMP_RESISTANCE = Effect(
 )
 
 
-def _turning_unlike(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _turning_unlike(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Y, N = 1/2 rho L^2 V^2 (Y_rr, L N_rr) r'^2 = 1/2 rho L^4 (Y_rr, L N_rr) r^2: alike to both sides, so unlike.
 
     Even terms in Y and N are those that a symmetric ship has not: Abkowitz (1964); SIMMAN 2008 tactical diameters.

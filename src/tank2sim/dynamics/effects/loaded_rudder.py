@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
 from tank2sim.dynamics.effects.forces import scales
 from tank2sim.dynamics.effects.rudder import RUDDER_SLIPSTREAM
@@ -15,7 +15,7 @@ LEAST_INFLOW = 0.05
 astern, and must not divide by zero there (project choice)."""
 
 
-def _in_loaded_slipstream(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _in_loaded_slipstream(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Rudder forces by angle of attack and inflow speed.
 
     w = U + k (u0 n/n0 - U) is the inflow speed over its share at u0 and n0; alpha = delta + atan(gamma (v + l L r)/w);

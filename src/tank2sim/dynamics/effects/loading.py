@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from tank2sim.cards.card import ManoeuvringCard, SteeredCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.estimates import CLARKE_BRACKETS
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.effects.derivatives import TRIM, hydrodynamic, inertial_parts, trimmed, with_changes
@@ -55,7 +55,7 @@ def waterplane_inertia(block: float) -> float:
 
 
 def _ratios(
-    model: Model, ratio: ca.SX, beam: float, block: float, card_draught: float, card: ManoeuvringCard
+    model: Model, ratio: ca.SX, beam: float, block: float, card_draught: float, card: SteeredCard
 ) -> dict[str, ca.SX]:
     """Factors of the hydrodynamic part of each derivative at `ratio` times the `card_draught` (m)."""
     bl, bt, volume = beam / card.ship.length_m, beam / card_draught, volume_exponent(block)
@@ -81,7 +81,7 @@ def _ratios(
     return found
 
 
-def _loaded(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _loaded(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """The ship at a mean draught T and a trim tau by the stern, from the card's T_0:
 
         m, J_z times k = (T/T_0)^(C_WP/C_B);   x_G - tau I_L/(V L)
@@ -139,7 +139,7 @@ def _loaded(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
 _WITH_MASS = ("ship.mass", "ship.yaw_inertia", "ship.roll_inertia", "ship.weight")
 
 
-def _a_little_lighter(card: ManoeuvringCard) -> tuple[float]:
+def _a_little_lighter(card: SteeredCard) -> tuple[float]:
     return (LIGHTER * model_particular(card, "draught_m"),)
 
 

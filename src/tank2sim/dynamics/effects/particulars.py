@@ -7,7 +7,7 @@ from typing import Any
 
 import casadi as ca
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.model import Model
 from tank2sim.notices import Notice
 
@@ -31,22 +31,22 @@ FULLEST, FINEST = 0.95, 0.3
 """Block coefficients are held within these bounds where mass and an estimated draught disagree (project choice)."""
 
 
-def _beam(card: ManoeuvringCard) -> float:
+def _beam(card: SteeredCard) -> float:
     return card.ship.length_m / BEAMS_IN_LENGTH
 
 
-def _draught(card: ManoeuvringCard) -> float:
+def _draught(card: SteeredCard) -> float:
     return BEAMS_IN_DRAUGHT * model_particular(card, "beam_m")
 
 
-def _block(card: ManoeuvringCard) -> float:
+def _block(card: SteeredCard) -> float:
     """C_B = m/(rho L B T), with the mass of the card's equations of motion."""
     scales = card.scales
     box = card.ship.length_m * model_particular(card, "beam_m") * model_particular(card, "draught_m")
     return float(min(max(card.rigid_body.mass * scales.mass / (scales.density * box), FINEST), FULLEST))
 
 
-_ESTIMATES: dict[str, tuple[str, str, str, Callable[[ManoeuvringCard], float]]] = {
+_ESTIMATES: dict[str, tuple[str, str, str, Callable[[SteeredCard], float]]] = {
     "beam_m": ("beam", "m", "L/7", _beam),
     "draught_m": ("draught", "m", "0.4 of the beam", _draught),
     "block_coefficient": ("block coefficient", "", "from mass, length, beam and draught", _block),
@@ -75,7 +75,7 @@ ESTIMABLE = tuple(_ESTIMATES)
 """Particulars that :func:`model_particular` can estimate."""
 
 
-def model_particular(card: ManoeuvringCard, key: str) -> float:
+def model_particular(card: SteeredCard, key: str) -> float:
     """A number of the card's ``[ship]``, or an estimate of it (SI).
 
     `key`: one of :data:`ESTIMABLE`.
@@ -89,7 +89,7 @@ def estimated_from(key: str) -> str:
     return f"{_ESTIMATES[key][2]}, typical"
 
 
-def estimate_notice(card: ManoeuvringCard, key: str) -> Notice:
+def estimate_notice(card: SteeredCard, key: str) -> Notice:
     """The notice of an effect that takes an estimate for a number that the card does not state."""
     name, unit, *_ = _ESTIMATES[key]
     taken = f"the {name} is taken as {model_particular(card, key):.3g} {unit}".rstrip()
@@ -107,7 +107,7 @@ def volume_exponent(block: float) -> float:
     return (1 + 2 * block) / 3 / block
 
 
-def _at_draught(model: Model, card: ManoeuvringCard, key: str) -> ca.SX | float:
+def _at_draught(model: Model, card: SteeredCard, key: str) -> ca.SX | float:
     """A particular at the model's draught ``ship.draught``: the side above the water grows as the draught falls."""
     value = model_particular(card, key)
     if "ship.draught" not in model:
@@ -122,7 +122,7 @@ def _at_draught(model: Model, card: ManoeuvringCard, key: str) -> ca.SX | float:
     return by_draught[key]() if key in by_draught else value
 
 
-def with_particulars(model: Model, card: ManoeuvringCard, *keys: str) -> tuple[Model, tuple[Any, ...]]:
+def with_particulars(model: Model, card: SteeredCard, *keys: str) -> tuple[Model, tuple[Any, ...]]:
     """Particulars by their keys (SI), and the model with a notice on each that the card does not state.
 
     Draught, block coefficient and areas above the water are expressions of ``ship.draught``, where the model has it.

@@ -6,7 +6,7 @@ import math
 
 import casadi as ca
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.form import ASTERN_THRUST
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, side_force, with_steps_for
 from tank2sim.dynamics.effects.forces import scales, with_forces, with_side_force
@@ -20,7 +20,7 @@ RESISTANCE = 6e-4
 a tanker (5e-4) and of the Mariner (8e-4); project choice."""
 
 
-def resistance_prime(model: Model, card: ManoeuvringCard) -> ca.SX:
+def resistance_prime(model: Model, card: SteeredCard) -> ca.SX:
     """Resistance at u0 over 1/2 rho L^2 u0^2: R_0 of an MMG card, Xnn of [propulsion], or :data:`RESISTANCE`."""
     if card.model.kind == "mmg":
         return -model.symbol("derivatives.X0")
@@ -36,7 +36,7 @@ def _relative_revolutions(model: Model) -> ca.SX:
     return model.symbol("propeller.speed_actual") / model.symbol("propulsion.nominal_speed")
 
 
-def _with_side_force(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_side_force(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Y, N = 1/2 rho L^2 u0^2 (Y', L N') n abs(n)/n0^2.
 
     The blades meet the upper and the lower half of the wake unlike: Saunders (1957), Hydrodynamics in Ship Design;
@@ -58,7 +58,7 @@ PROPELLER_SIDE_FORCE = Effect(
 )
 
 
-def _with_walk(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_walk(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Y, N = 1/2 rho L^2 u0^2 (Y', L N') min(n, 0)^2/n0^2: only while the propeller turns astern.
 
     Then its jet meets one side of the stern: Brix (ed.) (1993), Manoeuvring Technical Manual; a right-handed propeller
@@ -82,7 +82,7 @@ PROPELLER_WALK = Effect(
 )
 
 
-def _with_loading_side_force(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_loading_side_force(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Y, N = 1/2 rho L^2 U^2 (Y', L N') eta, with the propeller loading eta = (n/n0) u0/U - 1.
 
     An asymmetry that vanishes where the propeller holds the speed and grows as the ship slows: the form is a project
@@ -107,7 +107,7 @@ LOADING_SIDE_FORCE = Effect(
 )
 
 
-def _with_droop(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_droop(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """n = order (1 - droop (1 - u/u0)): the engine is not held at its revolutions when the ship slows.
 
     First order in the loss of speed of an engine at constant torque or power, whose propeller load rises in a turn: the
@@ -173,7 +173,7 @@ def _revolutions_reached(effect: str, order: Input, start: ca.SX) -> State:
     )
 
 
-def _with_engine_lag(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_engine_lag(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """dn/dt = (order - n)/T: the engine's gear between telegraph and propeller, of the first order.
 
     ITTC 7.5-02-06-03 asks for the time constants of engine and steering gear. A diesel that must be
@@ -214,7 +214,7 @@ _CLUTCHING = 0.05
 """Share of the way of the engine's gear in its new direction over which it takes the order: project choice."""
 
 
-def _with_telegraph(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_telegraph(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """An engine that must be started, and stopped before it is reversed.
 
     A state g goes from 0 (stopped) to 1 (running ahead) or -1 (astern) in the time `start`, back to 0 in `reversal`
@@ -277,7 +277,7 @@ ENGINE_TELEGRAPH = Effect(
 )
 
 
-def _with_weaker_astern(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_weaker_astern(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """X += Xnn 1/2 rho L^2 u0^2 (1 - f) min(n, 0)^2/n0^2: astern the thrust is f of what it is ahead.
 
     Blades are cambered and twisted for ahead, and astern the hull takes more of the thrust: Harvald (1983), Resistance
@@ -322,7 +322,7 @@ SIDE_BOUNDS = (0.06, 0.35)
 """-J below which A and B are constant, and where their slopes change: the same source."""
 
 
-def _with_propeller_astern(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_propeller_astern(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Thrust and side force of a propeller that turns astern, by its J = u/(n D), in place of the card's:
 
         X = c rho D^4 n^2 C(J),   Y = k 1/2 rho L T D^2 n^2 A(J),   N = k 1/2 rho L^2 T D^2 n^2 B(J),   n < 0

@@ -6,7 +6,7 @@ import math
 
 import casadi as ca
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ALL_TERMS
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
@@ -24,7 +24,7 @@ def with_rudder_force(model: Model, multiplier: ca.SX, equations: str = "XYN") -
     return model
 
 
-def _biased(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _biased(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """The hull sees delta + d0: the rudder angle differs from its indicator."""
     return model.redefine("rudder.effective", lambda angle: angle + given["angle"])
 
@@ -49,7 +49,7 @@ RUDDER_BIAS = Effect(
 )
 
 
-def _more_effective(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _more_effective(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """(1 + factor) F_delta, F_delta all terms of X, Y, N that hold the rudder."""
     return with_rudder_force(model, 1 + given["factor"])
 
@@ -80,7 +80,7 @@ SLOWEST_IN_JET = 0.2
 slower than any turn; the forces at low speed have a jet of their own)."""
 
 
-def _in_slipstream(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _in_slipstream(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """F_delta (1 + (1 - s) g (1 - u/u0) + s ((w/U)^2 - 1)), w = U + g/2 (u0 n/n0 - U): the propeller keeps up the flow
     over the rudder while the ship loses speed; g is ``gain``, s is ``jet``.
 
@@ -128,7 +128,7 @@ RUDDER_SLIPSTREAM = Effect(
 )
 
 
-def _stalled(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _stalled(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Y and N times 1 - loss s, X times 1 - drag loss s, s = 3 a^2 - 2 a^3 rising from 0 to 1 over ``width`` above the
     angle of stall: with ``drag`` 1 the force normal to the rudder falls off, with 0 the lift, and the drag stays.
     """

@@ -9,7 +9,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects.banks import FAR_M
 from tank2sim.dynamics.effects.depth import DEPTH_FROUDE_MARGIN, LARGEST_DEPTH_FROUDE, MIDSHIP_COEFFICIENT
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
@@ -191,7 +191,7 @@ def clearance(given: EffectSymbols, ship: Body, other: Body) -> ca.SX:
     return least
 
 
-def _with_other_ship(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_other_ship(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """X, Y, N of a slender hull in the flow U, V of another one, sums over its length with c = a - b:
 
         X = rho sum of (A + b) U_t - c ((v + x r) V_x + r V)

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import casadi as ca
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, side_force
 from tank2sim.dynamics.effects.forces import scales, with_forces, with_side_force
 from tank2sim.dynamics.effects.froude_scale import DIRECTION_SIGNS, lengths, speeds, wave_speeds
@@ -39,7 +39,7 @@ def in_calm(model: Model) -> Model:
     return replace(still, inputs=tuple(inputs))
 
 
-def _with_current(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_current(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Water that moves uniformly over the ground: dx/dt and dy/dt gain its velocity.
 
     u and v are through the water; a uniform steady current is only another inertial frame, so that no force changes.
@@ -93,7 +93,7 @@ def relative_air(model: Model, north: ca.SX, east: ca.SX) -> tuple[ca.SX, ca.SX]
     return earth_velocity(north, east, -model.symbol("motion.psi"))
 
 
-def _with_wind(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_wind(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Wind force on hull and superstructure, with V_R and gamma_R (from, clockwise from the bow) of the relative wind:
 
         X = -1/2 rho_air V_R^2 c_X A_F cos(gamma_R)
@@ -124,7 +124,7 @@ def _with_wind(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mod
     return with_forces(model, X=X, Y=Y, N=N)
 
 
-def _coefficient_error(error: float, value: float, area: str) -> Callable[[ManoeuvringCard], float]:
+def _coefficient_error(error: float, value: float, area: str) -> Callable[[SteeredCard], float]:
     """Standard error of a wind coefficient, wider where the area is estimated, for only their product acts."""
     return lambda card: error if getattr(card.ship, area) else math.hypot(error, AREA_ERROR * value)
 
@@ -195,7 +195,7 @@ WIND = Effect(
 )
 
 
-def _with_wave_drift(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_wave_drift(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Mean second-order force of short irregular waves that the side and a round bow reflect:
 
         X = -rho g Hs^2/16 B c_X |cos(chi)| cos(chi)
@@ -248,7 +248,7 @@ WAVE_DRIFT = Effect(
 )
 
 
-def _with_bank_suction(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_bank_suction(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Y, N = 1/2 rho L^2 u^2 Y', 1/2 rho L^3 u^2 N': a ship that runs along a bank or wall at one distance.
 
     Norrbin (1974), Bank effects on a ship moving through a short dredged channel: force and moment are proportional to

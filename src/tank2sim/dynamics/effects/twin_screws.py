@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import casadi as ca
 
-from tank2sim.cards.card import ManoeuvringCard, MmgCard
+from tank2sim.cards.card import MmgCard, SteeredCard
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, refuse_given
 from tank2sim.dynamics.effects.forces import scales, with_forces
 from tank2sim.dynamics.effects.froude_scale import rates
@@ -24,7 +24,7 @@ PROPELLER_PLACE = 0.2
 side. Project choice."""
 
 
-def _with_separate_orders(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_separate_orders(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Each propeller turns with n + n_i, each rudder is ordered to delta + delta_i, i = S, P, by a gear of its own:
 
         MMG card:        thrust T_i, inflow and normal force of each side, N_P = -sum of y_i (1 - t_P) T_i

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.wave_table import MIRRORED, WAVE_MOTIONS, WAVE_ROTATIONS, WaveTable, wave_table
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
 from tank2sim.dynamics.effects.forces import with_forces, with_validity
@@ -142,7 +142,7 @@ def _motion(table: WaveTable, motion: str, chosen: Components, waves: tuple[ca.S
     return ca.dot(ca.mtimes(real, harmonics), waves[0]) - ca.dot(ca.mtimes(imaginary, harmonics), waves[1])
 
 
-def _with_waves(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Model:
+def _with_waves(model: Model, given: EffectSymbols, card: SteeredCard) -> Model:
     """Mean drift at the frequency of encounter, and the pose with the first-order motions on top.
 
         X, Y, N = sum of a_k^2 (1 + 4 w_k/g w) D(w_k + w_k^2/g w, beta + 2 w_k/g (v cos(beta) - u sin(beta)))
@@ -158,9 +158,10 @@ def _with_waves(model: Model, given: EffectSymbols, card: ManoeuvringCard) -> Mo
     (2021), Handbook of Marine Craft Hydrodynamics and Motion Control, 10.2.3, which do not act back on the manoeuvre.
     The waves are long-crested, of deep water.
     """
-    if card.waves is None:
+    own = card.manoeuvring().waves
+    if own is None:
         raise card.fault("waves", "is missing", "the effect waves needs the table [waves] of the ship's own answer")
-    table = wave_table(card.waves.columns, card.waves.rows)
+    table = wave_table(own.columns, own.rows)
     chosen = components(table)
     clock = State("waves.clock", "s", "Time since the start", derivative="waves.clock_rate", start=0.0)
     rate = Quantity("waves.clock_rate", "1", "Rate of the time since the start", ca.SX(1))

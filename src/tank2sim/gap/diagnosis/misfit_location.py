@@ -13,7 +13,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredBy, SteeredCard
 from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
@@ -137,7 +137,7 @@ def _in_noise(replay: Passed, signal: str) -> Array:
 
 
 def figures(
-    card: ManoeuvringCard, trials: Sequence[Trial], passed: Sequence[Passed], version: str
+    card: SteeredCard, trials: Sequence[Trial], passed: Sequence[Passed], version: str
 ) -> tuple[FigureComparison, ...]:
     """The mariner's figures, measured and by a card.
 
@@ -146,7 +146,7 @@ def figures(
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
         The card of `version` in `passed`.
     trials : sequence of Trial
     passed : sequence of Passed
@@ -155,7 +155,7 @@ def figures(
         ``before`` or ``after``.
     """
     end_figures = [figure for replay in passed for figure in _ends(replay, version)]
-    steered = predicted_figures(card, trials)
+    steered = predicted_figures(card.manoeuvring(), trials) if card.steered_by is SteeredBy.RUDDER else ()
     order = {trial.name: place for place, trial in enumerate(trials)}
     return tuple(sorted((*steered, *end_figures), key=lambda figure: order.get(figure.trial, len(order))))
 
@@ -317,7 +317,7 @@ OF_ACTION = {"kinematics": "kinematics", "sensor": "sensor", "actuator": "actuat
 
 
 def equation_of(
-    names: Sequence[str], improved: ManoeuvringCard, force: MissingForce | None, passed: Sequence[Passed]
+    names: Sequence[str], improved: SteeredCard, force: MissingForce | None, passed: Sequence[Passed]
 ) -> str:
     """The equation at fault: surge, sway, yaw, actuator, kinematics or sensor; "" if unknown.
 
@@ -325,7 +325,7 @@ def equation_of(
     ----------
     names : sequence of str
         Effects that were named, the strongest first; may be empty.
-    improved : ManoeuvringCard
+    improved : SteeredCard
         With those of them that act on the ship.
     force : MissingForce or None
     passed : sequence of Passed
@@ -340,7 +340,7 @@ def equation_of(
     return EQUATIONS[force.equation] if force is not None else ""
 
 
-def _most_changed(card: ManoeuvringCard, name: str) -> str:
+def _most_changed(card: SteeredCard, name: str) -> str:
     """Surge, sway or yaw: the acceleration that an effect of the card changes most, relative to its size.
 
     Over motions as they occur in manoeuvres: u 0.6 to 1 u0, v to 0.2 u0, r to 0.5 u0/L, rudder to 25 deg, any heading.

@@ -30,9 +30,8 @@ def force_lacking(likelihood: Likelihood, fit: ExplanationFit) -> MissingForce |
     inside[:, -1] = False  # inputs and states between the blocks
     part = inside[:, :-1]
     u, v, r, psi, _, _ = np.moveaxis(motion.block_states, -1, 0)
-    rudder = motion.block_inputs[..., hypothesis.model.input_names.index("rudder.command")]
     columns = {
-        "rudder": rudder,
+        "rudder": hypothesis.steered(motion.block_inputs),
         "drift": -np.arcsin(np.clip(v / np.maximum(np.hypot(u, v), 1e-9), -1, 1)),
         "yaw rate": r,
         "speed": np.hypot(u, v),

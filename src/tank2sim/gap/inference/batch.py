@@ -273,12 +273,17 @@ def batch_trials(model: Model, trials: Sequence[Trial], ship_time: float) -> Mea
         states=np.array(states),
         inputs=np.array(inputs),
         measured=np.array(measured),
-        unsure_s=np.array([0.0 if "delta_rad" in trial.signals else sampling_step(trial) for trial in trials]),
+        unsure_s=np.array([_unsure_s(trial) for trial in trials]),
         at_execute=np.zeros(len(runs), dtype=bool),
         recorded=_recorded(trials, runs, size, model.input_names),
         averaged=averaged,
         noise=_typical(noise, np.array([_LEAST_NOISE * model[name].nominal for name in seen])) / np.sqrt(fine),
     )
+
+
+def _unsure_s(trial: Trial) -> float:
+    """Time between two readings of the rudder's order, s; 0 where its angle was measured, or of a craft without one."""
+    return sampling_step(trial) if "delta_order_rad" in trial.signals and "delta_rad" not in trial.signals else 0.0
 
 
 def _recorded(

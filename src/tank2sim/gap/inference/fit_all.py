@@ -12,7 +12,7 @@ from uuid import uuid4
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.inference.batch import MeasuredBatch
 from tank2sim.gap.inference.fit import Belief, ExplanationFit, NuisanceParameters
@@ -91,7 +91,7 @@ class _LikelihoodParts:
     """The data from which another process builds the same likelihood."""
 
     token: str
-    card: ManoeuvringCard
+    card: SteeredCard
     driven_by: str
     motion: MeasuredBatch
     coefficients: NuisanceParameters
@@ -200,7 +200,7 @@ _LOCK = Lock()
 """Threads of one executor share the dictionary above."""
 
 
-def _same_trials(cache: HypothesisCache, ship: tuple[ManoeuvringCard, str], sent: _LikelihoodParts) -> bool:
+def _same_trials(cache: HypothesisCache, ship: tuple[SteeredCard, str], sent: _LikelihoodParts) -> bool:
     """Whether hypotheses were built for the same ship and trials."""
     new = HypothesisCache(cache.none, sent.motion)
     known = cache.none.card, cache.none.driven_by

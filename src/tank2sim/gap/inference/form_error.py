@@ -23,12 +23,12 @@ class Forms:
     Parameters
     ----------
     motion : MeasuredBatch
-    command : int
-        Place of ``rudder.command`` among the inputs.
+    steering : array (R, T - 1)
+        What steers (:meth:`.Hypothesis.steered`).
     """
 
-    def __init__(self, motion: MeasuredBatch, command: int):
-        self.motion, self.command = motion, command
+    def __init__(self, motion: MeasuredBatch, steering: Array):
+        self.motion, self.steering = motion, steering
 
     def columns(self, added: Array, *, directed: bool) -> Array:
         """Driving of each form error, for one standard deviation (R, T - 1, 6, nf).
@@ -55,11 +55,11 @@ class Forms:
 
     @cached_property
     def _shapes(self) -> tuple[Array, ...]:
-        """Rudder, yaw rate and loss of speed between -1 and 1 of their range (R, T - 1, 1)."""
+        """Steering, yaw rate and loss of speed between -1 and 1 of their range (R, T - 1, 1)."""
         motion = self.motion
-        rudder = np.abs(motion.block_inputs[..., [self.command]])
+        steering = np.abs(self.steering)[..., None]
         speed, rate = motion.block_states[..., [0]], np.abs(motion.block_states[..., [2]])
-        return tuple(2 * (signal - signal.min()) / (np.ptp(signal) or 1.0) - 1 for signal in (rudder, rate, -speed))
+        return tuple(2 * (signal - signal.min()) / (np.ptp(signal) or 1.0) - 1 for signal in (steering, rate, -speed))
 
     @cached_property
     def _turns(self) -> tuple[Array, ...]:

@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects import EFFECTS, EffectParameter
 from tank2sim.dynamics.model import Model
 from tank2sim.gap.inference.batch import MEASURED_STATES, MeasuredBatch
@@ -113,7 +113,7 @@ class Hypothesis:
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
         The ship as it was known.
     driven_by : str
         ``angle`` or ``order``: the recorded rudder signal.
@@ -132,7 +132,7 @@ class Hypothesis:
 
     def __init__(
         self,
-        card: ManoeuvringCard,
+        card: SteeredCard,
         driven_by: str,
         effects: Sequence[str] = (),
         ship: Model | None = None,
@@ -410,6 +410,16 @@ class Hypothesis:
     def moves_clock(self) -> bool:
         """Whether an effect delays the rudder's record, as an error of its clock does."""
         return any("rudder.command" in EFFECTS[name].delays for name in self.effects)
+
+    def steered(self, inputs: Array) -> Array:
+        """What steers in inputs (..., nu): the order of the rudder (rad), the direction of a craft's thruster (rad), or
+        the revolutions of its first thruster less those of its last (rad/s)."""
+        names = self.model.input_names
+        for ending in ("rudder.command", ".azimuth_command"):
+            if places := [place for place, name in enumerate(names) if name.endswith(ending)]:
+                return np.asarray(inputs[..., places[0]])
+        first, *_, last = [place for place, name in enumerate(names) if name.startswith("thrusters.")]
+        return np.asarray(inputs[..., first] - inputs[..., last])
 
     @property
     def _command(self) -> int:

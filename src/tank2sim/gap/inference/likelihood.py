@@ -112,17 +112,23 @@ class Likelihood:
         changes = np.diff(motion.middles, axis=1)
         self._lack = (motion.block_s * none.fine_rates(motion, nothing) - changes) * self._inside
         self._shown = motion.measured - none.readings(motion, nothing, self._unmeasured)
-        self._forms: Forms | None = Forms(motion, none.model.input_names.index("rudder.command"))
+        self._forms: Forms | None = Forms(motion, none.steered(motion.block_inputs))
         self._widest = WIDTHS[1]
         self.known = ~np.isnan(motion.measured) & motion.inside[..., None]
         self.count = int(self.known.sum())
-        unsure = motion.unsure_s > SHORTEST_UNSURE * motion.block_s
-        moves = motion.order_moves(none.model.input_names.index("rudder.command")) * unsure[:, None, None]
-        moves = moves[..., moves.any(axis=(0, 1))] if CLOCK in coefficients.names else moves[..., :0]
-        self._moves = moves * motion.unsure_s[:, None, None] / np.sqrt(12.0)  # of a uniform distribution
+        self._moves = self._unsure_moves() if CLOCK in coefficients.names else np.zeros((*self._lack.shape[:2], 0))
         self.wide = WIDE_PRIOR * motion.errors if belief.wide is None else belief.wide
         self.base = self.linear(none, nothing)
         self.coefficient_columns = self.of_coefficients(none, nothing)
+
+    def _unsure_moves(self) -> Array:
+        """Moves of the rudder's order at unknown instants (R, T - 1, m), each for one standard deviation, s."""
+        motion = self.motion
+        unsure = motion.unsure_s > SHORTEST_UNSURE * motion.block_s
+        moves = motion.order_moves(self.none.model.input_names.index("rudder.command")) * unsure[:, None, None]
+        moved: Array = moves[..., moves.any(axis=(0, 1))] * motion.unsure_s[:, None, None]
+        moved /= np.sqrt(12.0)  # of a uniform distribution
+        return moved
 
     def linear(self, hypothesis: Hypothesis, theta: Array) -> Linear:
         """The linearised motion of an explanation, with the slopes of the same model as its forces.

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredBy, SteeredCard
 from tank2sim.cards.terms import known_term
+from tank2sim.dynamics.build import build
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
 from tank2sim.gap.inference.batch import BLOCKS_PER_SHIP_TIME, MEASURED_STATES, MeasuredBatch, batch_trials
@@ -17,6 +18,7 @@ from tank2sim.gap.inference.fit import Belief, NuisanceParameters
 from tank2sim.gap.inference.hypothesis import CLOCK, Hypothesis
 from tank2sim.gap.inference.kalman_filter import FORCE_STATES, NoiseLevels
 from tank2sim.gap.inference.likelihood import WIDE_PRIOR, Likelihood
+from tank2sim.identification.craft.problem import craft_prior
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import free_parameters
 from tank2sim.records.trials import sampling_step
@@ -53,12 +55,12 @@ BELIEVED = {"white": 0.5, "slow": 1.5, "slow_s": 0.7, "force": 2.5, "force_s": 0
 plausible noise."""
 
 
-def likelihood_from_card(card: ManoeuvringCard, measured: Measured) -> Likelihood:
+def likelihood_from_card(card: SteeredCard, measured: Measured) -> Likelihood:
     """The likelihood of trials for a card.
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
     measured : Measured
 
     Raises
@@ -69,18 +71,36 @@ def likelihood_from_card(card: ManoeuvringCard, measured: Measured) -> Likelihoo
     none = Hypothesis(card, measured.driven_by)
     ship_time = card.ship.length_m / card.model.speed_mps
     motion = with_executes(none, batch_trials(none.model, measured.trials, ship_time))
-    free = free_parameters(card, inertia=True)
+    free = coefficients_of_card(card)
     known = {name: error for name, (_, error) in free.items() if name in none.model.parameter_names}
     count = len(known)
-    known |= _gear_errors(card, none.model)
-    known[CLOCK] = CLOCK_SHARE * max(sampling_step(trial) for trial in measured.trials)
-    each, shared = np.diag(list(known.values())), _shared(tuple(known), known, free)
+    shared: list[NDArray[np.float64]] = []
+    if card.steered_by is SteeredBy.RUDDER:
+        known |= _gear_errors(card, none.model)
+        known[CLOCK] = CLOCK_SHARE * max(sampling_step(trial) for trial in measured.trials)
+        shared = _shared(tuple(known), known, free)
+    each = np.diag(list(known.values()))
     mixing = np.column_stack([each[:, :count], *shared, each[:, count:]])
     length, speed = card.ship.length_m, card.model.speed_mps
     wide = BEGINNING * np.array([speed, speed, speed / length, 1.0, 3 * length, 3 * length])
     known_before = replace(belief(motion, ship_time), wide=np.maximum(wide, WIDE_PRIOR * motion.errors))
     nuisance = NuisanceParameters(tuple(known), mixing, count + len(shared))
     return Likelihood(motion, none, nuisance, known_before)
+
+
+def coefficients_of_card(card: SteeredCard) -> dict[str, tuple[float, float]]:
+    """Coefficients that explanations are fitted with: parameter to its value on the card and its standard error.
+
+    Parameters
+    ----------
+    card : SteeredCard
+        Of a craft, hull and thrust curves, and not the lags of its thrusters.
+    """
+    if card.steered_by is SteeredBy.RUDDER:
+        return free_parameters(card.manoeuvring(), inertia=True)
+    model = build(card)
+    prior = craft_prior(card, model).items()
+    return {name: known for name, known in prior if name in model and not name.endswith(".time_constant")}
 
 
 def _group(name: str) -> str:
@@ -107,7 +127,7 @@ def _shared(
     return list(columns.values())
 
 
-def _gear_errors(card: ManoeuvringCard, model: Model) -> dict[str, float]:
+def _gear_errors(card: SteeredCard, model: Model) -> dict[str, float]:
     """Rate and time constant of the steering gear, as uncertain as a coefficient; one that was assumed far more so."""
     start = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
     stated = card.steering_gear is not None and card.steering_gear.time_constant_s is not None
@@ -149,7 +169,7 @@ def belief(motion: MeasuredBatch, ship_time: float) -> Belief:
     return Belief(np.append(noise.logs, 0.0), np.append(spread, BELIEVED["width"]))
 
 
-def candidate_explanations(card: ManoeuvringCard, driven_by: str) -> tuple[str, ...]:
+def candidate_explanations(card: SteeredCard, driven_by: str) -> tuple[str, ...]:
     """Effects that can be tried: those not on the card, with values to begin a search from.
 
     Not one with an input that an effect of the card has already: a steady current, on a card with one that changes.

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.diagnosis.error_intervals import acting, contradiction, missing_force_intervals
 from tank2sim.gap.improve_card import estimate_in_file, in_file_units
@@ -341,7 +341,7 @@ def hidden_effects_caution(gap: Gap) -> tuple[Notice, ...]:
     return (caution(f"{sum(known)} of {len(known)} effects would not show in these data at their usual size"),)
 
 
-def _is_hidden(card: ManoeuvringCard, name: str, sizes: Mapping[str, float]) -> bool | None:
+def _is_hidden(card: SteeredCard, name: str, sizes: Mapping[str, float]) -> bool | None:
     """Whether an effect would not show at its usual size in any of its amplitudes; None without a usual size."""
     typical = {parameter.name: parameter.typical_values(card) for parameter in EFFECTS[name].parameters}
     pairs = [(size, max(map(abs, typical[key]))) for key, size in sizes.items() if typical[key]]

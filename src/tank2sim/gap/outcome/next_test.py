@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard, MmgCard
+from tank2sim.cards.card import MmgCard, SteeredCard
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.effects.effect import MEASURED_BEFOREHAND
@@ -73,7 +73,7 @@ class Explanation:
     ----------
     name : str
         For people: the effect, or ``none``.
-    card : ManoeuvringCard
+    card : SteeredCard
         With the effect at its most probable parameters; for ``none`` the card as it is.
     free : tuple of str
         k names of the model's parameters and inputs that are not known exactly: the effect's, and derivatives.
@@ -82,7 +82,7 @@ class Explanation:
     """
 
     name: str
-    card: ManoeuvringCard
+    card: SteeredCard
     free: tuple[str, ...]
     covariance: Array
 
@@ -454,7 +454,7 @@ class SailedShip:
 _STEERED = ("motion.psi", "motion.r")
 
 
-def _disturbances(card: ManoeuvringCard) -> dict[str, float]:
+def _disturbances(card: SteeredCard) -> dict[str, float]:
     """Standard deviations (prime) of constant forces in a window: the forces of :data:`GUSTS` of rudder."""
     known = linear_equivalent(card, build(card), "plus") if isinstance(card, MmgCard) else card.derivatives
     sway, yaw = (GUSTS * abs(known.get(name, 0.0)) for name in ("Yd", "Nd"))
@@ -472,7 +472,7 @@ def _independent(covariance: Array) -> Array:
     return columns
 
 
-def _delayed(card: ManoeuvringCard, model: Model, inputs: Array, step_s: float, p: Array) -> Array:
+def _delayed(card: SteeredCard, model: Model, inputs: Array, step_s: float, p: Array) -> Array:
     """Inputs (n, nu), each row held for `step_s`, with the delays of the card's effects at parameters `p`."""
     late = inputs.copy()
     edges = step_s * np.arange(len(inputs) + 1, dtype=float)

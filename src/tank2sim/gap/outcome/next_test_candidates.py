@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 
 RUDDER, REVOLUTIONS = "rudder.command", "propeller.speed"
 """Inputs of a ship's model that a helmsman orders."""
@@ -57,12 +57,12 @@ class Candidate:
     on_course: bool = False
 
 
-def candidate_manoeuvres(card: ManoeuvringCard, length: float) -> tuple[Candidate, ...]:
+def candidate_manoeuvres(card: SteeredCard, length: float) -> tuple[Candidate, ...]:
     """Turns, zigzags, pull-outs, straight runs, course keeping, random steps, and with propulsion a slow-down.
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
     length : float
         Length of each, L/u0.
     """

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredBy, SteeredCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.diagnosis.strangeness import Strange, trial_consistency
 from tank2sim.gap.inference.wave_band import WaveBand
@@ -26,7 +26,7 @@ DOUBT = 1e-3
 
 
 def gap_notices(
-    card: ManoeuvringCard,
+    card: SteeredCard,
     judged: Judged,
     agreement: Mapping[str, Mapping[str, tuple[float, float]]],
     trials: tuple[Measured, Measured],
@@ -36,7 +36,7 @@ def gap_notices(
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
         As given.
     judged : Judged
     agreement : mapping
@@ -75,7 +75,7 @@ def gap_notices(
     return tuple(dict.fromkeys(notices))
 
 
-def _of_names(card: ManoeuvringCard, judged: Judged, *, held_out: bool) -> list[Notice]:
+def _of_names(card: SteeredCard, judged: Judged, *, held_out: bool) -> list[Notice]:
     """Notices of effects that are withheld, fitted to trials held out, or on the card."""
     notices = []
     if judged.withheld:
@@ -98,7 +98,7 @@ def _of_names(card: ManoeuvringCard, judged: Judged, *, held_out: bool) -> list[
     return notices
 
 
-def _of_what_remains(card: ManoeuvringCard, judged: Judged) -> list[Notice]:
+def _of_what_remains(card: SteeredCard, judged: Judged) -> list[Notice]:
     """That the trials are still missed by far, and how the named effects are fitted together with the hull."""
     remaining = misfit_of(judged.proof.results, "after")
     if remaining <= MUCH:
@@ -110,7 +110,8 @@ def _of_what_remains(card: ManoeuvringCard, judged: Judged) -> list[Notice]:
         )
     ]
     effects = judged.decision.best.hypothesis.effects
-    if structure := structure_that_adds(card, effects):
+    by_rudder = card.steered_by is SteeredBy.RUDDER
+    if structure := structure_that_adds(card.manoeuvring(), effects) if by_rudder else None:
         notices.append(
             Notice(
                 f"identify with structure {structure} fits {' and '.join(effects)} to the trials together with the "

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredBy, SteeredCard
 from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.errors import InputError
@@ -30,9 +30,7 @@ _OVERSHOOTS = 2
 """Overshoots that make a zigzag: one to each side."""
 
 
-def improvement_objections(
-    given: ManoeuvringCard, improved: ManoeuvringCard, passed: Sequence[Passed]
-) -> tuple[str, ...]:
+def improvement_objections(given: SteeredCard, improved: SteeredCard, passed: Sequence[Passed]) -> tuple[str, ...]:
     """Reasons for which the improved card should not replace the given one; empty without any, or if they are equal.
 
     A standard manoeuvre that the given card does and the improved one does not, and trials held out that the improved
@@ -40,7 +38,7 @@ def improvement_objections(
 
     Parameters
     ----------
-    given, improved : ManoeuvringCard
+    given, improved : SteeredCard
     passed : sequence of Passed
         Fitted trials and those held out, simulated with both.
     """
@@ -59,9 +57,12 @@ def _worse_held_out(passed: Sequence[Passed]) -> list[str]:
     return lines
 
 
-def _lost_manoeuvres(given: ManoeuvringCard, improved: ManoeuvringCard) -> list[str]:
-    """Turning circles and zigzags in calm water that the given card does and the improved one does not."""
-    ten, twenty, hard = math.radians(10), math.radians(20), hard_rudder(given)
+def _lost_manoeuvres(given: SteeredCard, improved: SteeredCard) -> list[str]:
+    """Turning circles and zigzags in calm water that the given card does and the improved one does not; none of a craft
+    with thrusters."""
+    if given.steered_by is SteeredBy.THRUSTERS:
+        return []
+    ten, twenty, hard = math.radians(10), math.radians(20), hard_rudder(given.manoeuvring())
     manoeuvres = (Turn(hard), Turn(-hard), Zigzag(ten, ten), Zigzag(twenty, twenty))
     improved_integrator, given_integrator = (Integrator(build(card)) for card in (improved, given))
     lines = []

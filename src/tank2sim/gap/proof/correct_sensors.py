@@ -11,12 +11,14 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.arrays import Array
+from tank2sim.cards.form import ThrusterSection
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.effects.sensors import correct_reading as without_fault
 from tank2sim.files import BYTE_ORDER_MARK, read_exact_text
 from tank2sim.gap.improve_card import Found, in_short
 from tank2sim.notices import Notice, caution
 from tank2sim.records.audit import repair_trial
+from tank2sim.records.craft_trials import read_craft_trial
 from tank2sim.records.csv_table import read_table, text_with_commas
 from tank2sim.records.reading import read_trial_file, reader_of
 from tank2sim.records.signals.writing import trial_text
@@ -54,7 +56,9 @@ def correct_sensor_faults(trial: Trial, found: Sequence[Found]) -> Trial:
     return replace(trial, signals=signals, notices=(*trial.notices, *messages))
 
 
-def corrected_text(path: Path, trial: Trial, found: Sequence[Found]) -> str | None:
+def corrected_text(
+    path: Path, trial: Trial, found: Sequence[Found], thrusters: Sequence[ThrusterSection] = ()
+) -> str | None:
     """Text of a trial's file with the columns of faulty sensors corrected, and a comment that says so.
 
     Comments, other columns and their digits stay as they are in a trial CSV. Files of other formats, and those of which
@@ -68,6 +72,8 @@ def corrected_text(path: Path, trial: Trial, found: Sequence[Found]) -> str | No
         Its data, repaired and scaled to the ship to which `found` applies.
     found : sequence of Found
         See :func:`correct_sensor_faults`.
+    thrusters : sequence of ThrusterSection
+        Thrusters of the craft that was tried; none of a ship with a rudder.
 
     Returns
     -------
@@ -80,8 +86,8 @@ def corrected_text(path: Path, trial: Trial, found: Sequence[Found]) -> str | No
         The file cannot be read any more.
     """
     if in_file := path.is_file():
-        raw = read_trial_file(path, rising=False)
-        repaired, _ = repair_trial(raw)
+        raw = read_craft_trial(path, thrusters) if thrusters else read_trial_file(path, rising=False)
+        repaired = raw if thrusters else repair_trial(raw)[0]
         sized = _at_size_of(repaired, trial, found)
     else:  # a data frame: written at the size of the ship
         raw, repaired, sized = trial, trial, list(found)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.reading import revised
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.proof.open_loop import InputRecord, Replayer, difference_slopes, input_record
@@ -56,17 +56,17 @@ class BlackBox:
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
         The given one with some linear derivatives changed.
     values : mapping
         Name of each changed derivative to its change, prime.
     """
 
-    card: ManoeuvringCard
+    card: SteeredCard
     values: Mapping[str, float]
 
 
-def black_box(card: ManoeuvringCard, measured: Measured, noise: Mapping[str, float], count: int) -> BlackBox:
+def black_box(card: SteeredCard, measured: Measured, noise: Mapping[str, float], count: int) -> BlackBox:
     """Fit a linear black box: as many terms of :data:`_LINEAR` as an effect has parameters.
 
     The terms are chosen one after another by their gain, and fitted by output error to the whole trials; at the end
@@ -75,7 +75,7 @@ def black_box(card: ManoeuvringCard, measured: Measured, noise: Mapping[str, flo
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
         As given.
     measured : Measured
         Fitting trials only.

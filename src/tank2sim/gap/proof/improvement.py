@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.reading import revised
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.diagnosis.residuals import estimates, surroundings_by_trial
@@ -50,7 +50,7 @@ class Proof:
     trials : tuple of Measured
         Fitted ones and those held out, in the winds and currents that were found for them.
     named : NamedEffects
-    base, improved : ManoeuvringCard
+    base, improved : SteeredCard
         Without the effects, coefficients refitted where this follows the fitted trials better, and with them.
     results : list of Passed
         Of the fitted trials; those held out follow once they are opened (:meth:`Prover.open_holdout`).
@@ -65,8 +65,8 @@ class Proof:
 
     trials: tuple[Measured, Measured]
     named: NamedEffects
-    base: ManoeuvringCard
-    improved: ManoeuvringCard
+    base: SteeredCard
+    improved: SteeredCard
     results: list[Passed]
     coefficients: tuple[Refitted, ...] = ()
     width: float = 1.0
@@ -84,7 +84,7 @@ class Prover:
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
         As given.
     trials : tuple of Measured
         Fitted ones and those held out.
@@ -95,7 +95,7 @@ class Prover:
         Speed down to which the cards' polynomials are used in trials held out, m/s, where it is below their own.
     """
 
-    card: ManoeuvringCard
+    card: SteeredCard
     trials: tuple[Measured, Measured]
     likelihood: Likelihood
     replays: TrialReplays
@@ -162,9 +162,7 @@ class Prover:
         if not held.trials:
             return proof
         named = proof.named
-        card, base, improved = (
-            with_polynomial_down_to(each, self.lowest_mps) for each in (self.card, proof.base, proof.improved)
-        )
+        card, base, improved = (self._lowered(each) for each in (self.card, proof.base, proof.improved))
         if named.by_trial:
             found = fit_surroundings(improved, held, tuple(named.by_trial), self.replays.noise)
             named = replace(
@@ -189,7 +187,11 @@ class Prover:
             effect_alone=alone,
         )
 
-    def _replayed(self, card: ManoeuvringCard, base: ManoeuvringCard, named: NamedEffects) -> Proof:
+    def _lowered(self, card: SteeredCard) -> SteeredCard:
+        """The card as trials held out need it, which may be slower than those fitted."""
+        return with_polynomial_down_to(card.manoeuvring(), self.lowest_mps) if self.lowest_mps < math.inf else card
+
+    def _replayed(self, card: SteeredCard, base: SteeredCard, named: NamedEffects) -> Proof:
         """The fitted trials by the given card and by a base with effects, in the winds and currents that were found."""
         improved = add_effects_to_card(base, named.estimated)
         fitted, held = self.trials

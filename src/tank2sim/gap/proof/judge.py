@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.gap.proof.cross_check import MUCH, NEAR_NOISE, closes_gap
 from tank2sim.gap.proof.improvement import Proof, Prover
 from tank2sim.gap.proof.refit import effects_like
@@ -49,7 +49,7 @@ class Judged:
     withheld: str = ""
     by_simulation: str = ""
 
-    def alternatives(self, card: ManoeuvringCard) -> tuple[tuple[str, ...], ...]:
+    def alternatives(self, card: SteeredCard) -> tuple[tuple[str, ...], ...]:
         """Sets that the trials do not distinguish from what is named, or from the coefficients that explain the gap."""
         if self.proof.named.estimated:
             return tuple(fit.hypothesis.effects for fit in self.decision.alike)

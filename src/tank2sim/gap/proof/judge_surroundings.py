@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 from scipy.special import softmax
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.improve_card import add_effects_to_card, at_rest
 from tank2sim.gap.inference.fit import ExplanationFit
@@ -168,7 +168,7 @@ def _at(fit: ExplanationFit, common: CommonSurroundings, trials: Sequence[str]) 
 
 
 def probabilities_by_simulation(
-    card: ManoeuvringCard, fitted: Measured, proofs: Mapping[tuple[str, ...], Proof], by_trial: Collection[str]
+    card: SteeredCard, fitted: Measured, proofs: Mapping[tuple[str, ...], Proof], by_trial: Collection[str]
 ) -> dict[tuple[str, ...], float]:
     """Probability of each explanation by the misfits of the fitted trials.
 
@@ -177,7 +177,7 @@ def probabilities_by_simulation(
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
         For L/u0.
     fitted : Measured
         T trials.
@@ -222,7 +222,7 @@ class CommonSurroundings:
 
 
 def fit_common_surroundings(
-    card: ManoeuvringCard, measured: Measured, effect: str, noise: Mapping[str, float]
+    card: SteeredCard, measured: Measured, effect: str, noise: Mapping[str, float]
 ) -> CommonSurroundings | None:
     """One effect of the surroundings with the coefficients of its forces, which are the same in all trials.
 
@@ -235,7 +235,7 @@ def fit_common_surroundings(
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
         With the effect, whose wind or current is an input of its model.
     measured : Measured
         The trials.
@@ -255,7 +255,7 @@ def fit_common_surroundings(
 class _AllTrials:
     """Least squares of all trials; unknowns (k + 2 trials,): k coefficients, currents north and east, m/s."""
 
-    def __init__(self, card: ManoeuvringCard, effect: str, trials: Sequence[SurroundedTrial]):
+    def __init__(self, card: SteeredCard, effect: str, trials: Sequence[SurroundedTrial]):
         self.effect, self.trials, self._card = effect, trials, card
         self._shared = [parameter for parameter in EFFECTS[effect].parameters if parameter.spread_value(card)]
         self._centre = np.array([parameter.value({}, card) for parameter in self._shared])

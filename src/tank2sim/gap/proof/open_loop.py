@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
@@ -143,7 +143,7 @@ class Replayer:
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
         Its effects' inputs (a current's speed) keep the values of the card unless the trial measured them.
     driven_by : str
         ``angle`` or ``order``.
@@ -153,7 +153,7 @@ class Replayer:
         In place of the card's: with more states, of which an initial value is to be found.
     """
 
-    def __init__(self, card: ManoeuvringCard, driven_by: str, seen: Sequence[str], model: Model | None = None):
+    def __init__(self, card: SteeredCard, driven_by: str, seen: Sequence[str], model: Model | None = None):
         self.card, self.seen = card, tuple(seen)
         self.model = driven_model(card, driven_by) if model is None else model
         step, constants = step_and_constants(self.model)
@@ -487,11 +487,12 @@ def input_record(replayer: Replayer, trial: Trial) -> InputRecord:
             inputs[:, column] = record.means(column, edges - late.get(name, 0.0))
     compared = np.searchsorted(instants, np.where(seen, time[nearest], wanted))
     readings = np.where(seen[:, None], record.measured[nearest], np.nan)
-    delay = late.get(_ORDER, 0.0) if record.orders[model.input_names.index(_ORDER)] else 0.0
+    ordered = _ORDER in model.input_names and record.orders[model.input_names.index(_ORDER)]
+    delay = late.get(_ORDER, 0.0) if ordered else 0.0
     return InputRecord(trial.name, instants, inputs, compared, readings, delay)
 
 
-def delays_of(card: ManoeuvringCard, model: Model, p: Array | None = None) -> dict[str, float]:
+def delays_of(card: SteeredCard, model: Model, p: Array | None = None) -> dict[str, float]:
     """Delay of each input by the effects of the card at parameters `p`, s."""
     known = dict(zip(model.parameter_names, model.parameter_values() if p is None else p, strict=True))
     delays: dict[str, float] = {}

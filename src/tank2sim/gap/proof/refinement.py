@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.ship import mass_fault
 from tank2sim.gap.proof.open_loop import InputRecord, Replayer, difference_slopes, first_state, input_record
 from tank2sim.gap.proof.replay import replayer_of
@@ -62,7 +62,7 @@ class CoefficientPrior:
 
 
 def refined_coefficients(
-    card: ManoeuvringCard,
+    card: SteeredCard,
     prior: CoefficientPrior,
     measured: Measured,
     noise: Mapping[str, float],
@@ -72,7 +72,7 @@ def refined_coefficients(
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
         With the named effects; its coefficients are the first values.
     prior : CoefficientPrior
     measured : Measured
@@ -147,7 +147,7 @@ class _Linearised:
 
 
 def _begin(
-    card: ManoeuvringCard,
+    card: SteeredCard,
     driven_by: str,
     noise: Mapping[str, float],
     prior: CoefficientPrior,
@@ -162,7 +162,7 @@ def _begin(
 
 
 def _linearised(
-    card: ManoeuvringCard,
+    card: SteeredCard,
     driven_by: str,
     noise: Mapping[str, float],
     prior: CoefficientPrior,
@@ -200,7 +200,7 @@ def _linearised(
     )
 
 
-def _replayer(card: ManoeuvringCard, driven_by: str, noise: Mapping[str, float]) -> tuple[Replayer, Array]:
+def _replayer(card: SteeredCard, driven_by: str, noise: Mapping[str, float]) -> tuple[Replayer, Array]:
     replayer = replayer_of(card, driven_by, tuple(noise))
     return replayer, np.array([noise[name] for name in replayer.seen])
 

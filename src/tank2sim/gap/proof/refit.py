@@ -9,7 +9,7 @@ import numpy as np
 
 from tank2sim.analysis.ensemble.draws import by_file_name
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredBy, SteeredCard
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS
 from tank2sim.dynamics.effects import EFFECTS
@@ -17,10 +17,12 @@ from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.ship import mass_fault
 from tank2sim.gap.improve_card import changed_derivatives
 from tank2sim.gap.inference.fit import CoefficientEstimates
+from tank2sim.gap.inference.prior import coefficients_of_card
 from tank2sim.gap.result import Refitted
 from tank2sim.gap.search.decision import STANDARD_ERRORS
+from tank2sim.identification.craft.card import craft_with
 from tank2sim.identification.trials.problem.estimation_problem import Estimate
-from tank2sim.identification.trials.problem.problem_from_card import card_with_estimate, free_parameters
+from tank2sim.identification.trials.problem.problem_from_card import card_with_estimate
 
 EXPLAINS = 0.5
 """Share of what the coefficients moved, in squares of their standard errors, that an effect named next to them explains
@@ -28,7 +30,7 @@ EXPLAINS = 0.5
 
 
 def effects_like(
-    card: ManoeuvringCard, coefficients: Sequence[Refitted], named: Collection[str] = ()
+    card: SteeredCard, coefficients: Sequence[Refitted], named: Collection[str] = ()
 ) -> dict[str, Refitted]:
     """Effects that change the coefficients as they moved, and the coefficient of theirs that moved most.
 
@@ -38,7 +40,7 @@ def effects_like(
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
         As given.
     coefficients : sequence of Refitted
     named : collection of str
@@ -60,7 +62,7 @@ def effects_like(
     return found
 
 
-def _changes(card: ManoeuvringCard, name: str, errors: Mapping[str, float]) -> Array:
+def _changes(card: SteeredCard, name: str, errors: Mapping[str, float]) -> Array:
     """Changes of coefficients, in errors, by each amplitude of an effect of typical size (coefficients, amplitudes)."""
     parameters = EFFECTS[name].parameters
     typical = {each.name: (each.typical_values(card) or (each.value({}, card),))[0] for each in parameters}
@@ -77,8 +79,8 @@ def _changes(card: ManoeuvringCard, name: str, errors: Mapping[str, float]) -> A
 
 
 def refit_coefficients(
-    card: ManoeuvringCard, model: Model, estimates: CoefficientEstimates
-) -> tuple[tuple[Refitted, ...], ManoeuvringCard]:
+    card: SteeredCard, model: Model, estimates: CoefficientEstimates
+) -> tuple[tuple[Refitted, ...], SteeredCard]:
     """The coefficients with their values before and after, and the card with them and their covariance.
 
     Data of the steering gear and the clock of the record are part of the fit and are not written: the card states what
@@ -87,13 +89,13 @@ def refit_coefficients(
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
     model : Model
         Model of the card; values stay within its bounds.
     estimates : CoefficientEstimates
         Estimates of parameters of the card's model.
     """
-    known = free_parameters(card, inertia=True)
+    known = coefficients_of_card(card)
     values = _within_bounds(model, estimates, known)
     defaults = dict(zip(model.parameter_names, map(float, model.parameter_values()), strict=True))
     if mass_fault(model, defaults | values):
@@ -108,10 +110,18 @@ def refit_coefficients(
     )
     short = [name.removeprefix("derivatives.") for name in names]
     columns = zip(short, values.values(), estimate.standard_errors.tolist(), *before.T.tolist(), strict=True)
-    refitted = card_with_estimate(card, estimate, "refitted by gap")
+    refitted = _with_estimate(card, estimate, "refitted by gap")
     return tuple(Refitted(*row) for row in columns), replace(
         refitted, covariance=by_file_name(refitted, names, covariance)
     )
+
+
+def _with_estimate(card: SteeredCard, estimate: Estimate, comment: str) -> SteeredCard:
+    """The card with estimates of its coefficients."""
+    if card.steered_by is SteeredBy.RUDDER:
+        return card_with_estimate(card.manoeuvring(), estimate, comment)
+    found = zip(estimate.free, estimate.values.tolist(), estimate.standard_errors.tolist(), strict=True)
+    return craft_with(card, {name: (value, error) for name, value, error in found}, comment=comment)
 
 
 def _within_bounds(

@@ -10,7 +10,7 @@ from functools import cache, partial
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.gap.proof.open_loop import InputRecord, Replayer, input_record
 from tank2sim.gap.result import Passed
 from tank2sim.identification.trials.problem.estimation_problem import driven_model
@@ -41,8 +41,8 @@ class TrialReplays:
 
     def by_cards(
         self,
-        card: ManoeuvringCard,
-        improved: ManoeuvringCard,
+        card: SteeredCard,
+        improved: SteeredCard,
         measured: Measured,
         held_out: bool,
         corrected: Measured | None = None,
@@ -56,7 +56,7 @@ class TrialReplays:
             results.append(_passed(old.record, old.seen, self.noise, held_out, (old.simulated, simulated)))
         return tuple(results)
 
-    def with_black_box(self, results: Sequence[Passed], box: ManoeuvringCard, measured: Measured) -> tuple[Passed, ...]:
+    def with_black_box(self, results: Sequence[Passed], box: SteeredCard, measured: Measured) -> tuple[Passed, ...]:
         """The same replays with the simulation of each trial by a black box's card."""
         followed = {each.record.name: each for each in (wait() for wait in self.begin(box, measured))}
         boxed = []
@@ -66,7 +66,7 @@ class TrialReplays:
             boxed.append(replace(result, black_box={name: columns[name] for name in result.noise}))
         return tuple(boxed)
 
-    def begin(self, card: ManoeuvringCard, measured: Measured) -> list[Callable[[], _Followed]]:
+    def begin(self, card: SteeredCard, measured: Measured) -> list[Callable[[], _Followed]]:
         """Begin to follow each trial, the longest first; return the functions that wait for them.
 
         The card's model simulates each from the initial state that fits it best, and once.
@@ -80,8 +80,8 @@ class TrialReplays:
 
 
 def replay_trials(
-    card: ManoeuvringCard,
-    improved: ManoeuvringCard,
+    card: SteeredCard,
+    improved: SteeredCard,
     measured: Measured,
     noise: Mapping[str, float],
     held_out: bool,
@@ -94,7 +94,7 @@ def replay_trials(
 
     Parameters
     ----------
-    card, improved : ManoeuvringCard
+    card, improved : SteeredCard
         As given, and with the effects found.
     measured : Measured
         As recorded.
@@ -124,7 +124,7 @@ class _Followed:
     simulated: Array
 
 
-def _follow(card: ManoeuvringCard, driven_by: str, noise: Mapping[str, float], trial: Trial) -> _Followed:
+def _follow(card: SteeredCard, driven_by: str, noise: Mapping[str, float], trial: Trial) -> _Followed:
     replayer = replayer_of(card, driven_by, tuple(noise))
     p, sigma = replayer.model.parameter_values(), np.array([noise[name] for name in replayer.seen])
     record, start = replayer.fit_record(input_record(replayer, trial), sigma, p)
@@ -135,12 +135,12 @@ _REPLAYERS: dict[tuple[str, str, tuple[str, ...]], Replayer] = {}
 """The last replayer of this process, by the card's text, what drives the rudder and the variables with noise."""
 
 
-def replayer_of(card: ManoeuvringCard, driven_by: str, known: tuple[str, ...]) -> Replayer:
+def replayer_of(card: SteeredCard, driven_by: str, known: tuple[str, ...]) -> Replayer:
     """The replayer of a card, kept for the next trial.
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
     driven_by : str
         ``angle`` or ``order``.
     known : tuple of str
@@ -157,7 +157,7 @@ def replayer_of(card: ManoeuvringCard, driven_by: str, known: tuple[str, ...]) -
     return found
 
 
-def replay_by_card(card: ManoeuvringCard, measured: Measured) -> tuple[Passed, ...]:
+def replay_by_card(card: SteeredCard, measured: Measured) -> tuple[Passed, ...]:
     """Each trial, free running with its recorded inputs over its whole length, from the state that fits it best.
 
     Signals are weighted by their stated or estimated noise.

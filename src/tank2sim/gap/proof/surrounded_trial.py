@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.proof.open_loop import InputRecord, Replayer, difference_slopes, input_record
 from tank2sim.gap.result import Surroundings
@@ -47,7 +47,7 @@ def with_columns(trial: Trial, found: ByTrial) -> Trial:
     return replace(trial, signals=signals)
 
 
-def typical_speed(card: ManoeuvringCard, name: str) -> float:
+def typical_speed(card: SteeredCard, name: str) -> float:
     """Size of a usual wind or current, m/s."""
     (speed,) = (parameter for parameter in EFFECTS[name].parameters if parameter.name == "speed_mps")
     return max(map(abs, speed.typical_values(card)))
@@ -58,7 +58,7 @@ class SurroundedTrial:
 
     def __init__(
         self,
-        card: ManoeuvringCard,
+        card: SteeredCard,
         driven_by: str,
         trial: Trial,
         effects: Sequence[str],

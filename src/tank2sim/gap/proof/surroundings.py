@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model, Quantity, State
 from tank2sim.gap.proof.open_loop import Replayer, difference_slopes
@@ -24,7 +24,7 @@ def with_surroundings(measured: Measured, found: ByTrial) -> Measured:
 
 
 def fit_surroundings(
-    card: ManoeuvringCard, measured: Measured, effects: Sequence[str], noise: Mapping[str, float]
+    card: SteeredCard, measured: Measured, effects: Sequence[str], noise: Mapping[str, float]
 ) -> dict[str, dict[str, Surroundings]]:
     """The winds and currents with which a card follows each trial best, free running with its recorded orders.
 
@@ -33,7 +33,7 @@ def fit_surroundings(
 
     Parameters
     ----------
-    card : ManoeuvringCard
+    card : SteeredCard
         With the effects, whose wind or current is an input of its model.
     measured : Measured
         The trials.
@@ -56,7 +56,7 @@ def fit_surroundings(
 
 
 def _of_trial(
-    card: ManoeuvringCard, trial: SurroundedTrial, replayer: Replayer, effects: Sequence[str]
+    card: SteeredCard, trial: SurroundedTrial, replayer: Replayer, effects: Sequence[str]
 ) -> dict[str, Surroundings]:
     """Together with the initial state and the instants of the orders: a heading that is a little off moves the track
     as a current across it does.
@@ -87,7 +87,7 @@ def _of_trial(
 
 
 def _slopes_in_errors(
-    card: ManoeuvringCard,
+    card: SteeredCard,
     effects: Sequence[str],
     model: Model,
     away: Callable[[Array, Array], Array],

@@ -41,17 +41,36 @@ def identified_craft(
             value, error = response.dead_band
             write(place, key, value * unit, error * unit)
     values, errors = fit.estimate.values.tolist(), fit.estimate.standard_errors.tolist()
+    estimates = {name: (values[at], errors[at]) for name, at in estimated_numbers(card, fit).items()}
+    return craft_with(card, estimates, changes, comment="identified")
+
+
+def craft_with(
+    card: SteeredCard,
+    estimates: Mapping[str, tuple[float, float]],
+    others: Mapping[str, object] | None = None,
+    *,
+    comment: str,
+) -> SteeredCard:
+    """The card of a craft with estimates and their standard errors, in the scaling of its own text.
+
+    `estimates`: Parameter of the model (``derivatives.Xu``, ``thrusters.port.ahead``) to value and standard error, SI;
+    `others`: further values at keys of the text; `comment`: next to each. Raises InputError: With the estimates the
+    damping of the craft would drive it on.
+    """
+    changes: dict[str, object] = dict(others or {})
     numbers = {thruster.name: number for number, thruster in enumerate(card.thrusters)}
-    for name, at in estimated_numbers(card, fit).items():
+    for name, (value, error) in estimates.items():
         section, *rest = name.split(".")
         if section == "derivatives":
             factor = card.file_factor(rest[0])
-            changes[name] = values[at] * factor
-            changes[f"uncertainty.{rest[0]}"] = errors[at] * abs(factor)
+            changes[name] = value * factor
+            changes[f"uncertainty.{rest[0]}"] = error * abs(factor)
         else:
-            write(f"thrusters.{numbers[rest[0]]}", _KEYS[rest[1]], max(0.0, values[at]), errors[at])
+            place, key = f"thrusters.{numbers[rest[0]]}", _KEYS[rest[1]]
+            changes |= {f"{place}.{key}": max(0.0, value), f"{place}.uncertainty.{key}": error}
     try:
-        return parse_card(changed_text(card.text, card.source, changes, comment="identified"), card.source).steered()
+        return parse_card(changed_text(card.text, card.source, changes, comment=comment), card.source).steered()
     except InputError as error:
         problem = f"fitted to these trials, it {error.problem}"
         remedy = (

@@ -25,8 +25,10 @@ from tank2sim.dynamics.build import build
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model, Parameter, Quantity, State, same_symbol
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
+from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, without_order_response
+from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.sampled_runs import prepare
+from tank2sim.records.same_record import refuse_copies
 from tank2sim.records.trials import Trial
 
 CURRENT_SPREAD = 0.3
@@ -96,17 +98,18 @@ def craft_fit_model(card: SteeredCard, driven_by: str = "revolutions", *, turned
     revolutions; ``orders``: they are in, except a lag shorter than a step. `turned`: The directions of thrusters that
     turn were measured: their lag is left out.
     """
-    thrusters = tuple(
-        thruster.model_copy(update={"time_constant_s": None, "dead_band_radps": 0.0, "order_exponent": None})
-        if driven_by == "revolutions"
-        else thruster.model_copy(
-            update={
-                "time_constant_s": _felt(thruster.time_constant_s),
-                "order_exponent": thruster.order_exponent or 1.0,
-            }
+    if driven_by == "revolutions":
+        thrusters = without_order_response(card).thrusters
+    else:
+        thrusters = tuple(
+            thruster.model_copy(
+                update={
+                    "time_constant_s": _felt(thruster.time_constant_s),
+                    "order_exponent": thruster.order_exponent or 1.0,
+                }
+            )
+            for thruster in card.thrusters
         )
-        for thruster in card.thrusters
-    )
     if turned:
         thrusters = tuple(thruster.model_copy(update={"azimuth_time_constant_s": None}) for thruster in thrusters)
     model = build(replace(card, thrusters=thrusters))
@@ -255,11 +258,7 @@ def craft_problem(card: SteeredCard, trials: Sequence[Trial]) -> Problem:
     turned = not any(name.startswith("azimuth_order_") for trial in trials for name in trial.signals)
     model = craft_fit_model(card, by, turned=turned)
     model = replace(model, parameters=tuple(map(_bounded, model.parameters)))
-    unused = "order_" if by == "revolutions" else "n_"
-    trials = [
-        replace(trial, signals={key: values for key, values in trial.signals.items() if not key.startswith(unused)})
-        for trial in trials
-    ]
+    trials = [_driven(trial, by) for trial in trials]
     prior = craft_prior(card, model)
     signals = {signal for trial in trials for signal in trial.signals}
     seen = [variable for signal, variable in _SEEN.items() if signal in signals]
@@ -294,6 +293,24 @@ def craft_driven_by(card: SteeredCard, trials: Sequence[Trial]) -> str:
             problem = "has revolutions and no orders, and another trial has orders alone"
             raise InputError(trial.path, "header", problem, "give trials of one kind")
     return "orders"
+
+
+def measured_of_craft(card: SteeredCard, *groups: Sequence[Trial]) -> tuple[Measured, ...]:
+    """Groups of trials of a craft, with the inputs alone that drive its model in all of them.
+
+    `groups`: By :func:`tank2sim.records.craft_trials.read_craft_trial`. Raises InputError: Some trials have revolutions
+    and others orders alone, or two of a group are one record.
+    """
+    by = craft_driven_by(card, [trial for group in groups for trial in group])
+    return tuple(
+        Measured(tuple(_driven(trial, by) for trial in group), by, tuple(refuse_copies(group))) for group in groups
+    )
+
+
+def _driven(trial: Trial, driven_by: str) -> Trial:
+    """A trial without the orders where revolutions drive the model, and the reverse."""
+    unused = "order_" if driven_by == "revolutions" else "n_"
+    return replace(trial, signals={key: value for key, value in trial.signals.items() if not key.startswith(unused)})
 
 
 def with_disturbances(problem: Problem, means: Array, spreads: Array) -> Problem:

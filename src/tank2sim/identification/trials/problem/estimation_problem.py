@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from tank2sim.arrays import Array
-from tank2sim.cards import ManoeuvringCard, parse_card
+from tank2sim.cards import SteeredCard, parse_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.build import KEPT_MODELS
 from tank2sim.dynamics.kinematics import earth_velocity
@@ -28,9 +28,16 @@ LITTLE_KNOWN = 0.25
 """A standard error of at least this share of the value is not widened (project choice)."""
 
 
-def driven_model(card: ManoeuvringCard, driven_by: str) -> Model:
-    """The card's model, driven by the measured angle of the rudder (`driven_by` is ``angle``) or by its order."""
-    return _driven(build(card), driven_by)
+def driven_model(card: SteeredCard, driven_by: str) -> Model:
+    """The card's model, driven by the measured angle of the rudder (`driven_by` is ``angle``) or by its order; of a
+    craft, by the measured ``revolutions`` of its thrusters or by their ``orders``."""
+    return _driven(build(without_order_response(card) if driven_by == "revolutions" else card), driven_by)
+
+
+def without_order_response(card: SteeredCard) -> SteeredCard:
+    """The card of a craft without what lies between orders and revolutions: lag, dead band and exponent."""
+    none = {"time_constant_s": None, "dead_band_radps": 0.0, "order_exponent": None}
+    return replace(card, thrusters=tuple(thruster.model_copy(update=none) for thruster in card.thrusters))
 
 
 @lru_cache(maxsize=KEPT_MODELS)
@@ -89,7 +96,7 @@ class DrivenShip:
 @lru_cache(maxsize=8)
 def _model_of(ship: DrivenShip) -> Model:
     card = parse_card(ship.card, "card")
-    assert isinstance(card, ManoeuvringCard)
+    assert isinstance(card, SteeredCard)
     return driven_model(card, ship.driven_by)
 
 
