@@ -24,11 +24,17 @@ ROWS = {
 
 
 def written(
-    folder: Path, craft: dict[str, float], names: list[str], *, scale: float = 1.0, ordered: bool = False
+    folder: Path,
+    craft: dict[str, float],
+    names: list[str],
+    *,
+    scale: float = 1.0,
+    ordered: bool = False,
+    current: tuple[float, float] = (0.0, 0.0),
 ) -> list[Path]:
-    """Trials by the integration of the benchmark, without wind or current, with 1 cm and 0.1 deg of noise.
+    """Trials by the integration of the benchmark, without wind, with 1 cm and 0.1 deg of noise.
 
-    With revolutions, or `ordered` with orders alone.
+    With revolutions, or `ordered` with orders alone; `current` is towards north and east, m/s.
     """
     rng, paths = np.random.default_rng(11), []
     full = craft["rpm"] * np.pi / 30
@@ -41,7 +47,8 @@ def written(
                     rows.append([t, *state[:3], *(orders if ordered else n)])
                 n = goal + (n - goal) * np.exp(-0.02 / craft["lag"])
                 psi, u, v, r = state[2:]
-                speed = [u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi), r]
+                north, east = u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi)
+                speed = [north + current[0], east + current[1], r]
                 state = state + 0.02 * np.array([*speed, *craft_log.rates(craft, state[3:], n, np.zeros(3))])
                 t += 0.02
         table = np.array(rows)

@@ -92,6 +92,9 @@ class Toy:
     def steps(self):
         return np.full(len(self.priors), 0.01)
 
+    def steered(self, inputs):
+        return inputs[..., 0]
+
     def unmeasured_states(self, motion, theta, p=None):
         return np.zeros((*motion.states.shape[:2], 0))
 

@@ -27,4 +27,4 @@ def judge(motion=None, *, names=("0", "1"), errors=(0.5, 0.3), spread=0.5, mixin
 
 def forms_of(of: Likelihood, toy: Toy, theta) -> np.ndarray:
     """By how much the effects may differ from their formula at some parameters."""
-    return Forms(of.motion, 0).columns(of.added(toy, theta)[0], directed=toy.directed)
+    return Forms(of.motion, of.motion.block_inputs[..., 0]).columns(of.added(toy, theta)[0], directed=toy.directed)
