@@ -50,7 +50,7 @@ def find_gap(
     Parameters
     ----------
     ship : Vessel, Card, str or path
-        The ship before these trials, a polynomial or an MMG card.
+        The vessel before these trials: a polynomial or an MMG card, or a craft with thrusters.
     trials : path, TrialRecord, DataFrame, or sequence of them
         Trials that name the effect; a folder means the trials in it.
     holdout : path, TrialRecord, DataFrame, or sequence of them
