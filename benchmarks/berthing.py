@@ -17,7 +17,7 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -141,9 +141,9 @@ ASTERN_EFFECTS = {"propeller_astern", "astern_thrust"}
 """Effects of the bundled cards that act with the propeller astern alone."""
 
 
-def identified(low_speed_mps: float | None = None) -> t2s.Ship:
-    """The card of turns and zigzags, from the one that was estimated before any trial, or from that with another bound
-    of the forces at low speed (m/s)."""
+def identified(low_speed_mps: float | None = None, kinds: Sequence[str] = ("turning", "zigzag")) -> t2s.Ship:
+    """The card of these kinds of runs, from the one that was estimated before any trial, or from that with another
+    bound of the forces at low speed (m/s)."""
     folder = DATA / "esso_osaka"
     with tempfile.TemporaryDirectory() as temporary:
         path = Path(temporary) / "ship.toml"
@@ -151,7 +151,7 @@ def identified(low_speed_mps: float | None = None) -> t2s.Ship:
         if low_speed_mps is not None:
             content["model"]["low_speed_below_mps"] = low_speed_mps
         path.write_text(tomlkit.dumps(content), encoding="utf-8")
-        return t2s.identify(path, [*folder.glob("turning/*.csv"), *folder.glob("zigzag/*.csv")]).ship
+        return t2s.identify(path, [file for kind in kinds for file in folder.glob(f"{kind}/*.csv")]).ship
 
 
 def with_astern(ship: t2s.Ship, *astern: EffectEntry, low_speed_mps: float | None = None) -> t2s.Ship:
@@ -179,6 +179,9 @@ def main() -> None:
             "thrust and side force astern as published": with_astern(ship, published),
             "the same, forces at low speed below 0.28 m/s": with_astern(ship, published, low_speed_mps=0.28),
             "the same, identified so": with_astern(identified(0.28), published),
+            "as published, identified from random runs as well": with_astern(
+                identified(kinds=("turning", "zigzag", "random")), published
+            ),
         }
     trials = [read_trial_file(path) for path in paths]
     for name, ship in cards.items():

@@ -7,14 +7,20 @@ is the shortest that is predicted to make every figure as certain. Both are made
 several seeds, reduced by ``reduce``, and the figures of the reduced ships are compared with those of the true one. The
 same is predicted against the generator's own full matrix.
 
+Last, a real tank's matrix: the 141 captive runs of the KVLCC2 at INSEAN, which gave no forces. How many runs of a plan
+are predicted to be as certain? Needs the data folder (TANK2SIM_DATA).
+
     python benchmarks/campaign_design.py [SHIPS [SEEDS]]
+    python benchmarks/campaign_design.py 0   # the real matrix alone
 """
 
 from __future__ import annotations
 
+import os
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -42,7 +48,35 @@ GAIN = 0.002
 PRIOR_ERROR = 0.15
 
 
+INSEAN = (
+    Path(os.environ.get("TANK2SIM_DATA", Path(__file__).resolve().parents[2] / "shared"))
+    / "data/kvlcc2_insean_runs/index_PMM.csv"
+)
+INSEAN_SHIPS = ("kvlcc2", "kvlcc2-captive")
+
+
+def print_insean() -> None:
+    """Runs and hours of a plan that is predicted to be as certain as INSEAN's matrix, and standard errors of both."""
+    if not INSEAN.is_file():
+        print(f"no matrix of INSEAN: there is no {INSEAN} (set TANK2SIM_DATA)")
+        return
+    for name in INSEAN_SHIPS:
+        whole = design_campaign(name, figures=FIGURES, usual=INSEAN).design
+        kinds = Counter(run.type for group in whole.usual for run in group)
+        print(f"{name}: INSEAN's matrix, {sum(kinds.values())} runs in {whole.usual_hours:.1f} h: {dict(kinds)}")
+        if whole.hours_needed is None:
+            print("  no plan is as certain in these hours")
+        else:
+            short = design_campaign(name, figures=FIGURES, usual=INSEAN, hours=whole.hours_needed).design
+            print(f"  a plan of {len(short.runs)} runs in {whole.hours_needed:.1f} h is as certain")
+        for figure, plan, usual in zip(FIGURES, whole.standard_errors, whole.usual_standard_errors, strict=True):
+            print(f"  {figure}: standard error in the same hours {plan:.3g}, by the matrix {usual:.3g}")
+
+
 def main() -> int:
+    if sys.argv[1:2] == ["0"]:
+        print_insean()
+        return 0
     wanted = int(sys.argv[1]) if len(sys.argv) > 1 else 5
     seeds = int(sys.argv[2]) if len(sys.argv) > 2 else 8
     shares, generator_shares, design_ratios, usual_ratios, measured, before = [], [], [], [], [], []
@@ -73,6 +107,7 @@ def main() -> int:
         f"(predicted {predicted:.2f})"
     )
     _bundled()
+    print_insean()
     return 0
 
 

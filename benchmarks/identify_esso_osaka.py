@@ -4,8 +4,14 @@ Prints, for each structure of the model, the root mean square error of the yaw r
 windows of 100 s that each begin in a state of their own, for turns and zigzags, with the measured wind as an input and
 without wind. Half of the runs is fitted and the other half scored, then the other way about, for two ways of halving:
 no window is ever scored by a model that has seen its run. Windows in the range of speeds in which the card holds and
-those that leave it are told apart; only the first have an aim. The measurements are in the data folder (TANK2SIM_DATA,
-else ../shared beside the project).
+those that leave it are counted apart; only the first have an aim. The measurements are in the data folder
+(TANK2SIM_DATA, else ../shared beside the project).
+
+Last, with halves by days that hold random runs, too: errors of u, v and r in windows at all speeds, for several speeds
+below which the forces at low speed take the place of the polynomial, fitted in the range of speeds and to whole runs;
+and where the accelerations are that the model lacks.
+
+    python benchmarks/identify_esso_osaka.py [--days]   # with --days the last part alone
 """
 
 from __future__ import annotations
@@ -22,9 +28,11 @@ from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
+from scipy.signal import savgol_filter
 
 from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
+from tank2sim.cards.reading import revised
 from tank2sim.identification.trials.assessment.evaluation import replay_error
 from tank2sim.identification.trials.methods.output_error import OutputErrorSettings, output_error
 from tank2sim.identification.trials.problem.estimation_problem import Problem, driven_model
@@ -197,6 +205,104 @@ def slow(run: SampledRun, slowest: float) -> bool:
     return bool(smooth.min() <= slowest)
 
 
+DAYS = (
+    "turn_14-Sep-2020_13_39_32 turn_14-Sep-2020_14_16_04 turn_14-Sep-2020_15_47_33 zigzag_31-Jul-2020_13_04_24 "
+    "zigzag_31-Jul-2020_13_42_53 random_31-Jul-2020_12_48_39 random_03-Aug-2020_11_04_37"
+).split()
+"""One half by days; chosen before any of it was looked at. The zigzags are all of one day."""
+
+ALL_SPEEDS = ("motion.u", "motion.v", "motion.r")
+ACCELERATION_WINDOW = 21
+"""Instants of the parabola whose slope is the measured acceleration: 10 s."""
+
+
+def whole(problem: Problem, trial: Trial) -> SampledRun:
+    """A run at all speeds and revolutions."""
+    return prepare(problem.model, trial, SEEN, step_s=STEP_S)
+
+
+def errors_by_days(
+    problem: Problem, trials: Mapping[str, Trial], slowest: float, entire: bool
+) -> dict[str, list[float]]:
+    """Kind of run to errors of u, v, r in windows at all speeds over their size, of each half by the other."""
+    sums: dict[str, Array] = {}
+    halves = DAYS, [name for name in trials if name not in DAYS]
+    for known, unknown in (halves, halves[::-1]):
+        if entire:
+            settings = OutputErrorSettings(piece_s=PIECE_S, scale_prior=False, rounds=3)
+            runs = tuple(whole(problem, trials[name]) for name in known)
+            values = output_error(problem.with_runs(runs), settings=settings).values
+        else:
+            values = fitted(problem, [trials[name] for name in known], slowest)
+        for name in unknown:
+            scored = tuple(windows(whole(problem, trials[name])))
+            for run, result in zip(scored, replay_error(problem.with_runs(scored), values, WEIGHTS), strict=True):
+                size = np.array([_size(run, signal) for signal in ALL_SPEEDS])
+                error = np.array([result.whole[signal] for signal in ALL_SPEEDS])
+                error = np.where(error < RUNAWAY * size, error, RUNAWAY * size)
+                kind = name.partition("_")[0]
+                sums[kind] = sums.get(kind, np.zeros((2, 3))) + np.stack([error, size]) ** 2
+    return {kind: [float(one) for one in np.sqrt(pair[0] / pair[1])] for kind, pair in sums.items()}
+
+
+def _size(run: SampledRun, signal: str) -> float:
+    """Size of a signal in a window: of u about its mean, of v and r about zero."""
+    values = run.column(signal)
+    return float(np.sqrt(np.nanmean((values - (np.nanmean(values) if signal == "motion.u" else 0)) ** 2)))
+
+
+def print_lacking(problem: Problem, values: Array, trials: Mapping[str, Trial], slowest: float) -> None:
+    """Accelerations that the model lacks over those measured; of yaw what goes with r|r|, by speed and propeller."""
+    model, p = problem.model, problem.parameters(values)
+    places = [model.state_names.index(f"motion.{name}") for name in ("u", "v", "r", "psi")]
+    rows = []
+    for trial in trials.values():
+        run = whole(problem, trial)
+        known = np.column_stack([_filled(run, name) for name in ("u", "v", "r", "psi")])
+        states = np.tile(np.array(model.initial(p)).ravel(), (len(known), 1))
+        states[:, places] = savgol_filter(known, ACCELERATION_WINDOW, 2, axis=0)
+        rates = np.array(model.rhs(states.T, run.inputs.T, np.repeat(p[:, None], len(known), axis=1))).T
+        measured = savgol_filter(known, ACCELERATION_WINDOW, 2, deriv=1, delta=run.step_s, axis=0)[:, :3]
+        turning = run.inputs[:, model.input_names.index("propeller.speed")]
+        columns = measured, measured - rates[:, places[:3]], states[:, places[:3]], turning
+        rows.append(np.column_stack(columns)[ACCELERATION_WINDOW:-ACCELERATION_WINDOW])
+    table = np.concatenate(rows)
+    u, r, turning = table[:, 6], table[:, 8], table[:, 9]
+    print("accelerations that the model lacks, rms over that of the measured ones; correlation of yaw with r|r|, slope")
+    for words, chosen in (
+        ("ahead, in the range of speeds", (u > slowest) & (turning > AHEAD_RADPS)),
+        ("ahead, slower", (u <= slowest) & (turning > AHEAD_RADPS)),
+        ("propeller astern", turning < -AHEAD_RADPS),
+    ):
+        share = np.sqrt(np.mean(table[chosen, 3:6] ** 2, axis=0) / np.mean(table[chosen, :3] ** 2, axis=0))
+        turn = (r * np.abs(r))[chosen]
+        slope, together = turn @ table[chosen, 5] / (turn @ turn), np.corrcoef(turn, table[chosen, 5])[0, 1]
+        print(f"  {words:32}" + "".join(f"{one:8.2f}" for one in share) + f"{together:12.2f}{slope:8.2f}")
+
+
+def _filled(run: SampledRun, name: str) -> Array:
+    values = run.column(f"motion.{name}")
+    known = ~np.isnan(values)
+    return np.interp(run.times, run.times[known], values[known])
+
+
+def print_days(card: ManoeuvringCard, trials: Mapping[str, Trial]) -> None:
+    """Print the part by days."""
+    slowest = card.model.speed_range_mps[0]
+    print("halves by days, windows of 100 s at all speeds, errors of u, v, r over their size (u about its mean)")
+    print(f"{'low speed below':18}{'fitted':14}" + "".join(f"{kind:>27}" for kind in ("turn", "zigzag", "random")))
+    for bound in (slowest, 0.2 * card.model.speed_mps, 0.28):
+        lowered = revised(card, {}, {"model.low_speed_below_mps": bound}, comment="benchmark")
+        problem = question(STRUCTURES["cross_flow"].start(lowered))
+        for entire in (False, True):
+            found = errors_by_days(problem, trials, slowest, entire)
+            shown = ("".join(f"{one:9.3f}" for one in found[kind]) for kind in ("turn", "zigzag", "random"))
+            print(f"{bound:<18.3f}{'whole runs' if entire else 'in the range':14}" + "".join(shown), flush=True)
+    problem = question(STRUCTURES["cross_flow"].start(card))
+    values = fitted(problem, [trials[name] for name in DAYS], slowest)
+    print_lacking(problem, values, trials, slowest)
+
+
 def read(data: Path) -> dict[str, Trial]:
     """The runs, mended by the audit, the wind's direction continuous."""
     found = {}
@@ -220,6 +326,9 @@ def main() -> int:
     assert isinstance(calm, ManoeuvringCard)
     reached = False
     np.seterr(over="ignore")  # a motion that runs away is counted as such
+    if "--days" in sys.argv:
+        print_days(card, trials)
+        return 0
     print("yaw-rate error over yaw rate, held-out windows of 100 s (number of windows; L: of them ran away)")
     print(f"{'':44}{'in the range of speeds':>28}{'leaving it':>32}")
     print(f"{'':44}{'turns':>16}{'zigzags':>16}{'turns':>16}{'zigzags':>16}")
@@ -238,6 +347,7 @@ def main() -> int:
             if structure == "cross_flow" and wind == "wind":
                 reached = all(scores[0].relative(kind) <= aim for kind, aim in AIMS.items())
     print(f"aim with wind, in the range: turns {AIMS['turn']:g}, zigzags {AIMS['zigzag']:g}")
+    print_days(card, trials)
     return 0 if reached else 1
 
 

@@ -4,6 +4,11 @@ First a log of 24 h at 10 Hz is written, read and cut. Then for each format: how
 found with their kind, and the largest error of a begin. Last, the bundled Mariner is fitted to the zigzag and the turn
 of 20 deg of the ship's log, by default and by output error, and the tactical diameter of the turn of -35 deg, which is
 held out, is predicted; nothing is given of the current.
+
+Before these, logs that others recorded: boats' NMEA 2000 (clocks, headings, steering gear) and two ROS bags, by
+themselves and with their topics named.
+
+    python benchmarks/logs.py [--recorded]   # with --recorded these alone
 """
 
 from __future__ import annotations
@@ -11,6 +16,7 @@ from __future__ import annotations
 import json
 import os
 import resource
+import struct
 import sys
 import tempfile
 import time
@@ -89,8 +95,73 @@ def day(folder: Path) -> str:
     return f"{spent}, {memory:.2f} GB at most, {len(result.cuts)} trials of 48"
 
 
+BUS = LOGS.parent / "canboat_n2k"
+BAG_CHANNELS = {
+    "x": ("position.x", "m"),
+    "y": ("position.y", "m"),
+    "heading": ("position.theta", "rad"),
+    "yaw_rate": ("y_heading", "rad/s"),
+    "u_water": ("y_speed", "m/s"),
+}
+"""Quantity to stream and unit in the bags; all are positive to starboard, or ahead."""
+
+
+def print_boats() -> None:
+    """What is found in each recording of a boat's bus: length, doubts about clocks and headings, steering gear."""
+    for path in sorted([*BUS.glob("*.raw"), *BUS.glob("*.all")]):
+        study = t2s.log(path).study
+        print(f"{path.name}: {study.duration_s:.0f} s by the clock in use, stretches: {len(study.stretches)}")
+        for finding in study.findings:
+            if finding.evidence.keys() & {"behind_s", "apart_deg", "apart", "delay_s"}:
+                print(f"  {finding.text}")
+        print_clocks(path)
+        print(f"  {study.gear.words if study.gear else 'no orders of the rudder to judge its gear by'}")
+
+
+def print_clocks(path: Path) -> None:
+    """Time of day of each source by PGN 126992 less that of the recorder, s, at the beginning and at the end: decoded
+    here from the bytes."""
+    readings: dict[str, list[float]] = {}
+    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+        fields = line.strip().split(",")
+        if len(fields) < 14 or fields[2] != "126992":
+            continue
+        _, _, _, clock = struct.unpack("<BBHI", bytes(int(byte, 16) for byte in fields[6:14]))
+        stamp = pd.Timestamp(fields[0]).tz_localize(None)
+        readings.setdefault(fields[3], []).append(clock * 1e-4 - (stamp - stamp.normalize()).total_seconds())
+    for source, ahead in readings.items():
+        print(
+            f"  by its bytes: source {source} ahead of the recorder by {ahead[0]:+.2f} s, at the end {ahead[-1]:+.2f} s"
+        )
+
+
+def print_bags(folder: Path) -> None:
+    """What is found in the ROS bags of others, by themselves and with their topics named."""
+    entries = [
+        f'[[channels]]\nquantity = "{quantity}"\nstream = "{stream}"\nunit = "{unit}"\nsign = 1\nuse = true'
+        for quantity, (stream, unit) in BAG_CHANNELS.items()
+    ]
+    channels = folder / "bag_channels.toml"
+    channels.write_text("\n".join(['format = "tank2sim-channels/1"', *entries]) + "\n", encoding="utf-8")
+    for path in sorted((LOGS / "real").glob("*.bag")):
+        try:
+            t2s.log(path)
+        except t2s.InputError as error:
+            print(f"{path.name}: by itself: {str(error).partition(': ')[2].partition(';')[0]}")
+        study = t2s.log(path, channels=channels).study
+        kinds = ", ".join(f"{stretch.kind.value} {stretch.duration_s:.1f} s" for stretch in study.stretches)
+        found = f"{kinds or 'no stretch'}; findings: {len(study.findings)}"
+        print(f"  with its topics named: {study.duration_s:.1f} s; {found}")
+
+
 def main() -> None:
     """Print the figures."""
+    with tempfile.TemporaryDirectory() as name:
+        if BUS.is_dir():
+            print_boats()
+            print_bags(Path(name))
+    if "--recorded" in sys.argv:
+        return
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         print(f"24 h at 10 Hz as CSV: {day(folder)}")

@@ -141,7 +141,13 @@ class Fitting:
         ]
 
     def finish(self, begun: Sequence[Begun]) -> None:
-        """Wait for the fits, and keep the better of each and of any earlier fit of the same effects."""
+        """Wait for the fits, and keep the better of each and of any earlier fit of the same effects.
+
+        Parameters
+        ----------
+        begun : sequence of Begun
+            As of :meth:`begin`.
+        """
         for proposal, fitted in begun:
             self.progress(" and ".join(proposal.effects) or "the card as it is")
             self._keep(proposal, fitted())

@@ -96,8 +96,9 @@ _FEWEST_ROWS = 10
 _LEAST_RUDDER = math.radians(1.0)
 """A first order below this is not an execute (project choice)."""
 
-_ROUNDS = 5
-"""Gauss-Newton steps, and updates of the weights of signals; both converge in two or three."""
+_ROUNDS = 15
+"""Gauss-Newton steps, and updates of the weights of signals, at most; both converge in two to four, of an unstable ship
+that begins far away in ten."""
 
 _NEAR = 2.0
 """A model that follows a record to within this many times the noise is taken as right when its initial state is sought
@@ -301,7 +302,7 @@ class Replayer:
                 return None
             scale = np.append(spread, np.full(count, 0.3))
             found = least_squares(
-                misfit, unknown[free], slopes, bounds=(low, high), x_scale=scale, ftol=1e-2, max_nfev=3 * _ROUNDS
+                misfit, unknown[free], slopes, bounds=(low, high), x_scale=scale, ftol=1e-2, max_nfev=_ROUNDS
             )
             unknown[free] = found.x
             remaining = float(np.sqrt(np.mean(found.fun[: int(compared.sum())] ** 2)))
@@ -377,7 +378,7 @@ class Replayer:
     def _least_squares_start(
         self, record: InputRecord, sigma: Array, p: Array, near: Array | None = None, *, wrong: bool
     ) -> tuple[Array, float]:
-        """Initial state by Gauss-Newton with differences, and its misfit: inf where the motion exceeds all bounds."""
+        """Initial state by Gauss-Newton, and its misfit: inf where the motion exceeds all bounds."""
         guess, spread = self.guess_initial_state(record, sigma, p), first_state(self, record, sigma, p)[1]
         known = ~np.isnan(record.readings)
         column = np.broadcast_to(np.arange(len(sigma)), known.shape)[known]
@@ -387,13 +388,12 @@ class Replayer:
             return (self.motion(record, start, p) - record.readings)[known]
 
         start = guess if near is None else near
-        residual, before, slopes = residuals(start), np.zeros(0), np.zeros(0)
+        residual, before = residuals(start), np.zeros(0)
         for turn in range(_ROUNDS):
             size = np.sqrt(np.bincount(column, residual**2, len(sigma)) / number)
             beyond = INSTANTS * np.maximum(size**2 - sigma**2, 0) if wrong else 0.0
             weights = np.sqrt(sigma**2 + beyond)
-            if turn % 2 == 0:  # the motion is nearly linear in its initial state
-                slopes = self._slopes_of_motion(record, start, p, np.zeros(0, dtype=np.intp))[known]
+            slopes = self._slopes_of_motion(record, start, p, np.zeros(0, dtype=np.intp))[known]
             if not (np.isfinite(weights).all() and np.isfinite(slopes).all()):
                 break
             if wrong and turn and np.allclose(weights, before, rtol=0.02):
