@@ -30,6 +30,11 @@ def test_influence_tells_both_coefficients_of_every_parameter(tmp_path) -> None:
     assert (tmp_path / "i.html").read_text().startswith("<!doctype html>")
 
 
+def test_a_result_without_a_chart_cannot_be_drawn(tmp_path) -> None:
+    points = ("influence", "mariner", "--through", "35@35", "1400m@3")
+    refused(tank2sim(*points, "--plot", "p.png", cwd=tmp_path), "--plot", "there is no chart to draw")
+
+
 def test_a_tuned_card_is_written_and_read_again(tmp_path) -> None:
     result = tank2sim(
         *("influence", "mariner", "--tune", "steady_radius_m=640@20", "--by", "fewest", "-o", "new.toml"),
