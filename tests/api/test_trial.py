@@ -65,6 +65,8 @@ def test_the_audit_finds_a_rudder_to_port_and_agrees_with_the_json(write):
     content = json.loads(found.to_json())
     assert content["schema"] == "tank2sim/audit/1"
     assert [entry["what"] for entry in content["findings"]] == [finding["what"]]
+    first = content["trials"][0]
+    assert (first["duration_s"], first["step_s"], first["rows"]) == pytest.approx((300.0, 0.1, 3001))
     noise = found.noise.set_index(["file", "column"])
     assert noise.loc[(str(bad), "r_degps"), "sigma"] == pytest.approx(0.03)
     assert noise.loc[(str(bad), "r_degps"), "stated"] and not noise.loc[(str(bad), "psi_deg"), "stated"]

@@ -19,6 +19,15 @@ def path(tmp_path_factory):
     return file
 
 
+def test_statistics_are_in_the_units_of_the_file(path):
+    rows = t2s.signals(path).statistics.set_index("column")
+    assert rows.loc["r_degps", "mean"] == pytest.approx(0.5, abs=0.01)
+    assert rows.loc["r_degps", "standard_deviation"] == pytest.approx(np.hypot(np.sqrt(2), 0.1), rel=0.01)
+    assert rows.loc["r_degps", "peak_hz"] == pytest.approx(0.05, rel=0.1)
+    assert rows.loc["delta_deg", "mean"] == pytest.approx(5.0) and rows.loc["r_degps", "unit"] == "deg/s"
+    assert np.isnan(rows.loc["delta_deg", "correlation_time_s"])  # constant
+
+
 def test_the_spectrum_has_the_variance_of_the_signal(path):
     found = t2s.signals(path, "r_degps")
     spectrum = found.spectrum("r_degps")

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 import tank2sim as t2s
+from tank2sim.apps.rigs.yaw.records import read_yaw_record
 from tests.yaw_truth import Truth, record, written
 
 BODY_KGM2, ADDED_KGM2 = 0.0204, 0.03
@@ -60,6 +63,10 @@ def test_a_simulated_record_is_identified_at_once(tmp_path):
         again.estimates.loc[found.method].tolist(), rel=1e-3
     )
     assert "rates times 8.968" in found.notices[-1]
+    # (L*/L) sqrt(B/B*) = 8.968 of paper 3: rates times, times by; a hump's motion lasts three rises.
+    programme = read_yaw_record(path).programme
+    assert math.degrees(programme.max_rate_radps) == pytest.approx(100 / 60 * 8.968, rel=1e-4)
+    assert 3 * programme.rise_s == pytest.approx(120 / 8.968, rel=1e-4) and programme.humps == 5
     with pytest.raises(t2s.InputError) as refusal:
         t2s.yaw(path, simulate="alyshev")
     assert refusal.value.source == str(path)
