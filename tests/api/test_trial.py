@@ -73,6 +73,23 @@ def test_the_audit_finds_a_rudder_to_port_and_agrees_with_the_json(write):
     assert noise.loc[(str(bad), "psi_deg"), "sigma"] == pytest.approx(0.1, rel=0.1)  # what was added
 
 
+def test_the_json_has_the_record_to_draw_with_its_peaks_and_the_places_of_findings(write):
+    path = write("bad.csv")
+    lines = path.read_text().splitlines()
+    header = next(place for place, text in enumerate(lines) if text.startswith("t_s"))
+    cells = lines[header + 1001].split(",")
+    cells[lines[header].split(",").index("u_mps")] = "50.0"
+    lines[header + 1001] = ",".join(cells)
+    path.write_text("\n".join(lines[: header + 2001] + lines[header + 2051 :]) + "\n")
+    found = json.loads(t2s.audit(path).to_json())
+    places = {entry["column"]: entry["places_s"] for entry in found["findings"] if entry["places_s"]}
+    (spike,), (gap,) = places["u_mps"], places["t_s"]
+    assert spike == pytest.approx([100.0, 100.0]) and gap == pytest.approx([199.9, 205.0])
+    histories = found["trials"][0]["histories"]
+    assert len(histories["t_s"]) <= 420
+    assert histories["u_mps"][histories["t_s"].index(100.0)] == 50.0
+
+
 def test_a_folder_is_for_its_trials(write, tmp_path):
     write("b.csv"), write("a.csv")
     (tmp_path / "notes.csv").write_text("word\nnothing\n")
