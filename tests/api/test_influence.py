@@ -53,6 +53,13 @@ def test_the_tuned_ship_makes_the_turn_that_was_the_target(mariner: t2s.Ship) ->
     )
 
 
+def test_targets_that_contradict_each_other_have_no_card(mariner: t2s.Ship) -> None:
+    tuning = mariner.tune(["steady_radius_m@20=640", "steady_diameter_m@20=1200"])
+    with pytest.raises(t2s.InputError) as refused:
+        _ = tuning.card
+    assert not tuning.reached and refused.value.source == "targets" and "within" in refused.value.remedy
+
+
 def test_the_scaled_ship_turns_through_both_points(mariner: t2s.Ship) -> None:
     tuning = mariner.tune_through(["35@35", "1400m@3"])
     assert tuning.turns["rate_after_degpmin"].iloc[0] == pytest.approx(35)

@@ -21,6 +21,11 @@ def test_the_name_of_the_schema_is_not_a_figure_of_the_page(turn: t2s.ManoeuvreR
     assert "tank2sim/simulate/1" not in t2s.make_report(turn.to_dict()).page().partition("<script")[0]
 
 
+def test_a_chart_that_is_not_there_is_a_lookup_error(turn: t2s.ManoeuvreResult) -> None:
+    with pytest.raises(LookupError):
+        turn.plot(name="none")
+
+
 @pytest.mark.parametrize("schema", ["tank2sim/simulate/2", "tank2sim/dance/1", "simulate", 3])
 def test_a_schema_that_is_not_known_is_refused(turn: t2s.ManoeuvreResult, schema: object) -> None:
     with pytest.raises(t2s.InputError) as refusal:

@@ -65,10 +65,29 @@ def test_the_audit_finds_a_rudder_to_port_and_agrees_with_the_json(write):
     content = json.loads(found.to_json())
     assert content["schema"] == "tank2sim/audit/1"
     assert [entry["what"] for entry in content["findings"]] == [finding["what"]]
+    first = content["trials"][0]
+    assert (first["duration_s"], first["step_s"], first["rows"]) == pytest.approx((300.0, 0.1, 3001))
     noise = found.noise.set_index(["file", "column"])
     assert noise.loc[(str(bad), "r_degps"), "sigma"] == pytest.approx(0.03)
     assert noise.loc[(str(bad), "r_degps"), "stated"] and not noise.loc[(str(bad), "psi_deg"), "stated"]
     assert noise.loc[(str(bad), "psi_deg"), "sigma"] == pytest.approx(0.1, rel=0.1)  # what was added
+
+
+def test_the_json_has_the_record_to_draw_with_its_peaks_and_the_places_of_findings(write):
+    path = write("bad.csv")
+    lines = path.read_text().splitlines()
+    header = next(place for place, text in enumerate(lines) if text.startswith("t_s"))
+    cells = lines[header + 1001].split(",")
+    cells[lines[header].split(",").index("u_mps")] = "50.0"
+    lines[header + 1001] = ",".join(cells)
+    path.write_text("\n".join(lines[: header + 2001] + lines[header + 2051 :]) + "\n")
+    found = json.loads(t2s.audit(path).to_json())
+    places = {entry["column"]: entry["places_s"] for entry in found["findings"] if entry["places_s"]}
+    (spike,), (gap,) = places["u_mps"], places["t_s"]
+    assert spike == pytest.approx([100.0, 100.0]) and gap == pytest.approx([199.9, 205.0])
+    histories = found["trials"][0]["histories"]
+    assert len(histories["t_s"]) <= 420
+    assert histories["u_mps"][histories["t_s"].index(100.0)] == 50.0
 
 
 def test_a_folder_is_for_its_trials(write, tmp_path):

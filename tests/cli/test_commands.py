@@ -169,6 +169,13 @@ def test_a_seed_without_an_ensemble_and_a_word_for_its_size_are_refused(tmp_path
     refused(tank2sim("stability", "mariner", "--members", "abc", cwd=tmp_path), "--members", "abc", "whole number")
 
 
+def test_orders_of_a_poster_are_pairs_of_name_and_number(tmp_path) -> None:
+    orders = ("--order", "Full ahead=600", "--order", "Half ahead=450")
+    result = tank2sim("poster", "esso-osaka-estimated", *orders, "-o", "w.html", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert "Half ahead" in (tmp_path / "w.html").read_text()
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

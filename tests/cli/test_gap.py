@@ -1,4 +1,4 @@
-"""``tank2sim gap`` as a user calls it: files whole or not at all, and what they hold."""
+"""``tank2sim gap``: card, covariance, page and JSON, corrected trials, and what is refused."""
 
 from __future__ import annotations
 
@@ -13,20 +13,23 @@ import numpy as np
 import pytest
 
 from tank2sim import find_gap, make_report
-from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.cards import ManoeuvringCard, parse_card, read_card
+from tank2sim.cards.covariance import Covariance, covariance_file, referring
+from tank2sim.cards.covariance_reading import read_covariance
+from tank2sim.cards.reading import changed_text
 from tank2sim.dynamics import build
 from tank2sim.errors import InputError
 from tank2sim.gap.improve_card import add_effects_to_card, card_with_effects_text
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, Gap, Named
 from tank2sim.identification.trials.problem.prepare_trials import fitted_as
+from tank2sim.results.gap import improved_files
 from tank2sim.simulation.manoeuvres import parse_manoeuvre
 from tank2sim.simulation.run import simulate
 from tank2sim.simulation.trial_file import trial_csv
 from tank2sim.units import to_si
+from tests.cli.command_line import refused, tank2sim
 from tests.dynamics.effects.ships import TYPICAL
 from tests.gap import made_up
-
-from .command_line import refused, tank2sim
 
 CURRENT = Named(
     "current",
@@ -337,3 +340,32 @@ def test_an_option_of_the_wrong_kind_is_refused_by_its_name(given: dict, option:
     with pytest.raises(InputError) as raised:
         find_gap("mariner", "turn20.csv", **given)
     assert raised.value.source == option
+
+
+NAMES = ("derivatives.Yv", "derivatives.Nv")
+
+
+def test_the_improved_card_has_its_covariance_next_to_it_or_is_reported_to_have_none(tmp_path, mariner_card) -> None:
+    ship, out = tmp_path / "ship.toml", tmp_path / "out" / "improved.toml"
+    out.parent.mkdir()
+    ship.write_text(referring(mariner_card.text + "\n[uncertainty]\nYv = 2e-4\nNv = 1e-4\n", ship))
+    matrix = np.array([[4e-8, 1e-8], [1e-8, 1e-8]])
+    covariance_file(ship).write_text(Covariance(NAMES, matrix).as_text())
+    card = read_card(ship)
+    assert isinstance(card, ManoeuvringCard)
+    effect = "\n[[effects]]\nname = 'rudder_bias'\nparameters = {angle_deg = 1.0}\n"
+    files, reported = improved_files(card, card.text + effect, out)
+    assert not reported and set(files) == {out, covariance_file(out)}
+    for path, content in files.items():
+        path.write_text(content)
+    found = read_covariance(read_card(out))
+    assert found is not None and found.names == NAMES
+    np.testing.assert_array_equal(found.matrix, matrix)
+    changed = changed_text(card.text, card.source, {"derivatives.Yv": -0.01, "derivatives.Nv": -0.002})
+    files, reported = improved_files(card, changed, out)
+    assert set(files) == {out} and "no covariance" in reported[0]
+    assert read_covariance(parse_card(str(files[out]), str(out))) is None
+    # A search of an hour is not lost for a file that only ensembles need.
+    covariance_file(ship).unlink()
+    files, reported = improved_files(card, card.text + effect, out)
+    assert set(files) == {out} and "is missing" in reported[0] and "# covariance" not in str(files[out])

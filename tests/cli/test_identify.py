@@ -15,9 +15,8 @@ from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.cards.covariance_reading import read_covariance
 from tank2sim.identification.trials.assessment.evaluation import predicted_figures
 from tank2sim.identification.trials.problem.prepare_trials import measured
+from tests.cli.command_line import refused, tank2sim
 from tests.identification.trials.made_up_ship import CARD, LENGTH, TRUTH, trial, turn, zigzag
-
-from .command_line import refused, tank2sim
 
 COLUMNS = {"delta_rad": "delta_deg", "u_mps": "u_mps", "v_mps": "v_mps", "r_radps": "r_degps", "psi_rad": "psi_deg"}
 

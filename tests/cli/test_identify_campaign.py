@@ -14,9 +14,8 @@ from tank2sim.cards.reading import revised
 from tank2sim.identification.captive.reduction import reduce_campaign
 from tank2sim.identification.captive.result_card import card_contents, reduced_card_text
 from tank2sim.records.campaigns import read_campaign
+from tests.cli.command_line import refused, tank2sim
 from tests.identification.captive.generator import Campaign, write
-
-from .command_line import refused, tank2sim
 
 SCALE = 25.0
 NOISE = {"u_mps": 0.05, "v_mps": 0.05, "r_degps": 0.02, "psi_deg": 0.2, "x_m": 1.0, "y_m": 1.0}

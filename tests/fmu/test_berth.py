@@ -1,4 +1,4 @@
-"""A driven ship in an FMU: from the berth, at rest, in both kinds of FMI, with derivatives; ahead, astern, trimmed."""
+"""Driven ships in FMUs: from the berth, ahead, astern, trimmed, and with the orders and surroundings of a harbour."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tank2sim.fmu.unpacking import FmuType, UnpackedFmu
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.running import Running
 
-from ..dynamics.effects.ships import N0, TYPICAL, U0, ship
+from ..dynamics.effects.ships import N0, TYPICAL, U0, T, ship, values
 
 pytestmark = pytest.mark.slow
 
@@ -153,3 +153,62 @@ def test_an_input_beyond_its_bounds_is_refused_or_held_as_a_parameter_says(unpac
         assert len(Lines(fmu).with_text("is held at")) == 1
         with pytest.raises(Exception, match="fmi"):
             fmu.write({"current.speed": float("nan")})
+
+
+EFFECTS = ("waves", "other_ship", "twin_orders", "controllable_pitch", "loading")
+
+
+@pytest.fixture(scope="module")
+def harbour() -> Model:
+    """The Mariner with all of them."""
+    return ship({name: TYPICAL[name] for name in EFFECTS})
+
+
+@pytest.fixture(scope="module", params=[pytest.param(2, marks=pytest.mark.long), 3])
+def harbour_fmu(request, harbour: Model, tmp_path_factory) -> UnpackedFmu:
+    folder: Path = tmp_path_factory.mktemp("harbour")
+    write_fmu(harbour, folder / "ship.fmu", fmi=request.param)
+    with zipfile.ZipFile(folder / "ship.fmu") as archive:
+        archive.extractall(folder)
+    return UnpackedFmu(folder, read_model_description(str(folder), validate=False))
+
+
+HARBOUR_ORDERS = (
+    {"propeller.pitch": 0.9, "propeller.starboard_offset": -0.3 * N0, "rudder.port_offset": 0.2},
+    {
+        "propeller.pitch": -0.5,
+        "propeller.starboard_offset": 0.0,
+        "waves.height": 3.0,
+        "waves.direction": 1.2,
+        "other_ship.forward": 30.0,
+        "other_ship.starboard": -60.0,
+        "other_ship.heading": 0.3,
+        "other_ship.speed": 9.0,
+    },
+)
+SHOWN = [
+    *("motion.x", "motion.y", "motion.psi", "motion.u", "motion.v", "motion.r"),
+    *("propeller.pitch_actual", "rudder.added_port"),
+]
+HARBOUR_OUTPUTS = [
+    *("waves.heave", "waves.roll", "pose.z", "propeller.speed_starboard", "rudder.angle_port", "validity_by.pitch"),
+    *("loading.displacement", "validity_by.loading", "other_ship.clearance", "validity_by.other_ship"),
+]
+
+
+def test_ordered_propellers_pitch_and_seas_are_those_of_the_model(harbour_fmu: UnpackedFmu, harbour: Model) -> None:
+    start = {"loading.mean_draught": 0.95 * T, "loading.trim": 0.5}
+    truth = Running(Integrator(harbour), HARBOUR_ORDERS[0], start)
+    with running(harbour_fmu, "CoSimulation") as fmu:
+        fmu.initialise({**start, **HARBOUR_ORDERS[0]})
+        for part, orders in enumerate(HARBOUR_ORDERS):
+            fmu.write(orders)
+            truth.order(orders)
+            for step in range(10):
+                fmu.instance.doStep(currentCommunicationPoint=5.0 * part + 0.5 * step, communicationStepSize=0.5)
+                truth.run(0.5)
+        assert fmu.read(SHOWN) == pytest.approx([truth.state(name) for name in SHOWN], rel=1e-7, abs=1e-8)
+        at = {name: truth.state(name) for name in harbour.state_names}
+        expected = values(harbour, HARBOUR_OUTPUTS, {**at, **start, **HARBOUR_ORDERS[0], **HARBOUR_ORDERS[1]})
+        assert fmu.read(HARBOUR_OUTPUTS) == pytest.approx(expected, rel=1e-6, abs=1e-7)
+        assert abs(fmu.read(["waves.heave"])[0]) > 0.01

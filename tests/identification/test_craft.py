@@ -1,8 +1,9 @@
-"""Hull and thrust curves of a craft from trials: against a truth that another simulation has, and honest verdicts."""
+"""Craft from trials: hull, thrust curves, lag and dead band against truths of other simulations; honest verdicts."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import craft_log
@@ -15,11 +16,13 @@ from tank2sim.errors import InputError
 from tank2sim.identification.craft.card import identified_craft
 from tank2sim.identification.craft.first_values import _by_velocities
 from tank2sim.identification.craft.fit import CoefficientVerdict, CraftFit, determination
+from tank2sim.identification.craft.order_response import order_responses
 from tank2sim.identification.craft.problem import craft_problem
 from tank2sim.identification.craft.study import _model_does_not_hold, worse_than_a_mean
 from tank2sim.notices import Level
 from tank2sim.records.craft_trials import read_craft_trial
 from tank2sim.records.csv_table import table_of_frame
+from tank2sim.records.trials import Trial
 from tests.craft_trials import written
 
 
@@ -250,3 +253,129 @@ def test_a_model_that_does_not_hold_is_said_as_far_as_the_estimate_suffers(metho
     fit = CraftFit(None, estimate, np.zeros((1, 1, 1)), gust_share=0.2)  # type: ignore[arg-type]
     assert not fit.holds and _model_does_not_hold(fit).level is level
     assert replace(fit, gust_share=0.04).holds
+
+
+PLACE = -1.4
+THRUST = 0.03  # N s^2
+LEGS = [(8, 0.6, 0), (7, 0.6, 20), (7, 0.8, -20), (6, 0.8, 10), (8, 0.0, 0), (6, 0.9, -25), (6, 0.4, 25), (7, 1.0, 0)]
+
+
+def outboard_trial(path: Path, craft: dict[str, float], columns: str = "n_rpm,delta_deg", side: float = 1.0) -> Path:
+    """A trial by the integration of the benchmark; the helm's angle is positive where the craft turns to starboard."""
+    rng, full = np.random.default_rng(2), craft["rpm"] * np.pi / 30
+    state, n, angle, t, rows = np.zeros(6), 0.0, 0.0, 0.0, []
+    for seconds, share, degrees in LEGS:
+        for _ in range(round(seconds / 0.02)):
+            if round(t / 0.02) % 10 == 0:
+                rows.append([t, *state[:3], n * 30 / np.pi, side * np.degrees(angle)])
+            n += (share * full - n) * 0.02 / 0.3
+            angle += (np.radians(degrees) - angle) * 0.02 / 0.4
+            T = THRUST * n * abs(n)
+            push = np.array([T * np.cos(angle), -T * np.sin(angle), -PLACE * T * np.sin(angle)])  # the stern to port
+            psi, u, v, r = state[2:]
+            speed = [u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi), r]
+            state = state + 0.02 * np.array([*speed, *craft_log.rates(craft, state[3:], np.zeros(2), push)])
+            t += 0.02
+    table = np.array(rows)
+    table[:, 1:3] += 0.01 * rng.normal(size=(len(table), 2))
+    table[:, 3] = np.degrees(table[:, 3]) + 0.1 * rng.normal(size=len(table))
+    np.savetxt(path, table, delimiter=",", header=f"t_s,x_m,y_m,psi_deg,{columns}", comments="")
+    return path
+
+
+@pytest.fixture(scope="module")
+def outboard(craft) -> t2s.Ship:
+    text = craft_log.first_card(craft, np.random.default_rng(5)).card.text
+    thruster = f"""[[thrusters]]
+name = "outboard"
+x_m = {PLACE}
+ahead_Ns2 = {1.4 * THRUST}
+astern_Ns2 = {THRUST}
+max_rpm = {1.05 * craft["rpm"]}
+max_azimuth_deg = 35.0
+azimuth_time_constant_s = 0.4
+"""
+    return t2s.Ship(parse_card(text[: text.index("[[thrusters]]")] + thruster, "outboard.toml"))
+
+
+def test_the_columns_of_a_rudder_are_the_direction_of_the_one_outboard(craft, outboard, tmp_path) -> None:
+    by_rudder = read_craft_trial(outboard_trial(tmp_path / "a.csv", craft), outboard.card.thrusters)
+    columns = "n_outboard_rpm,azimuth_outboard_deg"
+    by_name = read_craft_trial(outboard_trial(tmp_path / "b.csv", craft, columns, side=-1.0), outboard.card.thrusters)
+    for signal in ("azimuth_outboard_rad", "n_outboard_radps"):
+        np.testing.assert_allclose(by_rudder.signals[signal], by_name.signals[signal], atol=1e-12)
+
+
+@pytest.mark.slow
+def test_thrust_and_damping_are_found(craft, outboard, tmp_path) -> None:
+    path = outboard_trial(tmp_path / "trial.csv", craft)
+    found = t2s.identify(outboard, path).study.coefficients
+    truth = {"outboard.ahead": THRUST, "Xu": craft["Xu"], "Nr": craft["Nr"], "Nrabsr": craft["Nrabsr"]}
+    for name, value in truth.items():
+        assert abs(found[name].value - value) < 3 * found[name].standard_error, name
+    assert found["outboard.ahead"].standard_error < 0.15 * THRUST
+
+
+def test_a_trial_without_the_direction_is_refused(craft, outboard, tmp_path) -> None:
+    path = outboard_trial(tmp_path / "trial.csv", craft, "n_outboard_rpm,heel_deg")
+    with pytest.raises(InputError, match="azimuth_outboard_deg"):
+        t2s.identify(outboard, path)
+
+
+FULL = 1800 * np.pi / 30
+
+
+@pytest.fixture(scope="module")
+def card():
+    rng = np.random.default_rng(7)
+    craft = craft_log.random_craft(rng)
+    text = craft_log.first_card(craft, rng).card.text
+    return parse_card(text.replace(f"max_rpm = {1.05 * craft['rpm']!r}", "max_rpm = 1800.0"), "first.toml")
+
+
+def trial(shares: list[float], *, lag: float = 0.4, band: float = 0.04, gain: float = 1.0, noise: float = 0.3) -> Trial:
+    """Orders of 4 s each, read five times a second at an instant that the orders do not know; both thrusters alike."""
+    rng = np.random.default_rng(3)
+    fine, n, rows = 0.01, 0.0, []
+    orders = np.repeat(np.array(shares) * FULL, 403)
+    for k, order in enumerate(orders):
+        if k % 20 == 0:
+            rows.append([k * fine, order, n])
+        goal = gain * order if abs(order) > band * FULL else 0.0
+        n = goal + (n - goal) * np.exp(-fine / lag)
+    time, order, n = np.array(rows).T
+    n = n + noise * rng.normal(size=len(n))
+    signals = {
+        f"{what}_{name}_radps": values
+        for name in ("port", "starboard")
+        for what, values in (("order", order), ("n", n))
+    }
+    return Trial(Path("trial.csv"), time, signals)
+
+
+def test_lag_and_dead_band_are_found_with_their_errors(card) -> None:
+    found = order_responses(card, [trial([0.5, 0.03, -0.4, 0.05, 0.7, -0.02, 0.3, -0.06], gain=0.95)])
+    response = found["port"]
+    assert abs(response.lag_s - 0.4) < 2 * response.lag_error_s < 0.15
+    value, error = response.dead_band
+    assert (response.rest_radps, response.turning_radps) == pytest.approx((0.03 * FULL, 0.05 * FULL), rel=1e-3)
+    assert abs(value - 0.04 * FULL) < 2 * error
+    assert found["starboard"] == response  # one thruster twice on the card
+
+
+def test_without_small_orders_the_dead_band_is_not_determined(card) -> None:
+    response = order_responses(card, [trial([0.5, -0.4, 0.2, 0.7, -0.3])])["port"]
+    assert response.dead_band is None
+    assert response.turning_radps == pytest.approx(0.2 * FULL, rel=1e-3)
+
+
+def test_a_thruster_without_a_dead_band_has_none(card) -> None:
+    response = order_responses(card, [trial([0.5, 0.02, -0.4, 0.04, 0.7], band=0.0)])["port"]
+    assert response.dead_band is None
+    assert response.turning_radps == pytest.approx(0.02 * FULL, rel=1e-3)
+
+
+def test_orders_alone_have_no_response(card) -> None:
+    ordered = trial([0.5, 0.02, -0.4])
+    alone = {name: values for name, values in ordered.signals.items() if name.startswith("order")}
+    assert order_responses(card, [Trial(ordered.path, ordered.time_s, alone)]) == {}

@@ -60,34 +60,25 @@ def test_times_of_day_alone_go_on_over_midnight_without_a_date(tmp_path) -> None
     np.testing.assert_allclose(np.diff(found.streams[0].time_s), 0.5, atol=1e-6)
 
 
-class TestOneShaft:
-    @pytest.fixture(autouse=True)
-    def _library(self) -> None:
-        pytest.importorskip("pynmea2")
-
-    def test_an_only_shaft_of_number_1_is_that_of_the_ship(self, tmp_path) -> None:
-        lines = []
-        for line in nmea_lines():
-            if "RPM" not in line:
-                lines.append(line)
-                continue
-            rpm = float(line.split(",")[3])
-            lines += [sentence(f"IIRPM,E,1,{4 * rpm:.1f},,A"), sentence(f"IIRPM,S,1,{rpm:.1f},,A")]
-        path = tmp_path / "one.nmea"
-        path.write_text("\r\n".join(lines), encoding="ascii")
-        named = {stream.name: stream for stream in read_log(path).streams}
-        assert (named["RPM.S1"].quantity, named["RPM.E1"].quantity) == ("rpm", "")
-
-    def test_two_shafts_keep_their_sides(self, tmp_path) -> None:
-        lines = []
-        for line in nmea_lines():
-            lines += [line] if "RPM" not in line else [line, line]
-            if "RPM" in line:
-                lines[-2:] = [sentence(f"IIRPM,S,{shaft},{line.split(',')[3]},,A") for shaft in (1, 2)]
-        path = tmp_path / "two.nmea"
-        path.write_text("\r\n".join(lines), encoding="ascii")
-        named = {stream.name: stream for stream in read_log(path).streams}
-        assert (named["RPM.S1"].quantity, named["RPM.S2"].quantity) == ("rpm_starboard", "rpm_port")
+@pytest.mark.parametrize(
+    ("shafts", "expected"),
+    [
+        ({"E,1": 4.0, "S,1": 1.0}, {"RPM.E1": "", "RPM.S1": "rpm"}),
+        ({"S,1": 1.0, "S,2": 1.0}, {"RPM.S1": "rpm_starboard", "RPM.S2": "rpm_port"}),
+    ],
+)
+def test_an_only_shaft_of_number_1_is_that_of_the_ship_and_two_keep_their_sides(tmp_path, shafts, expected) -> None:
+    """Revolutions of an engine that turns four times as fast, or of a second shaft."""
+    pytest.importorskip("pynmea2")
+    lines = []
+    for line in nmea_lines():
+        rpm = float(line.split(",")[3]) if "RPM" in line else 0.0
+        own = [sentence(f"IIRPM,{shaft},{share * rpm:.1f},,A") for shaft, share in shafts.items()]
+        lines += own if "RPM" in line else [line]
+    path = tmp_path / "shafts.nmea"
+    path.write_text("\r\n".join(lines), encoding="ascii")
+    named = {stream.name: stream.quantity for stream in read_log(path).streams}
+    assert {name: named[name] for name in expected} == expected
 
 
 def astern() -> tuple[pd.DataFrame, np.ndarray]:

@@ -1,15 +1,25 @@
-"""``tank2sim signals``: table, JSON, page, and filtered trials that never replace the measured ones."""
+"""``signals`` as a command and a function: statistics, spectra and filters of files, and what its result holds."""
+
+from __future__ import annotations
 
 import json
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import tank2sim as t2s
 from tank2sim.apps.signals.command import signals
+from tank2sim.apps.signals.result import SignalsResult
+from tank2sim.apps.signals.study import SignalSettings, SignalsStudy, analyse, filtered
 from tank2sim.cli.derived import command_of
 from tank2sim.errors import InputError
 from tank2sim.records.reading import read_trial_file
+from tank2sim.records.signals.filtering import savitzky_golay
+from tank2sim.records.signals.sampling import even_series
+from tests.records.signals.made import first_order, nomoto, trial
 
 COMMAND = command_of(signals.verb)
 
@@ -146,3 +156,104 @@ def test_measured_trials_of_every_kind(data, tmp_path):
         pytest.skip("the measured trials are missing")
     shown = run(*files, "--columns", "r", "--columns", "delta").output
     assert shown.count("rudder angle to yaw rate: correlation") == 2
+
+
+@pytest.fixture(scope="module")
+def sine(tmp_path_factory):
+    """1000 s of a heading rate that is a sine of 0.05 Hz and 2 deg/s about 0.5 deg/s, with noise of 0.1 deg/s."""
+    time = 0.5 * np.arange(2000)
+    rate = 0.5 + 2.0 * np.sin(2 * np.pi * 0.05 * time) + 0.1 * np.random.default_rng(3).standard_normal(2000)
+    rows = np.column_stack([time, np.full(2000, 5.0), rate])
+    file = tmp_path_factory.mktemp("signals") / "sine.csv"
+    np.savetxt(file, rows, delimiter=",", header="t_s,delta_deg,r_degps", comments="", fmt="%.8g")
+    return file
+
+
+def test_statistics_are_in_the_units_of_the_file(sine):
+    rows = t2s.signals(sine).statistics.set_index("column")
+    assert rows.loc["r_degps", "mean"] == pytest.approx(0.5, abs=0.01)
+    assert rows.loc["r_degps", "standard_deviation"] == pytest.approx(np.hypot(np.sqrt(2), 0.1), rel=0.01)
+    assert rows.loc["r_degps", "peak_hz"] == pytest.approx(0.05, rel=0.1)
+    assert rows.loc["delta_deg", "mean"] == pytest.approx(5.0) and rows.loc["r_degps", "unit"] == "deg/s"
+    assert np.isnan(rows.loc["delta_deg", "correlation_time_s"])  # constant
+
+
+def test_the_spectrum_has_the_variance_of_the_signal(sine):
+    found = t2s.signals(sine, "r_degps")
+    spectrum = found.spectrum("r_degps")
+    area = np.trapezoid(spectrum["density"], spectrum["frequency_hz"])
+    assert area == pytest.approx(2.01, rel=0.1)
+    assert (spectrum["low"] < spectrum["density"]).all() and (spectrum["density"] < spectrum["high"]).all()
+    with pytest.raises(LookupError, match="r_degps"):
+        found.spectrum("u_mps")
+
+
+def test_a_filter_removes_the_sine_and_the_trial_is_written_elsewhere(sine, tmp_path):
+    found = t2s.read_trial(sine).signals(["r_degps"], filter="lowpass:0.01")
+    assert found.filtered is not None
+    after = found.filtered.df["r_degps"][400:1600]
+    assert after.mean() == pytest.approx(0.5, abs=0.02) and after.std() < 0.1
+    found.filtered.to_csv(tmp_path / "filtered.csv")
+    again = t2s.read_trial(tmp_path / "filtered.csv").df
+    assert np.allclose(again["r_degps"], found.filtered.df["r_degps"], equal_nan=True)
+    with pytest.raises(t2s.InputError) as refusal:
+        found.filtered.to_csv(sine)
+    assert refusal.value.source == str(sine) and refusal.value.remedy
+    assert t2s.signals(sine).filtered is None
+
+
+@pytest.mark.parametrize(
+    ("options", "source"),
+    [
+        ({"columns": ["phi_deg"]}, "sine.csv"),
+        ({"filter": "lowpass:0.1"}, "filter"),
+        ({"columns": ["r"], "filter": "nothing:1"}, "filter"),
+        ({"columns": ["r"], "filter": "decimate:2"}, "columns"),
+    ],
+)
+def test_bad_input_is_refused_with_place_and_remedy(sine, options, source):
+    with pytest.raises(t2s.InputError) as refusal:
+        t2s.signals(sine, **options)
+    assert refusal.value.source.endswith(source) and refusal.value.problem and refusal.value.remedy
+
+
+@pytest.fixture(scope="module")
+def measured():
+    rudder = np.repeat(0.2 * first_order(2, 1.0, 200), 10)
+    return trial(0.1 * np.arange(2000), delta_rad=rudder, r_radps=nomoto(rudder, 0.1, 0.08, 3.0), n_radps=np.ones(2000))
+
+
+@pytest.fixture(scope="module")
+def result(measured):
+    before = even_series(measured, "r_radps")
+    applied = filtered("savgol:11,3", "r_degps filtered", before, savitzky_golay(before, 11, 3))
+    return SignalsResult(SignalsStudy(trials=(analyse(measured, SignalSettings()),), filter=applied))
+
+
+def test_the_sections_have_the_tests_and_every_chart(result):
+    assert list(result.charts()) == [
+        "filter_response",
+        "filter_signal",
+        "made_histories",
+        "made_transfer",
+        "made_cross_correlation",
+        *(f"made_{name}_{kind}" for name in ("delta", "r") for kind in ("density", "autocorrelation", "spectrum")),
+    ]
+    statistics, tests = result.tables
+    constant = statistics.df.set_index("column").loc["n_rpm"]
+    assert constant["stationarity"] == "constant" and float(constant["mean"]) == pytest.approx(9.549, rel=1e-3)
+    assert tests.df["signal"].to_list() == ["rudder angle", "yaw rate"]
+    assert [table.caption for table in result.screen_tables] == ["made"]
+
+
+def test_files_of_one_name_get_names_of_their_own(measured):
+    found = SignalsResult(SignalsStudy(trials=(analyse(measured, SignalSettings(columns=["r"])),) * 2))
+    assert [section.heading for section in found.sections[:2]] == ["made_1", "made_2"]
+    assert len(found.charts()) == 8
+
+
+def test_a_trial_whose_name_begins_as_another_keeps_its_own_charts(measured):
+    settings = SignalSettings(columns=["r"])
+    trials = tuple(analyse(replace(measured, path=Path(name)), settings) for name in ("a.csv", "a_b.csv"))
+    sections = SignalsResult(SignalsStudy(trials=trials)).sections
+    assert [len(section.charts) for section in sections] == [1, 1, 3, 3]

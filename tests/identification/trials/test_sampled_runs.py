@@ -1,12 +1,26 @@
-"""Trials on equal steps: means of inputs, averages of signals, orders held, gaps."""
+"""Trials on equal steps: means, orders, gaps, first instants; the rudder by its orders against the path of a gear."""
 
+from __future__ import annotations
+
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tank2sim.cards import parse_card, read_card
+from tank2sim.dynamics import build
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.problem.sampled_runs import SampledRun, prepare, rudder_at_start, seen_in
+from tank2sim.identification.trials.methods.output_error import _start
+from tank2sim.identification.trials.methods.weak_form import _complete_positions
+from tank2sim.identification.trials.problem.problem_from_card import fit_driven_by, problem_from_card
+from tank2sim.identification.trials.problem.sampled_runs import (
+    SampledRun,
+    ordered_rudder,
+    prepare,
+    rudder_at_start,
+    seen_in,
+)
 from tank2sim.records.trials import Trial
 from tests.identification.trials.made_up_ship import model, problem, trial, turn, zigzag
 
@@ -152,11 +166,11 @@ def test_rows_slower_than_the_steps_asked_for_are_taken_apart(by_angle):
     np.testing.assert_allclose(command(by_angle, run)[:-1], 0.01 * (run.times[:-1] + 0.1))
 
 
-OVER = np.deg2rad(30)
+HARD_OVER = np.deg2rad(30)
 STARTS = {  # yaw rate (rad/s) over the time (s), order, and the rudder's angle at the first instant
-    "begins at the execute": (lambda t: 0.01 * (1 - np.exp(-t / 20)) * (t > 3), OVER, 0.0),
-    "to port": (lambda t: -0.01 * (1 - np.exp(-t / 20)), -OVER, 0.0),
-    "begins in the turn": (lambda t: np.full_like(t, 0.01), OVER, OVER),
+    "begins at the execute": (lambda t: 0.01 * (1 - np.exp(-t / 20)) * (t > 3), HARD_OVER, 0.0),
+    "to port": (lambda t: -0.01 * (1 - np.exp(-t / 20)), -HARD_OVER, 0.0),
+    "begins in the turn": (lambda t: np.full_like(t, 0.01), HARD_OVER, HARD_OVER),
     "weather helm on a straight course": (np.zeros_like, np.deg2rad(4), np.deg2rad(4)),
     "in waves": (lambda t: 0.004 * np.sin(2 * np.pi * t / 8), np.deg2rad(4), np.deg2rad(4)),
     "amidships": (np.zeros_like, 0.0, 0.0),
@@ -172,3 +186,108 @@ def test_the_rudder_of_a_run_by_its_orders_begins_amidships_where_the_ship_does_
     values = rates + 1e-4 * noise if measured == "motion.r" else np.cumsum(rates) * 0.5 + 1e-4 * noise
     run = SampledRun("a", 0.0, 0.5, np.full((400, 1), order), values[:, None], (measured,))
     assert rudder_at_start(run, run.inputs[:, 0], ship_time=20.0) == pytest.approx(expected)
+
+
+RATE, LAG, OVER = 5.0, 1.0, 20.0
+"""Of the Mariner's gear, deg/s and s; and an order, deg."""
+
+
+@pytest.fixture(scope="module")
+def card():
+    return read_card("mariner")
+
+
+def ordered(step: float, given: float, *, begin: float = 0.0) -> Trial:
+    """20 deg ordered at a time, shown by the first row after it; a ship that turns from then on."""
+    time = np.arange(begin, 60.0, step)
+    order = np.where(time >= given, np.deg2rad(OVER), 0.0)
+    rate = 0.01 * np.clip((time - given - 2.0) / 20.0, 0.0, 1.0)
+    signals = {"delta_order_rad": order, "r_radps": rate, "u_mps": np.full(len(time), 7.5)}
+    return Trial(Path("a.csv"), time, signals)
+
+
+def exact(time: np.ndarray, given: float) -> np.ndarray:
+    """At the largest rate until the error is rate times lag, and then an exponential, deg."""
+    ramp = (OVER - RATE * LAG) / RATE
+    since = np.maximum(time - given, 0.0)
+    after = OVER - RATE * LAG * np.exp(-np.maximum(since - ramp, 0.0) / LAG)
+    return np.where(since < ramp, RATE * since, after)
+
+
+@pytest.mark.parametrize("step", [0.1, 0.5, 1.0, 2.0])
+def test_the_rudder_leaves_half_a_row_before_the_row_that_shows_its_order(card, step) -> None:
+    gear = ordered_rudder(build(card))
+    time, angle = gear.angle(ordered(step, 10.0))
+    assert np.rad2deg(angle) == pytest.approx(exact(time, 10.0 - 0.5 * step), abs=0.05)
+
+
+def test_the_rudder_arrives_within_a_gap_of_the_record(card) -> None:
+    trial = ordered(0.5, 10.0)
+    rows = (trial.time_s < 10.6) | (trial.time_s > 19.0)
+    short = replace(
+        trial, time_s=trial.time_s[rows], signals={name: values[rows] for name, values in trial.signals.items()}
+    )
+    time, angle = ordered_rudder(build(card)).angle(short)
+    assert np.rad2deg(angle) == pytest.approx(exact(time, 9.75), abs=0.05)
+
+
+def test_a_record_that_begins_at_its_execute_begins_amidships(card) -> None:
+    gear = ordered_rudder(build(card))
+    time, angle = gear.angle(ordered(0.5, 10.0, begin=10.0))
+    assert np.rad2deg(angle) == pytest.approx(exact(time, 10.0), abs=0.05)
+    turning = ordered(0.5, 10.0, begin=10.0)
+    turning = replace(turning, signals={**turning.signals, "r_radps": np.full(len(turning.time_s), 0.01)})
+    assert np.rad2deg(gear.angle(turning)[1]) == pytest.approx(OVER)
+
+
+def test_the_model_that_is_fitted_is_driven_by_the_angle_that_the_gear_reaches_in_each_step(card) -> None:
+    trial = ordered(1.0, 10.0)
+    problem = problem_from_card(card, [trial], "order")
+    assert "rudder.angle" not in problem.model.state_names
+    (run,) = problem.runs
+    angle = np.rad2deg(run.inputs[:, problem.model.input_names.index("rudder.command")])
+    middles = run.times + 0.5 * run.step_s
+    assert angle[:-2] == pytest.approx(exact(middles, 9.5)[:-2], abs=0.7)  # means over steps with a bend
+
+
+def test_a_gear_with_a_fault_on_the_card_stays_in_the_model(card) -> None:
+    fault = '\n[[effects]]\nname = "rudder_backlash"\n[effects.parameters]\nwidth_deg = 2.0\n'
+    faulty = parse_card(card.text + fault, "faulty.toml")
+    assert ordered_rudder(build(faulty)) is None and fit_driven_by(faulty, "order") == "order"
+    assert fit_driven_by(card, "order") == fit_driven_by(card, "angle") == "angle"
+
+
+T = np.arange(0.0, 20.0, 0.1)
+KNOWN = 1000.0 + 0 * T
+
+
+def columns() -> dict[str, np.ndarray]:
+    """5 m/s ahead and 1 m/s to port on a course of 30 deg."""
+    return {
+        "motion.u": 5.0 + 0 * T,
+        "motion.v": -1.0 + 0 * T,
+        "motion.psi": np.radians(30) + 0 * T,
+        "motion.x": KNOWN,
+        "motion.y": KNOWN,
+    }
+
+
+@pytest.mark.parametrize("missing", [set(), {"motion.x"}, {"motion.y"}, {"motion.x", "motion.y"}])
+def test_a_position_that_was_measured_stays_and_one_that_was_not_is_reckoned(missing: set[str]) -> None:
+    found = columns()
+    _complete_positions(found, missing, 0.1)
+    north, east = (5 * np.sqrt(3) / 2 + 1 * 0.5) * T, (5 * 0.5 - 1 * np.sqrt(3) / 2) * T
+    for name, reckoned in (("motion.x", north), ("motion.y", east)):
+        np.testing.assert_allclose(found[name], reckoned if name in missing else KNOWN, atol=1e-9)
+
+
+def test_the_first_state_is_what_was_measured_there() -> None:
+    asked = problem([trial(zigzag(20), name="zigzag", seed=1, duration=100.0, noise=0.0)], free=("Yv",))
+    run, first = asked.runs[0], 250
+    state = dict(zip(asked.model.state_names, _start(asked, run, first), strict=True))
+    for name in ("motion.u", "motion.v", "motion.r", "motion.psi", "motion.x", "motion.y"):
+        if name in run.seen:
+            near = run.column(name)[first - 1 : first + 2]
+            size = np.ptp(run.column(name))
+            assert state[name] == pytest.approx(near.mean(), abs=0.02 * size), name
+    assert "motion.v" in run.seen and abs(state["motion.v"]) > 0

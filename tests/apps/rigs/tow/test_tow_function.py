@@ -80,18 +80,8 @@ TOWS = str(Path(__file__).parents[4] / "models/wilinski-zellman/tows.csv")
 
 
 def test_a_force_that_varies_and_a_known_mass(tmp_path) -> None:
-    arguments = (
-        "--force-N",
-        "11.63,0.001",
-        "--total-mass-kg",
-        "2800",
-        "--terms",
-        "B3",
-        "--json",
-        "t.json",
-        "-o",
-        "body.toml",
-    )
+    arguments = ("--force-N", "11.63,0.001", "--total-mass-kg", "2800", "--terms", "B3")
+    arguments += ("--json", "t.json", "-o", "body.toml")
     result = tank2sim("tow", TOWS, *arguments, cwd=tmp_path)
     assert result.returncode == 0 and "T = 11.63 + 0.001 t N" in result.stdout, result.stderr
     found = json.loads((tmp_path / "t.json").read_text())
