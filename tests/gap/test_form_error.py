@@ -49,7 +49,9 @@ def test_the_form_of_a_force_leaves_its_size_to_the_effect() -> None:
     """Surge, sway and yaw may be wrong against each other; all larger together is the effect's own parameter."""
     motion = toy_motion(tuple(SIZES))
     force = pushes(motion)
-    first, second, *_ = np.moveaxis(Forms(motion, motion.block_inputs[..., 0]).columns(everywhere(force), directed=False), -1, 0)
+    first, second, *_ = np.moveaxis(
+        Forms(motion, motion.block_inputs[..., 0]).columns(everywhere(force), directed=False), -1, 0
+    )
     whole = np.stack([driving[..., :3].ravel() for driving in (first, second, force)], axis=-1)
     assert np.linalg.matrix_rank(whole) == 3
     residual = force.ravel() - whole[:, :2] @ np.linalg.lstsq(whole[:, :2], force.ravel(), rcond=None)[0]
