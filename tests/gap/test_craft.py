@@ -64,7 +64,7 @@ def test_a_current_is_named_with_its_size_and_written_on_the_card(craft, tmp_pat
     assert effect.parameters["speed_mps"] == pytest.approx(speed, rel=0.05)
     assert effect.parameters["direction_rad"] == pytest.approx(towards, abs=math.radians(2.0))
     assert found.gap.misfit("before", held_out=True) > 10
-    assert found.gap.misfit("after", held_out=True) < 1.5
+    assert found.gap.misfit("after", held_out=True) < 2
     (entry,) = found.gap.improved.effects
     assert entry.name == "current" and entry.parameters["speed_mps"] == pytest.approx(speed, rel=0.05)
 
@@ -78,7 +78,7 @@ def test_nothing_is_named_where_nothing_is_missing(craft, tmp_path: Path, ordere
     found = t2s.find_gap(ship, fitted, effects=SOUGHT, workers=1)
     assert found.gap.verdict in (NO_EFFECT_MISSING, COEFFICIENTS)
     assert not found.gap.effects
-    assert found.gap.misfit("before", held_out=False) < 1.5
+    assert found.gap.misfit("after", held_out=False) < 1.5
 
 
 def test_only_effects_that_a_craft_can_have_are_tried(craft, tmp_path: Path) -> None:
