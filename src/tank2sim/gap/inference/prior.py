@@ -173,8 +173,8 @@ def candidate_explanations(card: SteeredCard, driven_by: str) -> tuple[str, ...]
     """Effects that can be tried: those not on the card, with values to begin a search from.
 
     Not one with an input that an effect of the card has already: a steady current, on a card with one that changes.
-    Where the rudder's angle was measured (`driven_by` is ``angle``), the record contains the response of the gear, and its
-    effects are not tried.
+    Where the rudder's angle was measured (`driven_by` is ``angle``), the record contains the response of the gear, and
+    its effects are not tried.
     """
     have = {entry.name for entry in card.effects}
     taken = frozenset[str]().union(*(EFFECTS[name].input_names for name in have))
