@@ -124,20 +124,34 @@ def cruising_revolutions(card: SteeredCard) -> float:
 
     Raises InputError: no thruster pushes ahead, or the speed is beyond the largest revolutions.
     """
-    ahead = [thruster for thruster, holds in zip(card.thrusters, pushes_ahead(card), strict=True) if holds]
     speed = card.model.speed_mps
-    if not ahead:
-        raise card.fault("thrusters.0.azimuth_rad", "leaves no thruster that pushes ahead", "give one within 90 deg")
-    thrust = sum(thruster.ahead_Ns2 * math.cos(thruster.azimuth_rad) for thruster in ahead)
-    loss = sum(thruster.speed_loss_kg * math.cos(thruster.azimuth_rad) ** 2 for thruster in ahead) * speed
+    thrust, loss, least = _thrust_ahead(card)
+    loss *= speed
     resistance = -(card.derivatives.get("Xu", 0.0) + card.derivatives.get("Xuabsu", 0.0) * speed) * speed
     n = (loss + math.sqrt(loss**2 + 4 * thrust * resistance)) / (2 * thrust)
-    least = min(thruster.max_radps for thruster in ahead)
     if n > least * (1 + 1e-9):
         needed, reached = (from_si("n_rpm", value) for value in (n, least))
         problem = f"needs {needed:.4g} rpm, and the thrusters reach {reached:.4g} rpm"
         raise card.fault("model.speed_mps", problem, "give a speed that they hold, or check thrust and resistance")
     return n
+
+
+def _thrust_ahead(card: SteeredCard) -> tuple[float, float, float]:
+    """Sums of k cos a and of l cos^2 a over thrusters that push ahead, and the least of their largest revolutions."""
+    ahead = [thruster for thruster, holds in zip(card.thrusters, pushes_ahead(card), strict=True) if holds]
+    if not ahead:
+        raise card.fault("thrusters.0.azimuth_rad", "leaves no thruster that pushes ahead", "give one within 90 deg")
+    thrust = sum(thruster.ahead_Ns2 * math.cos(thruster.azimuth_rad) for thruster in ahead)
+    loss = sum(thruster.speed_loss_kg * math.cos(thruster.azimuth_rad) ** 2 for thruster in ahead)
+    return thrust, loss, min(thruster.max_radps for thruster in ahead)
+
+
+def speed_held(card: SteeredCard) -> float:
+    """The cruising speed (m/s), or the largest that the thrusters hold if that is less."""
+    thrust, loss, n = _thrust_ahead(card)
+    linear = loss * n - card.derivatives.get("Xu", 0.0)
+    root = math.sqrt(max(0.0, linear**2 - 4 * card.derivatives.get("Xuabsu", 0.0) * thrust * n**2))
+    return min(card.model.speed_mps, 2 * thrust * n**2 / (linear + root)) if thrust > 0 else 0.0
 
 
 def pushes_ahead(card: SteeredCard) -> tuple[bool, ...]:

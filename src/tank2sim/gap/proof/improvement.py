@@ -11,6 +11,7 @@ import numpy as np
 from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.reading import revised
 from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.errors import InputError
 from tank2sim.gap.diagnosis.residuals import estimates, surroundings_by_trial
 from tank2sim.gap.improve_card import Found, add_effects_to_card
 from tank2sim.gap.inference.fit import ExplanationFit
@@ -118,7 +119,10 @@ class Prover:
         proof = self._replayed(card, card, named)
         if proof.misfit <= BETTER_FROM:
             return proof
-        refitted, base = refit_coefficients(card, likelihood.none.model, likelihood.coefficients_with(found))
+        try:
+            refitted, base = refit_coefficients(card, likelihood.none.model, likelihood.coefficients_with(found))
+        except InputError:
+            return proof  # no craft has these coefficients
         joint = self._replayed(card, base, proof.named)
         if joint.misfit >= (1 - BETTER) * proof.misfit or not most_are_closer(proof.results, joint.results):
             return proof

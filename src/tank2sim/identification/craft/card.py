@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.reading import changed_text, parse_card
+from tank2sim.cards.small_craft import speed_held
 from tank2sim.dynamics.small_craft import THRUSTER_PARAMETERS
 from tank2sim.errors import InputError
 from tank2sim.identification.craft.fit import CraftFit
@@ -54,12 +57,17 @@ def craft_with(
 ) -> SteeredCard:
     """The card of a craft with estimates and their standard errors, in the scaling of its own text.
 
+    A cruising speed that the thrusters no longer hold is lowered, unless the numbers of the text are scaled with it.
+
     `estimates`: Parameter of the model (``derivatives.Xu``, ``thrusters.port.ahead``) to value and standard error, SI;
     `others`: further values at keys of the text; `comment`: next to each. Raises InputError: With the estimates the
     damping of the craft would drive it on.
     """
     changes: dict[str, object] = dict(others or {})
     numbers = {thruster.name: number for number, thruster in enumerate(card.thrusters)}
+    held = speed_held(_with_values(card, {name: value for name, (value, _) in estimates.items()}))
+    if held < card.model.speed_mps and card.model.scaling == "dimensional":
+        changes["model.speed_mps"] = math.floor(held * 1000) / 1000
     for name, (value, error) in estimates.items():
         section, *rest = name.split(".")
         if section == "derivatives":
@@ -77,6 +85,22 @@ def craft_with(
             "check the mass, the inertia, and places and largest revolutions of the thrusters: they are taken as exact"
         )
         raise InputError(card.source, error.place, problem, remedy) from error
+
+
+def _with_values(card: SteeredCard, values: Mapping[str, float]) -> SteeredCard:
+    """The card with other coefficients (SI), not checked."""
+    thrusters = [
+        thruster.model_copy(
+            update={
+                key: max(0.0, values[name])
+                for part, key in _KEYS.items()
+                if (name := f"thrusters.{thruster.name}.{part}") in values
+            }
+        )
+        for thruster in card.thrusters
+    ]
+    hull = {name.partition(".")[2]: value for name, value in values.items() if name.startswith("derivatives.")}
+    return replace(card, derivatives={**card.derivatives, **hull}, thrusters=tuple(thrusters))
 
 
 def estimated_numbers(card: SteeredCard, fit: CraftFit) -> dict[str, int]:

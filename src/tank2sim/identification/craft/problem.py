@@ -257,7 +257,7 @@ def craft_problem(card: SteeredCard, trials: Sequence[Trial]) -> Problem:
     by = craft_driven_by(card, trials)
     turned = not any(name.startswith("azimuth_order_") for trial in trials for name in trial.signals)
     model = craft_fit_model(card, by, turned=turned)
-    model = replace(model, parameters=tuple(map(_bounded, model.parameters)))
+    model = within_physics(model)
     trials = [_driven(trial, by) for trial in trials]
     prior = craft_prior(card, model)
     signals = {signal for trial in trials for signal in trial.signals}
@@ -336,6 +336,11 @@ _BOUNDS: dict[str, dict[str, Any]] = {
     **{f"derivatives.{name}": {"maximum": 0.0} for name in NEVER_POSITIVE},
 }
 """End of a parameter's name to its bounds."""
+
+
+def within_physics(model: Model) -> Model:
+    """The model with bounds on the coefficients of the hull and the thrusters that no craft exceeds."""
+    return replace(model, parameters=tuple(map(_bounded, model.parameters)))
 
 
 def _bounded(parameter: Parameter) -> Parameter:

@@ -289,6 +289,7 @@ def study_craft(
             *dict.fromkeys((*doubts(card), *doubts(found))),
             *_fit_notices(fit, driven_by, too_short=too_short),
             *_dead_band_notices(card, responses, driven_by),
+            *_speed_notices(card, found),
             *_instrument_notices(compass),
         ),
     )
@@ -307,6 +308,14 @@ def _fit_notices(fit: CraftFit, driven_by: str, *, too_short: bool) -> Iterator[
         yield Notice(words)
     if not fit.holds:
         yield _model_does_not_hold(fit)
+
+
+def _speed_notices(card: SteeredCard, found: SteeredCard) -> Iterator[Notice]:
+    if found.model.speed_mps != card.model.speed_mps:
+        yield caution(
+            f"model.speed_mps is {found.model.speed_mps:g} in place of {card.model.speed_mps:g} m/s: with these "
+            "coefficients the largest revolutions of the thrusters hold no more; check them"
+        )
 
 
 def _instrument_notices(compass: CompassDeviation | None) -> Iterator[Notice]:
