@@ -12,6 +12,7 @@ import rudder_and_speed
 import tank2sim as t2s
 from tank2sim.bundled import bundled_cards
 from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.identification.trials.problem.problem_from_card import free_parameters
 
 IDENTIFIED = ("kvlcc2", "esso-osaka")
 
@@ -126,3 +127,11 @@ def test_the_mariner_at_nominal_speed_turns_within_the_imo_diameter_and_overshoo
     )
     zigzags = [t2s.load(name).zigzag(10, 10).figures["overshoot_1_deg"] for name in rudder_and_speed.SHIPS]
     assert zigzags[0] == pytest.approx(zigzags[1], abs=0.1)
+
+
+def test_a_fit_of_the_estimated_esso_osaka_holds_the_published_propeller_astern() -> None:
+    """Free within the bounds of the effect they move by several times their value on trials ahead."""
+    card = read_card("esso-osaka-estimated")
+    assert isinstance(card, ManoeuvringCard)
+    free = free_parameters(card)
+    assert "wind.sway_coefficient" in free and not [name for name in free if name.startswith("propeller_astern.")]
