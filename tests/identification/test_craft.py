@@ -13,7 +13,7 @@ import pytest
 import tank2sim as t2s
 from tank2sim.cards import CraftCard, parse_card
 from tank2sim.errors import InputError
-from tank2sim.identification.craft.card import identified_craft
+from tank2sim.identification.craft.card import craft_with, identified_craft
 from tank2sim.identification.craft.first_values import _by_velocities
 from tank2sim.identification.craft.fit import CoefficientVerdict, CraftFit, determination
 from tank2sim.identification.craft.order_response import order_responses
@@ -23,6 +23,7 @@ from tank2sim.notices import Level
 from tank2sim.records.craft_trials import read_craft_trial
 from tank2sim.records.csv_table import table_of_frame
 from tank2sim.records.trials import Trial
+from tests.cards.made_craft import craft_card
 from tests.craft_trials import written
 
 
@@ -120,6 +121,24 @@ def test_first_values_are_by_the_velocities_through_the_water_where_a_log_shows_
     truth = np.interp(run.times, rows["t_s"], speed) + (0.0 if logged else 0.5)
     late = run.times > (0.0 if logged else 5.0)
     np.testing.assert_allclose(derived.measured[late, 0], truth[late], atol=0.01)
+
+
+def test_a_cruising_speed_that_the_thrusters_found_do_not_hold_is_lowered_to_one_that_they_hold() -> None:
+    hull = {"Xu": -20.0, "Xuabsu": -30.0, "Yv": -100.0, "Nr": -50.0}
+    card = craft_card(55.0, 12.0, hull, ahead_Ns2=0.01, astern_Ns2=0.005, max_rpm=900.0)
+    weak = {f"thrusters.{name}.ahead": (0.001, 1e-5) for name in ("port", "starboard")}
+    speed = craft_with(card, weak, comment="identified").model.speed_mps
+    assert speed < card.model.speed_mps
+    assert 20 * speed + 30 * speed**2 == pytest.approx(2 * 0.001 * (900 * np.pi / 30) ** 2, rel=5e-3)
+
+
+def test_a_cruising_speed_that_scales_the_numbers_of_a_card_stays(craft) -> None:
+    hull = {"Xu": -0.02, "Xuabsu": -0.03, "Yv": -0.1, "Nr": -0.05}
+    card = craft_card(0.01, 0.001, hull, more='scaling = "prime"', ahead_Ns2=0.01, astern_Ns2=0.005, max_rpm=900.0)
+    weak = {f"thrusters.{name}.ahead": (0.001, 1e-5) for name in ("port", "starboard")}
+    with pytest.raises(InputError) as raised:
+        craft_with(card, weak, comment="identified")
+    assert raised.value.place == "model.speed_mps"
 
 
 @pytest.mark.parametrize(("rows", "place"), [("1.5", "order_port"), ("", "n_port_rpm")])
