@@ -50,6 +50,11 @@ class Proposal:
         """Names in the order of the library: the same set is the same explanation."""
         return tuple(sorted(self.thetas, key=list(EFFECTS).index))
 
+    @property
+    def parameter_count(self) -> int:
+        """Number of its parameters."""
+        return sum(map(len, self.thetas.values()))
+
 
 Begun = tuple[Proposal, Callable[[], ExplanationFit]]
 """A proposal, and the function that waits for its fit."""
@@ -133,12 +138,14 @@ class Fitting:
         self.finish(self.begin(proposals))
 
     def begin(self, proposals: Sequence[Proposal]) -> list[Begun]:
-        """Hand the proposals to the executor, if there is one."""
+        """Hand the proposals to the executor, if there is one, those with most to be done first."""
         if self.executor is None:
             return [(proposal, partial(_fit, self.likelihood, self.hypotheses, proposal)) for proposal in proposals]
-        return [
-            (proposal, self.executor.submit(_fit_in_worker, self._parts, proposal).result) for proposal in proposals
-        ]
+        longest = sorted(proposals, key=lambda proposal: (-sum(proposal.rounds), -proposal.parameter_count))
+        waiting = {
+            id(proposal): self.executor.submit(_fit_in_worker, self._parts, proposal).result for proposal in longest
+        }
+        return [(proposal, waiting[id(proposal)]) for proposal in proposals]
 
     def finish(self, begun: Sequence[Begun]) -> None:
         """Wait for the fits, and keep the better of each and of any earlier fit of the same effects.
