@@ -199,7 +199,7 @@ def _derivatives(
         # Rounded to a thousandth of the effect's standard error; the card's error would remove digits that it states.
         changes[key] = _rounded(value * factor, effect_error * abs(factor)), _was(document, key, name)
         if total > 0:
-            changes[error] = float(f"{total * abs(factor):.3g}"), f"that of the card combined with that of {name}"
+            changes[error] = float(f"{total * abs(factor):.3g}"), f"the card's combined with {name}'s"
     return changes
 
 

@@ -115,7 +115,7 @@ class Rival:
     effects : tuple of str
         Empty for "none".
     loss : float
-        Score (-2 log likelihood, penalised) above that of the best explanation; 0 for the best.
+        Score (-2 log likelihood, penalised) above the best explanation's; 0 for the best.
     probability : float
         Posterior of just these effects; 0 where one of them is within three standard errors of its absence.
     """
@@ -258,7 +258,7 @@ class MissingSignal:
     Parameters
     ----------
     quantity : str
-        ``north``, ``east``, ``ahead``, ``starboard`` (velocity over the ground less that of the log, m/s) or
+        ``north``, ``east``, ``ahead``, ``starboard`` (velocity over the ground less the log's, m/s) or
         ``turning`` (rate of the heading less the yaw rate, rad/s).
     trials : tuple of str
         Name of the trial of each row.

@@ -38,7 +38,7 @@ class Kinematics:
 def kinematic_consistency(passed: Sequence[Passed]) -> Kinematics:
     """Compare dpsi/dt with r, and positions with those from u, v and psi, without a model of the hull.
 
-    Both sides are compared over the whole of each trial; the standard error is that of white noise of the sensors,
+    Both sides are compared over the whole of each trial; the standard error follows from white noise of the sensors,
     integrated.
     """
     turning, track = [], []

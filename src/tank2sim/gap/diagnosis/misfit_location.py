@@ -52,7 +52,7 @@ STATE_BINS = 12
 EQUATIONS = {"X": "surge", "Y": "sway", "N": "yaw"}
 
 TURNED = math.pi
-"""A trial whose heading changes by more than this is a turn, of which the speed loss is a figure."""
+"""A trial whose heading changes by more than this is a turn; its speed loss is a figure."""
 
 INTEGRATED = ("motion.x", "motion.y", "motion.psi")
 """Signals that integrate earlier errors: the growth of the difference counts, not its size."""
@@ -326,7 +326,7 @@ def equation_of(
     names : sequence of str
         Effects that were named, the strongest first; may be empty.
     improved : SteeredCard
-        With those of them that act on the ship.
+        With the effects that act on the ship.
     force : MissingForce or None
     passed : sequence of Passed
         Used, with the force, where no effect was named.

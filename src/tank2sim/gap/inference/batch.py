@@ -88,7 +88,7 @@ class MeasuredBatch:
         Input of an effect (``wind.speed``) to its record (R, n - 1), SI, of those that every trial recorded and that
         `inputs` does not hold; directions without jumps of a full turn.
     averaged : array (R,)
-        Readings of a sensor in a fine step, 1 or more, of which the measured values are the mean.
+        Readings of a sensor in a fine step, 1 or more; the measured values are their means.
     """
 
     names: tuple[str, ...]
@@ -113,7 +113,7 @@ class MeasuredBatch:
 
     @property
     def noise_shares(self) -> Array:
-        """Variance of the noise of each run's means, over that of a run that reads as often as the median (R,)."""
+        """Variance of the noise of each run's means, over the same of a run that reads as often as the median (R,)."""
         shares: Array = np.median(self.averaged) / np.broadcast_to(self.averaged, len(self.names))
         return shares
 
@@ -141,7 +141,7 @@ class MeasuredBatch:
 
     @cached_property
     def block_states(self) -> Array:
-        """Mean of the states from the middle of a block to that of the next (R, T - 1, 6)."""
+        """Mean of the states from the middle of a block to the middle of the next (R, T - 1, 6)."""
         middles = 0.5 * (self.states[:, 1:] + self.states[:, :-1])
         return self.over_blocks(middles)
 
@@ -152,7 +152,7 @@ class MeasuredBatch:
 
     @property
     def block_inputs(self) -> Array:
-        """Means of the inputs from the middle of a block to that of the next (R, T - 1, nu)."""
+        """Means of the inputs from the middle of a block to the middle of the next (R, T - 1, nu)."""
         return self.over_blocks(self.inputs)
 
     def order_moves(self, command: int) -> NDArray[np.float64]:
@@ -172,7 +172,8 @@ class MeasuredBatch:
         return np.stack(masks, axis=-1) if masks else np.zeros((len(self.inputs), self.blocks - 1, 0))
 
     def over_blocks(self, values: Array) -> Array:
-        """Means of values of fine steps (R, n - 1, k) from the middle of a block to that of the next (R, T - 1, k)."""
+        """Means of values of fine steps (R, n - 1, k) from the middle of a block to the middle of the next (R, T - 1,
+        k)."""
         inside = values[:, self.fine // 2 : self.fine // 2 + (self.blocks - 1) * self.fine]
         return _means_of_blocks(inside, self.fine)
 
@@ -203,7 +204,7 @@ class MeasuredBatch:
         lack : array (R, n - 1, 6)
             Rates of the model less those of this motion, at each fine step.
         added : array (R, T - 1, 6)
-            Rates that are added to those of the model, over each block.
+            Rates that are added to the model's, over each block.
         """
         # log(exp(A h))/h to second order is enough within a block: its end is known
         small = transition - np.eye(6)

@@ -56,7 +56,7 @@ class CoefficientEstimates:
     names : tuple of str
         Names of n parameters, as in :class:`NuisanceParameters`.
     change : array (n,)
-        Most probable value less that of the card.
+        Most probable value less the card's.
     covariance : array (n, n)
     """
 
@@ -72,7 +72,7 @@ class Belief:
     Parameters
     ----------
     logs, spread : array
-        Mean and standard deviation of each logarithm (:attr:`.kalman_filter.NoiseLevels.logs`, and that of the width,
+        Mean and standard deviation of each logarithm (:attr:`.kalman_filter.NoiseLevels.logs`, and the width's,
         for which the deviation below the mean is :data:`NARROWER` times as large).
     wide : array (6,), optional
         Standard deviation of each state at the beginning of a run about the measured one: wide, for a sensor may be at

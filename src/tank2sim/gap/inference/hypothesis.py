@@ -278,7 +278,7 @@ class Hypothesis:
         names = self.model.input_names
         runs, steps, count = known.shape
         inputs = np.empty((runs, steps, len(names)))
-        inputs[:, :, :count] = known  # effects append their inputs to those of the ship
+        inputs[:, :, :count] = known  # effects append their inputs to the ship's
         inputs[:, :, count:] = self.model.input_values()[count:]
         for name, value in self._chosen(theta, names).items():
             inputs[:, :, names.index(name)] = value
@@ -350,7 +350,7 @@ class Hypothesis:
         return unmeasured
 
     def rates(self, motion: MeasuredBatch, theta: Array, unmeasured: Array | None = None) -> Array:
-        """Rates of the measured states, each from the middle of a block to that of the next (R, T - 1, 6).
+        """Rates of the measured states, each from the middle of a block to the middle of the next (R, T - 1, 6).
 
         `unmeasured` are the states that were not measured, if they are known already (:meth:`unmeasured_states`).
         """

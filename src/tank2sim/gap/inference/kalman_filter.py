@@ -74,7 +74,7 @@ class Linear:
     Parameters
     ----------
     transition : array (R, T - 1, 6, 6)
-        From the middle of each block to that of the next.
+        From the middle of each block to the middle of the next.
     spreading : array (R, T - 1, 6, 6)
         Change of the states at the end of that time by rates added during it, relative to a motion with zero slopes.
     reading : array (R, T, ny, 6)
@@ -85,7 +85,7 @@ class Linear:
     wide : array (6,)
         Standard deviation of the error of the smoothed motion at the beginning: generous.
     noise_shares : array (R,)
-        Variance of the white noise of each run over that of :class:`NoiseLevels`.
+        Variance of the white noise of each run over the variance in :class:`NoiseLevels`.
     """
 
     transition: Array

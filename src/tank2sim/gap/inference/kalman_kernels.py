@@ -51,7 +51,7 @@ def covariances(
     push : array (R, T - 1, 6, 3) or, in waves, (R, T - 1, 6, 9)
         Errors of the motion by accelerations a step before.
     fading : array (3 + ny,) or (5 + ny,)
-        Share of accelerations and sensor errors that remains a step later; real and imaginary part of that of the band.
+        Share of accelerations and sensor errors that remains a step later; real and imaginary part for the band.
     added : array (R, T - 1, nz, nz)
         Covariance of the process noise.
     seeing : arrays (R, T, ny, 6), (R, T, ny), (R, ny)
@@ -134,7 +134,7 @@ def backward(
     Returns
     -------
     variance, start, fading : arrays (3 + ny,)
-        By the variance of each slow process's driving noise, by that of its beginning, by its fading.
+        By the variance of each slow process's driving noise, by its variance at the beginning, by its fading.
     way, both, gain : arrays (3,)
         By the variances and the gain of a force over a block.
     white : array (R, ny)

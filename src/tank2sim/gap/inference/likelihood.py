@@ -46,7 +46,7 @@ choice): below, it moves the ship by less than any sensor shows."""
 
 LARGEST_FORM, IMPOSSIBLE = 3.5, 1000.0
 """Standard deviations by which a form may differ, and the cost of each beyond (project choice): a force that its
-form almost cancels is not a force, and its slope is then that of another one."""
+form almost cancels is not a force, and its slope then belongs to another one."""
 
 BY_FORMULA = (6, 4)
 """Iterations on the noise, for parameters by the formula alone: the noise must first cover the error of the formula."""

@@ -34,7 +34,7 @@ FORCE_SHARE = 0.01
 """Unexplained acceleration prior to the trials, as a share of the ship's accelerations (project choice)."""
 
 FORCE_TIME = 0.5
-"""Time constant of the unexplained acceleration prior to the trials, in L/u0 (project choice): that of gusts."""
+"""Time constant of the unexplained acceleration prior to the trials, in L/u0 (project choice): as of gusts."""
 
 GEAR, ASSUMED_GEAR = 0.02, 0.5
 """Relative standard error of the steering gear's data in a card, equal to that of a coefficient without a stated one,

@@ -293,7 +293,7 @@ def _replay(replay: Passed, file: str) -> GapReplay:
 
 
 def _drawn_rows(replay: Passed) -> Indices:
-    """Instants of a trial that are kept: evenly spread ones, those of seldom measured signals, and all extremes."""
+    """Instants of a trial that are kept: evenly spread ones, instants of seldom measured signals, and all extremes."""
     kept = even = thin_points([replay.time_s], _REPLAY_SAMPLES)
     for variable in measured_in(replay):
         measured = replay.measured[variable]

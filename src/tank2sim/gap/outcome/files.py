@@ -1,4 +1,4 @@
-"""Files of a gap in a folder, and the removal of those of an earlier run."""
+"""Files of a gap in a folder, and the removal of an earlier run's."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ def means_of_bins(
 ) -> dict[str, Array]:
     """Mean of the values (n,) in each of :data:`BINS` equal bins of the state (n,), with its 95 % interval.
 
-    The interval is that of the means of the trials in the bin; nan where there is one trial alone.
+    The interval follows from the means of the trials in the bin; nan where there is one trial alone.
 
     Returns
     -------

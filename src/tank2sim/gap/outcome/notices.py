@@ -1,4 +1,4 @@
-"""What a user should know of a gap besides the verdict."""
+"""Notices on a gap besides the verdict."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def gap_notices(
     trials: tuple[Measured, Measured],
     waves: WaveBand | None,
 ) -> tuple[Notice, ...]:
-    """What a user should know besides the verdict, one sentence each.
+    """Notices besides the verdict, one sentence each.
 
     Parameters
     ----------

@@ -82,7 +82,7 @@ def black_box(card: SteeredCard, measured: Measured, noise: Mapping[str, float],
     noise : mapping
         Variable to the standard deviation of one reading, SI.
     count : int
-        Number of terms, at most those of :data:`_LINEAR`.
+        Number of terms, at most as in :data:`_LINEAR`.
     """
     replayer = Replayer(card, measured.driven_by, [name for name in OBSERVED_SIGNALS.values() if name in noise])
     fit = _Fit(replayer, [input_record(replayer, trial) for trial in measured.trials], noise)

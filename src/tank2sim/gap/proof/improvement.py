@@ -132,7 +132,7 @@ class Prover:
     def refine(self, proof: Proof) -> Proof:
         """The proof with its coefficients refined by simulations of the fitted trials, if these are then closer.
 
-        Their standard errors and covariance remain those of the filter, and the named effects keep their values.
+        Their standard errors and covariance remain the filter's, and the named effects keep their values.
         """
         at_card = {entry.name: entry for entry in proof.coefficients}
         names = tuple(
@@ -160,7 +160,7 @@ class Prover:
     def open_holdout(self, proof: Proof) -> Proof:
         """The proof with the trials held out, which the named effects have not seen.
 
-        Winds and currents of single trials belong to the trials; those of a trial held out are fitted to itself.
+        Winds and currents of single trials belong to the trials; a trial held out has its own, fitted to itself.
         """
         fitted, held = proof.trials
         if not held.trials:

@@ -1,4 +1,4 @@
-"""What free-running simulations say of the names that the scores support: they report, and veto what closes no gap."""
+"""Free-running simulations of the names that the scores support: they report, and veto a name that closes no gap."""
 
 from __future__ import annotations
 

@@ -118,7 +118,7 @@ _ALONE = 0.1
 course keeper's changing order (project choice)."""
 
 _MOST_STEPS = 40
-"""Steps of the order in a trial at most of which the instants are estimated: more are those of a course keeper."""
+"""Steps of the order in a trial, at most, whose instants are estimated: more are a course keeper's."""
 
 _EXPLAINED = 0.5
 """Share of the misfit below which instants of orders explain it although the rest is not near the noise (project
@@ -151,7 +151,7 @@ class Replayer:
     seen : sequence of str
         The ny variables to compare, ``motion.*``.
     model : Model, optional
-        In place of the card's: with more states, of which an initial value is to be found.
+        In place of the card's: with more states whose initial values are to be found.
     """
 
     def __init__(self, card: SteeredCard, driven_by: str, seen: Sequence[str], model: Model | None = None):

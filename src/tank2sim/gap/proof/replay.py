@@ -90,7 +90,7 @@ def replay_trials(
     """Each trial as measured and as both cards' models simulate it, from the initial state that fits the record best.
 
     Measurements are compared as they are, at :data:`INSTANTS` instants in L/u0 or as often as they were sampled, so
-    that `noise` is that of one reading.
+    that `noise` is per reading.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def replayer_of(card: SteeredCard, driven_by: str, known: tuple[str, ...]) -> Re
     driven_by : str
         ``angle`` or ``order``.
     known : tuple of str
-        Variables with known noise; those of them that the model has are compared.
+        Variables with known noise; the model's variables among them are compared.
     """
     key = card.text, driven_by, known
     found = _REPLAYERS.get(key)

@@ -2,7 +2,7 @@
 more effects on top of the best pair, one at a time.
 
 The screen is linear and at one noise, the fit is not and estimates the noise again; so the screen only proposes. It is
-evaluated at the noise of "none" (large, for it must cover the missing effect), and again at that of the best
+evaluated at the noise of "none" (large, for it must cover the missing effect), and again at the noise of the best
 explanation so far. Pairs are screened as pairs, for with two effects missing the best single one is often neither of
 them; and each effect of the best pair is tried with all other effects.
 """
@@ -365,7 +365,7 @@ def _at_a_bound(fit: ExplanationFit) -> bool:
 
 
 def _of_typical_shape(fit: ExplanationFit) -> dict[str, Array]:
-    """Parameters of a fit by effect, with those of the shape at the likeliest of their typical values."""
+    """Parameters of a fit by effect; shape parameters take the likeliest of their typical values."""
     card = fit.hypothesis.card
     typical = [
         estimate.parameter.typical_values(card)[0] if shape else value

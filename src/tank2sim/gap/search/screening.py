@@ -148,7 +148,7 @@ class Screen:
     ----------
     likelihood : Likelihood
     base : ExplanationFit
-        The fit about which, and at the noise of which: "none", or the effects that are assumed present.
+        The fit that gives the motion and the noise: "none", or the effects that are assumed present.
     every : sequence of Variant
     """
 
