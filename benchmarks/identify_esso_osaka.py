@@ -43,7 +43,7 @@ from tank2sim.records.audit import repair_trial
 from tank2sim.records.reading import read_trial_file
 from tank2sim.records.trials import Trial, unwrapped, window, with_signals
 
-AIMS = {"turn": 0.10, "zigzag": 0.18}
+AIMS = {"turn": 0.07, "zigzag": 0.14}
 
 HALVES = (
     (
