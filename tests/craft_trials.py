@@ -22,6 +22,10 @@ ROWS = {
     ],
 }
 
+PLACE = -1.4
+THRUST = 0.03  # N s^2
+LEGS = [(8, 0.6, 0), (7, 0.6, 20), (7, 0.8, -20), (6, 0.8, 10), (8, 0.0, 0), (6, 0.9, -25), (6, 0.4, 25), (7, 1.0, 0)]
+
 
 def written(
     folder: Path,
@@ -60,3 +64,26 @@ def written(
         np.savetxt(path, table, delimiter=",", header=f"t_s,x_m,y_m,psi_deg,{driven}", comments="")
         paths.append(path)
     return paths
+
+
+def outboard_trial(path: Path, craft: dict[str, float], columns: str = "n_rpm,delta_deg", side: float = 1.0) -> Path:
+    """A trial by the integration of the benchmark; the helm's angle is positive where the craft turns to starboard."""
+    rng, full = np.random.default_rng(2), craft["rpm"] * np.pi / 30
+    state, n, angle, t, rows = np.zeros(6), 0.0, 0.0, 0.0, []
+    for seconds, share, degrees in LEGS:
+        for _ in range(round(seconds / 0.02)):
+            if round(t / 0.02) % 10 == 0:
+                rows.append([t, *state[:3], n * 30 / np.pi, side * np.degrees(angle)])
+            n += (share * full - n) * 0.02 / 0.3
+            angle += (np.radians(degrees) - angle) * 0.02 / 0.4
+            T = THRUST * n * abs(n)
+            push = np.array([T * np.cos(angle), -T * np.sin(angle), -PLACE * T * np.sin(angle)])  # the stern to port
+            psi, u, v, r = state[2:]
+            speed = [u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi), r]
+            state = state + 0.02 * np.array([*speed, *craft_log.rates(craft, state[3:], np.zeros(2), push)])
+            t += 0.02
+    table = np.array(rows)
+    table[:, 1:3] += 0.01 * rng.normal(size=(len(table), 2))
+    table[:, 3] = np.degrees(table[:, 3]) + 0.1 * rng.normal(size=len(table))
+    np.savetxt(path, table, delimiter=",", header=f"t_s,x_m,y_m,psi_deg,{columns}", comments="")
+    return path

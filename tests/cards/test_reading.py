@@ -232,3 +232,21 @@ def test_a_changed_key_of_an_inline_table_leaves_the_card_readable() -> None:
     changed = changed_text(text, "ship.toml", {"effects.0.parameters.time_constant_s": 3.0}, comment="identified")
     assert tomllib.loads(changed)["effects"][0]["parameters"] == {"time_constant_s": 3.0}
     assert changed.count("# measured") == 1
+
+
+@pytest.mark.parametrize(
+    ("key", "problem"),
+    [
+        (
+            "effects.current.parameters.speed_mps",
+            "current is not the number of a section; give 0 (rudder_lag), 1 (current)",
+        ),
+        ("effects.2.parameters.speed_mps", "2 is not the number of a section; give 0 (rudder_lag), 1 (current)"),
+        ("effects.1", "it is a section; give effects.1.key=value"),
+    ],
+)
+def test_a_section_of_several_of_one_name_is_set_by_its_place(key: str, problem: str) -> None:
+    text = SI_CARD + '\n[[effects]]\nname = "rudder_lag"\n\n[[effects]]\nname = "current"\n'
+    with pytest.raises(InputError) as raised:
+        changed_text(text, "ship.toml", {key: 0.3})
+    assert str(raised.value) == f"ship.toml: {key}: cannot be set: {problem}"

@@ -61,6 +61,12 @@ def test_a_held_out_trial_that_is_clearly_worse_is_an_objection(before, after, h
     assert bool(improvement_objections(mariner(), changed(Nd=1.01), (trial,))) == objected
 
 
+def test_a_held_out_trial_that_diverges_is_reported_in_words() -> None:
+    trial = made_up.passed("turn20", 4.0, math.nan, held_out=True)
+    (line,) = improvement_objections(mariner(), changed(Nd=1.01), (trial,))
+    assert "diverges with it" in line and "inf" not in line
+
+
 def test_a_card_with_objections_is_only_written_by_force_and_the_first_line_says_so(tmp_path: Path) -> None:
     gap = replace(made_up.missing(), objections=("turn:35 never reaches 180 deg",))
     result = gap_result(gap, NO_TRIALS, NO_TRIALS)

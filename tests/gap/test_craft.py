@@ -13,7 +13,7 @@ import tank2sim as t2s
 from tank2sim.cards import parse_card
 from tank2sim.errors import InputError
 from tank2sim.gap.result import COEFFICIENTS, MISSING, NO_EFFECT_MISSING
-from tests.craft_trials import written
+from tests.craft_trials import PLACE, THRUST, outboard_trial, written
 
 HULL = ("Xudot", "Yvdot", "Yrdot", "Nrdot", "Xu", "Xuabsu", "Yv", "Yvabsv", "Yr", "Nv", "Nr", "Nrabsr", "Nrabsu")
 NAMES = ["steps", "zigzag", "spin", "astern"]
@@ -92,3 +92,20 @@ def test_a_linear_black_box_is_of_ships(craft, tmp_path: Path) -> None:
     with pytest.raises(InputError) as raised:
         t2s.find_gap(true_card(craft), written(tmp_path, craft, ["spin"]), black_box=True, workers=1)
     assert raised.value.source == "black_box"
+
+
+def test_a_measured_direction_of_an_outboard_is_not_delayed_again(craft, tmp_path: Path) -> None:
+    thruster = f"""[[thrusters]]
+name = "outboard"
+x_m = {PLACE}
+ahead_Ns2 = {THRUST}
+astern_Ns2 = {THRUST}
+max_rpm = {1.05 * craft["rpm"]}
+max_azimuth_deg = 35.0
+azimuth_time_constant_s = 0.4
+"""
+    text = true_card(craft).card.text
+    ship = t2s.Ship(parse_card(text[: text.index("[[thrusters]]")] + thruster, "outboard.toml"))
+    found = t2s.find_gap(ship, outboard_trial(tmp_path / "trial.csv", craft), effects=SOUGHT, workers=1)
+    assert not found.gap.effects
+    assert found.gap.misfit("before", held_out=False) < 2

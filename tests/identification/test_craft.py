@@ -24,7 +24,7 @@ from tank2sim.records.craft_trials import read_craft_trial
 from tank2sim.records.csv_table import table_of_frame
 from tank2sim.records.trials import Trial
 from tests.cards.made_craft import craft_card
-from tests.craft_trials import written
+from tests.craft_trials import PLACE, THRUST, outboard_trial, written
 
 
 @pytest.fixture(scope="module")
@@ -272,34 +272,6 @@ def test_a_model_that_does_not_hold_is_said_as_far_as_the_estimate_suffers(metho
     fit = CraftFit(None, estimate, np.zeros((1, 1, 1)), gust_share=0.2)  # type: ignore[arg-type]
     assert not fit.holds and _model_does_not_hold(fit).level is level
     assert replace(fit, gust_share=0.04).holds
-
-
-PLACE = -1.4
-THRUST = 0.03  # N s^2
-LEGS = [(8, 0.6, 0), (7, 0.6, 20), (7, 0.8, -20), (6, 0.8, 10), (8, 0.0, 0), (6, 0.9, -25), (6, 0.4, 25), (7, 1.0, 0)]
-
-
-def outboard_trial(path: Path, craft: dict[str, float], columns: str = "n_rpm,delta_deg", side: float = 1.0) -> Path:
-    """A trial by the integration of the benchmark; the helm's angle is positive where the craft turns to starboard."""
-    rng, full = np.random.default_rng(2), craft["rpm"] * np.pi / 30
-    state, n, angle, t, rows = np.zeros(6), 0.0, 0.0, 0.0, []
-    for seconds, share, degrees in LEGS:
-        for _ in range(round(seconds / 0.02)):
-            if round(t / 0.02) % 10 == 0:
-                rows.append([t, *state[:3], n * 30 / np.pi, side * np.degrees(angle)])
-            n += (share * full - n) * 0.02 / 0.3
-            angle += (np.radians(degrees) - angle) * 0.02 / 0.4
-            T = THRUST * n * abs(n)
-            push = np.array([T * np.cos(angle), -T * np.sin(angle), -PLACE * T * np.sin(angle)])  # the stern to port
-            psi, u, v, r = state[2:]
-            speed = [u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi), r]
-            state = state + 0.02 * np.array([*speed, *craft_log.rates(craft, state[3:], np.zeros(2), push)])
-            t += 0.02
-    table = np.array(rows)
-    table[:, 1:3] += 0.01 * rng.normal(size=(len(table), 2))
-    table[:, 3] = np.degrees(table[:, 3]) + 0.1 * rng.normal(size=len(table))
-    np.savetxt(path, table, delimiter=",", header=f"t_s,x_m,y_m,psi_deg,{columns}", comments="")
-    return path
 
 
 @pytest.fixture(scope="module")

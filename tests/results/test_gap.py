@@ -386,6 +386,15 @@ def test_what_replaces_something_of_the_card_has_no_up_to() -> None:
     assert lag[2] == "1 in place of the card's" and trim[2] == "up to 0.1"
 
 
+@pytest.mark.parametrize("effect", ["rudder_lag", "trim"])
+def test_a_steering_gear_is_mentioned_only_where_one_is_judged(effect: str) -> None:
+    hidden = {"rudder_lag": {"time_constant_s": 1.04}} if effect == "rudder_lag" else {"trim": {"by_stern_m": 0.1}}
+    sections = {
+        section.heading: section for section in result_of(replace(made_up.missing(), could_hide=hidden)).sections
+    }
+    assert ("steering gear" in sections["What could hide"].text) is (effect == "rudder_lag")
+
+
 def test_a_name_that_leaves_much_of_the_gap_is_reported_with_caution() -> None:
     gap = made_up.missing()
     poor = replace(gap, passed=tuple(made_up.passed(one.name, 9.0, 5.0, held_out=one.held_out) for one in gap.passed))

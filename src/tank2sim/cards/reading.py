@@ -111,6 +111,8 @@ def changed_text(text: str, source: str, changes: Mapping[str, object], *, comme
     for key, value in changes.items():
         *sections, last = key.split(".")
         table = _section_of(document, sections, source, key)
+        if isinstance(table, list):
+            raise InputError(source, key, "cannot be set: it is a section", f"give {key}.key=value")
         try:
             table[last] = value.item() if isinstance(value, np.generic) else value
         except (TypeError, ValueError):
@@ -129,6 +131,11 @@ def _section_of(document: Any, sections: Sequence[str], source: str, key: str) -
         if isinstance(table, list) and section.isdigit() and int(section) < len(table):
             table = table[int(section)]
             continue
+        if isinstance(table, list):
+            places = [f"{place} ({entry.get('name', '')})" for place, entry in enumerate(table)]
+            raise InputError(
+                source, key, f"cannot be set: {section} is not the number of a section", f"give {', '.join(places)}"
+            )
         if section not in table:
             table[section] = tomlkit.table()
         table = table[section]

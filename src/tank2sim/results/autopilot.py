@@ -27,6 +27,7 @@ from tank2sim.answer.charts.analysis import (
 from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart
 from tank2sim.answer.charts.motion import History, Signal, TrackData, history_chart, track_chart
 from tank2sim.answer.charts.vega import PlotAxis, Rule
+from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import (
     Cell,
     Illustration,
@@ -445,7 +446,8 @@ class CraftAutopilotResult(ResultWithController[CraftAutopilotStudy]):
             return (f"{turned}, or one of speed by {speed.ordered:.3g} m/s, does not settle in the run.", *more)
         share = max(self.study.at_limit_percent[name] for name in ("course", "speed"))
         kept = f"In weather the heading is {self.study.course_keeping.heading_error_rms_deg:.2g} deg off (rms)"
-        limit = f"A thruster is at its limit for {share:.2g} % of the time" if share else "No thruster is at its limit"
+        limit = f"A thruster is at its limit for {format_number(share, 2)} % of the time"
+        limit = limit if share else "No thruster is at its limit"
         return (
             f"{turned} {_settles(course.settling_time_s)} with {course.overshoot:.2g} deg of overshoot, one of speed "
             f"by {speed.ordered:.3g} m/s in {speed.settling_time_s:.3g} s. {limit}. {kept}.",

@@ -101,10 +101,10 @@ _AGREEMENT = (
     "A true effect has the same size in every trial. Where trials want different sizes, the name is wrong or "
     "incomplete."
 )
-_COULD_HIDE = (
-    "Effects up to this size could be present, besides the named ones, without showing in these data. For limits and "
-    "time constants of the steering gear, which every ship has, the value furthest from the card's is reported that "
-    "would not show in its place."
+_COULD_HIDE = "Effects up to this size could be present, besides the named ones, without showing in these data."
+_COULD_REPLACE = (
+    " For limits and time constants of the steering gear, which every ship has, the value furthest from the card's is "
+    "reported that would not show in its place."
 )
 _NOISE = (
     "Misfits are counted in these standard deviations. Stated: by the files; estimated: from the records themselves."
@@ -319,7 +319,7 @@ class GapResult(Result[GapStudy]):
                 tables=[*_candidates(study), *_explanations(study)],
                 charts=_drawn("rivals", rival_chart(study, title="Explanations compared")),
             ),
-            *_shown("What could hide", _COULD_HIDE, tables=_could_hide(study)),
+            *_shown("What could hide", _could_hide_text(study), tables=_could_hide(study)),
             Section("Next test", text=_next_test(study), charts=_drawn("expected", expected)),
             Section(
                 "Before and after" if changed else "How well the card follows",
@@ -711,6 +711,11 @@ def _coefficients(study: GapStudy) -> list[Table]:
     heads = ("coefficient", "given card", "improved card", "moved by (standard errors)")
     caption = "Coefficients before and after, prime or SI, rudder to starboard"
     return [table(caption, heads, rows, on_screen=False)] if rows else []
+
+
+def _could_hide_text(study: GapStudy) -> str:
+    replaced = any(replaces(effect, name) for effect, sizes in study.could_hide.items() for name in sizes)
+    return _COULD_HIDE + (_COULD_REPLACE if replaced else "")
 
 
 def _could_hide(study: GapStudy) -> list[Table]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import casadi as ca
 import numpy as np
@@ -110,3 +111,9 @@ def test_a_track_across_a_current_is_kept_by_the_integral(otter: t2s.Ship) -> No
     alone, held = (found.loc[name, "mean_error_at_end_m"] for name in ("line of sight", "with integral"))
     assert found["finished"].all()
     assert alone > 0.5 and abs(held) < 0.3 * alone
+
+
+def test_a_thruster_that_is_always_at_its_limit_is_so_for_100_percent_of_the_time(otter: t2s.Ship) -> None:
+    found = otter.autopilot(course_change_deg=0.01)
+    always = replace(found, study=replace(found.study, at_limit_percent={"course": 99.8, "speed": 3.0}))
+    assert "at its limit for 100 % of the time" in " ".join(always.headline)

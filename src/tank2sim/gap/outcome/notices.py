@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -103,9 +104,10 @@ def _of_what_remains(card: SteeredCard, judged: Judged) -> list[Notice]:
     remaining = misfit_of(judged.proof.results, "after")
     if remaining <= MUCH:
         return []
+    much = f"missed by {remaining:.3g} times the noise" if math.isfinite(remaining) else "not followed (one diverges)"
     notices = [
         Notice(
-            f"all trials together are still missed by {remaining:.3g} times the noise: gusts, waves, coefficients that "
+            f"all trials together are still {much}: gusts, waves, coefficients that "
             "are off, or something more that is missing; the standard errors do not cover it"
         )
     ]

@@ -53,7 +53,8 @@ def _worse_held_out(passed: Sequence[Passed]) -> list[str]:
     lines = []
     for name in worse_trials([*held.values()], CLEARLY_WORSE):
         before, after = (held[name].misfit(version) for version in ("before", "after"))
-        lines.append(f"{name}, held out, has a misfit of {after:.3g} in noise units with it, and {before:.3g} without")
+        much = f"has a misfit of {after:.3g} in noise units" if math.isfinite(after) else "diverges"
+        lines.append(f"{name}, held out, {much} with it; its misfit without it is {before:.3g}")
     return lines
 
 

@@ -25,7 +25,13 @@ from tank2sim.dynamics.build import build
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model, Parameter, Quantity, State, same_symbol
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, without_order_response
+from tank2sim.identification.trials.problem.estimation_problem import (
+    AND_DIRECTIONS,
+    Estimate,
+    Problem,
+    without_order_response,
+    without_turning_lag,
+)
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.sampled_runs import prepare
 from tank2sim.records.same_record import refuse_copies
@@ -110,9 +116,8 @@ def craft_fit_model(card: SteeredCard, driven_by: str = "revolutions", *, turned
             )
             for thruster in card.thrusters
         )
-    if turned:
-        thrusters = tuple(thruster.model_copy(update={"azimuth_time_constant_s": None}) for thruster in thrusters)
-    model = build(replace(card, thrusters=thrusters))
+    driven = replace(card, thrusters=thrusters)
+    model = build(without_turning_lag(driven) if turned else driven)
     # Added masses are symmetric in theory (Fossen 2021, 6.3).
     if card.derivatives.get("Yrdot", 0.0) == card.derivatives.get("Nvdot", 0.0):
         model = model.substitute("derivatives.Nvdot", model.symbol("derivatives.Yrdot"))
@@ -255,8 +260,7 @@ def craft_problem(card: SteeredCard, trials: Sequence[Trial]) -> Problem:
     some trials have revolutions and others orders alone.
     """
     by = craft_driven_by(card, trials)
-    turned = not any(name.startswith("azimuth_order_") for trial in trials for name in trial.signals)
-    model = craft_fit_model(card, by, turned=turned)
+    model = craft_fit_model(card, by, turned=_directions_measured(trials))
     model = within_physics(model)
     trials = [_driven(trial, by) for trial in trials]
     prior = craft_prior(card, model)
@@ -301,10 +305,18 @@ def measured_of_craft(card: SteeredCard, *groups: Sequence[Trial]) -> tuple[Meas
     `groups`: By :func:`tank2sim.records.craft_trials.read_craft_trial`. Raises InputError: Some trials have revolutions
     and others orders alone, or two of a group are one record.
     """
-    by = craft_driven_by(card, [trial for group in groups for trial in group])
+    trials = [trial for group in groups for trial in group]
+    by = craft_driven_by(card, trials)
+    turned = any(thruster.max_azimuth_rad is not None for thruster in card.thrusters) and _directions_measured(trials)
+    drive = by + AND_DIRECTIONS if turned else by
     return tuple(
-        Measured(tuple(_driven(trial, by) for trial in group), by, tuple(refuse_copies(group))) for group in groups
+        Measured(tuple(_driven(trial, by) for trial in group), drive, tuple(refuse_copies(group))) for group in groups
     )
+
+
+def _directions_measured(trials: Sequence[Trial]) -> bool:
+    """Whether no trial has the ordered direction of a thruster."""
+    return not any(name.startswith("azimuth_order_") for trial in trials for name in trial.signals)
 
 
 def _driven(trial: Trial, driven_by: str) -> Trial:

@@ -27,16 +27,30 @@ from tank2sim.notices import Notice
 LITTLE_KNOWN = 0.25
 """A standard error of at least this share of the value is not widened (project choice)."""
 
+AND_DIRECTIONS = " and directions"
+"""Ending of what drives a craft's model where the directions of its thrusters were measured and not ordered."""
+
 
 def driven_model(card: SteeredCard, driven_by: str) -> Model:
     """The card's model, driven by the measured angle of the rudder (`driven_by` is ``angle``) or by its order; of a
-    craft, by the measured ``revolutions`` of its thrusters or by their ``orders``."""
-    return _driven(build(without_order_response(card) if driven_by == "revolutions" else card), driven_by)
+    craft, by the measured ``revolutions`` of its thrusters or by their ``orders``, followed by
+    :data:`AND_DIRECTIONS` where the directions of thrusters that turn were measured."""
+    if driven_by.startswith("revolutions"):
+        card = without_order_response(card)
+    if driven_by.endswith(AND_DIRECTIONS):
+        card = without_turning_lag(card)
+    return _driven(build(card), driven_by)
 
 
 def without_order_response(card: SteeredCard) -> SteeredCard:
     """The card of a craft without what lies between orders and revolutions: lag, dead band and exponent."""
     none = {"time_constant_s": None, "dead_band_radps": 0.0, "order_exponent": None}
+    return replace(card, thrusters=tuple(thruster.model_copy(update=none) for thruster in card.thrusters))
+
+
+def without_turning_lag(card: SteeredCard) -> SteeredCard:
+    """The card of a craft whose thrusters turn to their ordered direction at once."""
+    none = {"azimuth_time_constant_s": None}
     return replace(card, thrusters=tuple(thruster.model_copy(update=none) for thruster in card.thrusters))
 
 
