@@ -28,8 +28,7 @@ from tank2sim.records.csv_table import CsvTable, read_bytes_as_text, table_of_ro
 from tank2sim.records.trials import TRIAL_SIGNALS, Trial, TrialReader, unwrapped
 from tank2sim.units import to_si
 
-_Rows = Sequence[tuple[int, str]]
-"""Line of the file (from 1) and text of each row."""
+_Rows = Sequence[tuple[int, str]]  # Line of the file (from 1) and text of each row
 
 KVLCC2_SCALE = 45.714
 """Length of the KVLCC2 (320 m) over the length of the models, 7.000 m at HSVA and at MARIN (SIMMAN 2008)."""

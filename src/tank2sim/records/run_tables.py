@@ -280,8 +280,7 @@ def _unit_of_heading(heading: str) -> str:
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _MATLAB = b"MATLAB 5.0 MAT-file"
 _TDMS = b"TDSm"
-_FIRST_BYTES = 1024
-"""Bytes that show the format: a MATLAB 7.3 file has a header of 512 bytes before the HDF5 one."""
+_FIRST_BYTES = 1024  # Bytes that show the format: a MATLAB 7.3 file has a header of 512 bytes before the HDF5 one
 
 
 @dataclass(frozen=True)

@@ -17,15 +17,15 @@ from tank2sim.apps.logs.reference import ReferenceMotion, interpolated, thinned_
 from tank2sim.apps.logs.streams import LogFinding, LogStream, fault, note
 from tank2sim.arrays import Array
 
+# Streams are thinned to this step for the tests, s. Project choice: yaw of small craft lasts a second or more
 _TESTED_STEP_S = 0.2
-"""Streams are thinned to this step for the tests, s. Project choice: yaw of small craft lasts a second or more."""
 
 HEADINGS_APART_DEG = 5.0
 """Mean difference of two headings, deg, from which they contradict each other (project choice: beyond the deviation of
 a compass that was swung)."""
 
+# Quantities that a vessel may have twice, each with a name of its own
 _TWINS = ("rudder_angle", "rudder_order", "rpm", "rpm_order")
-"""Quantities that a vessel may have twice, each with a name of its own."""
 
 STATED = {"format": 0.95, "name": 0.75, "": 0.6}
 """Confidence by what states a quantity, before its content is tested."""

@@ -12,18 +12,14 @@ from tank2sim.arrays import Array
 from tank2sim.records.csv_table import LARGEST
 from tank2sim.records.signals.sampling import GAP_STEPS
 
-_DOUBLED = 0.2
-"""Share of samples at the time of another from which two instruments are suspected. Project choice."""
+_DOUBLED = 0.2  # Share of samples at the time of another from which two instruments are suspected (project choice)
 
 DOUBLED_STEPS = 3.0
 """Their difference, as a multiple of the change from sample to sample, from which they are. Project choice: noise alone
 differs by one to two."""
 
-_ROLLOVER_S = 1024 * 604800.0
-"""Time after which the week number of GPS starts again, s (IS-GPS-200, 20.3.3.3.1.1)."""
-
-_DAY_S = 86400.0
-"""Difference of two clocks, s, from which one is wrong by more than a time zone."""
+_ROLLOVER_S = 1024 * 604800.0  # Time after which the week number of GPS starts again, s (IS-GPS-200, 20.3.3.3.1.1)
+_DAY_S = 86400.0  # Difference of two clocks, s, from which one is wrong by more than a time zone
 
 TWO_DIGITS_FROM = 80
 """Years of two digits from here on are of the 20th century: GPS time begins in 1980 (IS-GPS-200, 3.3.4)."""

@@ -44,55 +44,39 @@ _TAG_TIME = re.compile(rb"\\(?:[^\\]*,)?c:(\d+)[,*]")
 _EPOCH = re.compile(rb"(?<![\d.])(\d{10}(?:\.\d+)?|\d{13})(?![\d.])")
 _ISO = re.compile(rb"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(?:\.\d+)?)Z?")
 
+# Sentences of a kind from which a sum missing or wrong in all is by their sender, not a fault (project choice)
 _FEW = 10
-"""Sentences of a kind from which on all of them have no checksum, or a wrong one, by their sender and not by a fault of
-the line. Project choice."""
-
+# Share of a kind's sentences, spoilt or without a value, from which that is said of the kind (project choice)
 _MOST = 0.5
-"""Share of the sentences of a kind that are spoilt, or hold no value, from which that is said of the kind. Project
-choice."""
-
+# Share of a talker's sentences in another's time: few at a change of talker, all of two receivers (project choice)
 _OVERLAP = 0.1
-"""Share of sentences of a talker that may lie within the time of another before the two are two instruments. Project
-choice: at a change of talker a few sentences overlap; two receivers overlap throughout."""
-
+# Largest drift of usable time stamps: delays of serial lines stay below a second or two (project choice)
 _STAMPS_AGREE_S = 5.0
-"""Largest drift of a recorder's time stamps against the receiver's clock, s, with which they are used. Project choice:
-delays of serial lines stay below a second or two."""
 
 _BLOCK = 100_000
+# Sentences before and after over which a time is averaged: seconds, in which clocks do not drift (project choice)
 _NEIGHBOURS = 10
-"""Sentences of a kind before and after one over which its time is averaged. Project choice: a few seconds at the usual
-1 to 10 Hz, in which clocks do not drift and few sentences are lost."""
 
 
 _FIELDS = FIELDS["nmea0183"]
+# Headings that repeat another instrument's, or rest on a compass: a gyro's goes first
 _LAST = ("HDG.true_heading", "HDM.true_heading", "VHW.heading")
-"""Headings that repeat another instrument's, or rest on a compass: a gyro's goes first."""
-
+# Cells of a speed in km/h that some instruments fill in place of the one in knots
 _KMH = {("VTG", 4): 6, ("VHW", 4): 6}
-"""Cells of a speed in km/h that some instruments fill in place of the one in knots."""
-
-_STATUS = {"RMC": 1, "ROT": 1, "GLL": 5, "MWV": 4}
-"""Cells of the status of a sentence, A where it is valid."""
-
+_STATUS = {"RMC": 1, "ROT": 1, "GLL": 5, "MWV": 4}  # Cells of the status of a sentence, A where it is valid
+# Cells of the mode of the receiver, N where it has no fix (NMEA 0183, 2.3)
 _MODE = {"RMC": 11, "VTG": 8, "GLL": 6, "GNS": 5}
-"""Cells of the mode of the receiver, N where it has no fix (NMEA 0183, 2.3)."""
-
+# Cells of the latitude and of the time of day of sentences with a position
 _PLACES = {"RMC": (2, 0), "GGA": (1, 0), "GLL": (0, 4), "GNS": (1, 0)}
-"""Cells of the latitude and of the time of day of sentences with a position."""
 
 _STAMPS = "the recorder's time stamps"
 _FIRST_DAY = dt.date(1970, 1, 1)
-_TIME_OF_DAY = "time of day of "
-"""Beginning of the name of a clock without a date, before the kind of its sentences."""
-
-_SATELLITES = ("GSV", "GSA", "GRS", "GBS", "GST", "ALM", "DTM", "TXT")
-"""Kinds that say nothing of the vessel."""
+_TIME_OF_DAY = "time of day of "  # Beginning of the name of a clock without a date, before the kind of its sentences
+_SATELLITES = ("GSV", "GSA", "GRS", "GBS", "GST", "ALM", "DTM", "TXT")  # Kinds that say nothing of the vessel
 
 _XDR_UNITS = {"D": "deg", "R": "rpm", "P": "%", "M": "m"}
+# m/s of the units of MWV; S are statute miles per hour (NIST SP 811)
 _WIND_UNITS = {"N": KNOT_MPS, "K": 1 / 3.6, "M": 1.0, "S": 0.44704}
-"""m/s of the units of MWV; S are statute miles per hour (NIST SP 811)."""
 
 
 def looks_like_nmea0183(head: bytes) -> bool:
@@ -439,6 +423,7 @@ class _Reader:
         return _overlapping(np.concatenate(lines), np.repeat(np.arange(len(lines)), list(map(len, lines))))
 
 
+# Kinds of sentences with more than numbers in cells
 _SPECIAL: dict[str, Callable[[_Reader, str, list[str]], None]] = {
     **dict.fromkeys(("GGA", "GLL", "GNS"), _Reader._position),
     **dict.fromkeys(("HDG", "HDM"), _Reader._magnetic),
@@ -449,7 +434,6 @@ _SPECIAL: dict[str, Callable[[_Reader, str, list[str]], None]] = {
     "ZDA": _Reader._zda,
     "THS": _Reader._ths,
 }
-"""Kinds of sentences with more than numbers in cells."""
 
 
 def _cell(cells: list[str], place: int) -> str:

@@ -33,30 +33,23 @@ _FIELDS: dict[int, dict[str, list[str]]] = {int(pgn): fields for pgn, fields in 
 _SYSTEM_TIME, _VARIATION, _RUDDER, _ENGINE = 126992, 127258, 127245, 127488
 _TRUE = "true heading"
 _EPOCHS = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
+# Share of time stamps that fall from which they are differences. Project choice: messages rarely change places
 _OFTEN = 0.1
-"""Share of time stamps that fall from which they are differences. Project choice: messages rarely change places."""
-
+# Difference of the clocks of two sources that is reported, s: they send whole seconds (project choice)
 _CLOCKS_APART_S = 1.5
-"""Difference of the clocks of two sources that is reported, s: they send whole seconds (project choice)."""
-
+# Least difference of paces, and number and span (s) of system times that show it: 3 % in ten seconds (project choice)
 _PACE_OFF, _PACE_FROM, _PACE_FROM_S = 0.05, 8, 10.0
-"""Share by which the pace of two clocks must differ, and the number and span (s) of system times from which it is known
-(project choice: whole seconds over ten leave 3 %)."""
-
+# Time of day of Actisense's ASCII and of the raw format of gateways, without a date
 _CLOCK = re.compile(r"^(?:A(\d\d)(\d\d)(\d\d\.\d+)|(\d\d):(\d\d):(\d\d\.\d+)) ")
-"""Time of day of Actisense's ASCII and of the raw format of gateways, without a date."""
 
 _TIMED = re.compile(r"^\(\d+\.\d+\)|^\d{4}-\d\d-\d\d|^\d\d:\d\d:\d\d\.|^A\d{6}\.")
+# A frame of 29 bits: candump in any form (-L, -t, -x, -a; can-utils), Vector's ASC, and tables of frames
 _FRAME = re.compile(
     r"^\s*\(?(?P<stamp>\d{4}-\d\d-\d\d[T ]\d\d:[\d:.]+Z?|\d+(?:\.\d+)?)\)?[\s,;]+"
     r"(?P<bus>\S+?)[\s,;]+(?:[RT]X\s+\S\s+\S\s+)?(?P<id>[0-9A-Fa-f]{8})x?(?:\s*\[\d\]\s*|\#|\s+[RT]x\s+d\s+\d\s+|[\s,;]+)"
     r"(?P<data>(?:[0-9A-Fa-f]{2} ?){1,8})\s*(?:[RT]|'.*')?\s*$"
 )
-"""A frame with a time stamp, a bus, the identifier of 29 bits and the data: candump in any form (-L, -t, -x, -a; of
-can-utils), Vector's ASC, and tables of frames."""
-
-_SIGNAL_K = re.compile(r"^\d{13};[^;]*;")
-"""Prefix of a line recorded by Signal K."""
+_SIGNAL_K = re.compile(r"^\d{13};[^;]*;")  # Prefix of a line recorded by Signal K
 
 _LINES = (
     re.compile(r"^\d{4}-\d\d-\d\d[T-][\d:.]+Z?,\d,\d+,\d+,\d+,\d+,[0-9A-Fa-f]{2},"),
@@ -66,17 +59,12 @@ _LINES = (
     _FRAME,
 )
 
+# Least time stamp that counts from 1970, s (the year 1973); less counts from the beginning, or from line to line
 _FIRST_EPOCH_S = 1e8
-"""Least time stamp that counts from 1970, s (the year 1973); less counts from the beginning, or from line to line."""
-
-_SAME = 0.5
-"""Share of the lines of a log that decides how it is written. Project choice."""
-
+_SAME = 0.5  # Share of the lines of a log that decides how it is written (project choice)
+# Messages of the vessel: without protocol, proprietary ones, satellites and other ships (AIS)
 _VESSELS = frozenset((*range(127001, 129038), *range(129551, 129793), *range(129811, 130816)))
-"""Messages of the vessel: without protocol, proprietary ones, satellites and other ships (AIS)."""
-
-_NOT_VALUES = re.compile(r"sid|instance|reserved|spare|source")
-"""Beginnings of fields that are no values (canboat)."""
+_NOT_VALUES = re.compile(r"sid|instance|reserved|spare|source")  # Beginnings of fields that are no values (canboat)
 
 
 def looks_like_nmea2000(head: bytes) -> bool:
@@ -105,8 +93,7 @@ def read_nmea2000(path: Path) -> VesselLog:
     return reader.log()
 
 
-_Key = tuple[int, int, str, str, str]
-"""Message (PGN), source, field, quantity, instance."""
+_Key = tuple[int, int, str, str, str]  # Message (PGN), source, field, quantity, instance
 
 
 class _Reader:

@@ -24,8 +24,8 @@ from tank2sim.errors import InputError, optional_library
 
 _FIELDS = FIELDS["px4"]
 _RECEIVERS = ("sensor_gps", "vehicle_gps_position")
+# CA_AIRFRAME of two motors that steer by their difference (docs.px4.io, parameter reference)
 _AIRFRAME_ROVER_DIFFERENTIAL = 6
-"""CA_AIRFRAME of two motors that steer by their difference (docs.px4.io, parameter reference)."""
 
 
 def read_px4_ulog(path: Path) -> VesselLog:

@@ -74,6 +74,7 @@ def _known() -> str:
 
 
 _RAW = "record the raw frames (candump -L, or the input of the analyzer)"
+# Beginnings of files that are no log that is read, what they are, and what to give in their place
 _FOREIGN: tuple[tuple[bytes, str, str], ...] = (
     (rb"\x1f\x8b", "is compressed (gzip)", "unpack it"),
     (rb"PK\x03\x04", "is a ZIP archive or a spreadsheet", "unpack it, or save it as CSV"),
@@ -88,7 +89,6 @@ _FOREIGN: tuple[tuple[bytes, str, str], ...] = (
     (rb"\s*[{\[]", "is JSON", "save it as CSV, a row a sample"),
     (rb"\s*<(\?xml|gpx|kml|!DOCTYPE|html)", "is XML or HTML", "save it as CSV, a row a sample"),
 )
-"""Beginnings of files that are no log that is read, what they are, and what to give in their place."""
 
 
 def read_log(path: Path | str) -> VesselLog:

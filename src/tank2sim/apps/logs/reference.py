@@ -26,8 +26,7 @@ leeway turn the course."""
 LEAST_SPEED_MPS = 0.3
 """Speed below which a course is noise, m/s: receivers leave it out below about half a knot."""
 
-_LONGEST_BRIDGE = 3.0
-"""Gaps of this many windows are not bridged in differences."""
+_LONGEST_BRIDGE = 3.0  # Gaps of this many windows are not bridged in differences
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,19 +38,14 @@ LONGEST_VECTOR = 32
 """Entries of an array up to which each is a stream. Project choice: outputs of MAVROS are 16 or 18, joints and motors
 fewer; scans and pictures have hundreds."""
 
+# From here on a header's time is not UTC: latencies are seconds, simulated clocks are off by years (project choice)
 _OFF_BY_S = 3600.0
-"""Difference of the time in a header from the time of recording beyond which the header's is not UTC. Project choice:
-latencies are seconds; a simulated or unset clock is off by years."""
-
+# Difference of paces of a simulated clock: computers differ by 1e-4, delays by less than a second (project choice)
 _PACE = 0.01
-"""Relative difference of the paces of two clocks from which one is simulated. Project choice: clocks of computers
-differ by 1e-4, and the delays of a log of a minute by less than a second."""
-
+# Endings that the library needs, by the first bytes of a file
 _SUFFIXES = {b"#ROS": ".bag", b"SQLi": ".db3", b"\x89MCA": ".mcap"}
-"""Endings that the library needs, by the first bytes of a file."""
-
+# Names of frames that are fixed to the earth: east, north, up (REP 103, REP 105)
 _WORLD_FRAMES = ("map", "odom", "world", "enu", "earth", "local_origin", "utm")
-"""Names of frames that are fixed to the earth: east, north, up (REP 103, REP 105)."""
 
 _OMITTED = ("header", "covariance", "seq", "status", "layout", "covariance_type")
 _GROUND_WORDS = ("gps", "gnss", "vel", "fix", "navsat", "enu")
@@ -231,6 +226,7 @@ class _Topic:
         return []
 
 
+# Beginnings of the paths of standard messages
 _PREFIXES = {
     "Twist": "",
     "TwistStamped": "twist.",
@@ -239,7 +235,6 @@ _PREFIXES = {
     "PoseStamped": "pose.",
     "PoseWithCovarianceStamped": "pose.pose.",
 }
-"""Beginnings of the paths of standard messages."""
 
 
 def _velocity(columns: dict[str, Array], prefix: str, of_world: bool) -> list[tuple[str, Array, str]]:

@@ -24,8 +24,7 @@ from tank2sim.records.trials import MEASURED_COLUMNS, RUDDERS, TRIAL_SIGNALS, Tr
 CUT_BY = "cut by tank2sim"
 """Words in a comment of every trial that is cut from a log."""
 
-_HEAD_LINES = 100
-"""Lines of a file in which the comments of a trial are looked for."""
+_HEAD_LINES = 100  # Lines of a file in which the comments of a trial are looked for
 
 LEAD_S = 5.0
 """Time before the execute with which a trial begins, s. Project choice: long enough to see the approach, too short for
@@ -42,13 +41,13 @@ PREDICTABLE_S = 40.0
 
 _HELD = ("rudder_order", "rpm_order", "thrust_order_port", "thrust_order_starboard")
 
+# Columns of vessels with two thrusters, and their factors: the trial format has none for them
 _THRUSTER_COLUMNS = {
     "rpm_port": ("n_port_rpm", 60 / (2 * math.pi)),
     "rpm_starboard": ("n_starboard_rpm", 60 / (2 * math.pi)),
     "thrust_order_port": ("order_port", 1.0),
     "thrust_order_starboard": ("order_starboard", 1.0),
 }
-"""Columns of vessels with two thrusters, and their factors: the trial format has none for them."""
 
 
 @dataclass(frozen=True, eq=False)

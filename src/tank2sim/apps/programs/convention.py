@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     from tank2sim.apps.programs.readings import RankedReading
     from tank2sim.cards.coefficient_table import CoefficientTable
 
-_SIMULATED = 1e-3
-"""Probability from which a reading is simulated: others cannot become the first (project choice)."""
+_SIMULATED = 1e-3  # Probability from which a reading is simulated: others cannot become the first (project choice)
 
 
 @verb(

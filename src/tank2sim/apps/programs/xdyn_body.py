@@ -98,15 +98,12 @@ def rolled_rates(model: Model, forces: ca.SX, rigid: Array, total: Array) -> dic
     return found
 
 
+# First parts of the names of inputs that are orders; all others are constants of the file
 _ORDERS = ("rudder.", "propeller.", "thrusters.")
-"""First parts of the names of inputs that are orders; all others are constants of the file."""
 
 
-_PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
-"""Surge, sway and yaw among u v w p q r."""
-
-_ROLL_RADIUS = 0.05
-"""Radius of roll over L where it is blocked: xdyn asks for an inertia and does not use it."""
+_PLANAR = np.ix_([0, 1, 5], [0, 1, 5])  # Surge, sway and yaw among u v w p q r
+_ROLL_RADIUS = 0.05  # Radius of roll over L where it is blocked: xdyn asks for an inertia and does not use it
 
 
 @dataclass(frozen=True)

@@ -21,11 +21,9 @@ UNEVEN = 0.1
 STRAY = 20.0
 """Times the duration of the middle half of a record from its middle, ten times the record: no row of one manoeuvre is
 as far away. Project choice; it also bounds the memory that later checks take."""
+# Share of rows with stray times up to which they are left out. Project choice, as for the readings of a sensor
 _FEW = 0.05
-"""Share of rows with stray times up to which they are left out. Project choice, as for the readings of a sensor."""
-
-_UNITS = {60.0: "minutes", 3600.0: "hours", 1e-3: "milliseconds"}
-"""Seconds in a unit of time, to its name."""
+_UNITS = {60.0: "minutes", 3600.0: "hours", 1e-3: "milliseconds"}  # Seconds in a unit of time, to its name
 
 AGREEMENT = 0.03
 """How near both factors must come: 60 lies 4.7 % from the 57.3 of degrees that are radians."""
@@ -35,8 +33,8 @@ MISCALIBRATED = 0.15
 choice: three times the 5 % that IMO A.526(13) allows a rate-of-turn indicator, far above the 2 % that MSC.96(72)
 allows a speed log."""
 
+# The way is measured between this many points of a track, so that noise of the positions does not lengthen it
 _POINTS = 50
-"""The way is measured between this many points of a track, so that noise of the positions does not lengthen it."""
 
 
 def time_findings(trial: Trial) -> list[Finding]:

@@ -18,8 +18,8 @@ from tank2sim.records.signals.sampling import FEWEST_SAMPLES, Series
 ORDER = 4
 """Order of a Butterworth filter if none is given: 24 dB an octave, and twice that forwards and backwards."""
 
+# Part of the sum of a filter's impulse response that is still to come where its ends are called undistorted
 _SETTLED = 0.01
-"""Part of the sum of a filter's impulse response that is still to come where its ends are called undistorted."""
 
 HIGHEST_DEGREE = 10
 """Project choice: higher polynomials are high-pass filters with bad ends; a Butterworth filter is better."""

@@ -16,12 +16,9 @@ from tank2sim.records.signals.statistics import autocorrelation
 
 CONFIDENCE = 0.95
 
-_SEGMENTS = 8
-"""Segments by default, each overlapping half of the next; project choice between scatter and resolution."""
-
+_SEGMENTS = 8  # Segments by default, each overlapping half of the next; project choice between scatter and resolution
+# In a default segment: a first-order spectrum bends at 1/(2 pi correlation time), three steps (project choice)
 _CORRELATION_TIMES = 20.0
-"""Correlation times that a segment lasts by default if half the record allows it, whatever that does to their number:
-the spectrum of a first-order process bends at 1/(2 pi correlation time), about three times its step. Our choice."""
 
 _FEWEST_IN_SEGMENT = 10
 
