@@ -111,10 +111,7 @@ class CsvTable:
         InputError
             The column does not exist, a cell of it is empty, or it does not rise; the message names the first such row.
         """
-        values = self.column(name)
-        empty = np.flatnonzero(np.isnan(values))
-        if empty.size:
-            raise InputError(self.path, self.place(int(empty[0]), name), "is empty", "give each row its value")
+        values = self.filled_column(name, "give each row its value")
         falls = np.flatnonzero(np.diff(values) < SHORTEST_STEP)
         if falls.size:
             row = int(falls[0]) + 1

@@ -135,14 +135,9 @@ def _canonical(path: Path, number: int, line: str, separator: str, comma: bool) 
     if comma and "." in line:
         remedy = "write numbers with one decimal sign and nothing between thousands, or give [files] decimal"
         raise InputError(path, f"line {number}", "has points and decimal commas", remedy)
-    if '"' in line:
-        cells = cells_of(line, separator)
-    elif separator == WHITESPACE:
-        cells = line.split()
-    else:
-        if separator == ",":
-            return line
-        return (line.replace(",", ".") if comma else line).replace(separator, ",")
+    if separator == "," and '"' not in line:
+        return line
+    cells = cells_of(line, separator) if separator == WHITESPACE or '"' in line else line.split(separator)
     return ",".join(cell.replace(",", ".") if comma else cell for cell in cells)
 
 

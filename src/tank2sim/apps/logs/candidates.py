@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tank2sim.apps.logs.channels import USED_FROM, ChannelSet, LogChannel
-from tank2sim.apps.logs.clock import usual_step
 from tank2sim.apps.logs.content import AGREES, DIFFERS, ContentEvidence, angle_unit, rate_delay
 from tank2sim.apps.logs.quantities import QUANTITIES
 from tank2sim.apps.logs.recorded import PulseScale, pulses_of, rest_of
 from tank2sim.apps.logs.reference import ReferenceMotion, interpolated, thinned_series
 from tank2sim.apps.logs.streams import LogFinding, LogStream, fault, note
 from tank2sim.arrays import Array
+from tank2sim.records.trials import usual_step
 
 # Streams are thinned to this step for the tests, s. Project choice: yaw of small craft lasts a second or more
 _TESTED_STEP_S = 0.2

@@ -116,9 +116,11 @@ def tidied(stream: LogStream) -> tuple[LogStream, int, list[LogFinding]]:
     return replace(stream, time_s=time[new], values=values[new]), repeated, findings
 
 
-def usual_step(time_s: Array) -> float:
-    """Median step between samples, s; nan of fewer than two."""
-    return float(np.median(np.diff(time_s))) if len(time_s) > 1 else float("nan")
+def over_midnight(clock_s: Array) -> Array:
+    """Times of day (n,), s, that go on over midnight; nan stays."""
+    known, out = np.isfinite(clock_s), np.array(clock_s)
+    out[known] += 86400 * np.cumsum(np.diff(clock_s[known], prepend=clock_s[known][:1]) < -43200)
+    return out
 
 
 def gaps_of(time_s: Array, longest_s: float) -> list[tuple[float, float]]:

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tank2sim.apps.logs.clock import continued_clock, full_year, rollover_s
+from tank2sim.apps.logs.clock import continued_clock, full_year, over_midnight, rollover_s
 from tank2sim.apps.logs.quantities import quantity_of_name
 from tank2sim.apps.logs.streams import (
     FIELDS,
@@ -344,7 +344,7 @@ class _Reader:
             return stamp_lines, stamps, "", {}
         lines, times, talkers = (np.array(part) for part in (clock.lines, clock.values, clock.stamps))
         if undated:
-            times = times + 86400 * np.cumsum(np.diff(times, prepend=times[:1]) < -43200)
+            times = over_midnight(times)
             findings.append(note("no sentence has a date (RMC, ZDA): the trials have no date"))
         if _overlapping(lines, talkers):
             first = Counter(talkers.tolist()).most_common(1)[0][0]

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tank2sim.apps.logs.clock import usual_step
 from tank2sim.apps.logs.streams import wrapped_angle
 from tank2sim.arrays import Array
 from tank2sim.dynamics.geographic import EQUATORIAL_RADIUS_M, FLATTENING
+from tank2sim.records.trials import usual_step
 
 POSITION_WINDOW_S = 4.0
 """Time over which positions are differenced, s. Project choice: noise of 0.5 m of a receiver is then 0.1 m/s, and a

@@ -9,7 +9,7 @@ import numpy as np
 
 from tank2sim.apps.logs.candidates import REFUTED, STATED, ChannelSearch, Judgement
 from tank2sim.apps.logs.channels import SURE_FROM, USED_FROM, LogChannel
-from tank2sim.apps.logs.clock import usual_step, utc_text
+from tank2sim.apps.logs.clock import utc_text
 from tank2sim.apps.logs.content import (
     AGREES,
     DIFFERS,
@@ -25,6 +25,7 @@ from tank2sim.apps.logs.quantities import QUANTITIES, names_another, names_thrus
 from tank2sim.apps.logs.reference import LEAST_SPEED_MPS, interpolated
 from tank2sim.apps.logs.streams import LogStream, note
 from tank2sim.arrays import Array
+from tank2sim.records.trials import usual_step
 
 FULL_RUDDER_DEG = 35.0
 """Rudder angle at full order where a log has shares alone: 35 deg on either side (SOLAS II-1, regulation 29.3.1)."""

@@ -16,11 +16,11 @@ from itertools import pairwise
 import numpy as np
 from scipy.ndimage import median_filter
 
-from tank2sim.apps.logs.clock import usual_step
 from tank2sim.apps.logs.content import steering_evidence
 from tank2sim.apps.logs.reference import differenced, held, interpolated
 from tank2sim.apps.logs.voyage import QuantitySeries, Voyage
 from tank2sim.arrays import Array
+from tank2sim.records.trials import usual_step
 
 HELD_RUDDER_RAD = math.radians(4.0)
 """Rudder from which on a vessel is steered to turn. Project choice: course keeping in fair weather stays below, and the

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tank2sim.apps.logs.clock import DOUBLED_STEPS, TWO_DIGITS_FROM
+from tank2sim.apps.logs.clock import DOUBLED_STEPS, TWO_DIGITS_FROM, over_midnight
 from tank2sim.apps.logs.quantities import CLOCK_WORDS, plain_words, quantity_of_name, unit_of_signal_k
 from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, fault, named_stream, note
 from tank2sim.arrays import Array
@@ -214,7 +214,7 @@ class _TableClock:
                 of_day = _clock_of_numbers(self.numbers[name])
             if of_day is not None:
                 self._note(name, "has times of day without a date: the trials have no date")
-                return _over_midnight(of_day), False, {name}
+                return over_midnight(of_day), False, {name}
         for name in self.named or leftmost:
             values = self.numbers.get(name, np.zeros(0))
             steps = np.diff(values[np.isfinite(values)])
@@ -417,13 +417,6 @@ def _clock(column: pd.Series[Any]) -> Array:
     text = _of_24_hours(column.astype(str).str.strip().str.replace(",", ".", regex=False))
     text = text.where(text.str.count(":") > 1, text + ":00")
     return np.asarray(pd.to_timedelta(text, errors="coerce").dt.total_seconds(), dtype=float)
-
-
-def _over_midnight(clock: Array) -> Array:
-    """Times of day, s, that go on over midnight."""
-    known, out = np.isfinite(clock), np.array(clock)
-    out[known] += 86400 * np.cumsum(np.diff(clock[known], prepend=clock[known][:1]) < -43200)
-    return out
 
 
 def _dates(path: Path, name: str, column: pd.Series[Any]) -> pd.Series[Any]:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tank2sim.apps.logs.clock import usual_step, utc_text
+from tank2sim.apps.logs.clock import utc_text
 from tank2sim.apps.logs.quantities import QUANTITIES
 from tank2sim.apps.logs.reference import held, interpolated, thinned_series
 from tank2sim.apps.logs.stretches import LEAST_TRIAL_ROWS, Stretch, StretchKind
@@ -19,7 +19,7 @@ from tank2sim.apps.logs.voyage import QuantitySeries, Voyage, drift_current
 from tank2sim.arrays import Array
 from tank2sim.records.signals.sampling import GAP_STEPS
 from tank2sim.records.signals.writing import trial_text
-from tank2sim.records.trials import MEASURED_COLUMNS, RUDDERS, TRIAL_SIGNALS, Trial
+from tank2sim.records.trials import MEASURED_COLUMNS, RUDDERS, TRIAL_SIGNALS, Trial, usual_step
 
 CUT_BY = "cut by tank2sim"
 """Words in a comment of every trial that is cut from a log."""

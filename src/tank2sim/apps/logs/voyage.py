@@ -11,7 +11,7 @@ import numpy as np
 
 from tank2sim.apps.logs.channel_search import find_channels
 from tank2sim.apps.logs.channels import SURE_FROM, ChannelSet
-from tank2sim.apps.logs.clock import gaps_of, tidied, usual_step, utc_text
+from tank2sim.apps.logs.clock import gaps_of, tidied, utc_text
 from tank2sim.apps.logs.content import AGREES
 from tank2sim.apps.logs.quantities import QUANTITIES
 from tank2sim.apps.logs.recorded import pulses_of, without_missing
@@ -28,6 +28,7 @@ from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice, caution
 from tank2sim.records.signals.sampling import GAP_STEPS
+from tank2sim.records.trials import usual_step
 
 # Gaps shorter than this are not reported, s. Project choice: they are bridged without harm at ship's speeds
 _GAP_LEAST_S = 3.0

@@ -120,11 +120,14 @@ def windows_of(values: NDArray[AuditNumber], noise: float, step_s: float) -> Aud
     """Windows fit for the rate of a signal (n,) with this noise, by :func:`windows_for` and its own motion."""
     windows = AuditWindows(step_s, 9)
     for _ in range(2):  # narrow windows still hold noise, which the second pass does not
-        rate = np.abs(windows.rate(values))
-        rate = rate[np.isfinite(rate)]
-        motion = float(np.sqrt(np.mean(rate**2))) if rate.size else 0.0
-        windows = windows_for(noise, motion, step_s, len(values))
+        windows = windows_for(noise, known_rms(np.abs(windows.rate(values))), step_s, len(values))
     return windows
+
+
+def known_rms(values: Array) -> float:
+    """Root mean square of a signal (n,), nan left out; 0 where nothing is known."""
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(np.square(known)))) if known.size else 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from tank2sim.records.audit.finding import Finding, Repair, changed, found_in, n
 from tank2sim.records.audit.noise import record_noise, rounding
 from tank2sim.records.audit.rudder import rudder_response
 from tank2sim.records.audit.time_base import MISCALIBRATED
+from tank2sim.records.audit.track import audited_track
 from tank2sim.records.audit.weak import AuditWindows, WeakFit, fit, on_uniform_time, windows_of
 from tank2sim.records.trials import Trial, unwrapped
 
@@ -150,10 +151,7 @@ def _headings(trial: Trial, heading: Array) -> list[Array]:
         or np.nanmax(np.abs(heading)) > 1.01 * turn
     ):
         return [heading]
-    known = np.isfinite(heading)
-    again = heading.copy()
-    again[known] = np.unwrap(heading[known], period=turn)
-    return [again, heading]
+    return [unwrapped(heading, turn), heading]
 
 
 def _comparison(windows: AuditWindows, rate: Array, heading: Array, step: float) -> _Comparison | None:
@@ -324,11 +322,8 @@ def _course_slope(trial: Trial) -> float | None:
     """Change of the course of the track for one of the heading, or None if there is no track or no turn."""
     if not {"x_m", "y_m", "psi_rad"} <= set(trial.signals):
         return None
-    step, signals = on_uniform_time(trial)
-    noise = record_noise(trial)
-    place = signals["x_m"] + 1j * signals["y_m"]
-    windows = windows_of(place, max(noise["x_m"], noise["y_m"]), step)
-    velocity = windows.rate(place)
+    track = audited_track(trial)
+    velocity = track.ground
     if not np.isfinite(velocity).any():
         return None
     going = np.abs(velocity) > 0.3 * np.nanmedian(np.abs(velocity))
@@ -338,8 +333,8 @@ def _course_slope(trial: Trial) -> float | None:
     if not np.nanmax(course) - np.nanmin(course) > 10 * _DEGREE:  # beyond any drift of a straight run
         return None
     spread = float(np.nanstd(course))
-    for candidate in _headings(trial, signals["psi_rad"]):
-        found = fit(course, [windows.mean(candidate), np.ones(len(course))])
+    for candidate in _headings(trial, track.signals["psi_rad"]):
+        found = fit(course, [track.windows.mean(candidate), np.ones(len(course))])
         if found is not None and found.differs(0) and found.residual < UNLIKE * spread:
             return float(found.values[0])
     return None

@@ -176,8 +176,7 @@ def transfer_function(source: Series, result: Series, segment_s: float | None = 
     inner = _inner(averaging)
     frequency, power = signal.welch(source.values, **options)
     _, cross = signal.csd(source.values, result.values, **options)
-    unscaled = {key: value for key, value in options.items() if key != "scaling"}
-    _, coherence = signal.coherence(source.values, result.values, **unscaled)
+    _, coherence = signal.coherence(source.values, result.values, **options)
     names = " and ".join(SignalName(item.name).file for item in (source, result))
     if not np.all(power[inner] > 0):
         raise InputError(source.source, f"columns {names}", "have no power at some frequency", "leave them out")
@@ -228,8 +227,7 @@ def _averaging(signals: Sequence[Series], segment_s: float | None) -> Averaging:
 def _options(series: Series, averaging: Averaging) -> dict[str, object]:
     samples = averaging.samples_in_segment
     return {
-        "fs": series.rate_hz, "window": "hann", "nperseg": samples, "noverlap": samples // 2,
-        "detrend": "constant", "scaling": "density",
+        "fs": series.rate_hz, "window": "hann", "nperseg": samples, "noverlap": samples // 2, "detrend": "constant",
     }  # fmt: skip
 
 
