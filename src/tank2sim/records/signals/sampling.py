@@ -117,7 +117,7 @@ def even_series(trial: Trial, name: str, max_gap_s: float | None = None) -> Seri
     step = float(time[-1] - time[0]) / (count - 1)
     grid = time[0] + step * np.arange(count, dtype=np.float64)
     if count != time.size or np.max(np.abs(time - grid)) > _JITTER * step:
-        values = values_at(time, values, grid, held=name in HELD_COLUMNS)
+        values = at_grid(time, values, grid, held=name in HELD_COLUMNS)
         way = "held" if name in HELD_COLUMNS else "interpolated by straight lines"
         notices.append(f"is unevenly sampled or has gaps of up to {longest:.4g} s; it was {way} at {step:.4g} s")
     messages = tuple(Notice(f"{column.removeprefix('column ')} {notice}") for notice in notices)
@@ -155,12 +155,12 @@ def _moved(series: Series, grid: Array, step: float) -> Series:
     times = series.time_s
     if len(times) == len(grid) and np.max(np.abs(times - grid)) <= _JITTER * step:
         return series
-    values = values_at(times, series.values, grid, held=series.name in HELD_COLUMNS)
+    values = at_grid(times, series.values, grid, held=series.name in HELD_COLUMNS)
     return replace(series, start_s=float(grid[0]), step_s=step, values=values)
 
 
-def values_at(time: Array, values: Array, grid: Array, *, held: bool) -> Array:
-    """Values (n,) at the times (s) of an even grid (m,): `held` until the next, or by straight lines."""
+def at_grid(time: Array, values: Array, grid: Array, *, held: bool) -> Array:
+    """Values (m,) at an even `grid` (m,), s, of `values` (n,) at `time` (n,); `held`, or by straight lines."""
     if not held:
         return np.interp(grid, time, values)
     places = np.searchsorted(time, grid + 1e-6 * (grid[1] - grid[0]), side="right") - 1
