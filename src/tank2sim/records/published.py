@@ -131,12 +131,7 @@ def _begins_rows(cells: list[str]) -> bool:
 
 
 def _uniform_time(path: Path, rows: _Rows) -> tuple[Array, Notice]:
-    """Times of equal step that agree with every time printed, and messages about them.
-
-    A time printed as 1.23E+02 lies within half a unit of its last digit, evenly: the step is the least-squares one
-    with these halves as weights. A sample lost or doubled would shift the rest by a step, so that every time printed
-    must be met to its half digit and half a step.
-    """
+    """Times of equal step, by least squares with half digits as weights, meeting each printed one; a notice."""
     cells = [line.split()[0] for _, line in rows]
     printed, half = np.array([float(cell) for cell in cells]), np.array([_half_a_digit(cell) for cell in cells])
     count = np.arange(len(rows))

@@ -28,6 +28,14 @@ FALL_STEPS = 1.5
 """Steps by which a clock falls where it was set back. Project choice: two samples that changed places fall by one."""
 
 
+def stamp_s(text: str) -> float:
+    """A time stamp, s: ISO 8601, or a number that counts s, ms, us or ns since 1970, or s since the beginning."""
+    if "-" in text:
+        return dt.datetime.fromisoformat(text.rstrip("Z")).replace(tzinfo=dt.UTC).timestamp()
+    value = float(text)
+    return value / next((counts for least, counts in ((1e17, 1e9), (1e14, 1e6), (1e11, 1e3)) if value > least), 1.0)
+
+
 def full_year(year: int) -> int:
     """The year of a year of two digits."""
     return year + (1900 if year >= TWO_DIGITS_FROM else 2000)

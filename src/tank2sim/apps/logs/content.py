@@ -134,11 +134,7 @@ def direction_evidence(time_s: Array, angle_rad: Array, motion: ReferenceMotion)
 
 
 def _sideways_share(heading: Array, north: Array, east: Array) -> float:
-    """Sideways speed (rms) as a share of the speed through the water, in the steady current that makes it least.
-
-    Craft that go astern or slowly in a current have another course than heading, and still move along their keel:
-    -n sin(psi) + e cos(psi) is small for the velocity (n, e) less the current.
-    """
+    """Sideways over whole speed (rms), -n sin(psi) + e cos(psi), in the steady current that makes it least."""
     sideways = np.column_stack([-np.sin(heading), np.cos(heading)])
     across = np.sum(sideways * np.column_stack([north, east]), axis=1)
     current = np.linalg.lstsq(sideways, across, rcond=None)[0]

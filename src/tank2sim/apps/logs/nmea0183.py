@@ -18,8 +18,9 @@ from operator import xor
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import median_filter
 
-from tank2sim.apps.logs.clock import continued_clock, full_year, over_midnight, rollover_s
+from tank2sim.apps.logs.clock import continued_clock, full_year, over_midnight, rollover_s, stamp_s
 from tank2sim.apps.logs.quantities import quantity_of_name
 from tank2sim.apps.logs.streams import (
     FIELDS,
@@ -53,7 +54,6 @@ _OVERLAP = 0.1
 # Largest drift of usable time stamps: delays of serial lines stay below a second or two (project choice)
 _STAMPS_AGREE_S = 5.0
 
-_BLOCK = 100_000
 # Sentences before and after over which a time is averaged: seconds, in which clocks do not drift (project choice)
 _NEIGHBOURS = 10
 
@@ -484,11 +484,9 @@ def steady_times(time: Array) -> Array:
     if len(time) < 2 * _NEIGHBOURS + 1:
         return time
     period = float(np.median((time[_NEIGHBOURS:] - time[:-_NEIGHBOURS]) / _NEIGHBOURS))
-    reach = np.arange(-_NEIGHBOURS, _NEIGHBOURS + 1)
     padded = np.pad(time, _NEIGHBOURS, mode="reflect", reflect_type="odd")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, len(reach))
-    blocks = range(0, len(time), _BLOCK)  # a day of sentences at once would take gigabytes
-    smooth = np.concatenate([np.median(windows[k : k + _BLOCK] - period * reach, axis=1) for k in blocks])
+    even = time[0] + period * np.arange(-_NEIGHBOURS, len(time) + _NEIGHBOURS)
+    smooth = (even + median_filter(padded - even, size=2 * _NEIGHBOURS + 1))[_NEIGHBOURS:-_NEIGHBOURS]
     # Where the clock leaps (a pause of the recorder), neighbours beyond the leap do not count.
     return np.where(np.abs(smooth - time) < 2 * period, smooth, time)
 
@@ -503,11 +501,7 @@ def _lost(time: Array) -> int:
 
 
 def _time_of_prefix(prefix: bytes) -> float | None:
-    if match := _TAG_TIME.search(prefix) or _EPOCH.search(prefix):
-        value = float(match[1])
-        return value / 1000 if value > 1e11 else value
-    if match := _ISO.search(prefix):
-        with contextlib.suppress(ValueError):  # a month 13
-            moment = dt.datetime.fromisoformat(match[1].decode().replace(" ", "T"))
-            return moment.replace(tzinfo=dt.UTC).timestamp()
+    match = _TAG_TIME.search(prefix) or _EPOCH.search(prefix) or _ISO.search(prefix)
+    with contextlib.suppress(ValueError):  # a month 13
+        return stamp_s(match[1].decode()) if match else None
     return None

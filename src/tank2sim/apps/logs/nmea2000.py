@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import theilslopes
 
-from tank2sim.apps.logs.clock import continued_clock, rollover_s
+from tank2sim.apps.logs.clock import continued_clock, rollover_s, stamp_s
 from tank2sim.apps.logs.nmea0183 import steady_times
 from tank2sim.apps.logs.streams import (
     FIELDS,
@@ -32,7 +32,6 @@ from tank2sim.errors import InputError, optional_library
 _FIELDS: dict[int, dict[str, list[str]]] = {int(pgn): fields for pgn, fields in FIELDS["nmea2000"].items()}
 _SYSTEM_TIME, _VARIATION, _RUDDER, _ENGINE = 126992, 127258, 127245, 127488
 _TRUE = "true heading"
-_EPOCHS = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
 # Share of time stamps that fall from which they are differences. Project choice: messages rarely change places
 _OFTEN = 0.1
 # Difference of the clocks of two sources that is reported, s: they send whole seconds (project choice)
@@ -117,7 +116,7 @@ class _Reader:
         stamp = math.nan
         try:
             if frame := _FRAME.match(line):
-                stamp = _seconds(frame["stamp"])
+                stamp = stamp_s(frame["stamp"])
                 self._sum(stamp, number)
                 line = f"(0.0) can0 {frame['id']}#{frame['data'].replace(' ', '')}"
             message = self.decoder.decode(line)
@@ -220,10 +219,7 @@ class _Reader:
         return [stamp + shift for stamp in stamps[:-1]], dated or len(clock) > 0, findings
 
     def _one_clock(self) -> tuple[Samples, list[LogFinding]]:
-        """The system times of the source with most of them, and findings on other sources whose clocks differ.
-
-        Of sources that send equally often (within a fifth) it is the one whose clock is in the middle.
-        """
+        """System times of the source with most (of several within a fifth, the middle one); findings on the others."""
         if not self.clocks:
             return Samples(), []
         most = max(len(column.values) for column in self.clocks.values())
@@ -259,10 +255,7 @@ class _Reader:
 
 
 def _pace(stamps: Array, clock: Array) -> tuple[float, list[LogFinding]]:
-    """Time of the receiver's clock for a second of the recorder's, 1 where they agree, and what to say of it.
-
-    Times of a conversion, or of a replay, run at another pace than the times of the messages.
-    """
+    """Receiver's seconds to one of the recorder's, 1 where they agree, and a finding: replays run at another pace."""
     good = np.isfinite(stamps)
     if np.count_nonzero(good) < _PACE_FROM or np.ptp(stamps[good]) <= 0 or np.ptp(clock[good]) < _PACE_FROM_S:
         return 1.0, []
@@ -287,15 +280,6 @@ def _ahead_s(column: Samples, every: dict[int, Samples]) -> float:
         return float(np.median(clock - stamps))
     means = [np.interp(column.lines, other.lines, other.values) for other in every.values()]
     return float(np.median(clock - np.mean(means, axis=0)))
-
-
-def _seconds(text: str) -> float:
-    """A time stamp, s: ISO 8601, or a number that counts s, ms, us or ns since 1970, or s since the beginning."""
-    if "-" in text:
-        moment = dt.datetime.fromisoformat(text.rstrip("Z"))
-        return moment.replace(tzinfo=dt.UTC).timestamp()
-    value = float(text)
-    return value * next((factor for least, factor in _EPOCHS if value > least), 1.0)
 
 
 def _quantity(pgn: int, name: str, values: dict[str, object]) -> str:

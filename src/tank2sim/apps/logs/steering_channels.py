@@ -311,10 +311,7 @@ def _speed_ahead(search: ChannelSearch) -> Array:
 
 
 def _reversed(search: ChannelSearch, port: LogStream, starboard: LogStream) -> tuple[tuple[int, int], str]:
-    """Signs of two orders by the speed ahead, which follows their sum, and why one is reversed.
-
-    1, 1 without a reason where none is, and with one where it is not known which of the two.
-    """
+    """Signs of two orders by the speed ahead, which follows their sum, and why; 1, 1 also if unknown which."""
     at, ahead = search.motion.time_s, _speed_ahead(search)
     good = np.isfinite(ahead)
     if search.best("heading") is None or good.sum() < FEW_SAMPLES or port.stated_by == "format":
@@ -385,8 +382,7 @@ def _scale_engine_shares(search: ChannelSearch) -> None:
 
 
 def _report_lost_signs(search: ChannelSearch) -> None:
-    """Report revolutions that stay ahead while the vessel goes astern, for many engines count without a sign, and
-    refuse revolutions astern while it goes ahead."""
+    """Report revolutions that stay ahead while the vessel goes astern; refuse the opposite."""
     heading = search.best("heading")
     if heading is None or heading.confidence < SURE_FROM:
         return

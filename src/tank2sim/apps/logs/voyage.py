@@ -22,6 +22,7 @@ from tank2sim.apps.logs.reference import (
     interpolated,
     local_metres,
     rounded_origin,
+    thinned_series,
 )
 from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, fault, joined_parts, note
 from tank2sim.arrays import Array
@@ -136,10 +137,7 @@ def _refuse_odd_times(logs: Sequence[VesselLog], streams: Sequence[LogStream]) -
 def _tidied_streams(
     parts: Sequence[VesselLog], counts: dict[str, dict[str, int]]
 ) -> tuple[list[LogStream], list[LogFinding]]:
-    """Streams of all logs with rising times and values alone; what was left out is counted and found.
-
-    Findings that differ by the name of their stream alone are one.
-    """
+    """Streams of all logs, tidied, and findings (one for all streams alike); what was left out is counted."""
     streams: list[LogStream] = []
     findings = [finding for log in parts for finding in log.findings]
     for log in parts:
@@ -214,10 +212,8 @@ def _clock_findings(names: list[str], found: ChannelSet, streams: list[LogStream
         shift = _shift(rates[names[0]], rates[name]) if names[0] in rates and name in rates else None
         if shift is not None and abs(shift) > _CLOCKS_AGREE_S:
             side = "ahead of" if shift > 0 else "behind"
-            text = (
-                f"the clock of {name} is {abs(shift):.3g} s {side} the clock of {names[0]} by the rate of turn: give "
-            )
-            findings.append(fault(f"{text}its channels delay_s = {shift:.3g}", shift_s=shift))
+            text = f"the clock of {name} is {abs(shift):.3g} s {side} the clock of {names[0]} by the rate of turn"
+            findings.append(fault(f"{text}: give its channels delay_s = {shift:.3g}", shift_s=shift))
     return findings
 
 
@@ -373,11 +369,7 @@ def drift_current(voyage: Voyage, begin_s: float, end_s: float) -> DriftCurrent 
         if good.sum() < _FEWEST:
             return None
         time, x, y = time[good], x[good], y[good]
-        bins = np.floor((time - time[0]) / AVERAGED_S).astype(int)
-        counts = np.bincount(bins)
-        full = counts > 0
-        means = [np.bincount(bins, weights=part)[full] / counts[full] for part in (x, y)]
-        spread = math.hypot(float(np.std(means[0])), float(np.std(means[1])))
+        spread = math.hypot(*(float(np.std(thinned_series(time, part, AVERAGED_S)[1])) for part in (x, y)))
         return _current(float(x.mean()), float(y.mean()), spread, "velocities over the ground and through the water")
     difference = north * cosine + east * sine - ahead
     good = np.isfinite(difference)

@@ -23,7 +23,6 @@ from tank2sim.apps.programs.bridge_command_surge import (
     fitted_surge,
     full_ahead_order,
     speed_against_drag,
-    start_values,
     straight_runs,
     straight_runs_of_card,
 )
@@ -37,7 +36,7 @@ from tank2sim.apps.programs.bridge_command_yaw import (
     moment_astern,
     sailed,
 )
-from tank2sim.apps.programs.program_files import FigureChange, ProgramFiles
+from tank2sim.apps.programs.program_files import FigureChange, ProgramFiles, start_values
 from tank2sim.arrays import Array
 from tank2sim.cards.card import Card, MmgCard, SteeredCard
 from tank2sim.cards.small_craft import cruising_revolutions
@@ -264,10 +263,7 @@ _SHARES = (1.0, 0.7, 0.4)
 
 
 def _of_craft(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[FigureChange], list[str]]:
-    """Numbers that follow the straight runs, spins and turns of a craft best, figures before and after, and losses.
-
-    Raises InputError: Its thrusters are not two fixed ones of a size, one at either side, that push ahead.
-    """
+    """Numbers of a craft with two fixed thrusters by its runs, spins and turns, figures before and after, losses."""
     spacing, thruster, cruise = _spacing(card), card.thrusters[0], cruising_revolutions(card)
     most, least, force = thruster.max_radps, -thruster.lowest_radps, thruster.largest_thrust_N
     astern = max(1e-6, thruster.astern_Ns2 * least**2 / force)  # 0 would mean as much as ahead

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tank2sim.apps.programs.program_files import start_values
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.simulation.card_range import single_figures
@@ -28,11 +29,6 @@ Runs = dict[tuple[str, str], float]
 
 HEADING_ASTERN = ("stop", "heading_change_deg")
 """The figure of a crash stop that the walk of the propeller follows."""
-
-
-def start_values(model: Model) -> dict[str, float]:
-    """Parameters of a model by name."""
-    return dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
 
 
 def full_ahead_order(model: Model) -> float | None:

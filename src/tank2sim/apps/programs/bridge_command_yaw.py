@@ -18,7 +18,8 @@ from itertools import product
 import casadi as ca
 import numpy as np
 
-from tank2sim.apps.programs.bridge_command_surge import SurgeNumbers, full_ahead_order, start_values
+from tank2sim.apps.programs.bridge_command_surge import SurgeNumbers, full_ahead_order
+from tank2sim.apps.programs.program_files import start_values
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.simulation.card_range import single_figures

@@ -24,6 +24,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from tank2sim.apps.programs.program_files import start_values
 from tank2sim.apps.programs.xdyn_expressions import XDYN_STATES, Definitions, read_expressions
 from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard, SteeredCard
@@ -131,7 +132,7 @@ def values_at(model: Model, names: Sequence[str], run: Trajectory) -> Array:
 
 def written_body(card: SteeredCard, model: Model, run: Trajectory) -> XdynBody:
     """The equations of a model, checked at the rows of a run."""
-    values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    values = start_values(model)
     rigid, stated = _masses(model, values, run)
     total = (stated + stated.T) / 2
     states: dict[str, ca.SX] = {}

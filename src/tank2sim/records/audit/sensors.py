@@ -74,12 +74,7 @@ def _runs(true: NDArray[np.bool_]) -> list[slice]:
 
 
 def _stuck(trial: Trial, name: str, values: Array) -> list[Finding]:
-    """Runs of one value that chance does not explain.
-
-    With p the share of neighbours alike outside the longest run, a run of k repeats begins somewhere among n values
-    by chance with probability n p^k at most. That holds for a signal whose steps are noise; a smooth one, or one of a
-    coarse sensor, may rest, and counts only if it is three of its larger steps away when the run ends.
-    """
+    """Runs of one value that chance (n p^k, p the share of others alike) or a smooth rest does not explain."""
     alike = np.append(np.diff(values) == 0, False)
     runs = _runs(alike)
     if not runs:

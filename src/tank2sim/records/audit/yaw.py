@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import ndimage
 from scipy.signal import correlate, correlation_lags
 
 from tank2sim.arrays import Array
@@ -127,11 +128,7 @@ class _Comparison:
 
 
 def _hidden_by_rounding(trial: Trial, rate: Array, heading: Array, step: float) -> bool:
-    """True if what r and dpsi/dt differ by in wide windows is at most what the rounding of the heading may leave.
-
-    An error that is uniform within half a unit, and one value in each half of a window, leaves sqrt(2/12) unit times
-    the largest value of the window, 4/(3/2 width), in the rate: the slower the ship, the nearer it comes to that.
-    """
+    """Whether r and dpsi/dt differ by at most sqrt(2/12) unit 4/(3/2 width), as rounding may leave."""
     unit = rounding(trial.signals["psi_rad"])
     if not unit:
         return False
@@ -172,7 +169,7 @@ def _comparison(windows: AuditWindows, rate: Array, heading: Array, step: float)
 
 def _at(windows: AuditWindows, rate: Array, heading: Array, step: float, shift: int) -> _Comparison | None:
     """The comparison with r taken `shift` rows later, and the lag left over from regression on dr/dt."""
-    moved = _shifted(rate, shift)
+    moved = ndimage.shift(rate, -shift, order=0, cval=np.nan)
     r, target = windows.mean(moved), windows.rate(heading)
     found = fit(target, [r, np.ones(len(r)), windows.rate(moved)])
     if found is None or found.values[0] == 0:
@@ -191,16 +188,6 @@ def _independent(a: Array, b: Array) -> float:
     of_each = [correlate(values, values, mode="full", method="fft")[n - 1 :] for values in away]
     lags = np.prod([values / max(values[0], np.finfo(float).tiny) for values in of_each], axis=0)[1:]
     return float(n / max(1 + 2 * np.sum((1 - np.arange(1, n) / n) * lags), 1.0))
-
-
-def _shifted(values: Array, samples: int) -> Array:
-    """Values as they are `samples` rows later; nan where there are none."""
-    moved = np.full(len(values), np.nan)
-    if samples >= 0:
-        moved[: len(values) - samples] = values[samples:]
-    else:
-        moved[-samples:] = values[:samples]
-    return moved
 
 
 def _coarse_lag(windows: AuditWindows, rate: Array, heading: Array) -> int:
