@@ -13,7 +13,7 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
-from tank2sim.files import read_bytes, read_text
+from tank2sim.files import read_all_bytes
 from tank2sim.notices import Notice
 from tank2sim.records.campaign_form import CampaignFile, RunSheet, RunType, SpeltColumn
 from tank2sim.records.captive_record import CaptiveRun
@@ -87,10 +87,7 @@ def _refuse_missing(columns: Mapping[str, Sequence[str]], heading: str, source: 
 
 def _columns(file: Path) -> tuple[list[int], dict[str, list[str]], dict[str, str]]:
     """Line numbers of the rows, cells by the headings of their columns, and units by these, if there are any."""
-    try:
-        text, _ = decoded_text(read_bytes(file))
-    except OSError:
-        text = read_text(file)  # which says what is wrong with it
+    text, _ = decoded_text(read_all_bytes(file))
     every = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     numbered = [(n, line) for n, line in enumerate(every, start=1) if line.strip() and line.lstrip()[0] != "#"]
     if len(numbered) < 2:

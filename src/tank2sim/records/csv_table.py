@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.files import read_bytes, read_text
+from tank2sim.files import read_all_bytes, read_text
 from tank2sim.records.workbook import is_workbook, workbook_text
 from tank2sim.units import to_si
 
@@ -479,10 +479,5 @@ def read_bytes_as_text(path: Path | str) -> str:
     InputError
         The file is missing or unreadable.
     """
-    try:
-        text = read_bytes(path).decode("latin-1")
-    except FileNotFoundError:
-        raise InputError(path, "", "the file does not exist", "check the name") from None
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read ({error.strerror})", "check the name and its permissions") from None
+    text = read_all_bytes(Path(path)).decode("latin-1")
     return text.replace("\r\n", "\n").replace("\r", "\n")

@@ -58,11 +58,6 @@ _LABORATORIES = {
 }
 
 
-def is_simman(text: str) -> bool:
-    """Whether the first line of a file names a laboratory whose records are known here."""
-    return _laboratory(text) is not None
-
-
 def read_simman(path: Path | str) -> Trial:
     """Read a ``.dat`` of MARIN (11 columns, full scale) or HSVA (12 columns, model scale); times unchanged.
 
@@ -160,7 +155,7 @@ SIMMAN = TrialReader(
     name="simman",
     description="free-running records of MARIN and HSVA (SIMMAN 2008)",
     suffixes=(".dat",),
-    recognises=is_simman,
+    recognises=lambda text: _laboratory(text) is not None,
     read=read_simman,
 )
 
@@ -180,11 +175,6 @@ _ESSO_OSAKA_COLUMNS = {
     "wind_velo_true [m/s]": "wind_speed_mps",
     "wind_dir_true [rad]": "wind_direction_rad",
 }
-
-
-def is_esso_osaka(text: str) -> bool:
-    """Whether a file begins as these records do."""
-    return text.lstrip("\ufeff\xef\xbb\xbf").startswith("t [s],x_position_mid [m]")
 
 
 def read_esso_osaka(path: Path | str) -> Trial:
@@ -216,6 +206,6 @@ ESSO_OSAKA = TrialReader(
     name="esso_osaka",
     description="CSV of the free-running Esso Osaka model (Osaka University 2020)",
     suffixes=(".csv",),
-    recognises=is_esso_osaka,
+    recognises=lambda text: text.lstrip("\ufeff\xef\xbb\xbf").startswith("t [s],x_position_mid [m]"),
     read=read_esso_osaka,
 )

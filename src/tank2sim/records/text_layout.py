@@ -79,20 +79,19 @@ def text_layout(path: object, lines: Sequence[str], separator: str = "", comma: 
         raise InputError(str(path), "", "has no rows", "give a table with a line of names and rows of values")
     separator, width = _separator([line for _, line in numbered[-_SAMPLE:]], separator)
     first = _first_row(numbered, separator, width)
-    above = [(number, line) for number, line in numbered[:first]]
-    names, units = _head([line for _, line in above], separator, width)
+    names, units = _head([line for _, line in numbered[:first]], separator, width)
     if not names:
         remarks = [line.lstrip("#% ") for line in lines[: numbered[first][0]] if line.startswith("#")]
         names, units = _head(remarks, separator, width)
     body = [line for _, line in numbered[first:]]
-    if comma is None:
+    if comma is None and separator == ",":  # quotation marks alone distinguish commas between cells and in numbers
+        comma = any(re.search(r'"\s*[+-]?\d*,\d+', line) for line in body[:_SAMPLE])
+    elif comma is None:
         mark = r"\s" if separator == WHITESPACE else re.escape(separator)
-        comma = separator != "," and any(re.search(rf"(?:^|{mark})\s*[+-]?\d*,\d+", line) for line in body[:_SAMPLE])
-        comma = comma or (separator != "," and any(re.search(r"\d,\d", line) for line in body[-_SAMPLE:]))
-        # Commas between cells and in numbers can be distinguished by quotation marks alone.
-        comma = comma or (separator == "," and any(re.search(r'"\s*[+-]?\d*,\d+', line) for line in body[:_SAMPLE]))
+        comma = any(re.search(rf"(?:^|{mark})\s*[+-]?\d*,\d+", line) for line in body[:_SAMPLE])
+        comma = comma or any(re.search(r"\d,\d", line) for line in body[-_SAMPLE:])
+    names = [*names, *[""] * (width - len(names))]
     names = [name.strip() or f"column {place}" for place, name in enumerate(names, start=1)]
-    names += [f"column {place}" for place in range(len(names) + 1, width + 1)]
     names = [name if names.index(name) == place else f"{name} ({place + 1})" for place, name in enumerate(names)]
     units = [*units, *[""] * len(names)][: len(names)]
     return TextLayout(separator, comma, tuple(names), tuple(map(unit_of_text, units)), numbered[first][0])

@@ -74,10 +74,7 @@ class ChannelSearch:
         self.motion = ReferenceMotion(empty, empty, empty, empty, empty)
         self.rate: tuple[Array, Array] = (empty, empty)
         self.pulse_scales: dict[str, PulseScale] = {}
-        self._take_pulses()
-
-    def _take_pulses(self) -> None:
-        """Search among the shares that pulses are of full order; streams that hold their rest are no orders."""
+        # Pulses are searched as shares of full order; streams that hold their rest are no orders.
         rests = {stream.name: rest for stream in self.streams if (rest := rest_of(stream)) is not None}
         for place, stream in enumerate(self.streams):
             pulses, scale = pulses_of(stream)

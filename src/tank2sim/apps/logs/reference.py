@@ -58,24 +58,18 @@ class ReferenceMotion:
         return np.asarray(speed > max(LEAST_SPEED_MPS, MOVING_SHARE * float(np.percentile(speed, 95))))
 
 
-def earth_radii(latitude_deg: float) -> tuple[float, float]:
-    """Radii of curvature in the meridian and the prime vertical of WGS 84, m (Torge & Mueller 2012, 4.1)."""
-    eccentricity = FLATTENING * (2 - FLATTENING)
-    squared = 1 - eccentricity * math.sin(math.radians(latitude_deg)) ** 2
-    prime_vertical = EQUATORIAL_RADIUS_M / math.sqrt(squared)
-    return prime_vertical * (1 - eccentricity) / squared, prime_vertical
-
-
 def local_metres(latitude_deg: Array, longitude_deg: Array, origin_deg: tuple[float, float]) -> tuple[Array, Array]:
     """North and east (n,), m, of an origin: the inverse of the series of :mod:`tank2sim.dynamics.geographic`.
 
-    The series is solved for x and y by three fixed-point steps; the remainder is below 1 mm within 20 km.
+    The series is solved for x and y by three fixed-point steps; the remainder is below 1 mm within 20 km. Radii of
+    curvature in the meridian and the prime vertical are those of WGS 84 (Torge & Mueller 2012, 4.1).
     """
-    meridian, prime_vertical = earth_radii(origin_deg[0])
     phi0 = math.radians(origin_deg[0])
     sine, cosine, tangent = math.sin(phi0), math.cos(phi0), math.tan(phi0)
     eccentricity = FLATTENING * (2 - FLATTENING)
     squared = 1 - eccentricity * sine**2
+    prime_vertical = EQUATORIAL_RADIUS_M / math.sqrt(squared)
+    meridian = prime_vertical * (1 - eccentricity) / squared
     d_phi = np.radians(latitude_deg - origin_deg[0])
     d_lambda = wrapped_angle(np.radians(longitude_deg - origin_deg[1])) * cosine
     x, y = d_phi.copy(), d_lambda.copy()

@@ -101,7 +101,9 @@ def even_series(trial: Trial, name: str, max_gap_s: float | None = None) -> Seri
         problem = f"has {known.size} values, and at least {FEWEST_SAMPLES} are needed"
         raise InputError(trial.path, column, problem, "give a longer record or leave the column out")
     time, values = trial.time_s[known], values[known]
-    notices = _ends_cut(trial, known)
+    notices = []
+    if known[0] > 0 or known[-1] < len(trial.time_s) - 1:
+        notices.append(f"is known from {time[0]:.6g} to {time[-1]:.6g} s only")
     if name in DIRECTION_COLUMNS:
         continuous: Array = np.unwrap(values)
         if not np.array_equal(continuous, values):
@@ -165,9 +167,3 @@ def at_grid(time: Array, values: Array, grid: Array, *, held: bool) -> Array:
         return np.interp(grid, time, values)
     places = np.searchsorted(time, grid + 1e-6 * (grid[1] - grid[0]), side="right") - 1
     return np.asarray(values[np.clip(places, 0, None)])
-
-
-def _ends_cut(trial: Trial, known: np.ndarray[tuple[int], np.dtype[np.int64]]) -> list[str]:
-    if known[0] == 0 and known[-1] == len(trial.time_s) - 1:
-        return []
-    return [f"is known from {trial.time_s[known[0]]:.6g} to {trial.time_s[known[-1]]:.6g} s only"]
