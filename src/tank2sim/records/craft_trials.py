@@ -119,5 +119,4 @@ def _ordered(path: Path, thruster: ThrusterSection, columns: Mapping[str, Array]
     if np.nanmax(np.abs(share), initial=0.0) > 1 + ROUNDED_ORDER:
         problem = f"reaches {np.nanmax(np.abs(share)):.3g}"
         raise InputError(path, f"column order_{thruster.name}", problem, "give shares of the largest order, -1 to 1")
-    ordered: Array = share * np.where(share >= 0, thruster.max_radps, -thruster.lowest_radps)
-    return ordered
+    return np.asarray(share * np.where(share >= 0, thruster.max_radps, -thruster.lowest_radps))

@@ -151,8 +151,7 @@ def _of_heeling(name: str) -> bool:
 def _powers(name: str, primes: tuple[Array, Array, Array, Array]) -> Array:
     term = known_term(name)
     v, r, d, du = primes
-    powers: Array = v**term.v * r**term.r * d**term.d * du**term.u
-    return powers
+    return np.asarray(v**term.v * r**term.r * d**term.d * du**term.u)
 
 
 def _hydrodynamic_primes(

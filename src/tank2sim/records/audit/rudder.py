@@ -268,5 +268,4 @@ def _squares(move: _Move, rudder: Array, rate: Array, step: float, shifts: NDArr
     # Without the directions that rounding alone makes: where the rudder has not moved yet, its columns are empty.
     independent = weights > np.finfo(float).eps * max(table.shape[1:]) * weights[:, :1]
     explained = directions @ (np.where(independent, wanted @ directions, 0.0)[..., None])
-    squares: Array = np.sum((wanted - explained[..., 0]) ** 2, axis=1)
-    return squares
+    return np.asarray(np.sum((wanted - explained[..., 0]) ** 2, axis=1))

@@ -200,5 +200,4 @@ def _integral(time: Array, values: Array) -> Array | None:
     known = np.isfinite(values)
     if np.count_nonzero(known) < 2:
         return None
-    integral: Array = cumulative_trapezoid(np.interp(time, time[known], values[known]), time, initial=0.0)
-    return integral
+    return np.asarray(cumulative_trapezoid(np.interp(time, time[known], values[known]), time, initial=0.0))

@@ -82,8 +82,7 @@ class AuditWindows:
         if missing.any():
             holes = oaconvolve(missing.astype(float), np.ones(self.samples), mode="valid") > 0.5
             inside = np.where(holes, np.nan, inside)
-        picked: NDArray[AuditNumber] = inside[:: self.hop or (self.samples + 1) // 2]
-        return picked
+        return np.asarray(inside[:: self.hop or (self.samples + 1) // 2])
 
     def _kernel(self, order: int) -> Array:
         width = self.width_s
@@ -95,8 +94,7 @@ class AuditWindows:
             turn * (2 * np.sin(phase) - np.sin(2 * phase)),
             turn**2 * (2 * np.cos(phase) - 2 * np.cos(2 * phase)),
         )
-        kernel: Array = shapes[order] / (1.5 * width) * self.step_s
-        return kernel
+        return np.asarray(shapes[order] / (1.5 * width) * self.step_s)
 
 
 def windows_for(noise: float, motion: float, step_s: float, count: int) -> AuditWindows:
