@@ -28,7 +28,9 @@ from tank2sim.records.captive_record import FORCE_COLUMNS, CaptiveRun, read_capt
 from tank2sim.records.same_record import Likeness, Recording, has_noise, likeness
 
 _FEWEST_READINGS = 16  # Readings of three gauges that cannot agree by chance, however coarse the gauges are
-_FAULTS_SAID = 8  # Different faults that one message lists; the others are counted. Project choice: they fill a screen
+
+_FAULTS_SAID = 8
+"""Different faults that one message lists; the others are counted. Project choice: they fill a screen."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -47,8 +47,10 @@ LARGEST = 1e15
 ship is near it (an epoch is 1.8e9 s, or 1.8e12 ms), and squares and products of what is below stay far inside the
 range of a float. Project choice: a float this large still resolves 0.1."""
 
-# Likeness (difflib) of a misspelt key: ``nois`` or ``nosie``, while ``note`` is free text (project choice)
 _RESEMBLES = 0.8
+"""Likeness (difflib) from which a comment key is taken for a misspelt one: one letter of four, ``nois`` or ``nosie``
+for ``noise``, while ``note`` and ``source`` stay free text. Project choice."""
+
 _ALMOST_KEY = re.compile(r"([A-Za-z_][\w.-]*(?:[ \t]+[A-Za-z_][\w.-]*)?)\s*[:=](?!//)")  # two words, or an equals sign
 
 

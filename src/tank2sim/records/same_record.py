@@ -28,8 +28,11 @@ NOISE = 0.5
 """Two runs differ by sqrt(2) times the noise of their sensors at least, one record from itself by nothing: half the
 noise lies between."""
 
-_ROUNDED = 1.2  # Times what rounding to the coarser of two units leaves that is put down to it (project choice)
-_FAR = 0.3  # Signals farther apart than this share of their spread are not looked at any closer (project choice)
+_ROUNDED = 1.2
+"""Times what rounding to the coarser of two units leaves that is put down to it (project choice)."""
+
+_FAR = 0.3
+"""Signals farther apart than this share of their spread are not looked at any closer (project choice)."""
 
 COMMON = 0.5
 """Share of the shorter record that must lie at the same times to be compared (project choice)."""
@@ -48,12 +51,18 @@ STRIDES = (60, 12, 1)
 """The rows of a signature are a multiple of one of these apart, where the record is long enough. Project choice: a copy
 with every second, third, ... row still has them all."""
 
-# Parts over which a difference is averaged: some swings of a zigzag, and rows enough for a mean (project choice)
 _BLOCKS = 16
-# Times the noise of two sensors: noise is known to 10 %, and 16 means reach it in one of 100 records (project choice)
+"""Parts of a record over which the difference of two recordings is averaged. Project choice: some swings of a zigzag,
+and enough rows in each for a mean that shows a disturbance below the noise."""
+
 _BY_CHANCE = 1.5
-# Share of the spread that means must resolve: half the least between two runs (HSVA: 2 to 12 %; project choice)
+"""Times the noise of two sensors that their difference may have. Project choice: the noise is known to some 10 %, and
+the mean square of 16 block means exceeds twice its expectation by chance once in a hundred records."""
+
 _SHOWS = 0.01
+"""Share of a signal's spread that its block means must resolve, to distinguish a second recorder from a second run.
+Project choice: half of the least difference between runs of one manoeuvre (HSVA's zigzags: 2 to 12 % in yaw rate)."""
+
 _DIRECTIONS = ("psi_rad", "cog_rad", "angle_rad")  # Signals whose zero is arbitrary: the run may be turned
 # Signals that change sign in a mirror
 _MIRRORED = (
@@ -72,15 +81,26 @@ _COMPARED = (
 )
 # Signals by which two records are shifted onto each other, the first one that both have
 _TIMING = ("r_radps", "N_Nm", "Y_N", "current_A", "psi_rad", "cog_rad", "u_mps", "sog_mps", "x_m", "y_m")
-_FINEST = 1 << 16  # Rows of a record in the search for the shift. Project choice: it takes some hundredths of a second
-# Correlation below which no shift is tried: a copy has 1, every third row of noise alone 0.4 (project choice)
+
+_FINEST = 1 << 16
+"""Rows of a record in the search for the shift. Project choice: it takes some hundredths of a second."""
+
 _IN_STEP = 0.25
-_MORE_THAN_DIGITS = 1.5  # Times the noise of its rounding from which a signal has noise of its own (project choice)
-# Fewest units to the largest reading: of 170, five tows by one weight differ by ten (Wilinski & Zellman 1984)
+"""Correlation of the timing signal below which no shift is tried. Project choice: a copy has 1, and 0.4 with every
+third row of a signal that is noise alone."""
+
+_MORE_THAN_DIGITS = 1.5
+"""Times the noise of its rounding from which a signal has noise of its own (project choice)."""
+
 _STEPS_TO_SHOW = 50
-_NEIGHBOURHOOD = 0.02  # Share of a record by which the timing signal may be wrong, with noise (project choice)
-# Different values of a signal that must be multiples of a unit for it to count as its rounding (project choice)
+"""Units from zero to the largest reading below which columns may agree by chance. Project choice: readings of five tows
+of one body by the same weight (Wilinski & Zellman 1984), 170 units up to the fastest, differ by ten units."""
+
+_NEIGHBOURHOOD = 0.02
+"""Share of a record by which the timing signal may be wrong, with noise (project choice)."""
+
 _LEAST_VALUES = 8
+"""Different values of a signal that must be multiples of a unit for it to count as its rounding (project choice)."""
 
 
 class TimedSignals(Protocol):

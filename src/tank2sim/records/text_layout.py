@@ -19,13 +19,19 @@ from tank2sim.records.spelt_units import is_unit, unit_of_text
 WHITESPACE = " "
 """Separator of columns of fixed width: any number of blanks."""
 
-# Last rows by which separator and columns are judged: enough to meet decimals, few enough to be fast (project choice)
 _SAMPLE = 40
-# Share of these rows that must have the usual number of cells. Project choice: a footer and damaged rows are few
+"""Rows at the end of a text by which separator and number of columns are judged. Project choice: enough to meet values
+with decimals, few enough to be fast."""
+
 _REGULAR = 0.8
+"""Share of these rows that must have the usual number of cells. Project choice: a footer and damaged rows are few."""
+
 _MOSTLY = 0.5  # Share of numbers from which a row is one of values: logs have dates and words next to them
-# Share of letters of one byte in UTF-16 without its mark: names are in any alphabet, numbers not (project choice)
+
 _LATIN = 0.9
+"""Share of letters of one byte from which text is UTF-16 without its mark. Project choice: names are in any alphabet,
+numbers are not."""
+
 _UNIT_NUMBERS = ("1/min", "1/s")  # Units that begin with a digit
 
 

@@ -17,8 +17,8 @@ from tank2sim.apps.logs.streams import LogFinding, LogStream, fault, note
 from tank2sim.arrays import Array
 from tank2sim.records.trials import usual_step
 
-# Streams are thinned to this step for the tests, s. Project choice: yaw of small craft lasts a second or more
 _TESTED_STEP_S = 0.2
+"""Streams are thinned to this step for the tests, s. Project choice: yaw of small craft lasts a second or more."""
 
 HEADINGS_APART_DEG = 5.0
 """Mean difference of two headings, deg, from which they contradict each other (project choice: beyond the deviation of

@@ -49,12 +49,21 @@ of a receiver; antennas of a ship may be as far apart, which a track has to know
 FASTEST_TRACK_MPS = 60.0
 """Speed that no track of a vessel has, m/s: the record on water is 142, of vessels in service below 50."""
 
-# Correlation with the derivative of the heading: sensors reach 0.99, a course, noisier and drifting, does not
 _DERIVATIVE = 0.95
-_PAIRED = 0.5  # Share of a latitude's samples that have a longitude at the same time, of a pair (project choice)
-# Most that a nameless latitude changes (300 nautical miles), and number of streams tried (56 pairs; project choices)
+"""Correlation of a rate of turn with the derivative of its heading. Project choice: sensors reach 0.99, and a course
+over ground, which is noisier and has the drift in it, does not."""
+
+_PAIRED = 0.5
+"""Share of the samples of a latitude that have a longitude at the same time, from which they are a pair (project
+choice)."""
+
 _LONGEST_VOYAGE_DEG, _MOST_TRIED = 5.0, 8
-_MUCH_LESS = 0.7  # Ratio of deviations from which the lesser one decides (project choice)
+"""Change of latitude or longitude in a log, deg, up to which a stream without a name may be one, and the number of such
+streams that are tried. Project choice: 300 nautical miles of latitude, a day of sailing; 56 pairs."""
+
+_MUCH_LESS = 0.7
+"""Ratio of deviations from which the lesser one decides (project choice)."""
+
 # Quantities that are the components of one velocity
 _VECTORS = (("u_ground", "v_ground"), ("u_water", "v_water"), ("v_north", "v_east"))
 

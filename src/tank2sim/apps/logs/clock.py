@@ -12,7 +12,8 @@ from tank2sim.arrays import Array
 from tank2sim.records.csv_table import LARGEST
 from tank2sim.records.signals.sampling import GAP_STEPS
 
-_DOUBLED = 0.2  # Share of samples at the time of another from which two instruments are suspected (project choice)
+_DOUBLED = 0.2
+"""Share of samples at the time of another from which two instruments are suspected. Project choice."""
 
 DOUBLED_STEPS = 3.0
 """Their difference, as a multiple of the change from sample to sample, from which they are. Project choice: noise alone

@@ -33,8 +33,9 @@ craft leave it above, an exchanged channel is below 0.5."""
 DIFFERS = 0.5
 """Correlation or share below which content contradicts a name. Project choice: halfway to nothing."""
 
-# Sideways over whole speed (rms) of a heading: half the 0.71 of any angle; craft in turns have 0.3 (project choice)
 _SIDEWAYS = 0.35
+"""Sideways speed (rms) as a share of the speed below which a heading is one. Project choice: half of the 0.71 of an
+angle that has nothing to do with the motion; small craft in turns reach 0.3."""
 
 UNIT_SLACK = 0.2
 """Relative difference of a scale from the unit that is taken for it. Project choice: units are factors of 1.85
@@ -51,7 +52,8 @@ RATE_WINDOWS_S = (HEADING_WINDOW_S, 8.0, 30.0)
 """Times over which heading and rate of turn are compared, s, one after the other until they agree. Project choice: a
 large ship turns so slowly that the noise of a compass hides it within seconds."""
 
-_DECISIVE = 0.97  # Correlation from which no longer time is tried (project choice)
+_DECISIVE = 0.97
+"""Correlation from which no longer time is tried (project choice)."""
 
 _LAGS_S = np.arange(-3.0, 3.01, 0.25)
 # Time constants of yaw from craft to tanker, s (Nomoto 1957: T' of 0.3 to 3 at 1 to 10 m/s and 2 to 300 m)

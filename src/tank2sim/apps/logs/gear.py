@@ -18,24 +18,45 @@ from tank2sim.apps.logs.channels import LogChannel
 from tank2sim.apps.logs.voyage import Voyage
 from tank2sim.arrays import Array, Number
 
-_BLOCKS = 8  # Parts of a record for the jackknife (project choice: each has movements of its own in a minute or two)
-_FEWEST_MOVES = 4  # Changes of the order's direction of _MOVE from which a gear is judged (project choice)
-_MOVE = math.radians(1.0)  # Least change of the order that counts as one (project choice: twice a usual dead band)
-_STEP_S = 0.1  # Step of the simulated gear, s (project choice: half the step of rudder messages)
-# Longest part of a record that is simulated, s: the one in which the order moves most (project choice)
+_BLOCKS = 8
+"""Parts of a record for the jackknife (project choice: each has movements of its own in a minute or two)."""
+
+_FEWEST_MOVES = 4
+"""Changes of the order's direction of :data:`_MOVE` from which a gear is judged (project choice)."""
+
+_MOVE = math.radians(1.0)
+"""Least change of the order that counts as one (project choice: twice a usual dead band)."""
+
+_STEP_S = 0.1
+"""Step of the simulated gear, s (project choice: half the step of rudder messages)."""
+
 _LONGEST_S = 120.0
-# Points of a grid along each of three axes, number of grids, and share of the axes that is kept (project choices)
+"""Longest part of a record that is simulated, s: the one in which the order moves most (project choice)."""
+
 _POINTS, _ROUNDS, _NARROWER = 7, 6, 0.45
-_AGAIN = 3  # Number of grids of the fits without a part, which begin near the fit of all (project choice)
-# Rates (rad/s), lags (s) and dead bands (rad) that are searched: wider than any gear needs (project choice)
+"""Points of a grid along each of three axes, number of grids, and share of the axes that is kept (project choices)."""
+
+_AGAIN = 3
+"""Number of grids of the fits without a part, which begin near the fit of all (project choice)."""
+
 _RATES, _LAGS, _BANDS = (math.radians(0.5), math.radians(60.0)), (0.0, 4.0), (0.0, math.radians(4.0))
-# Mean square at the largest rate over the least: below, the order never left the rudder behind (project choice)
+"""Rates (rad/s), lags (s) and dead bands (rad) that are searched: wider than any gear needs (project choice)."""
+
 _KNOWN = 1.2
-_FOLLOWS = 0.5  # Residual over the spread of the angle from which the rudder does not follow the order (project choice)
-# Width of the angles that count as one stop (project choice: above the resolution of rudder sensors)
+"""Mean square at the largest rate over the least one from which the rate is determined: below, the order never left the
+rudder behind (project choice)."""
+
+_FOLLOWS = 0.5
+"""Residual over the spread of the angle from which the rudder does not follow the order (project choice)."""
+
 _STOP = math.radians(0.3)
-_FASTEST_S = 1.0  # Time over which the fastest movement is taken, s (project choice: five readings of a usual sensor)
-_STOP_S = 1.0  # Time for which an angle was held at a stop, s (project choice)
+"""Width of the angles that count as one stop (project choice: above the resolution of rudder sensors)."""
+
+_FASTEST_S = 1.0
+"""Time over which the fastest movement is taken, s (project choice: five readings of a usual sensor)."""
+
+_STOP_S = 1.0
+"""Time for which an angle was held at a stop, s (project choice)."""
 
 
 @dataclass(frozen=True, kw_only=True)

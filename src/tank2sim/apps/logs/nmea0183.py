@@ -45,17 +45,25 @@ _TAG_TIME = re.compile(rb"\\(?:[^\\]*,)?c:(\d+)[,*]")
 _EPOCH = re.compile(rb"(?<![\d.])(\d{10}(?:\.\d+)?|\d{13})(?![\d.])")
 _ISO = re.compile(rb"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(?:\.\d+)?)Z?")
 
-# Sentences of a kind from which a sum missing or wrong in all is by their sender, not a fault (project choice)
 _FEW = 10
-# Share of a kind's sentences, spoilt or without a value, from which that is said of the kind (project choice)
-_MOST = 0.5
-# Share of a talker's sentences in another's time: few at a change of talker, all of two receivers (project choice)
-_OVERLAP = 0.1
-# Largest drift of usable time stamps: delays of serial lines stay below a second or two (project choice)
-_STAMPS_AGREE_S = 5.0
+"""Sentences of a kind from which on all of them have no checksum, or a wrong one, by their sender and not by a fault of
+the line. Project choice."""
 
-# Sentences before and after over which a time is averaged: seconds, in which clocks do not drift (project choice)
+_MOST = 0.5
+"""Share of the sentences of a kind that are spoilt, or hold no value, from which that is said of the kind. Project
+choice."""
+
+_OVERLAP = 0.1
+"""Share of sentences of a talker that may lie within the time of another before the two are two instruments. Project
+choice: at a change of talker a few sentences overlap; two receivers overlap throughout."""
+
+_STAMPS_AGREE_S = 5.0
+"""Largest drift of a recorder's time stamps against the receiver's clock, s, with which they are used. Project choice:
+delays of serial lines stay below a second or two."""
+
 _NEIGHBOURS = 10
+"""Sentences of a kind before and after one over which its time is averaged. Project choice: a few seconds at the usual
+1 to 10 Hz, in which clocks do not drift and few sentences are lost."""
 
 
 _FIELDS = FIELDS["nmea0183"]

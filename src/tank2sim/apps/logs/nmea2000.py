@@ -32,12 +32,17 @@ from tank2sim.errors import InputError, optional_library
 _FIELDS: dict[int, dict[str, list[str]]] = {int(pgn): fields for pgn, fields in FIELDS["nmea2000"].items()}
 _SYSTEM_TIME, _VARIATION, _RUDDER, _ENGINE = 126992, 127258, 127245, 127488
 _TRUE = "true heading"
-# Share of time stamps that fall from which they are differences. Project choice: messages rarely change places
+
 _OFTEN = 0.1
-# Difference of the clocks of two sources that is reported, s: they send whole seconds (project choice)
+"""Share of time stamps that fall from which they are differences. Project choice: messages rarely change places."""
+
 _CLOCKS_APART_S = 1.5
-# Least difference of paces, and number and span (s) of system times that show it: 3 % in ten seconds (project choice)
+"""Difference of the clocks of two sources that is reported, s: they send whole seconds (project choice)."""
+
 _PACE_OFF, _PACE_FROM, _PACE_FROM_S = 0.05, 8, 10.0
+"""Share by which the pace of two clocks must differ, and the number and span (s) of system times from which it is known
+(project choice: whole seconds over ten leave 3 %)."""
+
 # Time of day of Actisense's ASCII and of the raw format of gateways, without a date
 _CLOCK = re.compile(r"^(?:A(\d\d)(\d\d)(\d\d\.\d+)|(\d\d):(\d\d):(\d\d\.\d+)) ")
 
@@ -60,7 +65,10 @@ _LINES = (
 
 # Least time stamp that counts from 1970, s (the year 1973); less counts from the beginning, or from line to line
 _FIRST_EPOCH_S = 1e8
-_SAME = 0.5  # Share of the lines of a log that decides how it is written (project choice)
+
+_SAME = 0.5
+"""Share of the lines of a log that decides how it is written. Project choice."""
+
 # Messages of the vessel: without protocol, proprietary ones, satellites and other ships (AIS)
 _VESSELS = frozenset((*range(127001, 129038), *range(129551, 129793), *range(129811, 130816)))
 _NOT_VALUES = re.compile(r"sid|instance|reserved|spare|source")  # Beginnings of fields that are no values (canboat)

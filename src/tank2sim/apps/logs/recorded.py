@@ -23,8 +23,10 @@ _CIRCULAR = ("cog", "heading")
 
 # Largest size of a quantity in deg
 _BOUNDS = {"heading": 361.0, "magnetic_heading": 361.0, "cog": 361.0, "latitude": 90.0, "longitude": 360.0}
-# Jump to such a number, over the 90th percentile of other steps and over their range or a radian (project choices)
+
 _JUMP, _LEAST_JUMP = 10.0, 0.05
+"""Jump to such a number, as a multiple of the 90th percentile of the steps of the others, and as a share of their range
+(of a radian for angles). Project choice."""
 
 
 def without_missing(stream: LogStream) -> tuple[LogStream, list[LogFinding]]:
@@ -89,8 +91,9 @@ MIDDLE_US, SPAN_US, WIDE_SPAN_US = 1500.0, 400.0, 500.0
 """Rest of a rudder or of a thruster that turns both ways, and full order from there: the defaults of ArduPilot
 (SERVOn_MIN, _TRIM, _MAX; ardupilot.org), or the whole of 1000 to 2000 us where a pulse is beyond those."""
 
-# Least excess over the usual range, longest pulse of a one-way rest, largest trim from the middle (project choices)
 _BEYOND_US, _IDLE_US, _REST_OFF_US = 10.0, 1150.0, 100.0
+"""Least excess of a pulse beyond the usual range, longest pulse of a controller at rest that turns one way, and largest
+distance of a rest from :data:`MIDDLE_US` (project choices: trims are some tens of us)."""
 
 _PULSE_WORDS = re.compile(
     r"\b(pwm|pulse|servo\d*|output|outputs|rcou|rcout|rc|esc\d*|ch\d*|chan\d*|channels?|ch ?\d* ?out|c\d+)\b"

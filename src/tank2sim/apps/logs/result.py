@@ -41,9 +41,12 @@ _SIGNALS = (
     Signal("u_water", "speed ahead through the water", "m/s"),
     Signal("v_water", "speed to starboard through the water", "m/s"),
 )
-# Stretches that have a line of their own on the map. Project choice: as many colours can be distinguished
+
 _MOST_TRACKS = 8
-_UNSURE = 0.7  # Confidence below which an unused channel is named under the table (project choice)
+"""Stretches that have a line of their own on the map. Project choice: as many colours can be distinguished."""
+
+_UNSURE = 0.7
+"""Confidence below which an unused channel is named under the table. Project choice."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -37,10 +37,14 @@ LONGEST_VECTOR = 32
 """Entries of an array up to which each is a stream. Project choice: outputs of MAVROS are 16 or 18, joints and motors
 fewer; scans and pictures have hundreds."""
 
-# From here on a header's time is not UTC: latencies are seconds, simulated clocks are off by years (project choice)
 _OFF_BY_S = 3600.0
-# Difference of paces of a simulated clock: computers differ by 1e-4, delays by less than a second (project choice)
+"""Difference of the time in a header from the time of recording beyond which the header's is not UTC. Project choice:
+latencies are seconds; a simulated or unset clock is off by years."""
+
 _PACE = 0.01
+"""Relative difference of the paces of two clocks from which one is simulated. Project choice: clocks of computers
+differ by 1e-4, and the delays of a log of a minute by less than a second."""
+
 # Endings that the library needs, by the first bytes of a file
 _SUFFIXES = {b"#ROS": ".bag", b"SQLi": ".db3", b"\x89MCA": ".mcap"}
 # Names of frames that are fixed to the earth: east, north, up (REP 103, REP 105)

@@ -37,27 +37,45 @@ ALONE_LESS = 0.1
 """A pair of orders is one of thrusters if either alone agrees with the turn by so much less than their difference
 (project choice)."""
 
-# Share of samples equal to the one before: of a stream that holds its values as an order, of one that moves (choices)
 _HOLDS, _MOVES = 0.5, 0.2
-# By how much a rudder beats all other streams, and orders' difference beats their sum if one is reversed (choices)
+"""Share of samples equal to the one before of a stream that holds its values, as an order does, and of one that moves
+(project choice)."""
+
 _CLEARLY, _CLEARLY_REVERSED = 0.05, 0.2
-# Sum of two orders over their difference, and turn, rad, of a vessel going straight with opposite orders (choices)
+"""By how much a rudder agrees better with the turn than all other streams, and of the speed with the
+difference of two orders above that with their sum, where one controller is reversed (project choices)."""
+
 _LITTLE, _TURNED_RAD = 0.4, math.pi / 2
+"""Size of the sum of two orders over their difference's, and change of heading, rad, below which a vessel goes
+straight although its orders are opposite (project choice)."""
+
 _DOUBTED = 0.85  # Largest confidence of a stream with one open question: whether it is measured or ordered, or its unit
-# Shares of usual speed and revolutions, and time, s, of a vessel astern: beyond a current or coasting (project choices)
+
 _ASTERN_SHARE, _ASTERN_S = 0.15, 8.0
-# Revolutions from which they are rpm, not 1/s (thrusters reach 80), and heel from which it is deg (project choices)
+"""Shares of the usual speed and of the usual revolutions, and a time, s, from which a vessel goes astern against them.
+Project choice: beyond what a current or a coasting propeller does."""
+
 _FASTEST_SHAFT_HZ, _LARGEST_HEEL_RAD = 100.0, 0.8
-# Rudder on straight legs, deg or %, that is a zero to take out, and the same without a unit over its range (choices):
-# wind and one propeller ask for some deg (SNAME, PNA vol. III, IX.17); servos rest at 90, sensors amid their range
+"""Revolutions beyond which a record without a unit is in rpm, 1/s (small thrusters reach 80), and heel beyond which it
+is in deg: 46 deg in rad (project choices)."""
+
 _LEAST_ZERO, _LEAST_ZERO_SHARE = 10.0, 0.4
-# Rudder on straight legs, deg, that is doubted. Project choice: from here on a held rudder is taken to turn
+"""Rudder on straight legs, deg or %, from which a zero of the record is taken out, and the same of a rudder of unknown
+unit, as a share of its range. Project choice: wind and a single propeller ask for some degrees (SNAME, PNA vol. III,
+IX.17); servos rest at 90 deg, sensors amid their range; a rudder hardly crosses such a zero."""
+
 _LEAST_HELM = 4.0
-# Agreement with the turn that shows sign and zero of a rudder: waves and currents turn a ship too (project choice)
+"""Rudder on straight legs, deg, that is doubted. Project choice: from here on a held rudder is taken to turn."""
+
 _SHOWN = 0.6
+"""Agreement of a rudder with the turn from which its sign and zero are shown. Project choice: waves and currents turn
+a ship too."""
+
 _SERVO_DEG = 90.0  # Servos rest at 90 deg of 180, or at 180 of 360
-# Of a straight leg: time before and after, s, rate over its 99th percentile, least share of a log (project choices)
+
 _STRAIGHT_S, _STRAIGHT_SHARE, _LEAST_STRAIGHT = 10.0, 0.1, 0.02
+"""Time before and after for which a straight leg has been one, s, rate of turn there as a share of its 99th percentile,
+and share of a log that must be such legs (project choice: rudders cross their zero faster)."""
 
 _PAIRS = (("thrust_order_port", "thrust_order_starboard"), ("rpm_port", "rpm_starboard"))
 

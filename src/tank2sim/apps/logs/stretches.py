@@ -336,16 +336,24 @@ CHANGED_COURSE_RAD = math.radians(45.0)
 """Change of heading from which a rudder's order is a turn, and not a step. Project choice: steps leave the course as
 it is in the mean."""
 
-# Relative difference of two orders: a helmsman's corrections are less, 20 to 35 deg is more (project choice)
 _OTHER_ORDER = 0.3
+"""Relative difference from which two rudders to one side are two orders. Project choice: corrections of a helmsman are
+smaller in the mean, the step from 20 to 35 deg is larger."""
+
 # Least change between samples, over the threshold, of a rudder on its way: a fifth of what gear turns in 0.2 s
 _MOVING = 0.1
-# Relative difference of the orders of a zigzag. Project choice: ITTC's are equal; angles differ by the gear
+
 _ALIKE = 0.4
-_FOLLOWING = 0.7  # Share of the legs of a zigzag in which the heading follows the order (project choice)
-# Short stretches in a row that are one of steps. Project choice: fewer are an approach and a manoeuvre
+"""Relative difference of the orders of a zigzag. Project choice: ITTC's are equal; angles differ by the gear."""
+
+_FOLLOWING = 0.7
+"""Share of the legs of a zigzag in which the heading follows the order (project choice)."""
+
 _STEPS_LEAST = 4
-_STEPS_LONGEST = 2.5  # Longest of them, as a multiple of the time that the vessel needs to settle (project choice)
+"""Short stretches in a row that are one of steps. Project choice: fewer are an approach and a manoeuvre."""
+
+_STEPS_LONGEST = 2.5
+"""Longest of them, as a multiple of the time that the vessel needs to settle. Project choice."""
 
 
 def _merged(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:

@@ -29,23 +29,39 @@ _LIKE_TIME = re.compile(rf"({_DATE.pattern}[T ,]+)?\d{{1,2}}:\d\d")
 _EPOCHS = ((1e8, 1e10, 1.0), (1e11, 1e13, 1e-3), (1e14, 1e16, 1e-6), (1e17, 1e19, 1e-9))
 # Days of the years 2000 to 2040, and the day of 1970-01-01: of spreadsheets since 1899-12-30, of MATLAB (datenum)
 _DAYS = ((36_526.0, 51_544.0, 25_569.0), (730_486.0, 745_504.0, 719_529.0))
-# Longest log in days: seconds of that size count from a beginning, and differ by more (project choice)
+
 _LONGEST_IN_DAYS = 31.0
-_FIRST_DAY, _LAST_DAY = 19800101, 21001231  # Least and largest date yyyymmdd. Project choice: GPS time begins in 1980
-# Least number of different seconds of a minute of a clock in digits. Project choice: counts by 50 have two
+"""Longest log whose times are taken for days. Project choice: seconds of so large a number count from a beginning, and
+then differ by more."""
+
+_FIRST_DAY, _LAST_DAY = 19800101, 21001231
+"""Least and largest date yyyymmdd. Project choice: GPS time begins in 1980."""
+
 _CLOCK_DIGITS = 3
-# Percentile of times that are since 1970 already; counts since a start are less. Project choice: some cells are 0
+"""Least number of different seconds of a minute of a clock in digits. Project choice: counts by 50 have two."""
+
 _BEGINNING = 10
-# Step of a count without a unit that is doubted, and that is not s: it would show no manoeuvre (project choices)
+"""Percentile of times that are since 1970 already; counts since a start are less. Project choice: some cells are 0."""
+
 _DOUBTFUL_STEP, _SLOWEST_STEP_S = 5.0, 100.0
-# Speed of a track, m/s, below which its times are in a smaller unit. Project choice: receivers at rest wander so
+"""Step of a count without a unit from which its unit is looked for, and from which it is not s. Project choice: logs
+have a row a second or more; a row in 100 s shows no manoeuvre."""
+
 _SLOWEST_MPS = 0.05
-# Least turn that shows the unit of time, and fastest rate of no vessel: large tankers turn at 0.3 deg/s (choices)
+"""Speed of a track, m/s, below which its times are in a smaller unit. Project choice: receivers at rest wander so."""
+
 _LEAST_TURNED_DEG, _SLOWEST_TURN_DEGPS = 10.0, 0.05
-_MOST = 0.5  # Share of the rows of a time that have a value of a column that is sampled row by row (project choice)
-# Least rows of a name in a column that is taken for one of names of signals. Project choice: remarks are rarer
+"""Turn of a log from which its rate gives the unit of the time, deg, and the rate at which no vessel turns at its
+fastest, deg/s. Project choice: large tankers turn at 0.3 deg/s."""
+
+_MOST = 0.5
+"""Share of the rows of a time that have a value of a column that is sampled row by row. Project choice."""
+
 _ROWS_OF_A_SIGNAL = 10
-_HEAD_BYTES = 1 << 16  # Bytes by which separator, decimal sign and units are judged. Project choice: some hundred rows
+"""Least rows of a name in a column that is taken for one of names of signals. Project choice: remarks are rarer."""
+
+_HEAD_BYTES = 1 << 16
+"""Bytes by which separator, decimal sign and units are judged. Project choice: some hundred rows."""
 
 _DEGREES_MINUTES = re.compile(
     r"^\s*(?P<front>[NSEW])?\s*(?P<degrees>[+-]?\d{1,3})\s*[°\s]\s*(?P<minutes>\d+(?:[.,]\d+)?)\s*['′]?"

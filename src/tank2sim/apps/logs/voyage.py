@@ -31,14 +31,15 @@ from tank2sim.notices import Notice, caution
 from tank2sim.records.signals.sampling import GAP_STEPS
 from tank2sim.records.trials import usual_step
 
-# Gaps shorter than this are not reported, s. Project choice: they are bridged without harm at ship's speeds
 _GAP_LEAST_S = 3.0
+"""Gaps shorter than this are not reported, s. Project choice: they are bridged without harm at ship's speeds."""
 
 LONGEST_VOYAGE_S = 1e7
 """Longest time that a log may span, s. Project choice: four months; more is a clock that was not set, and the even
 grids of so long a time would exhaust the memory."""
 
-_GAPS_LISTED = 5  # Gaps of a channel that are listed one by one. Project choice: more are a rate of loss
+_GAPS_LISTED = 5
+"""Gaps of a channel that are listed one by one. Project choice: more are a rate of loss."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,10 +191,12 @@ def _series(path: Path, found: ChannelSet, streams: Sequence[LogStream]) -> dict
 MOST_NAMED = 20
 """Streams that a note lists by name (project choice: logs of boards hold hundreds)."""
 
-# Difference of the clocks of two logs that is reported, s. Project choice: a ship turns by a degree at most
 _CLOCKS_AGREE_S = 0.5
-# Largest difference looked for: clocks never set are off by years, and their logs do not overlap (project choice)
+"""Difference of the clocks of two logs that is reported, s. Project choice: a ship turns by a degree at most."""
+
 _LARGEST_SHIFT_S = 120.0
+"""Largest difference that is looked for, s. Project choice: clocks that nobody set are off by years, and then the logs
+do not overlap."""
 
 
 def _clock_findings(names: list[str], found: ChannelSet, streams: list[LogStream]) -> list[LogFinding]:
@@ -324,9 +327,12 @@ def _gap_findings(series: Mapping[str, QuantitySeries]) -> list[LogFinding]:
 AVERAGED_S = 60.0
 """Time over which the current is averaged for its spread, s. Project choice: receivers wander over minutes."""
 
-_FEWEST = 10  # Samples below which no current is determined (project choice)
-# Least eigenvalue (at most 0.5) of headings' mean square, by which u alone shows a current: 90 deg (project choice)
+_FEWEST = 10
+"""Samples below which no current is determined (project choice)."""
+
 _LEAST_TURN = 0.15
+"""Least eigenvalue, of at most 0.5, of the mean square of heading vectors for which the speed ahead alone determines a
+current: headings spread over about 90 deg. Project choice."""
 
 
 @dataclass(frozen=True)

@@ -56,9 +56,10 @@ from tank2sim.simulation.run import simulate
 from tank2sim.simulation.running import Running
 from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, Spin, StraightRun
 
-# Freeboard and eye aft of midships over L (project choices); drag across of a card without, as 0 asks for a default;
-# rate of a rudder whose card states none, the default of Bridge Command
 _FREEBOARD, _EYE_AFT, _LEAST_DRAG, _GEAR_DEGPS = 0.04, 0.3, 1e-6, 30.0
+"""Freeboard and place of the eye aft of midships over L (project choices); drag across of a card without, above 0,
+which asks for a default; rate of a rudder whose card states none, the default of Bridge Command."""
+
 # Drag of still air on the box in Bridge Command, over area and squared speed (N s2/m4): part of the fitted drag
 _AIR_DRAG = 0.5 * 1.225 * 0.51444**2
 
@@ -258,8 +259,9 @@ def _losses_of_all(card: SteeredCard) -> list[str]:
     ]
 
 
-# Revolutions of runs and spins over the largest, differences over twice the rest: the whole range (project choice)
 _SHARES = (1.0, 0.7, 0.4)
+"""Revolutions of straight runs and spins over the largest, and differences over twice what is left beyond the cruising
+revolutions: the whole range (project choice)."""
 
 
 def _of_craft(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[FigureChange], list[str]]:

@@ -22,7 +22,9 @@ from tank2sim.simulation.run import simulate
 from tank2sim.simulation.running import Running
 
 _LEVERS = {"half thrust ahead": 0.5, "quarter thrust ahead": 0.25}
-_ASTERN = 0.5  # Thrust astern over ahead of a card without an engine (project choice)
+
+_ASTERN = 0.5
+"""Thrust astern over ahead of a card without an engine (project choice)."""
 
 Runs = dict[tuple[str, str], float]
 """Manoeuvre and figure to its value."""

@@ -33,8 +33,10 @@ COURSE_FIGURES = {"advance_m": 1.0, "tactical_diameter_m": 1.0, "overshoot_1_deg
 """Figures of turns and zigzags, and their weights in the fit: paths come first (project choice)."""
 
 _TURNS_DEG, _ZIGZAGS_DEG, _HALF_TURN_DEG = (10.0, 20.0, LARGEST_RUDDER_DEG), (10.0, 20.0), 20.0
-# Share of the rudder's moment with a stopped engine, its weight in the fit, RudderBAstern over RudderB (choices)
+
 _SHARE, _SHARE_WEIGHT, _ASTERN_RUDDER = 0.5, 0.2, 0.2
+"""Share of the rudder's moment that a stopped engine leaves, of a card without an engine; weight of that share in the
+fit; RudderBAstern over RudderB, in the stream of a propeller that turns astern (project choices)."""
 
 
 @dataclass(frozen=True)

@@ -120,9 +120,12 @@ def _rounded(values: Mapping[str, float]) -> dict[str, float]:
 HULL = "hull"
 """Name of the model and stem of its files."""
 
-# Bounds of low-speed drag: a hull has 0.6 to 1.6; less swings under the controller, more has no force at rest (choice)
 _LEAST_DRAG, _LARGEST_DRAG = 0.3, 30.0
-_STILL_PUSH = 1e-3  # Largest thrust at rest that counts as none, over a hundredth of the ship's weight (project choice)
+"""Bounds of drag coefficients of sway and yaw at low speed. A hull has 0.6 to 1.6 (cross flow); with less the ship
+swings under the case's controller, and with more the card has no bounded force at rest (project choice)."""
+
+_STILL_PUSH = 1e-3
+"""Largest thrust at rest that counts as none, over a hundredth of the ship's weight (project choice)."""
 
 
 def osp_files(card: Card) -> ProgramFiles:

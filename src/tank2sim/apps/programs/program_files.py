@@ -21,8 +21,10 @@ from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, Spin, Straig
 TURNS_DEG, ZIGZAGS_DEG = (10.0, 20.0, 35.0), (10.0, 20.0)
 """Rudders of the turning circles and of the zigzags, to both sides, by which forms of a ship are compared."""
 
-# Turn and spin over the cruising revolutions by which forms are compared: within any craft's reach (project choice)
 _DIFFERENCE, _SPIN = 0.3, 0.7
+"""Difference of a turn and revolutions of a spin, over the cruising revolutions, with which forms are compared: a wide
+turn and a spin within the reach of any craft (project choice)."""
+
 _OF_TURN = ("advance_m", "transfer_m", "tactical_diameter_m", "steady_diameter_m")
 _OVERSHOOTS = ("overshoot_1_deg", "overshoot_2_deg")
 

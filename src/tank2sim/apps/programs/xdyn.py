@@ -28,8 +28,10 @@ from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, StraightRun
 from tank2sim.simulation.trajectory import Trajectory
 
 _TURN_RAD, _ZIGZAG_RAD = math.radians(35.0), math.radians(20.0)
-# Difference of a craft's turn over its cruising revolutions, a wide turn of any craft (project choice)
+
 _DIFFERENCE = 0.3
+"""Difference of a craft's turn over its cruising revolutions, a wide turn of any craft (project choice)."""
+
 _VISCOSITY = 1.19e-6  # Kinematic viscosity of sea water at 15 degrees, m2/s: xdyn asks for it and does not use it here
 # Unit of a command to its unit in the file and the factor to that; any other is SI, and 1 for xdyn
 _UNITS = {"rad": ("deg", math.degrees(1.0)), "rad/s": ("rpm", 30 / math.pi)}

@@ -19,8 +19,10 @@ import casadi as ca
 from tank2sim.native.operations import FUNCTIONS, instructions
 
 _ADD, _MUL, _POW, _ATOM = range(4)
-# Operations up to which a term used twice is repeated and not named (project choice: v' r'^2 stays readable)
+
 _INLINE = 3
+"""Operations up to which a term used twice is repeated and not named (project choice: v' r'^2 stays readable)."""
+
 _TINY = "1e-200"  # Added to denominators against division by zero; beyond 1e-184 it changes no digit
 
 _WORD = re.compile(r"[A-Za-z]\w*")

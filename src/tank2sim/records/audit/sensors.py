@@ -30,8 +30,10 @@ Project choice."""
 
 # Share of a signal below which its noise is rounding of the arithmetic: the signal was calculated, not measured
 _ROUNDING = 1e-9
-# Share of a record up to which failed readings of a sensor are a note: leaving them out loses nothing (project choice)
+
 _SHORT = 0.05
+"""Share of a record up to which failed readings of one sensor are noted rather than called its fault: they are left
+out, and nothing is lost. Project choice."""
 
 
 def sensor_findings(trial: Trial) -> list[Finding]:

@@ -20,8 +20,10 @@ UNEVEN = 0.1
 STRAY = 20.0
 """Times the duration of the middle half of a record from its middle, ten times the record: no row of one manoeuvre is
 as far away. Project choice; it also bounds the memory that later checks take."""
-# Share of rows with stray times up to which they are left out. Project choice, as for the readings of a sensor
+
 _FEW = 0.05
+"""Share of rows with stray times up to which they are left out. Project choice, as for the readings of a sensor."""
+
 _UNITS = {60.0: "minutes", 3600.0: "hours", 1e-3: "milliseconds"}  # Seconds in a unit of time, to its name
 
 AGREEMENT = 0.03

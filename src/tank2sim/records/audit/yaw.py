@@ -24,12 +24,19 @@ UNIT_TOLERANCE = 0.023
 a time in minutes or of a rate per minute. Project choice."""
 COARSE = 0.3
 """The same for the course of a track over the heading, for the drift angle turns as well."""
-# Scale error of a rate of turn worth a word: above what rate gyros are usually calibrated to (project choice)
+
 _FACTOR = 0.02
-_ROUNDED = 1.5  # Times the expected rounding that is put down to it: its errors are not quite random (project choice)
+"""Scale error of a rate of turn worth a word: above what rate gyros are usually calibrated to. Project choice."""
+
+_ROUNDED = 1.5
+"""Times what rounding is expected to leave that is put down to it: errors of rounding are not quite so random (project
+choice)."""
+
 _ALIKE = 0.9  # correlation from which two signals are taken for the same motion
-# Standard errors (Fisher's z) by chance at one of many lags: drifts reach 3.5, turns from 3.7 (project choice)
+
 _BY_CHANCE = 4.0
+"""Standard errors of a correlation (Fisher's z) up to which chance makes it at one of the lags that are tried (project
+choice: p = 6e-5; slow drifts of a straight run reach 3.5, turns and zigzags 3.7 to 15)."""
 
 UNLIKE = 0.44
 """Share of a signal's spread that another record of the same motion leaves unexplained: a correlation of 0.9."""

@@ -20,8 +20,9 @@ GAP_STEPS = 5
 """Longest gap that is bridged unasked, in sampling steps; project choice. A straight line over five steps loses what
 has a period below about ten steps, which is already near the end of the spectrum."""
 
-# Part of a step by which even times may be off: 4.5 deg of phase at half the Nyquist frequency (project choice)
 _JITTER = 0.05
+"""Part of a step by which times may miss an even grid and be taken as even: at half the Nyquist frequency it is an
+error of phase of 4.5 deg, and of times written with two digits at 10 Hz it is the rounding. Project choice."""
 
 
 @dataclass(frozen=True, eq=False)

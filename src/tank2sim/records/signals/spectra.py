@@ -16,7 +16,9 @@ from tank2sim.records.signals.statistics import autocorrelation
 
 CONFIDENCE = 0.95
 
-_SEGMENTS = 8  # Segments by default, each overlapping half of the next; project choice between scatter and resolution
+_SEGMENTS = 8
+"""Segments by default, each overlapping half of the next; project choice between scatter and resolution."""
+
 # In a default segment: a first-order spectrum bends at 1/(2 pi correlation time), three steps (project choice)
 _CORRELATION_TIMES = 20.0
 
