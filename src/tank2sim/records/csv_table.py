@@ -50,7 +50,6 @@ range of a float. Project choice: a float this large still resolves 0.1."""
 _RESEMBLES = 0.8
 """Likeness (difflib) from which a comment key is taken for a misspelt one: one letter of four, ``nois`` or ``nosie``
 for ``noise``, while ``note`` and ``source`` stay free text. Project choice."""
-
 _ALMOST_KEY = re.compile(r"([A-Za-z_][\w.-]*(?:[ \t]+[A-Za-z_][\w.-]*)?)\s*[:=](?!//)")  # two words, or an equals sign
 
 

@@ -84,21 +84,16 @@ _TIMING = ("r_radps", "N_Nm", "Y_N", "current_A", "psi_rad", "cog_rad", "u_mps",
 
 _FINEST = 1 << 16
 """Rows of a record in the search for the shift. Project choice: it takes some hundredths of a second."""
-
 _IN_STEP = 0.25
 """Correlation of the timing signal below which no shift is tried. Project choice: a copy has 1, and 0.4 with every
 third row of a signal that is noise alone."""
-
 _MORE_THAN_DIGITS = 1.5
 """Times the noise of its rounding from which a signal has noise of its own (project choice)."""
-
 _STEPS_TO_SHOW = 50
 """Units from zero to the largest reading below which columns may agree by chance. Project choice: readings of five tows
 of one body by the same weight (Wilinski & Zellman 1984), 170 units up to the fastest, differ by ten units."""
-
 _NEIGHBOURHOOD = 0.02
 """Share of a record by which the timing signal may be wrong, with noise (project choice)."""
-
 _LEAST_VALUES = 8
 """Different values of a signal that must be multiples of a unit for it to count as its rounding (project choice)."""
 
@@ -186,9 +181,8 @@ def likeness(
     the sensors, also in means over a sixteenth of the record, where a second run shows its own disturbances. Both are
     at the size of one ship. A signal that does not move says nothing. Only what is in `among` is looked for.
     """
-    if usual_step(first.time_s) < usual_step(
-        second.time_s
-    ):  # at the rows of the coarser one, between which nothing is drawn
+    # At the rows of the coarser one, between which nothing is drawn.
+    if usual_step(first.time_s) < usual_step(second.time_s):
         first, second = second, first
     names = [name for name in _COMPARED if name in first.signals and name in second.signals]
     if len(names) > 1 and sum(name in _TRACK for name in names) == 1:  # turned, it would be another

@@ -22,7 +22,6 @@ WHITESPACE = " "
 _SAMPLE = 40
 """Rows at the end of a text by which separator and number of columns are judged. Project choice: enough to meet values
 with decimals, few enough to be fast."""
-
 _REGULAR = 0.8
 """Share of these rows that must have the usual number of cells. Project choice: a footer and damaged rows are few."""
 

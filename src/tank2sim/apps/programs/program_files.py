@@ -24,7 +24,6 @@ TURNS_DEG, ZIGZAGS_DEG = (10.0, 20.0, 35.0), (10.0, 20.0)
 _DIFFERENCE, _SPIN = 0.3, 0.7
 """Difference of a turn and revolutions of a spin, over the cruising revolutions, with which forms are compared: a wide
 turn and a spin within the reach of any craft (project choice)."""
-
 _OF_TURN = ("advance_m", "transfer_m", "tactical_diameter_m", "steady_diameter_m")
 _OVERSHOOTS = ("overshoot_1_deg", "overshoot_2_deg")
 

@@ -57,40 +57,30 @@ _TAIL = 4.0
 
 _MASS_ERROR = 0.05
 """Relative difference of a printed mass from the displacement: rounded dimensions. Project choice."""
-
 _ASSUMED_ERRORS, _ASSUMED_MASS_ERROR = 2.0, 0.3
 """Factor on the errors of estimates where beam or draught are assumed, and relative error of a mass by assumed sizes.
 Project choices: (T/L)^2 of ships varies by a factor of two either way."""
-
 _CENTRE_ERROR = 0.02
 """Standard deviation of x_G over L among ships. Project choice: 0.035 is the most of those bundled."""
-
 _P_MEDIAN, _P_SPREAD = 0.35, 0.5
 """Norrbin's P of ships: median and standard deviation of its logarithm; 0.3 is his limit for a good ship, 0.2 for large
 tankers (Norrbin 1965, as in Lewis (ed.), Principles of Naval Architecture III, 1989, IX). The spread is a project
 choice."""
-
 _GROWTH = 0.3
 """Scale of the growth of an unstable course, by U/L: full tankers reach about 0.3. Project choice."""
-
 _DIAMETER, _DIAMETER_SPREAD = 3.3, 0.35
 """Median of the tactical diameter at 35 deg over L, and standard deviation of its logarithm: 5 is IMO's limit, and
 ships have 2 to 5 (project choice)."""
-
 _WRONG_SIDE = -12.0
 """Log weight of a ship that turns against its rudder, or not at all. Project choice: one in 160 000."""
-
 _VANISHES = 2e-3
 """Share of its parts below which a term has vanished: tables print three digits. Project choice."""
-
 _CHANCE = 0.02
 """Probability that a wrong reading makes a given term vanish so. Project choice: some parts are alike by nature."""
-
 _MOST_VANISHED = 3
 
 _FAR = 2.5
 """Standard deviations from which a tactical diameter speaks against a reading. Project choice."""
-
 _RUDDER_ERROR, _LEVER, _LEVER_ERROR = 0.6, 0.45, 0.1
 """Rudder's sway force: standard deviation of its logarithm about the force of a rudder by the rules. Its moment: lever
 over L, 0.34 to 0.50 on the bundled ships, and standard deviation. Project choices."""
@@ -153,7 +143,6 @@ _SIGNATURE = {"v": (1.0,), "r": (1.0,), "d": (2.0, 1.0)}
 
 _LEAST_SIGNATURE = 3
 """Shares from which the scale is judged. Project choice: one or two may agree by chance."""
-
 _SAME_SHARE = 0.02
 """Project choice: by how much a share may differ from one where terms are printed to two digits or more."""
 

@@ -20,7 +20,6 @@ SIDEWAYS = np.pi / 2
 
 FAR_OVER = np.deg2rad(8.0)
 """Rudder that leaves the spiral loop of any usual course-unstable ship: it then turns with its rudder."""
-
 _STEADY = 0.9
 """Cosine between rudder and rate of turn from which a turn is steady. Project choice, as the one above."""
 
@@ -153,14 +152,11 @@ STEADY_ROWS, REACH_ROWS, FEWEST_MOVES = 6, 20, 3
 LATE = 0.17
 """Lateness, as a share of the time in which the yaw rate comes half-way, that is not due to the short-time expansion:
 free-running models with right clocks (KVLCC2 of HSVA and MARIN, Esso Osaka) stay below 0.15."""
-
 _FARTHEST = 0.6
 """Largest share that is determined: beyond, the yaw rate has come half-way without the rudder. Project choice."""
-
 _AGREEING = 0.3
 """How far the middle half of the movements, one by one, may be from their common lateness, over it. A delay is the same
 in all of them; the phase of a loop (a helm or autopilot that answers the yaw, and gusts) is not. Project choice."""
-
 _BETTER = 2.0
 """Ratio of the sums of squares without and with the shift; wind alone gives up to 1.4. Project choice."""
 

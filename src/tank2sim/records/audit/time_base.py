@@ -20,7 +20,6 @@ UNEVEN = 0.1
 STRAY = 20.0
 """Times the duration of the middle half of a record from its middle, ten times the record: no row of one manoeuvre is
 as far away. Project choice; it also bounds the memory that later checks take."""
-
 _FEW = 0.05
 """Share of rows with stray times up to which they are left out. Project choice, as for the readings of a sensor."""
 

@@ -24,10 +24,8 @@ SHARE = 0.01
 """The noise that a rate may keep, as a share of the motion: below most of the differences that matter."""
 FEWEST_WINDOWS = 12
 """Independent windows below which nothing is judged."""
-
 _FINEST = 20
 """Steps of a uniform time base for one row: bounds what uneven times may take. Project choice."""
-
 ORDERS = ("delta_order_rad", "n_radps")
 """Signals that hold until the next reading."""
 

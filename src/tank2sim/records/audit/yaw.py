@@ -24,14 +24,11 @@ UNIT_TOLERANCE = 0.023
 a time in minutes or of a rate per minute. Project choice."""
 COARSE = 0.3
 """The same for the course of a track over the heading, for the drift angle turns as well."""
-
 _FACTOR = 0.02
 """Scale error of a rate of turn worth a word: above what rate gyros are usually calibrated to. Project choice."""
-
 _ROUNDED = 1.5
 """Times what rounding is expected to leave that is put down to it: errors of rounding are not quite so random (project
 choice)."""
-
 _ALIKE = 0.9  # correlation from which two signals are taken for the same motion
 
 _BY_CHANCE = 4.0
