@@ -238,11 +238,23 @@ def read_text(path: Path) -> str:
 def read_exact_text(path: Path) -> str:
     """Text of a UTF-8 file unchanged, which encodes to the same bytes again. Raises as :func:`read_text`."""
     try:
-        return read_bytes(path).decode("utf-8")
-    except FileNotFoundError:
-        raise InputError(path, "", "the file does not exist", "check the name") from None
+        return read_all_bytes(path).decode("utf-8")
     except UnicodeDecodeError as error:
         raise InputError(path, f"byte {error.start}", "is not UTF-8 text", "save it as UTF-8") from None
+
+
+def read_all_bytes(path: Path) -> bytes:
+    """Content of a file or pipe.
+
+    Raises
+    ------
+    InputError
+        It is missing or unreadable.
+    """
+    try:
+        return read_bytes(path)
+    except FileNotFoundError:
+        raise InputError(path, "", "the file does not exist", "check the name") from None
     except OSError as error:
         raise InputError(path, "", f"cannot be read ({error.strerror})", "check the name and its permissions") from None
 

@@ -13,11 +13,12 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.cards.scaling import Scales
 from tank2sim.errors import InputError
-from tank2sim.files import read_bytes, read_text
+from tank2sim.files import read_all_bytes
 from tank2sim.notices import Notice
 from tank2sim.records.campaign_form import CampaignFile, RunSheet, RunType, SpeltColumn
 from tank2sim.records.captive_record import CaptiveRun
 from tank2sim.records.csv_table import LARGEST
+from tank2sim.records.run_tables import RUN_QUANTITIES
 from tank2sim.records.spelt_units import unit_factor
 from tank2sim.records.text_layout import cells_of, decoded_text, text_layout
 
@@ -86,10 +87,7 @@ def _refuse_missing(columns: Mapping[str, Sequence[str]], heading: str, source: 
 
 def _columns(file: Path) -> tuple[list[int], dict[str, list[str]], dict[str, str]]:
     """Line numbers of the rows, cells by the headings of their columns, and units by these, if there are any."""
-    try:
-        text, _ = decoded_text(read_bytes(file))
-    except OSError:
-        text = read_text(file)  # which says what is wrong with it
+    text, _ = decoded_text(read_all_bytes(file))
     every = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     numbered = [(n, line) for n, line in enumerate(every, start=1) if line.strip() and line.lstrip()[0] != "#"]
     if len(numbered) < 2:
@@ -115,9 +113,7 @@ def _columns(file: Path) -> tuple[list[int], dict[str, list[str]], dict[str, str
 
 def _refuse_other_unit(file: Path, heading: str, key: str, unit: str, factor: float) -> None:
     """Refuse a unit under a heading that is not the one in which the column is read."""
-    forces = {"X": "N", "Y": "N", "N": "Nm", "thrust": "N", "rudder_normal_force": "N", "torque": "Nm"}
-    forces |= {"thrust_left": "N", "rudder_normal_force_left": "N"}
-    suffix = forces.get(key, key.rpartition("_")[2])
+    suffix = RUN_QUANTITIES.get(key.removesuffix("_left"), key.rpartition("_")[2])
     if unit in ("", "-", "1") or (key == "propeller_radps"):
         return
     size = unit_factor(unit, suffix)

@@ -349,8 +349,8 @@ class CampaignFile(CardSection):
     runs: tuple[RunSheet, ...] = ()
 
 
+# Columns of averages that are one quantity in another scaling
 _SAME_QUANTITY = {"yaw_rate_radps": "yaw_rate_prime", "yaw_rate_prime": "yaw_rate_radps"}
-"""Columns of averages that are one quantity in another scaling."""
 
 
 def campaign_file(content: dict[str, Any], source: Path) -> tuple[CampaignFile, dict[str, SpeltColumn]]:

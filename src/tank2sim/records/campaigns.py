@@ -27,8 +27,8 @@ from tank2sim.records.campaign_form import (
 from tank2sim.records.captive_record import FORCE_COLUMNS, CaptiveRun, read_captive_run
 from tank2sim.records.same_record import Likeness, Recording, has_noise, likeness
 
-_FEWEST_READINGS = 16
-"""Readings of three gauges that cannot agree by chance, however coarse the gauges are."""
+_FEWEST_READINGS = 16  # Readings of three gauges that cannot agree by chance, however coarse the gauges are
+
 _FAULTS_SAID = 8
 """Different faults that one message lists; the others are counted. Project choice: they fill a screen."""
 

@@ -76,8 +76,7 @@ class CaptiveRun:
 
     def force(self, name: str) -> Array:
         """``X``, ``Y`` (N) or ``N`` (N m), (rows,)."""
-        values: Array = getattr(self, FORCE_COLUMNS[name])
-        return values
+        return np.asarray(getattr(self, FORCE_COLUMNS[name]))
 
 
 def read_captive_run(

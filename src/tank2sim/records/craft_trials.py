@@ -15,7 +15,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards.form import ThrusterSection
 from tank2sim.errors import InputError
 from tank2sim.records.csv_table import CsvTable, read_table
-from tank2sim.records.trials import Trial
+from tank2sim.records.trials import Trial, unwrapped
 
 CRAFT_SIGNALS = ("x_m", "y_m", "psi_rad", "r_radps", "u_mps", "v_mps")
 """Signals that are compared with the motion of a craft; position and heading suffice."""
@@ -75,11 +75,8 @@ def read_craft_trial(path: Path | CsvTable, thrusters: Sequence[ThrusterSection]
     signals |= {name: columns[name] for name in CRAFT_SIGNALS if name in columns}
     held = _held(signals["x_m"], signals["y_m"])
     signals |= {name: np.where(held, np.nan, signals[name]) for name in ("x_m", "y_m")}
-    known = np.isfinite(signals["psi_rad"])
-    psi = signals["psi_rad"].copy()
-    psi[known] = np.unwrap(psi[known])
     headings = {name: table.heading(name) for name in CRAFT_SIGNALS if name in signals}
-    return Trial(path, time, signals | {"psi_rad": psi}, columns=headings)
+    return Trial(path, time, signals | {"psi_rad": unwrapped(signals["psi_rad"])}, columns=headings)
 
 
 def _held(x: Array, y: Array) -> NDArray[np.bool_]:
@@ -122,5 +119,4 @@ def _ordered(path: Path, thruster: ThrusterSection, columns: Mapping[str, Array]
     if np.nanmax(np.abs(share), initial=0.0) > 1 + ROUNDED_ORDER:
         problem = f"reaches {np.nanmax(np.abs(share)):.3g}"
         raise InputError(path, f"column order_{thruster.name}", problem, "give shares of the largest order, -1 to 1")
-    ordered: Array = share * np.where(share >= 0, thruster.max_radps, -thruster.lowest_radps)
-    return ordered
+    return np.asarray(share * np.where(share >= 0, thruster.max_radps, -thruster.lowest_radps))

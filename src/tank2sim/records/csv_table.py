@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
-from tank2sim.files import read_bytes, read_text
+from tank2sim.files import read_all_bytes, read_text
 from tank2sim.records.workbook import is_workbook, workbook_text
 from tank2sim.units import to_si
 
@@ -31,8 +31,7 @@ if TYPE_CHECKING:
 _KEY = re.compile(r"([A-Za-z_][\w.-]*)\s*:(?!//)\s*(.*)", re.DOTALL)  # not the colon of https://
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _OF_NUMBERS = b"0123456789eE+-., \t\n"
-_BLOCK = 1 << 22
-"""Characters of a file that are read at once: memory then goes with its numbers, not with its text."""
+_BLOCK = 1 << 22  # Characters of a file that are read at once: memory then goes with its numbers, not with its text
 _FIRST_ROW = re.compile(r"^[^\S\n]*[^\s#].*$", re.MULTILINE)
 _EMPTY_CELL = re.compile(r"(?<![^,\n])(?=[,\n])", re.ASCII)
 _QUOTED_LENGTH = 30
@@ -113,10 +112,7 @@ class CsvTable:
         InputError
             The column does not exist, a cell of it is empty, or it does not rise; the message names the first such row.
         """
-        values = self.column(name)
-        empty = np.flatnonzero(np.isnan(values))
-        if empty.size:
-            raise InputError(self.path, self.place(int(empty[0]), name), "is empty", "give each row its value")
+        values = self.filled_column(name, "give each row its value")
         falls = np.flatnonzero(np.diff(values) < SHORTEST_STEP)
         if falls.size:
             row = int(falls[0]) + 1
@@ -484,10 +480,5 @@ def read_bytes_as_text(path: Path | str) -> str:
     InputError
         The file is missing or unreadable.
     """
-    try:
-        text = read_bytes(path).decode("latin-1")
-    except FileNotFoundError:
-        raise InputError(path, "", "the file does not exist", "check the name") from None
-    except OSError as error:
-        raise InputError(path, "", f"cannot be read ({error.strerror})", "check the name and its permissions") from None
+    text = read_all_bytes(Path(path)).decode("latin-1")
     return text.replace("\r\n", "\n").replace("\r", "\n")

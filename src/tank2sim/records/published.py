@@ -28,8 +28,7 @@ from tank2sim.records.csv_table import CsvTable, read_bytes_as_text, table_of_ro
 from tank2sim.records.trials import TRIAL_SIGNALS, Trial, TrialReader, unwrapped
 from tank2sim.units import to_si
 
-_Rows = Sequence[tuple[int, str]]
-"""Line of the file (from 1) and text of each row."""
+_Rows = Sequence[tuple[int, str]]  # Line of the file (from 1) and text of each row
 
 KVLCC2_SCALE = 45.714
 """Length of the KVLCC2 (320 m) over the length of the models, 7.000 m at HSVA and at MARIN (SIMMAN 2008)."""
@@ -57,11 +56,6 @@ _LABORATORIES = {
         KVLCC2_length_m=320.0,
     ),
 }
-
-
-def is_simman(text: str) -> bool:
-    """Whether the first line of a file names a laboratory whose records are known here."""
-    return _laboratory(text) is not None
 
 
 def read_simman(path: Path | str) -> Trial:
@@ -132,12 +126,7 @@ def _begins_rows(cells: list[str]) -> bool:
 
 
 def _uniform_time(path: Path, rows: _Rows) -> tuple[Array, Notice]:
-    """Times of equal step that agree with every time printed, and messages about them.
-
-    A time printed as 1.23E+02 lies within half a unit of its last digit, evenly: the step is the least-squares one
-    with these halves as weights. A sample lost or doubled would shift the rest by a step, so that every time printed
-    must be met to its half digit and half a step.
-    """
+    """Times of equal step, by least squares with half digits as weights, meeting each printed one; a notice."""
     cells = [line.split()[0] for _, line in rows]
     printed, half = np.array([float(cell) for cell in cells]), np.array([_half_a_digit(cell) for cell in cells])
     count = np.arange(len(rows))
@@ -166,7 +155,7 @@ SIMMAN = TrialReader(
     name="simman",
     description="free-running records of MARIN and HSVA (SIMMAN 2008)",
     suffixes=(".dat",),
-    recognises=is_simman,
+    recognises=lambda text: _laboratory(text) is not None,
     read=read_simman,
 )
 
@@ -186,11 +175,6 @@ _ESSO_OSAKA_COLUMNS = {
     "wind_velo_true [m/s]": "wind_speed_mps",
     "wind_dir_true [rad]": "wind_direction_rad",
 }
-
-
-def is_esso_osaka(text: str) -> bool:
-    """Whether a file begins as these records do."""
-    return text.lstrip("\ufeff\xef\xbb\xbf").startswith("t [s],x_position_mid [m]")
 
 
 def read_esso_osaka(path: Path | str) -> Trial:
@@ -222,6 +206,6 @@ ESSO_OSAKA = TrialReader(
     name="esso_osaka",
     description="CSV of the free-running Esso Osaka model (Osaka University 2020)",
     suffixes=(".csv",),
-    recognises=is_esso_osaka,
+    recognises=lambda text: text.lstrip("\ufeff\xef\xbb\xbf").startswith("t [s],x_position_mid [m]"),
     read=read_esso_osaka,
 )

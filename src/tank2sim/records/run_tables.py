@@ -135,14 +135,9 @@ def _canonical(path: Path, number: int, line: str, separator: str, comma: bool) 
     if comma and "." in line:
         remedy = "write numbers with one decimal sign and nothing between thousands, or give [files] decimal"
         raise InputError(path, f"line {number}", "has points and decimal commas", remedy)
-    if '"' in line:
-        cells = cells_of(line, separator)
-    elif separator == WHITESPACE:
-        cells = line.split()
-    else:
-        if separator == ",":
-            return line
-        return (line.replace(",", ".") if comma else line).replace(separator, ",")
+    if separator == "," and '"' not in line:
+        return line
+    cells = cells_of(line, separator) if separator == WHITESPACE or '"' in line else line.split(separator)
     return ",".join(cell.replace(",", ".") if comma else cell for cell in cells)
 
 
@@ -280,8 +275,7 @@ def _unit_of_heading(heading: str) -> str:
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _MATLAB = b"MATLAB 5.0 MAT-file"
 _TDMS = b"TDSm"
-_FIRST_BYTES = 1024
-"""Bytes that show the format: a MATLAB 7.3 file has a header of 512 bytes before the HDF5 one."""
+_FIRST_BYTES = 1024  # Bytes that show the format: a MATLAB 7.3 file has a header of 512 bytes before the HDF5 one
 
 
 @dataclass(frozen=True)

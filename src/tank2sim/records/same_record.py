@@ -18,7 +18,7 @@ from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice, caution
 from tank2sim.records.audit.noise import resolution, rounding, white_noise
-from tank2sim.records.trials import MEASURED_COLUMNS, Trial
+from tank2sim.records.trials import MEASURED_COLUMNS, Trial, usual_step
 
 PRINTED = 1e-3
 """Share of a signal's spread by which printing it with other digits may change it; two runs of one manoeuvre differ by
@@ -63,14 +63,12 @@ _SHOWS = 0.01
 """Share of a signal's spread that its block means must resolve, to distinguish a second recorder from a second run.
 Project choice: half of the least difference between runs of one manoeuvre (HSVA's zigzags: 2 to 12 % in yaw rate)."""
 
-_DIRECTIONS = ("psi_rad", "cog_rad", "angle_rad")
-"""Signals whose zero is arbitrary: the run may be turned."""
-
+_DIRECTIONS = ("psi_rad", "cog_rad", "angle_rad")  # Signals whose zero is arbitrary: the run may be turned
+# Signals that change sign in a mirror
 _MIRRORED = (
     *("v_mps", "v_ground_mps", "r_radps", "psi_rad", "cog_rad", "y_m", "phi_rad", "Y_N", "N_Nm"),
     *("angle_rad", "current_A"),
 )
-"""Signals that change sign in a mirror."""
 
 _TRACK = ("x_m", "y_m")
 _COMPARED = (
@@ -81,8 +79,9 @@ _COMPARED = (
     "angle_rad",
     "current_A",
 )
+# Signals by which two records are shifted onto each other, the first one that both have
 _TIMING = ("r_radps", "N_Nm", "Y_N", "current_A", "psi_rad", "cog_rad", "u_mps", "sog_mps", "x_m", "y_m")
-"""Signals by which two records are shifted onto each other, the first one that both have."""
+
 _FINEST = 1 << 16
 """Rows of a record in the search for the shift. Project choice: it takes some hundredths of a second."""
 _IN_STEP = 0.25
@@ -182,7 +181,8 @@ def likeness(
     the sensors, also in means over a sixteenth of the record, where a second run shows its own disturbances. Both are
     at the size of one ship. A signal that does not move says nothing. Only what is in `among` is looked for.
     """
-    if _step(first.time_s) < _step(second.time_s):  # at the rows of the coarser one, between which nothing is drawn
+    # At the rows of the coarser one, between which nothing is drawn.
+    if usual_step(first.time_s) < usual_step(second.time_s):
         first, second = second, first
     names = [name for name in _COMPARED if name in first.signals and name in second.signals]
     if len(names) > 1 and sum(name in _TRACK for name in names) == 1:  # turned, it would be another
@@ -220,8 +220,8 @@ def _nearest(together: Callable[[float], Iterator[_Pair]], shift: float, time: A
     def apart(tried: float) -> float:
         return sum(math.log(max(pair.apart / pair.spread, 1e-12)) for pair in together(tried))
 
-    reach = max(_step(time), _NEIGHBOURHOOD * float(time[-1] - time[0]))
-    bounds, options = (shift - reach, shift + reach), {"xatol": 0.01 * _step(time)}
+    reach = max(usual_step(time), _NEIGHBOURHOOD * float(time[-1] - time[0]))
+    bounds, options = (shift - reach, shift + reach), {"xatol": 0.01 * usual_step(time)}
     return float(minimize_scalar(apart, bounds=bounds, method="bounded", options=options).x)
 
 
@@ -269,7 +269,7 @@ def signature(trial: Trial) -> tuple[list[float], dict[str, list[float]]]:
         rows = np.flatnonzero(known[names[0]])
     unit = next((unit for unit in STRIDES if len(rows) >= unit * LEAST_SIGNED_ROWS), 1)
     rows = rows[:: unit * max(1, len(rows) // (unit * LEAST_SIGNED_ROWS))]
-    time = _rounded(trial.time_s[rows], 1e-3 * _step(trial.time_s))
+    time = _rounded(trial.time_s[rows], 1e-3 * usual_step(trial.time_s))
     signals = {name: trial.signals[name] for name in names}
     return time, {
         name: _rounded(signal[rows], 1e-5 * float(np.nanmax(signal) - np.nanmin(signal)))
@@ -398,7 +398,7 @@ def _shifts(first: TimedSignals, other: TimedSignals, sign: float) -> Iterator[f
     name = next((name for name in _TIMING if name in first.signals and name in other.signals), None)
     if name is None:
         return
-    step = min(_step(first.time_s), _step(time))
+    step = min(usual_step(first.time_s), usual_step(time))
     step = max(step, max(float(times[-1] - times[0]) for times in (first.time_s, time)) / _FINEST)
     grids = [np.arange(times[0], times[-1] + step / 2, step) for times in (first.time_s, time)]
     a = _rate(name, grids[0], first.time_s, first.signals[name])
@@ -460,7 +460,3 @@ def _divisor(different: Array, size: float) -> float:
         if 0 < unit < 10 * least:
             break
     return unit
-
-
-def _step(time: Array) -> float:
-    return float(np.median(np.diff(time)))

@@ -24,13 +24,14 @@ _SAMPLE = 40
 with decimals, few enough to be fast."""
 _REGULAR = 0.8
 """Share of these rows that must have the usual number of cells. Project choice: a footer and damaged rows are few."""
-_MOSTLY = 0.5
-"""Share of numbers from which a row is one of values: logs have dates and words next to them."""
+
+_MOSTLY = 0.5  # Share of numbers from which a row is one of values: logs have dates and words next to them
+
 _LATIN = 0.9
 """Share of letters of one byte from which text is UTF-16 without its mark. Project choice: names are in any alphabet,
 numbers are not."""
-_UNIT_NUMBERS = ("1/min", "1/s")
-"""Units that begin with a digit."""
+
+_UNIT_NUMBERS = ("1/min", "1/s")  # Units that begin with a digit
 
 
 @dataclass(frozen=True)
@@ -83,20 +84,19 @@ def text_layout(path: object, lines: Sequence[str], separator: str = "", comma: 
         raise InputError(str(path), "", "has no rows", "give a table with a line of names and rows of values")
     separator, width = _separator([line for _, line in numbered[-_SAMPLE:]], separator)
     first = _first_row(numbered, separator, width)
-    above = [(number, line) for number, line in numbered[:first]]
-    names, units = _head([line for _, line in above], separator, width)
+    names, units = _head([line for _, line in numbered[:first]], separator, width)
     if not names:
         remarks = [line.lstrip("#% ") for line in lines[: numbered[first][0]] if line.startswith("#")]
         names, units = _head(remarks, separator, width)
     body = [line for _, line in numbered[first:]]
-    if comma is None:
+    if comma is None and separator == ",":  # quotation marks alone distinguish commas between cells and in numbers
+        comma = any(re.search(r'"\s*[+-]?\d*,\d+', line) for line in body[:_SAMPLE])
+    elif comma is None:
         mark = r"\s" if separator == WHITESPACE else re.escape(separator)
-        comma = separator != "," and any(re.search(rf"(?:^|{mark})\s*[+-]?\d*,\d+", line) for line in body[:_SAMPLE])
-        comma = comma or (separator != "," and any(re.search(r"\d,\d", line) for line in body[-_SAMPLE:]))
-        # Commas between cells and in numbers can be distinguished by quotation marks alone.
-        comma = comma or (separator == "," and any(re.search(r'"\s*[+-]?\d*,\d+', line) for line in body[:_SAMPLE]))
+        comma = any(re.search(rf"(?:^|{mark})\s*[+-]?\d*,\d+", line) for line in body[:_SAMPLE])
+        comma = comma or any(re.search(r"\d,\d", line) for line in body[-_SAMPLE:])
+    names = [*names, *[""] * (width - len(names))]
     names = [name.strip() or f"column {place}" for place, name in enumerate(names, start=1)]
-    names += [f"column {place}" for place in range(len(names) + 1, width + 1)]
     names = [name if names.index(name) == place else f"{name} ({place + 1})" for place, name in enumerate(names)]
     units = [*units, *[""] * len(names)][: len(names)]
     return TextLayout(separator, comma, tuple(names), tuple(map(unit_of_text, units)), numbered[first][0])

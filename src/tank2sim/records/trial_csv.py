@@ -35,10 +35,7 @@ def read_trial_csv(path: Path | str | CsvTable) -> Trial:
     raw = read_table(path)
     raw.refuse_misspelt_keys(COMMENT_KEYS)
     table = raw.si()
-    time = table.column("t_s")
-    empty = np.flatnonzero(np.isnan(time))
-    if empty.size:
-        raise InputError(table.path, table.place(int(empty[0]), "t_s"), "is empty", "give each row its time")
+    time = table.filled_column("t_s", "give each row its time")
     signals = {name: values for name, values in table.columns.items() if name in TRIAL_SIGNALS}
     omitted = [name for name in table.columns if name != "t_s" and name not in TRIAL_SIGNALS]
     _refuse_slips(table, omitted)
@@ -52,9 +49,7 @@ def read_trial_csv(path: Path | str | CsvTable) -> Trial:
     if _rudder_sign(table) == "port":
         signals |= {name: 0.0 - signals[name] for name in RUDDERS if name in signals}
         notices.append(Notice("the rudder is positive to port in the file, and to starboard here"))
-    scale = table.comment_number("scale")
-    if scale is not None and scale <= 0:
-        raise InputError(table.path, "comment scale", f"is {scale:g}", "a positive number was expected")
+    scale = table.positive_comment("scale")
     columns = {name: table.heading(name) for name in signals if table.heading(name) != name}
     return Trial(table.path, time, signals, _noise(table), scale, tuple(notices), columns, origin_deg=_origin(table))
 

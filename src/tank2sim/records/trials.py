@@ -132,9 +132,14 @@ ROWS_TO_SHOW_AN_ORDER = 0.5
 is evenly distributed between 0 and 1."""
 
 
+def usual_step(time_s: Array) -> float:
+    """Median step between times (n,), s; nan of fewer than two."""
+    return float(np.median(np.diff(time_s))) if len(time_s) > 1 else math.nan
+
+
 def sampling_step(trial: Trial) -> float:
     """Median of the time between rows, s."""
-    return float(np.median(np.diff(trial.time_s)))
+    return usual_step(trial.time_s)
 
 
 def window(trial: Trial, begin_s: float, end_s: float) -> Trial:
@@ -190,11 +195,14 @@ def froude_scaled(trial: Trial, length_ratio: float) -> Trial:
     return replace(trial, time_s=trial.time_s * math.sqrt(length_ratio), signals=signals, noise=noise, length_m=length)
 
 
-def unwrapped(angle: Array) -> Array:
-    """A wrapped angle (n,), rad, made continuous; nan stays, and the angle goes the shorter way past it."""
+def unwrapped(angle: Array, period: float = math.tau) -> Array:
+    """A wrapped angle (n,), rad, made continuous; nan stays, and the angle goes the shorter way past it.
+
+    `period`: Where the angle begins again, rad.
+    """
     known = np.isfinite(angle)
     continuous = angle.copy()
-    continuous[known] = np.unwrap(angle[known])
+    continuous[known] = np.unwrap(angle[known], period=period)
     return continuous
 
 

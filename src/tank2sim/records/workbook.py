@@ -18,11 +18,12 @@ if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
 _BEGINS = b"PK\x03\x04"
+
 _LARGEST_PART = 1 << 29
 """Bytes of an unpacked part that are read at most. Project choice: a full sheet of numbers has half of that."""
 _LAST_ROW, _LAST_COLUMN = 1 << 20, 1 << 14  # the size of a sheet in Excel
+# Errors of Python's libraries for a damaged file
 _DAMAGE = (zipfile.BadZipFile, zlib.error, LookupError, ValueError, RuntimeError, EOFError, OSError)
-"""Errors of Python's libraries for a damaged file."""
 _PLACE = re.compile(r"([A-Z]{1,3})([0-9]{1,7})")
 
 

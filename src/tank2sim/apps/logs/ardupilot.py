@@ -36,40 +36,32 @@ LEAP_SECONDS = 18.0
 """GPS time is this many seconds ahead of UTC since 2017-01-01 (IERS Bulletin C 52; none was added up to 2025)."""
 
 _WEEK_S = 604800.0
+# GPS week of October 2008: ArduPilot's first boards are of 2009 (ardupilot.org, "History of ArduPilot")
 _FIRST_BOARD_WEEK = 1500
-"""GPS week of October 2008: ArduPilot's first boards are of 2009 (ardupilot.org, "History of ArduPilot")."""
 
 _MAGIC = b"\xa3\x95"
 
+# SERVOn_FUNCTION of ArduPilot Rover: GroundSteering, Throttle, ThrottleLeft, ThrottleRight
 _SERVO_FUNCTIONS = {
     26: "rudder_order",
     70: "rpm_order",
     73: "thrust_order_port",
     74: "thrust_order_starboard",
 }
-"""SERVOn_FUNCTION of ArduPilot Rover: GroundSteering, Throttle, ThrottleLeft, ThrottleRight."""
 
 _FIELDS, _TELEMETRY = FIELDS["dataflash"], FIELDS["mavlink"]
-_FORMAL = ("FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG")
-"""Messages about the log itself."""
+_FORMAL = ("FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG")  # Messages about the log itself
 
 _INSTANCES = ("I", "C", "Inst", "Instance")
-_FIX = 2
-"""Least status of a GPS fix, in two dimensions (GPS_STATUS of ArduPilot)."""
-
-_UNKNOWN_16_BITS = 65535
-"""Value of a 16-bit field where nothing is known (mavlink.io)."""
-
+_FIX = 2  # Least status of a GPS fix, in two dimensions (GPS_STATUS of ArduPilot)
+_UNKNOWN_16_BITS = 65535  # Value of a 16-bit field where nothing is known (mavlink.io)
+# Bytes of a message of MAVLink 1 and 2 besides its payload, by its first one (mavlink.io, "Packet Serialization")
 _FRAMES = {0xFE: 8, 0xFD: 12}
-"""Bytes of a message of MAVLink 1 and 2 besides its payload, by its first one (mavlink.io, "Packet Serialization")."""
-
-_SIGNED = 13
-"""Bytes of a signature."""
+_SIGNED = 13  # Bytes of a signature
 
 _Rows = dict[str, "array[float]"]
 _Table = Mapping[str, Array]
-_Sender = tuple[int, str, int]
-"""System, kind of message, component."""
+_Sender = tuple[int, str, int]  # System, kind of message, component
 
 
 def _rows() -> _Rows:

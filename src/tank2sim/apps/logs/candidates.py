@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tank2sim.apps.logs.channels import USED_FROM, ChannelSet, LogChannel
-from tank2sim.apps.logs.clock import usual_step
 from tank2sim.apps.logs.content import AGREES, DIFFERS, ContentEvidence, angle_unit, rate_delay
 from tank2sim.apps.logs.quantities import QUANTITIES
 from tank2sim.apps.logs.recorded import PulseScale, pulses_of, rest_of
 from tank2sim.apps.logs.reference import ReferenceMotion, interpolated, thinned_series
 from tank2sim.apps.logs.streams import LogFinding, LogStream, fault, note
 from tank2sim.arrays import Array
+from tank2sim.records.trials import usual_step
 
 _TESTED_STEP_S = 0.2
 """Streams are thinned to this step for the tests, s. Project choice: yaw of small craft lasts a second or more."""
@@ -24,8 +24,8 @@ HEADINGS_APART_DEG = 5.0
 """Mean difference of two headings, deg, from which they contradict each other (project choice: beyond the deviation of
 a compass that was swung)."""
 
+# Quantities that a vessel may have twice, each with a name of its own
 _TWINS = ("rudder_angle", "rudder_order", "rpm", "rpm_order")
-"""Quantities that a vessel may have twice, each with a name of its own."""
 
 STATED = {"format": 0.95, "name": 0.75, "": 0.6}
 """Confidence by what states a quantity, before its content is tested."""
@@ -74,10 +74,7 @@ class ChannelSearch:
         self.motion = ReferenceMotion(empty, empty, empty, empty, empty)
         self.rate: tuple[Array, Array] = (empty, empty)
         self.pulse_scales: dict[str, PulseScale] = {}
-        self._take_pulses()
-
-    def _take_pulses(self) -> None:
-        """Search among the shares that pulses are of full order; streams that hold their rest are no orders."""
+        # Pulses are searched as shares of full order; streams that hold their rest are no orders.
         rests = {stream.name: rest for stream in self.streams if (rest := rest_of(stream)) is not None}
         for place, stream in enumerate(self.streams):
             pulses, scale = pulses_of(stream)

@@ -12,7 +12,6 @@ import numpy as np
 
 from tank2sim.apps.logs.candidates import REFUTED, STATED, ChannelSearch, Judgement
 from tank2sim.apps.logs.channels import ChannelSet
-from tank2sim.apps.logs.clock import usual_step
 from tank2sim.apps.logs.content import (
     AGREES,
     DIFFERS,
@@ -37,6 +36,7 @@ from tank2sim.apps.logs.reference import (
 from tank2sim.apps.logs.steering_channels import find_steering
 from tank2sim.apps.logs.streams import LogStream, fault, note
 from tank2sim.arrays import Array
+from tank2sim.records.trials import usual_step
 
 LARGEST_OFFSET_RAD = math.radians(30.0)
 """Mean difference of heading and course beyond which a heading is doubtful. Project choice: leeway and current of a
@@ -64,8 +64,8 @@ streams that are tried. Project choice: 300 nautical miles of latitude, a day of
 _MUCH_LESS = 0.7
 """Ratio of deviations from which the lesser one decides (project choice)."""
 
+# Quantities that are the components of one velocity
 _VECTORS = (("u_ground", "v_ground"), ("u_water", "v_water"), ("v_north", "v_east"))
-"""Quantities that are the components of one velocity."""
 
 _Pair = tuple[LogStream, LogStream]
 

@@ -30,6 +30,7 @@ CHANNELS_FORMAT = "tank2sim-channels/1"
 CHANNELS_FILE = "channels.toml"
 """Its name in the folder of a voyage."""
 
+_USUAL: dict[str, float] = {"sign": 1, "scale": 1.0, "offset": 0.0, "delay_s": 0.0}
 _KEYS = ("quantity", "stream", "unit", "sign", "scale", "offset", "delay_s", "confidence", "why", "use")
 
 _HEAD = """\
@@ -101,8 +102,7 @@ def channels_text(channels: ChannelSet) -> str:
         entry = tomlkit.table()
         for key in _KEYS:
             value = getattr(channel, key)
-            usual = {"scale": 1.0, "offset": 0.0, "delay_s": 0.0}.get(key)
-            if usual is None or value != usual:
+            if key == "sign" or value != _USUAL.get(key):
                 entry[key] = float(f"{value:.9g}") if isinstance(value, float) else value
         entries.append(entry)
     document["channels"] = entries
@@ -150,9 +150,7 @@ def _channel(path: Path, place: int, entry: Any) -> LogChannel:
     if use and quantity != "ignore" and unit not in QUANTITIES[quantity].units:
         units = ", ".join(QUANTITIES[quantity].units)
         raise InputError(path, f"{where}, unit", f"{unit!r} is not a unit of {quantity}", f"write one of {units}")
-    numbers = {
-        key: entry.get(key, usual) for key, usual in (("sign", 1), ("scale", 1.0), ("offset", 0.0), ("delay_s", 0.0))
-    }
+    numbers = {key: entry.get(key, usual) for key, usual in _USUAL.items()}
     for key, value in numbers.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise InputError(path, f"{where}, {key}", f"is {value!r}", "write a number")

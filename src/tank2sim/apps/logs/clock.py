@@ -19,17 +19,22 @@ DOUBLED_STEPS = 3.0
 """Their difference, as a multiple of the change from sample to sample, from which they are. Project choice: noise alone
 differs by one to two."""
 
-_ROLLOVER_S = 1024 * 604800.0
-"""Time after which the week number of GPS starts again, s (IS-GPS-200, 20.3.3.3.1.1)."""
-
-_DAY_S = 86400.0
-"""Difference of two clocks, s, from which one is wrong by more than a time zone."""
+_ROLLOVER_S = 1024 * 604800.0  # Time after which the week number of GPS starts again, s (IS-GPS-200, 20.3.3.3.1.1)
+_DAY_S = 86400.0  # Difference of two clocks, s, from which one is wrong by more than a time zone
 
 TWO_DIGITS_FROM = 80
 """Years of two digits from here on are of the 20th century: GPS time begins in 1980 (IS-GPS-200, 3.3.4)."""
 
 FALL_STEPS = 1.5
 """Steps by which a clock falls where it was set back. Project choice: two samples that changed places fall by one."""
+
+
+def stamp_s(text: str) -> float:
+    """A time stamp, s: ISO 8601, or a number that counts s, ms, us or ns since 1970, or s since the beginning."""
+    if "-" in text:
+        return dt.datetime.fromisoformat(text.rstrip("Z")).replace(tzinfo=dt.UTC).timestamp()
+    value = float(text)
+    return value / next((counts for least, counts in ((1e17, 1e9), (1e14, 1e6), (1e11, 1e3)) if value > least), 1.0)
 
 
 def full_year(year: int) -> int:
@@ -120,9 +125,11 @@ def tidied(stream: LogStream) -> tuple[LogStream, int, list[LogFinding]]:
     return replace(stream, time_s=time[new], values=values[new]), repeated, findings
 
 
-def usual_step(time_s: Array) -> float:
-    """Median step between samples, s; nan of fewer than two."""
-    return float(np.median(np.diff(time_s))) if len(time_s) > 1 else float("nan")
+def over_midnight(clock_s: Array) -> Array:
+    """Times of day (n,), s, that go on over midnight; nan stays."""
+    known, out = np.isfinite(clock_s), np.array(clock_s)
+    out[known] += 86400 * np.cumsum(np.diff(clock_s[known], prepend=clock_s[known][:1]) < -43200)
+    return out
 
 
 def gaps_of(time_s: Array, longest_s: float) -> list[tuple[float, float]]:

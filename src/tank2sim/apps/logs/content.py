@@ -10,7 +10,6 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.signal import lfilter
 
-from tank2sim.apps.logs.clock import usual_step
 from tank2sim.apps.logs.quantities import QUANTITIES
 from tank2sim.apps.logs.reference import (
     HEADING_WINDOW_S,
@@ -21,6 +20,7 @@ from tank2sim.apps.logs.reference import (
 )
 from tank2sim.apps.logs.streams import wrapped_angle
 from tank2sim.arrays import Array
+from tank2sim.records.trials import usual_step
 
 NEAR_RAD = math.radians(35.0)
 """Largest difference of course and heading that counts as agreement: drift angles of ships in the tightest turns are
@@ -56,8 +56,8 @@ _DECISIVE = 0.97
 """Correlation from which no longer time is tried (project choice)."""
 
 _LAGS_S = np.arange(-3.0, 3.01, 0.25)
+# Time constants of yaw from craft to tanker, s (Nomoto 1957: T' of 0.3 to 3 at 1 to 10 m/s and 2 to 300 m)
 _NOMOTO_T_S = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 15.0, 30.0, 60.0)
-"""Time constants of yaw from craft to tanker, s (Nomoto 1957: T' of 0.3 to 3 at 1 to 10 m/s and 2 to 300 m)."""
 
 
 @dataclass(frozen=True)
@@ -136,21 +136,12 @@ def direction_evidence(time_s: Array, angle_rad: Array, motion: ReferenceMotion)
 
 
 def _sideways_share(heading: Array, north: Array, east: Array) -> float:
-    """Sideways speed (rms) as a share of the speed through the water, in the steady current that makes it least.
-
-    Craft that go astern or slowly in a current have another course than heading, and still move along their keel:
-    -n sin(psi) + e cos(psi) is small for the velocity (n, e) less the current.
-    """
+    """Sideways over whole speed (rms), -n sin(psi) + e cos(psi), in the steady current that makes it least."""
     sideways = np.column_stack([-np.sin(heading), np.cos(heading)])
     across = np.sum(sideways * np.column_stack([north, east]), axis=1)
     current = np.linalg.lstsq(sideways, across, rcond=None)[0]
     speed = np.hypot(north - current[0], east - current[1])
     return float(np.sqrt(np.mean((across - sideways @ current) ** 2) / np.mean(speed**2)))
-
-
-def _integral(time_s: Array, values: Array) -> Array:
-    """Integral (n,) of a signal from its first sample."""
-    return np.asarray(cumulative_trapezoid(values, time_s, initial=0.0))
 
 
 def rate_evidence(
@@ -162,7 +153,7 @@ def rate_evidence(
     """
     if len(motion.heading_time_s) < FEW_SAMPLES or len(time_s) < FEW_SAMPLES or np.ptp(values) == 0:
         return UNTESTED
-    area = _integral(time_s, values)
+    area = cumulative_trapezoid(values, time_s, initial=0.0)
     best, slope, other = 0.0, np.zeros(0), np.zeros(0)
     for window in windows_s:
         at, slopes = differenced(motion.heading_time_s, motion.heading_rad, window)
@@ -303,7 +294,7 @@ def rate_delay(heading_time_s: Array, heading_rad: Array, rate_time_s: Array, ra
     rate_at, rate = thinned_series(rate_time_s, rate_radps, 0.2)
     if len(rate_at) < 3 or len(heading_time_s) < 3:
         return None
-    area = _integral(rate_at, rate)
+    area = cumulative_trapezoid(rate, rate_at, initial=0.0)
     at, heading = thinned_series(heading_time_s, heading_rad, 0.2)
     longest = 5 * max(usual_step(rate_at), usual_step(at))
     segment = np.floor((at - at[0]) / SEGMENT_S).astype(np.int64)

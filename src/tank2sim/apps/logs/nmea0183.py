@@ -18,8 +18,9 @@ from operator import xor
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import median_filter
 
-from tank2sim.apps.logs.clock import continued_clock, full_year, rollover_s
+from tank2sim.apps.logs.clock import continued_clock, full_year, over_midnight, rollover_s, stamp_s
 from tank2sim.apps.logs.quantities import quantity_of_name
 from tank2sim.apps.logs.streams import (
     FIELDS,
@@ -60,39 +61,30 @@ _STAMPS_AGREE_S = 5.0
 """Largest drift of a recorder's time stamps against the receiver's clock, s, with which they are used. Project choice:
 delays of serial lines stay below a second or two."""
 
-_BLOCK = 100_000
 _NEIGHBOURS = 10
 """Sentences of a kind before and after one over which its time is averaged. Project choice: a few seconds at the usual
 1 to 10 Hz, in which clocks do not drift and few sentences are lost."""
 
 
 _FIELDS = FIELDS["nmea0183"]
+# Headings that repeat another instrument's, or rest on a compass: a gyro's goes first
 _LAST = ("HDG.true_heading", "HDM.true_heading", "VHW.heading")
-"""Headings that repeat another instrument's, or rest on a compass: a gyro's goes first."""
-
+# Cells of a speed in km/h that some instruments fill in place of the one in knots
 _KMH = {("VTG", 4): 6, ("VHW", 4): 6}
-"""Cells of a speed in km/h that some instruments fill in place of the one in knots."""
-
-_STATUS = {"RMC": 1, "ROT": 1, "GLL": 5, "MWV": 4}
-"""Cells of the status of a sentence, A where it is valid."""
-
+_STATUS = {"RMC": 1, "ROT": 1, "GLL": 5, "MWV": 4}  # Cells of the status of a sentence, A where it is valid
+# Cells of the mode of the receiver, N where it has no fix (NMEA 0183, 2.3)
 _MODE = {"RMC": 11, "VTG": 8, "GLL": 6, "GNS": 5}
-"""Cells of the mode of the receiver, N where it has no fix (NMEA 0183, 2.3)."""
-
+# Cells of the latitude and of the time of day of sentences with a position
 _PLACES = {"RMC": (2, 0), "GGA": (1, 0), "GLL": (0, 4), "GNS": (1, 0)}
-"""Cells of the latitude and of the time of day of sentences with a position."""
 
 _STAMPS = "the recorder's time stamps"
 _FIRST_DAY = dt.date(1970, 1, 1)
-_TIME_OF_DAY = "time of day of "
-"""Beginning of the name of a clock without a date, before the kind of its sentences."""
-
-_SATELLITES = ("GSV", "GSA", "GRS", "GBS", "GST", "ALM", "DTM", "TXT")
-"""Kinds that say nothing of the vessel."""
+_TIME_OF_DAY = "time of day of "  # Beginning of the name of a clock without a date, before the kind of its sentences
+_SATELLITES = ("GSV", "GSA", "GRS", "GBS", "GST", "ALM", "DTM", "TXT")  # Kinds that say nothing of the vessel
 
 _XDR_UNITS = {"D": "deg", "R": "rpm", "P": "%", "M": "m"}
+# m/s of the units of MWV; S are statute miles per hour (NIST SP 811)
 _WIND_UNITS = {"N": KNOT_MPS, "K": 1 / 3.6, "M": 1.0, "S": 0.44704}
-"""m/s of the units of MWV; S are statute miles per hour (NIST SP 811)."""
 
 
 def looks_like_nmea0183(head: bytes) -> bool:
@@ -360,7 +352,7 @@ class _Reader:
             return stamp_lines, stamps, "", {}
         lines, times, talkers = (np.array(part) for part in (clock.lines, clock.values, clock.stamps))
         if undated:
-            times = times + 86400 * np.cumsum(np.diff(times, prepend=times[:1]) < -43200)
+            times = over_midnight(times)
             findings.append(note("no sentence has a date (RMC, ZDA): the trials have no date"))
         if _overlapping(lines, talkers):
             first = Counter(talkers.tolist()).most_common(1)[0][0]
@@ -439,6 +431,7 @@ class _Reader:
         return _overlapping(np.concatenate(lines), np.repeat(np.arange(len(lines)), list(map(len, lines))))
 
 
+# Kinds of sentences with more than numbers in cells
 _SPECIAL: dict[str, Callable[[_Reader, str, list[str]], None]] = {
     **dict.fromkeys(("GGA", "GLL", "GNS"), _Reader._position),
     **dict.fromkeys(("HDG", "HDM"), _Reader._magnetic),
@@ -449,7 +442,6 @@ _SPECIAL: dict[str, Callable[[_Reader, str, list[str]], None]] = {
     "ZDA": _Reader._zda,
     "THS": _Reader._ths,
 }
-"""Kinds of sentences with more than numbers in cells."""
 
 
 def _cell(cells: list[str], place: int) -> str:
@@ -500,11 +492,9 @@ def steady_times(time: Array) -> Array:
     if len(time) < 2 * _NEIGHBOURS + 1:
         return time
     period = float(np.median((time[_NEIGHBOURS:] - time[:-_NEIGHBOURS]) / _NEIGHBOURS))
-    reach = np.arange(-_NEIGHBOURS, _NEIGHBOURS + 1)
     padded = np.pad(time, _NEIGHBOURS, mode="reflect", reflect_type="odd")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, len(reach))
-    blocks = range(0, len(time), _BLOCK)  # a day of sentences at once would take gigabytes
-    smooth = np.concatenate([np.median(windows[k : k + _BLOCK] - period * reach, axis=1) for k in blocks])
+    even = time[0] + period * np.arange(-_NEIGHBOURS, len(time) + _NEIGHBOURS)
+    smooth = (even + median_filter(padded - even, size=2 * _NEIGHBOURS + 1))[_NEIGHBOURS:-_NEIGHBOURS]
     # Where the clock leaps (a pause of the recorder), neighbours beyond the leap do not count.
     return np.where(np.abs(smooth - time) < 2 * period, smooth, time)
 
@@ -519,11 +509,7 @@ def _lost(time: Array) -> int:
 
 
 def _time_of_prefix(prefix: bytes) -> float | None:
-    if match := _TAG_TIME.search(prefix) or _EPOCH.search(prefix):
-        value = float(match[1])
-        return value / 1000 if value > 1e11 else value
-    if match := _ISO.search(prefix):
-        with contextlib.suppress(ValueError):  # a month 13
-            moment = dt.datetime.fromisoformat(match[1].decode().replace(" ", "T"))
-            return moment.replace(tzinfo=dt.UTC).timestamp()
+    match = _TAG_TIME.search(prefix) or _EPOCH.search(prefix) or _ISO.search(prefix)
+    with contextlib.suppress(ValueError):  # a month 13
+        return stamp_s(match[1].decode()) if match else None
     return None

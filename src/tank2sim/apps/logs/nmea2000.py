@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import theilslopes
 
-from tank2sim.apps.logs.clock import continued_clock, rollover_s
+from tank2sim.apps.logs.clock import continued_clock, rollover_s, stamp_s
 from tank2sim.apps.logs.nmea0183 import steady_times
 from tank2sim.apps.logs.streams import (
     FIELDS,
@@ -32,7 +32,7 @@ from tank2sim.errors import InputError, optional_library
 _FIELDS: dict[int, dict[str, list[str]]] = {int(pgn): fields for pgn, fields in FIELDS["nmea2000"].items()}
 _SYSTEM_TIME, _VARIATION, _RUDDER, _ENGINE = 126992, 127258, 127245, 127488
 _TRUE = "true heading"
-_EPOCHS = ((1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3))
+
 _OFTEN = 0.1
 """Share of time stamps that fall from which they are differences. Project choice: messages rarely change places."""
 
@@ -43,20 +43,17 @@ _PACE_OFF, _PACE_FROM, _PACE_FROM_S = 0.05, 8, 10.0
 """Share by which the pace of two clocks must differ, and the number and span (s) of system times from which it is known
 (project choice: whole seconds over ten leave 3 %)."""
 
+# Time of day of Actisense's ASCII and of the raw format of gateways, without a date
 _CLOCK = re.compile(r"^(?:A(\d\d)(\d\d)(\d\d\.\d+)|(\d\d):(\d\d):(\d\d\.\d+)) ")
-"""Time of day of Actisense's ASCII and of the raw format of gateways, without a date."""
 
 _TIMED = re.compile(r"^\(\d+\.\d+\)|^\d{4}-\d\d-\d\d|^\d\d:\d\d:\d\d\.|^A\d{6}\.")
+# A frame of 29 bits: candump in any form (-L, -t, -x, -a; can-utils), Vector's ASC, and tables of frames
 _FRAME = re.compile(
     r"^\s*\(?(?P<stamp>\d{4}-\d\d-\d\d[T ]\d\d:[\d:.]+Z?|\d+(?:\.\d+)?)\)?[\s,;]+"
     r"(?P<bus>\S+?)[\s,;]+(?:[RT]X\s+\S\s+\S\s+)?(?P<id>[0-9A-Fa-f]{8})x?(?:\s*\[\d\]\s*|\#|\s+[RT]x\s+d\s+\d\s+|[\s,;]+)"
     r"(?P<data>(?:[0-9A-Fa-f]{2} ?){1,8})\s*(?:[RT]|'.*')?\s*$"
 )
-"""A frame with a time stamp, a bus, the identifier of 29 bits and the data: candump in any form (-L, -t, -x, -a; of
-can-utils), Vector's ASC, and tables of frames."""
-
-_SIGNAL_K = re.compile(r"^\d{13};[^;]*;")
-"""Prefix of a line recorded by Signal K."""
+_SIGNAL_K = re.compile(r"^\d{13};[^;]*;")  # Prefix of a line recorded by Signal K
 
 _LINES = (
     re.compile(r"^\d{4}-\d\d-\d\d[T-][\d:.]+Z?,\d,\d+,\d+,\d+,\d+,[0-9A-Fa-f]{2},"),
@@ -66,17 +63,15 @@ _LINES = (
     _FRAME,
 )
 
+# Least time stamp that counts from 1970, s (the year 1973); less counts from the beginning, or from line to line
 _FIRST_EPOCH_S = 1e8
-"""Least time stamp that counts from 1970, s (the year 1973); less counts from the beginning, or from line to line."""
 
 _SAME = 0.5
 """Share of the lines of a log that decides how it is written. Project choice."""
 
+# Messages of the vessel: without protocol, proprietary ones, satellites and other ships (AIS)
 _VESSELS = frozenset((*range(127001, 129038), *range(129551, 129793), *range(129811, 130816)))
-"""Messages of the vessel: without protocol, proprietary ones, satellites and other ships (AIS)."""
-
-_NOT_VALUES = re.compile(r"sid|instance|reserved|spare|source")
-"""Beginnings of fields that are no values (canboat)."""
+_NOT_VALUES = re.compile(r"sid|instance|reserved|spare|source")  # Beginnings of fields that are no values (canboat)
 
 
 def looks_like_nmea2000(head: bytes) -> bool:
@@ -105,8 +100,7 @@ def read_nmea2000(path: Path) -> VesselLog:
     return reader.log()
 
 
-_Key = tuple[int, int, str, str, str]
-"""Message (PGN), source, field, quantity, instance."""
+_Key = tuple[int, int, str, str, str]  # Message (PGN), source, field, quantity, instance
 
 
 class _Reader:
@@ -130,7 +124,7 @@ class _Reader:
         stamp = math.nan
         try:
             if frame := _FRAME.match(line):
-                stamp = _seconds(frame["stamp"])
+                stamp = stamp_s(frame["stamp"])
                 self._sum(stamp, number)
                 line = f"(0.0) can0 {frame['id']}#{frame['data'].replace(' ', '')}"
             message = self.decoder.decode(line)
@@ -233,10 +227,7 @@ class _Reader:
         return [stamp + shift for stamp in stamps[:-1]], dated or len(clock) > 0, findings
 
     def _one_clock(self) -> tuple[Samples, list[LogFinding]]:
-        """The system times of the source with most of them, and findings on other sources whose clocks differ.
-
-        Of sources that send equally often (within a fifth) it is the one whose clock is in the middle.
-        """
+        """System times of the source with most (of several within a fifth, the middle one); findings on the others."""
         if not self.clocks:
             return Samples(), []
         most = max(len(column.values) for column in self.clocks.values())
@@ -272,10 +263,7 @@ class _Reader:
 
 
 def _pace(stamps: Array, clock: Array) -> tuple[float, list[LogFinding]]:
-    """Time of the receiver's clock for a second of the recorder's, 1 where they agree, and what to say of it.
-
-    Times of a conversion, or of a replay, run at another pace than the times of the messages.
-    """
+    """Receiver's seconds to one of the recorder's, 1 where they agree, and a finding: replays run at another pace."""
     good = np.isfinite(stamps)
     if np.count_nonzero(good) < _PACE_FROM or np.ptp(stamps[good]) <= 0 or np.ptp(clock[good]) < _PACE_FROM_S:
         return 1.0, []
@@ -300,15 +288,6 @@ def _ahead_s(column: Samples, every: dict[int, Samples]) -> float:
         return float(np.median(clock - stamps))
     means = [np.interp(column.lines, other.lines, other.values) for other in every.values()]
     return float(np.median(clock - np.mean(means, axis=0)))
-
-
-def _seconds(text: str) -> float:
-    """A time stamp, s: ISO 8601, or a number that counts s, ms, us or ns since 1970, or s since the beginning."""
-    if "-" in text:
-        moment = dt.datetime.fromisoformat(text.rstrip("Z"))
-        return moment.replace(tzinfo=dt.UTC).timestamp()
-    value = float(text)
-    return value * next((factor for least, factor in _EPOCHS if value > least), 1.0)
 
 
 def _quantity(pgn: int, name: str, values: dict[str, object]) -> str:

@@ -24,8 +24,8 @@ from tank2sim.errors import InputError, optional_library
 
 _FIELDS = FIELDS["px4"]
 _RECEIVERS = ("sensor_gps", "vehicle_gps_position")
+# CA_AIRFRAME of two motors that steer by their difference (docs.px4.io, parameter reference)
 _AIRFRAME_ROVER_DIFFERENTIAL = 6
-"""CA_AIRFRAME of two motors that steer by their difference (docs.px4.io, parameter reference)."""
 
 
 def read_px4_ulog(path: Path) -> VesselLog:
@@ -90,7 +90,7 @@ def _streams(topics: dict[tuple[str, int], dict[str, Any]], boot: float, airfram
                     meaning = (("rpm_port", "rpm_starboard")[min(instance, 1)], "")
                 yield LogStream(f"{label}.{field}", time, values, unit, *meaning)
         if name == "vehicle_attitude":
-            roll, _, yaw = heading_of_quaternion(*(data[f"q[{place}]"].astype(float) for place in range(4)))
+            roll, yaw = heading_of_quaternion(*(data[f"q[{place}]"].astype(float) for place in range(4)))
             yield LogStream(f"{label}.heading", time, yaw % (2 * np.pi), "rad", "heading", "format")
             yield LogStream(f"{label}.heel", time, roll, "rad", "heel", "format")
         if name == "esc_status":  # of two, PX4 numbers the right one first, which the turn confirms

@@ -74,8 +74,8 @@ _SIDES = [
     for sign, words in ((-1, "|".join(_DECLARED["words"]["port"])), (1, "|".join(_DECLARED["words"]["starboard"])))
 ]
 _SIGNAL_K = re.compile(r"^(navigation|propulsion|steering|environment)\.[a-z]")
+# Letters that are not one of a to z with an accent
 _LETTERS = str.maketrans({"ø": "o", "æ": "ae", "ß": "ss", "ł": "l", "ı": "i"})
-"""Letters that are not one of a to z with an accent."""
 
 
 def unit_of_signal_k(name: str, quantity: str) -> str:

@@ -13,7 +13,6 @@ from tank2sim.apps.logs.nmea2000 import looks_like_nmea2000, read_nmea2000
 from tank2sim.apps.logs.px4 import read_px4_ulog
 from tank2sim.apps.logs.ros import read_ros_bag
 from tank2sim.apps.logs.streams import VesselLog
-from tank2sim.apps.logs.table import read_table_log
 from tank2sim.errors import InputError
 from tank2sim.files import first_bytes
 from tank2sim.plugins import Registry
@@ -74,6 +73,7 @@ def _known() -> str:
 
 
 _RAW = "record the raw frames (candump -L, or the input of the analyzer)"
+# Beginnings of files that are no log that is read, what they are, and what to give in their place
 _FOREIGN: tuple[tuple[bytes, str, str], ...] = (
     (rb"\x1f\x8b", "is compressed (gzip)", "unpack it"),
     (rb"PK\x03\x04", "is a ZIP archive or a spreadsheet", "unpack it, or save it as CSV"),
@@ -88,7 +88,6 @@ _FOREIGN: tuple[tuple[bytes, str, str], ...] = (
     (rb"\s*[{\[]", "is JSON", "save it as CSV, a row a sample"),
     (rb"\s*<(\?xml|gpx|kml|!DOCTYPE|html)", "is XML or HTML", "save it as CSV, a row a sample"),
 )
-"""Beginnings of files that are no log that is read, what they are, and what to give in their place."""
 
 
 def read_log(path: Path | str) -> VesselLog:
@@ -121,4 +120,6 @@ def read_log(path: Path | str) -> VesselLog:
         return read_ardupilot_tlog(path)
     if b"\0" in plain:
         raise InputError(path, "", "is of no known format, or its beginning is missing", _known())
+    from tank2sim.apps.logs.table import read_table_log  # slow to import
+
     return read_table_log(path)

@@ -12,19 +12,17 @@ from tank2sim.apps.logs.quantities import names_rest, plain_words
 from tank2sim.apps.logs.streams import LogFinding, LogStream, note, wrapped_angle
 from tank2sim.arrays import Array
 
+# Numbers that recorders write for no value: nines, and the bounds of their integers
 _MARK = re.compile(r"-?(9{2,}(\.9+)?|32767|32768|65535|2147483647|2147483648|1023|4095)")
-"""Numbers that recorders write for no value: nines, and the bounds of their integers."""
-
+# Numbers that AIS sends for no value (ITU-R M.1371-5, table 47), if the values around are others
 _NOT_AVAILABLE = {"sog": (102.3,), "cog": (360.0,), "heading": (511.0,), "yaw_rate": (128.0, -128.0)}
-"""Numbers that AIS sends for no value (ITU-R M.1371-5, table 47), if the values around are others."""
-
+# The same of a position (AIS), and what receivers send before the first fix
 _NO_PLACE = {"latitude": (0.0, 91.0), "longitude": (0.0, 181.0)}
-"""The same of a position (AIS), and what receivers send before the first fix."""
 
 _CIRCULAR = ("cog", "heading")
 
+# Largest size of a quantity in deg
 _BOUNDS = {"heading": 361.0, "magnetic_heading": 361.0, "cog": 361.0, "latitude": 90.0, "longitude": 360.0}
-"""Largest size of a quantity in deg."""
 
 _JUMP, _LEAST_JUMP = 10.0, 0.05
 """Jump to such a number, as a multiple of the 90th percentile of the steps of the others, and as a share of their range

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tank2sim.apps.logs.clock import usual_step
 from tank2sim.apps.logs.streams import wrapped_angle
 from tank2sim.arrays import Array
 from tank2sim.dynamics.geographic import EQUATORIAL_RADIUS_M, FLATTENING
+from tank2sim.records.trials import usual_step
 
 POSITION_WINDOW_S = 4.0
 """Time over which positions are differenced, s. Project choice: noise of 0.5 m of a receiver is then 0.1 m/s, and a
@@ -26,8 +26,7 @@ leeway turn the course."""
 LEAST_SPEED_MPS = 0.3
 """Speed below which a course is noise, m/s: receivers leave it out below about half a knot."""
 
-_LONGEST_BRIDGE = 3.0
-"""Gaps of this many windows are not bridged in differences."""
+_LONGEST_BRIDGE = 3.0  # Gaps of this many windows are not bridged in differences
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,24 +58,18 @@ class ReferenceMotion:
         return np.asarray(speed > max(LEAST_SPEED_MPS, MOVING_SHARE * float(np.percentile(speed, 95))))
 
 
-def earth_radii(latitude_deg: float) -> tuple[float, float]:
-    """Radii of curvature in the meridian and the prime vertical of WGS 84, m (Torge & Mueller 2012, 4.1)."""
-    eccentricity = FLATTENING * (2 - FLATTENING)
-    squared = 1 - eccentricity * math.sin(math.radians(latitude_deg)) ** 2
-    prime_vertical = EQUATORIAL_RADIUS_M / math.sqrt(squared)
-    return prime_vertical * (1 - eccentricity) / squared, prime_vertical
-
-
 def local_metres(latitude_deg: Array, longitude_deg: Array, origin_deg: tuple[float, float]) -> tuple[Array, Array]:
     """North and east (n,), m, of an origin: the inverse of the series of :mod:`tank2sim.dynamics.geographic`.
 
-    The series is solved for x and y by three fixed-point steps; the remainder is below 1 mm within 20 km.
+    The series is solved for x and y by three fixed-point steps; the remainder is below 1 mm within 20 km. Radii of
+    curvature in the meridian and the prime vertical are those of WGS 84 (Torge & Mueller 2012, 4.1).
     """
-    meridian, prime_vertical = earth_radii(origin_deg[0])
     phi0 = math.radians(origin_deg[0])
     sine, cosine, tangent = math.sin(phi0), math.cos(phi0), math.tan(phi0)
     eccentricity = FLATTENING * (2 - FLATTENING)
     squared = 1 - eccentricity * sine**2
+    prime_vertical = EQUATORIAL_RADIUS_M / math.sqrt(squared)
+    meridian = prime_vertical * (1 - eccentricity) / squared
     d_phi = np.radians(latitude_deg - origin_deg[0])
     d_lambda = wrapped_angle(np.radians(longitude_deg - origin_deg[1])) * cosine
     x, y = d_phi.copy(), d_lambda.copy()

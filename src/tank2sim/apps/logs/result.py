@@ -41,6 +41,7 @@ _SIGNALS = (
     Signal("u_water", "speed ahead through the water", "m/s"),
     Signal("v_water", "speed to starboard through the water", "m/s"),
 )
+
 _MOST_TRACKS = 8
 """Stretches that have a line of their own on the map. Project choice: as many colours can be distinguished."""
 
@@ -274,22 +275,9 @@ class LogResult(Result[LogStudy]):
         return [replace(used, notes=notes), every]
 
     def _stretch_table(self) -> Table:
-        rows: list[list[Cell]] = [
-            [
-                stretch.kind.value,
-                stretch.begins_s,
-                stretch.duration_s,
-                stretch.steering,
-                stretch.heading_change_deg,
-                stretch.reversals,
-                stretch.speed_mps,
-                stretch.yaw_rate_rms_degps,
-                stretch.file,
-            ]
-            for stretch in self.study.stretches
-        ]
-        heads = ("stretch", "begins (s)", "lasts (s)", "steering", "heading change (deg)", "reversals", "speed (m/s)")
-        return replace(table("Stretches", [*heads, "rms yaw rate (deg/s)", "file"], rows), wide=True)
+        fields = {"kind": "stretch", "begins_s": "", "duration_s": "lasts", "steering": "", "heading_change_deg": ""}
+        fields |= {"reversals": "", "speed_mps": "", "yaw_rate_rms_degps": "rms yaw rate", "file": ""}
+        return replace(records_table("Stretches", self.study.stretches, fields=fields), wide=True)
 
     def _log_table(self) -> Table:
         rows: list[list[Cell]] = [

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 import tempfile
 from array import array
-from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import cache
@@ -46,11 +45,10 @@ _PACE = 0.01
 """Relative difference of the paces of two clocks from which one is simulated. Project choice: clocks of computers
 differ by 1e-4, and the delays of a log of a minute by less than a second."""
 
+# Endings that the library needs, by the first bytes of a file
 _SUFFIXES = {b"#ROS": ".bag", b"SQLi": ".db3", b"\x89MCA": ".mcap"}
-"""Endings that the library needs, by the first bytes of a file."""
-
+# Names of frames that are fixed to the earth: east, north, up (REP 103, REP 105)
 _WORLD_FRAMES = ("map", "odom", "world", "enu", "earth", "local_origin", "utm")
-"""Names of frames that are fixed to the earth: east, north, up (REP 103, REP 105)."""
 
 _OMITTED = ("header", "covariance", "seq", "status", "layout", "covariance_type")
 _GROUND_WORDS = ("gps", "gnss", "vel", "fix", "navsat", "enu")
@@ -136,41 +134,31 @@ class _Topic:
     def __init__(self, name: str, kind: str, message: Any) -> None:
         header = getattr(message, "header", None)
         self.name, self.kind = name, kind.rpartition("/")[2]
-        self.paths = list(_numbers_of(message))
         self.stamped = hasattr(header or message, "stamp")
         self.frame, self.child = (
             str(frame).strip("/").lower()
             for frame in (getattr(header, "frame_id", ""), getattr(message, "child_frame_id", ""))
         )
         self.received, self.stamps = array("d"), array("d")
-        self.columns: dict[str, array[float]] = defaultdict(lambda: array("d"))
+        self.columns = {path: array("d") for path in _numbers_of(message)}
         self.valid = array("b")
-        self.lists = [path for path, value in _fields_of(message) if _is_list(value)]  # whatever their length
-        self.longest = self._length(message)
-        self.scans = {path: size for path, size in self._sizes(message) if size > LONGEST_VECTOR}
-
-    def _sizes(self, message: Any) -> Iterator[tuple[str, int]]:
-        return ((path, len(attrgetter(path)(message))) for path in self.lists)
-
-    def _length(self, message: Any) -> int:
-        """Entries of all lists that are short enough to be streams."""
-        return sum(size for _, size in self._sizes(message) if size <= LONGEST_VECTOR)
+        lists = {path: value for path, value in _fields_of(message) if _is_list(value)}
+        self.scans = {path: len(value) for path, value in lists.items() if len(value) > LONGEST_VECTOR}
+        self.grows = len(lists) > len(self.scans)  # lists are often empty at first
 
     def take(self, message: Any, received_ns: int) -> None:
-        if self.lists and self._length(message) > self.longest:  # lists are often empty at first
-            self.longest = self._length(message)
-            for path in set(_numbers_of(message)) - set(self.paths):
-                self.columns[path].extend([math.nan] * len(self.received))
-            self.paths += [path for path in _numbers_of(message) if path not in self.paths]
+        for path in _numbers_of(message) if self.grows else ():
+            if path not in self.columns:
+                self.columns[path] = array("d", [math.nan] * len(self.received))
         self.received.append(received_ns * 1e-9)
         if self.stamped:
             stamp = getattr(message, "header", message).stamp
             self.stamps.append(stamp.sec + stamp.nanosec * 1e-9)
-        for path in self.paths:
+        for path, column in self.columns.items():
             try:
-                self.columns[path].append(float(_getter(path)(message)))
+                column.append(float(_getter(path)(message)))
             except (IndexError, TypeError, ValueError):
-                self.columns[path].append(math.nan)
+                column.append(math.nan)
         self.valid.append(getattr(getattr(message, "status", None), "status", 0) >= 0)
 
     @property
@@ -231,6 +219,7 @@ class _Topic:
         return []
 
 
+# Beginnings of the paths of standard messages
 _PREFIXES = {
     "Twist": "",
     "TwistStamped": "twist.",
@@ -239,7 +228,6 @@ _PREFIXES = {
     "PoseStamped": "pose.",
     "PoseWithCovarianceStamped": "pose.pose.",
 }
-"""Beginnings of the paths of standard messages."""
 
 
 def _velocity(columns: dict[str, Array], prefix: str, of_world: bool) -> list[tuple[str, Array, str]]:
@@ -263,7 +251,7 @@ def _attitude(columns: dict[str, Array], prefix: str) -> list[tuple[str, Array, 
     w, x, y, z = (columns[f"{prefix}.{axis}"] for axis in "wxyz")
     if not np.nanmax(np.abs(w**2 + x**2 + y**2 + z**2), initial=0.0) > 0.5:
         return []
-    roll, _, yaw = heading_of_quaternion(w, x, y, z)
+    roll, yaw = heading_of_quaternion(w, x, y, z)
     return [("heading", np.asarray((math.pi / 2 - yaw) % (2 * math.pi)), "rad"), ("heel", roll, "rad")]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from tank2sim.apps.logs.candidates import REFUTED, STATED, ChannelSearch, Judgement
 from tank2sim.apps.logs.channels import SURE_FROM, USED_FROM, LogChannel
-from tank2sim.apps.logs.clock import usual_step, utc_text
+from tank2sim.apps.logs.clock import utc_text
 from tank2sim.apps.logs.content import (
     AGREES,
     DIFFERS,
@@ -25,6 +25,7 @@ from tank2sim.apps.logs.quantities import QUANTITIES, names_another, names_thrus
 from tank2sim.apps.logs.reference import LEAST_SPEED_MPS, interpolated
 from tank2sim.apps.logs.streams import LogStream, note
 from tank2sim.arrays import Array
+from tank2sim.records.trials import usual_step
 
 FULL_RUDDER_DEG = 35.0
 """Rudder angle at full order where a log has shares alone: 35 deg on either side (SOLAS II-1, regulation 29.3.1)."""
@@ -48,8 +49,7 @@ _LITTLE, _TURNED_RAD = 0.4, math.pi / 2
 """Size of the sum of two orders over their difference's, and change of heading, rad, below which a vessel goes
 straight although its orders are opposite (project choice)."""
 
-_DOUBTED = 0.85
-"""Largest confidence of a stream with one open question: whether it is measured or ordered, or its unit."""
+_DOUBTED = 0.85  # Largest confidence of a stream with one open question: whether it is measured or ordered, or its unit
 
 _ASTERN_SHARE, _ASTERN_S = 0.15, 8.0
 """Shares of the usual speed and of the usual revolutions, and a time, s, from which a vessel goes astern against them.
@@ -71,8 +71,7 @@ _SHOWN = 0.6
 """Agreement of a rudder with the turn from which its sign and zero are shown. Project choice: waves and currents turn
 a ship too."""
 
-_SERVO_DEG = 90.0
-"""Servos rest at 90 deg of 180, or at 180 of 360."""
+_SERVO_DEG = 90.0  # Servos rest at 90 deg of 180, or at 180 of 360
 
 _STRAIGHT_S, _STRAIGHT_SHARE, _LEAST_STRAIGHT = 10.0, 0.1, 0.02
 """Time before and after for which a straight leg has been one, s, rate of turn there as a share of its 99th percentile,
@@ -330,10 +329,7 @@ def _speed_ahead(search: ChannelSearch) -> Array:
 
 
 def _reversed(search: ChannelSearch, port: LogStream, starboard: LogStream) -> tuple[tuple[int, int], str]:
-    """Signs of two orders by the speed ahead, which follows their sum, and why one is reversed.
-
-    1, 1 without a reason where none is, and with one where it is not known which of the two.
-    """
+    """Signs of two orders by the speed ahead, which follows their sum, and why; 1, 1 also if unknown which."""
     at, ahead = search.motion.time_s, _speed_ahead(search)
     good = np.isfinite(ahead)
     if search.best("heading") is None or good.sum() < FEW_SAMPLES or port.stated_by == "format":
@@ -404,8 +400,7 @@ def _scale_engine_shares(search: ChannelSearch) -> None:
 
 
 def _report_lost_signs(search: ChannelSearch) -> None:
-    """Report revolutions that stay ahead while the vessel goes astern, for many engines count without a sign, and
-    refuse revolutions astern while it goes ahead."""
+    """Report revolutions that stay ahead while the vessel goes astern; refuse the opposite."""
     heading = search.best("heading")
     if heading is None or heading.confidence < SURE_FROM:
         return

@@ -171,12 +171,10 @@ def wrapped_angle(angle_rad: Array) -> Array:
     return np.asarray((angle_rad + math.pi) % (2 * math.pi) - math.pi)
 
 
-def heading_of_quaternion(w: Array, x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
-    """Roll, pitch, yaw (n,), rad, of quaternions ``w + xi + yj + zk``: rotations z, y, x (Diebel 2006, eq. 290)."""
+def heading_of_quaternion(w: Array, x: Array, y: Array, z: Array) -> tuple[Array, Array]:
+    """Roll and yaw (n,), rad, of quaternions ``w + xi + yj + zk``: rotations z, y, x (Diebel 2006, eq. 290)."""
     roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x**2 + y**2))
-    pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1, 1))
-    yaw = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y**2 + z**2))
-    return roll, pitch, yaw
+    return roll, np.arctan2(2 * (w * z + x * y), 1 - 2 * (y**2 + z**2))
 
 
 def joined_parts(logs: Sequence[VesselLog]) -> list[VesselLog]:

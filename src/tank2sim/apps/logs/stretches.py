@@ -16,11 +16,11 @@ from itertools import pairwise
 import numpy as np
 from scipy.ndimage import median_filter
 
-from tank2sim.apps.logs.clock import usual_step
 from tank2sim.apps.logs.content import steering_evidence
 from tank2sim.apps.logs.reference import differenced, held, interpolated
 from tank2sim.apps.logs.voyage import QuantitySeries, Voyage
 from tank2sim.arrays import Array
+from tank2sim.records.trials import usual_step
 
 HELD_RUDDER_RAD = math.radians(4.0)
 """Rudder from which on a vessel is steered to turn. Project choice: course keeping in fair weather stays below, and the
@@ -340,8 +340,8 @@ _OTHER_ORDER = 0.3
 """Relative difference from which two rudders to one side are two orders. Project choice: corrections of a helmsman are
 smaller in the mean, the step from 20 to 35 deg is larger."""
 
+# Least change between samples, over the threshold, of a rudder on its way: a fifth of what gear turns in 0.2 s
 _MOVING = 0.1
-"""Least change between samples, over the threshold, of a rudder on its way: a fifth of what gear turns in 0.2 s."""
 
 _ALIKE = 0.4
 """Relative difference of the orders of a zigzag. Project choice: ITTC's are equal; angles differ by the gear."""

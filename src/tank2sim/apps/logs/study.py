@@ -209,15 +209,9 @@ def _why_no_trial(voyage: Voyage, stretches: Sequence[Stretch]) -> Notice:
 
 
 def _channel(channel: LogChannel) -> ChannelStudy:
-    return ChannelStudy(
-        quantity=channel.quantity,
-        stream=channel.stream,
-        unit=channel.unit if channel.scale == 1 else f"{channel.scale:.4g} {channel.unit}",
-        sign=channel.sign,
-        confidence=channel.confidence,
-        use=channel.use,
-        why=channel.why,
-    )
+    unit = channel.unit if channel.scale == 1 else f"{channel.scale:.4g} {channel.unit}"
+    same = {name: getattr(channel, name) for name in ("quantity", "stream", "sign", "confidence", "use", "why")}
+    return ChannelStudy(unit=unit, **same)
 
 
 def _stretch(voyage: Voyage, stretch: Stretch, file: str | None) -> StretchStudy:

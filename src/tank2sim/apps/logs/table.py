@@ -7,11 +7,12 @@ import itertools
 import re
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
-from tank2sim.apps.logs.clock import DOUBLED_STEPS, TWO_DIGITS_FROM
+from tank2sim.apps.logs.clock import DOUBLED_STEPS, TWO_DIGITS_FROM, over_midnight
 from tank2sim.apps.logs.quantities import CLOCK_WORDS, plain_words, quantity_of_name, unit_of_signal_k
 from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, fault, named_stream, note
 from tank2sim.arrays import Array
@@ -20,18 +21,14 @@ from tank2sim.files import first_bytes
 from tank2sim.records.spelt_units import split_unit
 from tank2sim.records.text_layout import WHITESPACE, TextLayout, decoded_text, text_layout
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 _ZONES_H, _COUNTS = CLOCK_WORDS["zones_h"], CLOCK_WORDS["seconds"]
 _TIME_WORDS, _DATE_WORDS = (re.compile(rf"\b({'|'.join(CLOCK_WORDS[kind])})\b") for kind in ("time", "date"))
 _DATE = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}")
 _LIKE_TIME = re.compile(rf"({_DATE.pattern}[T ,]+)?\d{{1,2}}:\d\d")
+# Least and largest size of an epoch in s, ms, us and ns since 1970 (years 1973 to 2286), and its factor to seconds
 _EPOCHS = ((1e8, 1e10, 1.0), (1e11, 1e13, 1e-3), (1e14, 1e16, 1e-6), (1e17, 1e19, 1e-9))
-"""Least and largest size of an epoch in s, ms, us and ns since 1970 (years 1973 to 2286), and its factor to seconds."""
-
+# Days of the years 2000 to 2040, and the day of 1970-01-01: of spreadsheets since 1899-12-30, of MATLAB (datenum)
 _DAYS = ((36_526.0, 51_544.0, 25_569.0), (730_486.0, 745_504.0, 719_529.0))
-"""Days of the years 2000 to 2040, and the day of 1970-01-01: of spreadsheets since 1899-12-30, of MATLAB (datenum)."""
 
 _LONGEST_IN_DAYS = 31.0
 """Longest log whose times are taken for days. Project choice: seconds of so large a number count from a beginning, and
@@ -120,8 +117,6 @@ def read_table_log(path: Path) -> VesselLog:
 
 def _frame(path: Path, layout: TextLayout, encoding: str) -> tuple[pd.DataFrame, list[LogFinding], int]:
     """Cells of the table, and notes of rows with too many, whose number is the last."""
-    import pandas as pd
-
     try:
         with warnings.catch_warnings(record=True) as warned:
             warnings.simplefilter("always", pd.errors.ParserWarning)
@@ -231,7 +226,7 @@ class _TableClock:
                 of_day = _clock_of_numbers(self.numbers[name])
             if of_day is not None:
                 self._note(name, "has times of day without a date: the trials have no date")
-                return _over_midnight(of_day), False, {name}
+                return over_midnight(of_day), False, {name}
         for name in self.named or leftmost:
             values = self.numbers.get(name, np.zeros(0))
             steps = np.diff(values[np.isfinite(values)])
@@ -256,8 +251,6 @@ class _TableClock:
 
     def _written(self, name: str) -> tuple[Array, list[str]] | None:
         """UTC (rows,) of a column of text, and the columns of dates used; None if it does not show it."""
-        import pandas as pd
-
         column, first, offset = self.columns[name], self.first[name], self._zone_s(name)
         if re.match(r"\d{4}-\d\d-\d\d[T ]\d", first):
             moments = pd.to_datetime(column, format="ISO8601", utc=True, errors="coerce")
@@ -377,8 +370,6 @@ class _TableClock:
 
 def _as_numbers(column: pd.Series[Any]) -> pd.Series[Any]:
     """A column of numbers with another decimal sign than the rest of the table as numbers; any other as it is."""
-    import pandas as pd
-
     if column.dtype.kind in "iufb" or not re.fullmatch(r"\s*-?\d+[.,]\d+\s*", _first_cell(column)):
         return column
     return pd.to_numeric(column.astype(str).str.replace(",", ".", regex=False), errors="coerce")
@@ -417,8 +408,6 @@ def _moments_of_numbers(values: Array) -> Array | None:
 
 def _calendar_days(values: Array) -> Array | None:
     """Seconds (rows,) since 1970 of dates yyyymmdd; None unless all are."""
-    import pandas as pd
-
     known = np.isfinite(values)
     text = pd.Series(values[known]).astype(int).astype(str)
     moments = pd.to_datetime(text, format="%Y%m%d", utc=True, errors="coerce")
@@ -429,24 +418,13 @@ def _calendar_days(values: Array) -> Array | None:
 
 def _clock(column: pd.Series[Any]) -> Array:
     """Seconds (rows,) of times of day; some may end with AM or PM."""
-    import pandas as pd
-
     text = _of_24_hours(column.astype(str).str.strip().str.replace(",", ".", regex=False))
     text = text.where(text.str.count(":") > 1, text + ":00")
     return np.asarray(pd.to_timedelta(text, errors="coerce").dt.total_seconds(), dtype=float)
 
 
-def _over_midnight(clock: Array) -> Array:
-    """Times of day, s, that go on over midnight."""
-    known, out = np.isfinite(clock), np.array(clock)
-    out[known] += 86400 * np.cumsum(np.diff(clock[known], prepend=clock[known][:1]) < -43200)
-    return out
-
-
 def _dates(path: Path, name: str, column: pd.Series[Any]) -> pd.Series[Any]:
     """Dates with numbers for months; points and a year at the end put the day first, as ISO 8601 the year."""
-    import pandas as pd
-
     text = column.astype(str).str.strip().str.replace(",", ".", regex=False)
     parts = text.str.extract(r"^(\d{1,4})[./-](\d{1,2})[./-](\d{2,4})[T ,]*(.*)$")
     first, second = (pd.to_numeric(parts[place], errors="coerce") for place in (0, 1))
@@ -473,8 +451,6 @@ def _dates(path: Path, name: str, column: pd.Series[Any]) -> pd.Series[Any]:
 
 def _of_24_hours(clock: pd.Series[Any]) -> pd.Series[Any]:
     """Times of day; some may end with AM or PM."""
-    import pandas as pd
-
     parts = clock.str.extract(r"^\s*(\d{1,2})(:\S*)\s*([AaPp])\.?\s?[Mm]\.?\s*$")
     hours = pd.to_numeric(parts[0], errors="coerce") % 12 + 12 * parts[2].str.lower().eq("p")
     halved = hours.fillna(0).astype(int).astype(str).str.zfill(2) + parts[1].fillna("")
@@ -482,16 +458,12 @@ def _of_24_hours(clock: pd.Series[Any]) -> pd.Series[Any]:
 
 
 def _seconds(moments: pd.Series[Any], offset_s: float) -> Array:
-    import pandas as pd
-
     values = (moments - pd.Timestamp(0, tz="UTC")) / pd.Timedelta(seconds=1)
     return np.asarray(values.to_numpy(dtype=float) - offset_s)
 
 
 def _numbers(column: pd.Series[Any], comma: bool) -> Array | None:
     """Values (rows,) of a column, nan where it has none; None of a column of words."""
-    import pandas as pd
-
     if pd.api.types.is_numeric_dtype(column):
         values = column.to_numpy(dtype=float)
     else:

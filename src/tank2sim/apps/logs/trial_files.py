@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tank2sim.apps.logs.clock import usual_step, utc_text
+from tank2sim.apps.logs.clock import utc_text
 from tank2sim.apps.logs.quantities import QUANTITIES
 from tank2sim.apps.logs.reference import held, interpolated, thinned_series
 from tank2sim.apps.logs.stretches import LEAST_TRIAL_ROWS, Stretch, StretchKind
@@ -19,13 +19,12 @@ from tank2sim.apps.logs.voyage import QuantitySeries, Voyage, drift_current
 from tank2sim.arrays import Array
 from tank2sim.records.signals.sampling import GAP_STEPS
 from tank2sim.records.signals.writing import trial_text
-from tank2sim.records.trials import MEASURED_COLUMNS, RUDDERS, TRIAL_SIGNALS, Trial
+from tank2sim.records.trials import MEASURED_COLUMNS, RUDDERS, TRIAL_SIGNALS, Trial, usual_step
 
 CUT_BY = "cut by tank2sim"
 """Words in a comment of every trial that is cut from a log."""
 
-_HEAD_LINES = 100
-"""Lines of a file in which the comments of a trial are looked for."""
+_HEAD_LINES = 100  # Lines of a file in which the comments of a trial are looked for
 
 LEAD_S = 5.0
 """Time before the execute with which a trial begins, s. Project choice: long enough to see the approach, too short for
@@ -42,13 +41,13 @@ PREDICTABLE_S = 40.0
 
 _HELD = ("rudder_order", "rpm_order", "thrust_order_port", "thrust_order_starboard")
 
+# Columns of vessels with two thrusters, and their factors: the trial format has none for them
 _THRUSTER_COLUMNS = {
     "rpm_port": ("n_port_rpm", 60 / (2 * math.pi)),
     "rpm_starboard": ("n_starboard_rpm", 60 / (2 * math.pi)),
     "thrust_order_port": ("order_port", 1.0),
     "thrust_order_starboard": ("order_starboard", 1.0),
 }
-"""Columns of vessels with two thrusters, and their factors: the trial format has none for them."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ import numpy as np
 
 from tank2sim.apps.logs.channel_search import find_channels
 from tank2sim.apps.logs.channels import SURE_FROM, ChannelSet
-from tank2sim.apps.logs.clock import gaps_of, tidied, usual_step, utc_text
+from tank2sim.apps.logs.clock import gaps_of, tidied, utc_text
 from tank2sim.apps.logs.content import AGREES
 from tank2sim.apps.logs.quantities import QUANTITIES
 from tank2sim.apps.logs.recorded import pulses_of, without_missing
@@ -22,12 +22,14 @@ from tank2sim.apps.logs.reference import (
     interpolated,
     local_metres,
     rounded_origin,
+    thinned_series,
 )
 from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, fault, joined_parts, note
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice, caution
 from tank2sim.records.signals.sampling import GAP_STEPS
+from tank2sim.records.trials import usual_step
 
 _GAP_LEAST_S = 3.0
 """Gaps shorter than this are not reported, s. Project choice: they are bridged without harm at ship's speeds."""
@@ -136,10 +138,7 @@ def _refuse_odd_times(logs: Sequence[VesselLog], streams: Sequence[LogStream]) -
 def _tidied_streams(
     parts: Sequence[VesselLog], counts: dict[str, dict[str, int]]
 ) -> tuple[list[LogStream], list[LogFinding]]:
-    """Streams of all logs with rising times and values alone; what was left out is counted and found.
-
-    Findings that differ by the name of their stream alone are one.
-    """
+    """Streams of all logs, tidied, and findings (one for all streams alike); what was left out is counted."""
     streams: list[LogStream] = []
     findings = [finding for log in parts for finding in log.findings]
     for log in parts:
@@ -216,10 +215,8 @@ def _clock_findings(names: list[str], found: ChannelSet, streams: list[LogStream
         shift = _shift(rates[names[0]], rates[name]) if names[0] in rates and name in rates else None
         if shift is not None and abs(shift) > _CLOCKS_AGREE_S:
             side = "ahead of" if shift > 0 else "behind"
-            text = (
-                f"the clock of {name} is {abs(shift):.3g} s {side} the clock of {names[0]} by the rate of turn: give "
-            )
-            findings.append(fault(f"{text}its channels delay_s = {shift:.3g}", shift_s=shift))
+            text = f"the clock of {name} is {abs(shift):.3g} s {side} the clock of {names[0]} by the rate of turn"
+            findings.append(fault(f"{text}: give its channels delay_s = {shift:.3g}", shift_s=shift))
     return findings
 
 
@@ -249,8 +246,8 @@ def _not_understood(found: ChannelSet, streams: list[LogStream]) -> list[LogFind
     return [note(text, streams=len(names))] if names else []
 
 
+# Quantities without which no manoeuvre is understood
 _ESSENTIAL = ("rudder_angle", "rudder_order", "heading", "yaw_rate")
-"""Quantities without which no manoeuvre is understood."""
 
 
 def _to_confirm(found: ChannelSet) -> list[LogFinding]:
@@ -378,11 +375,7 @@ def drift_current(voyage: Voyage, begin_s: float, end_s: float) -> DriftCurrent 
         if good.sum() < _FEWEST:
             return None
         time, x, y = time[good], x[good], y[good]
-        bins = np.floor((time - time[0]) / AVERAGED_S).astype(int)
-        counts = np.bincount(bins)
-        full = counts > 0
-        means = [np.bincount(bins, weights=part)[full] / counts[full] for part in (x, y)]
-        spread = math.hypot(float(np.std(means[0])), float(np.std(means[1])))
+        spread = math.hypot(*(float(np.std(thinned_series(time, part, AVERAGED_S)[1])) for part in (x, y)))
         return _current(float(x.mean()), float(y.mean()), spread, "velocities over the ground and through the water")
     difference = north * cosine + east * sine - ahead
     good = np.isfinite(difference)

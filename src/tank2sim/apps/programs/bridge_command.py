@@ -23,7 +23,6 @@ from tank2sim.apps.programs.bridge_command_surge import (
     fitted_surge,
     full_ahead_order,
     speed_against_drag,
-    start_values,
     straight_runs,
     straight_runs_of_card,
 )
@@ -37,7 +36,7 @@ from tank2sim.apps.programs.bridge_command_yaw import (
     moment_astern,
     sailed,
 )
-from tank2sim.apps.programs.program_files import FigureChange, ProgramFiles
+from tank2sim.apps.programs.program_files import FigureChange, ProgramFiles, start_values
 from tank2sim.arrays import Array
 from tank2sim.cards.card import Card, MmgCard, SteeredCard
 from tank2sim.cards.small_craft import cruising_revolutions
@@ -61,8 +60,8 @@ _FREEBOARD, _EYE_AFT, _LEAST_DRAG, _GEAR_DEGPS = 0.04, 0.3, 1e-6, 30.0
 """Freeboard and place of the eye aft of midships over L (project choices); drag across of a card without, above 0,
 which asks for a default; rate of a rudder whose card states none, the default of Bridge Command."""
 
+# Drag of still air on the box in Bridge Command, over area and squared speed (N s2/m4): part of the fitted drag
 _AIR_DRAG = 0.5 * 1.225 * 0.51444**2
-"""Drag of still air on the box in Bridge Command, over area and squared speed (N s2/m4): part of the fitted drag."""
 
 _WEATHER = {CURRENT.name, CURRENT_FIELD.name, WAVES.name, WAVE_DRIFT.name, WIND.name, WIND_FIELD.name}
 _TUNNELS = {BOW_THRUSTER.name: "Bow", STERN_THRUSTER.name: "Stern"}
@@ -266,10 +265,7 @@ revolutions: the whole range (project choice)."""
 
 
 def _of_craft(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[FigureChange], list[str]]:
-    """Numbers that follow the straight runs, spins and turns of a craft best, figures before and after, and losses.
-
-    Raises InputError: Its thrusters are not two fixed ones of a size, one at either side, that push ahead.
-    """
+    """Numbers of a craft with two fixed thrusters by its runs, spins and turns, figures before and after, losses."""
     spacing, thruster, cruise = _spacing(card), card.thrusters[0], cruising_revolutions(card)
     most, least, force = thruster.max_radps, -thruster.lowest_radps, thruster.largest_thrust_N
     astern = max(1e-6, thruster.astern_Ns2 * least**2 / force)  # 0 would mean as much as ahead

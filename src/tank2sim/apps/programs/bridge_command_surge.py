@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tank2sim.apps.programs.program_files import start_values
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.simulation.card_range import single_figures
@@ -21,6 +22,7 @@ from tank2sim.simulation.run import simulate
 from tank2sim.simulation.running import Running
 
 _LEVERS = {"half thrust ahead": 0.5, "quarter thrust ahead": 0.25}
+
 _ASTERN = 0.5
 """Thrust astern over ahead of a card without an engine (project choice)."""
 
@@ -29,11 +31,6 @@ Runs = dict[tuple[str, str], float]
 
 HEADING_ASTERN = ("stop", "heading_change_deg")
 """The figure of a crash stop that the walk of the propeller follows."""
-
-
-def start_values(model: Model) -> dict[str, float]:
-    """Parameters of a model by name."""
-    return dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
 
 
 def full_ahead_order(model: Model) -> float | None:

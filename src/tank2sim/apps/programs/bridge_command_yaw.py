@@ -18,7 +18,8 @@ from itertools import product
 import casadi as ca
 import numpy as np
 
-from tank2sim.apps.programs.bridge_command_surge import SurgeNumbers, full_ahead_order, start_values
+from tank2sim.apps.programs.bridge_command_surge import SurgeNumbers, full_ahead_order
+from tank2sim.apps.programs.program_files import start_values
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.simulation.card_range import single_figures
@@ -32,6 +33,7 @@ COURSE_FIGURES = {"advance_m": 1.0, "tactical_diameter_m": 1.0, "overshoot_1_deg
 """Figures of turns and zigzags, and their weights in the fit: paths come first (project choice)."""
 
 _TURNS_DEG, _ZIGZAGS_DEG, _HALF_TURN_DEG = (10.0, 20.0, LARGEST_RUDDER_DEG), (10.0, 20.0), 20.0
+
 _SHARE, _SHARE_WEIGHT, _ASTERN_RUDDER = 0.5, 0.2, 0.2
 """Share of the rudder's moment that a stopped engine leaves, of a card without an engine; weight of that share in the
 fit; RudderBAstern over RudderB, in the stream of a propeller that turns astern (project choices)."""

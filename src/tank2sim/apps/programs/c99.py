@@ -19,8 +19,8 @@ from tank2sim.native.compiler import find_compiler
 from tank2sim.native.library import cached_library
 from tank2sim.simulation.integrator import Integrator
 
+# Half a unit in the last place of an angle of 2 to 4 rad, on the radius of the earth
 _GEODETIC = "position.latitude and position.longitude in float are rounded to 0.8 m: take motion.x and motion.y"
-"""Half a unit in the last place of an angle of 2 to 4 rad, on the radius of the earth."""
 
 
 def c99_files(card: Card) -> ProgramFiles:

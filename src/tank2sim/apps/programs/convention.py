@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tank2sim.api.verbs import Output, verb
-from tank2sim.errors import InputError
 from tank2sim.files import CARD
 
 if TYPE_CHECKING:
     from tank2sim.apps.programs.convention_result import ConventionResult
-    from tank2sim.apps.programs.readings import RankedReading
-    from tank2sim.cards.coefficient_table import CoefficientTable
-
-_SIMULATED = 1e-3
-"""Probability from which a reading is simulated: others cannot become the first (project choice)."""
 
 
 @verb(
@@ -53,30 +46,12 @@ def convention(coefficients: str | Path) -> ConventionResult:
     'total'
     """
     from tank2sim.apps.programs.convention_result import ConventionResult, ConventionStudy, ReadingFound
-    from tank2sim.apps.programs.readings import (
-        possible_readings,
-        read_card_text,
-        scaled_with_nominal_speed,
-        weigh,
-        with_diameter,
-        with_probabilities,
-    )
+    from tank2sim.apps.programs.readings import ranked_readings, read_card_text, scaled_with_nominal_speed
     from tank2sim.cards.coefficient_table import read_coefficients
     from tank2sim.cards.reading import parse_card
 
     read = read_coefficients(coefficients)
-    weighed = with_probabilities([weigh(read, reading) for reading in possible_readings(read)])
-    if not math.isfinite(weighed[0].weight):
-        raise InputError(read.source, "", "no reading of it is a ship", "check its sizes and units")
-    moves = _moves(read)
-    figures = {entry.reading: _figures(read, entry) for entry in weighed if entry.probability > _SIMULATED and moves}
-    ranked = [
-        with_diameter(entry, figures[entry.reading].get("tactical_diameter_lengths"))
-        if entry.reading in figures
-        else entry
-        for entry in weighed
-    ]
-    ordered = with_probabilities(ranked)
+    ordered, figures = ranked_readings(read)
     unknown: dict[str, float | None] = dict.fromkeys(
         ("advance_lengths", "tactical_diameter_lengths", "overshoot_1_deg")
     )
@@ -101,36 +76,3 @@ def convention(coefficients: str | Path) -> ConventionResult:
         speed_scale=read.speed_scale,
     )
     return ConventionResult(study, parse_card(read_card_text(read, ordered[0]), read.source))
-
-
-def _moves(table: CoefficientTable) -> bool:
-    """True if it has what a turn takes: surge that holds a speed, the rudder, terms beyond the linear."""
-    from tank2sim.apps.programs.readings import possible_readings, read_as
-
-    ship = read_as(table, possible_readings(table)[0])
-    return {"Xu", "Nd"} <= {name for name, value in ship.derivatives.items() if value}
-
-
-def _figures(table: CoefficientTable, entry: RankedReading) -> dict[str, float | None]:
-    """Figures of a turn and a zigzag of the ship by a reading; empty if it does not sail."""
-    from tank2sim.apps.programs.readings import read_card_text
-    from tank2sim.cards import ManoeuvringCard
-    from tank2sim.cards.reading import parse_card
-    from tank2sim.dynamics import build
-    from tank2sim.simulation.card_range import single_figures
-    from tank2sim.simulation.manoeuvres import Turn, Zigzag
-    from tank2sim.simulation.run import simulate
-
-    try:
-        card = parse_card(read_card_text(table, entry), table.source)
-        assert isinstance(card, ManoeuvringCard)
-        model = build(card)
-        turn = single_figures(simulate(model, Turn(math.radians(35))).figures)
-        zigzag = single_figures(simulate(model, Zigzag(math.radians(10), math.radians(10))).figures)
-    except InputError:  # no mass matrix, or a motion without bounds: not a ship
-        return {}
-    lengths = {
-        f"{name}_lengths": turn[f"{name}_m"] / table.length_m if turn.get(f"{name}_m", 0.0) > 0 else None
-        for name in ("advance", "tactical_diameter")
-    }
-    return {**lengths, "overshoot_1_deg": zigzag.get("overshoot_1_deg")}

@@ -18,6 +18,7 @@ SURE_READING = 0.9
 how often a first reading with it is the true one."""
 
 _SHOWN, _LEAST_SHOWN, _MOST_SHOWN = 1e-3, 4, 8
+
 _ALIKE = 0.05
 """Relative difference of figures up to which two readings are one ship in practice (project choice)."""
 

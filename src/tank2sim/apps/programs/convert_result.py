@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
-from tank2sim.answer.parts import Cell, Section, table
+from tank2sim.answer.parts import Section, records_table
 from tank2sim.answer.result import Result
 from tank2sim.apps.programs.forms import FORMS
 from tank2sim.apps.programs.program_code import program_name
@@ -166,8 +166,6 @@ class ConversionResult(Result[ConversionStudy]):
         """Figures of standard manoeuvres before and after."""
         if not self.study.figures:
             return []
-        rows: list[list[Cell]] = [
-            [one.manoeuvre, one.figure, one.before, one.after, one.error_percent] for one in self.study.figures
-        ]
-        heads = ("manoeuvre", "figure", "card", self.study.to, "error (%)")
-        return [Section("Standard manoeuvres", tables=[table("Standard manoeuvres", heads, rows)])]
+        fields = {"manoeuvre": "", "figure": "", "before": "card", "after": self.study.to, "error_percent": ""}
+        name = "Standard manoeuvres"
+        return [Section(name, tables=[records_table(name, self.study.figures, fields=fields)])]

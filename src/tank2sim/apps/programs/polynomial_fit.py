@@ -21,7 +21,7 @@ import numpy as np
 import tomlkit
 
 from tank2sim.apps.programs.conventions import roll_in_file
-from tank2sim.apps.programs.program_files import PolynomialFit, standard_manoeuvres
+from tank2sim.apps.programs.program_files import PolynomialFit, standard_manoeuvres, start_values
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard, MmgCard
 from tank2sim.cards.covariance import Covariance, not_referring
@@ -70,7 +70,7 @@ def scattered_motions(
 
     `motions` (n, 4): u, v, r, rudder, SI; `scatter`: Over :data:`SPREADS`; `samples`: Number of motions to return.
     """
-    values = {parameter.name: parameter.start for parameter in model.parameters}
+    values = start_values(model)
     u0, length = values["ship.speed"], values["ship.length"]
     largest = values.get("steering.max_angle", math.pi / 2)
     generator = np.random.default_rng(_SEED)
@@ -151,8 +151,7 @@ def _of_heeling(name: str) -> bool:
 def _powers(name: str, primes: tuple[Array, Array, Array, Array]) -> Array:
     term = known_term(name)
     v, r, d, du = primes
-    powers: Array = v**term.v * r**term.r * d**term.d * du**term.u
-    return powers
+    return np.asarray(v**term.v * r**term.r * d**term.d * du**term.u)
 
 
 def _hydrodynamic_primes(

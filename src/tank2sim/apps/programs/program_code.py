@@ -21,8 +21,8 @@ from tank2sim.escaping import one_line, python_text
 from tank2sim.native.operations import COMPARISONS, FUNCTIONS, OPERATORS, instructions
 
 _RENAMED = {"fabs": "abs", "fmin": "min", "fmax": "max", "fmod": "rem"}
+# Operations of CasADi to functions of MATLAB; Python's are the same or in _PYTHON
 _CALLED = {op: _RENAMED.get(word, word) for op, word in FUNCTIONS.items()} | {ca.OP_SIGN: "sign"}
-"""Operations of CasADi to functions of MATLAB; Python's are the same or in :data:`_PYTHON`."""
 
 _PYTHON = {word: f"math.{word}" for word in _CALLED.values() if word not in ("abs", "min", "max")}
 _PYTHON |= {"rem": "math.fmod", "sign": "_sign", "~=": "!="}
@@ -184,8 +184,7 @@ _PVS_CLASS = '''class {name}:
 '''
 
 
-_OF_PVS = ("math", "np", "P", "UI", "X0", "rates_of")
-"""Names of the module in which the class is."""
+_OF_PVS = ("math", "np", "P", "UI", "X0", "rates_of")  # Names of the module in which the class is
 
 
 def pvs_class(card: ManoeuvringCard, model: Model) -> str:

@@ -32,12 +32,18 @@ from scipy.stats import t as student
 
 from tank2sim.apps.guess.prior import rudder_by_rules
 from tank2sim.apps.programs.conventions import shift_matrix, shifted_body
-from tank2sim.cards.card import scales_of_file
+from tank2sim.cards.card import ManoeuvringCard, scales_of_file
 from tank2sim.cards.coefficient_table import STATED_CONVENTIONS, CoefficientTable
 from tank2sim.cards.estimates import Particulars, estimate
 from tank2sim.cards.form import RigidBody, ShipModel, ShipSection
+from tank2sim.cards.reading import parse_card
 from tank2sim.cards.scaling import FileScales, file_factor
 from tank2sim.cards.terms import known_term
+from tank2sim.dynamics.build import build
+from tank2sim.errors import InputError
+from tank2sim.simulation.card_range import single_figures
+from tank2sim.simulation.manoeuvres import Turn, Zigzag
+from tank2sim.simulation.run import simulate
 
 PRIOR: Mapping[str, Mapping[str, float]] = {
     "rudder_sign": {"starboard": 0.5, "port": 0.5},
@@ -48,6 +54,7 @@ PRIOR: Mapping[str, Mapping[str, float]] = {
 """How often tables are printed so, before a number is looked at. Project choices."""
 
 _TAIL = 4.0
+
 _MASS_ERROR = 0.05
 """Relative difference of a printed mass from the displacement: rounded dimensions. Project choice."""
 _ASSUMED_ERRORS, _ASSUMED_MASS_ERROR = 2.0, 0.3
@@ -71,6 +78,7 @@ _VANISHES = 2e-3
 _CHANCE = 0.02
 """Probability that a wrong reading makes a given term vanish so. Project choice: some parts are alike by nature."""
 _MOST_VANISHED = 3
+
 _FAR = 2.5
 """Standard deviations from which a tactical diameter speaks against a reading. Project choice."""
 _RUDDER_ERROR, _LEVER, _LEVER_ERROR = 0.6, 0.45, 0.1
@@ -130,8 +138,9 @@ def possible_readings(table: CoefficientTable) -> list[Reading]:
     return [Reading(*values) for values in itertools.product(*choices.values())]
 
 
+# Coefficients of Du', Du'^2 over the term's own, of a force that goes with u v, u r, u^2 delta, scaled with u0
 _SIGNATURE = {"v": (1.0,), "r": (1.0,), "d": (2.0, 1.0)}
-"""Coefficients of Du', Du'^2 over the term's own, of a force that goes with u v, u r, u^2 delta, scaled with u0."""
+
 _LEAST_SIGNATURE = 3
 """Shares from which the scale is judged. Project choice: one or two may agree by chance."""
 _SAME_SHARE = 0.02
@@ -230,9 +239,8 @@ def _centre_of_gravity(table: CoefficientTable, scales: FileScales | None) -> fl
 
 def _body(table: CoefficientTable, scales: FileScales | None, centre: float, about_centre: bool) -> RigidBody:
     """Mass, inertia and x_G about the table's origin; what is not printed by displacement and 0.25 L."""
-    expected = table.displacement_kg / (0.5 * table.environment.water_density_kgpm3 * table.length_m**3)
     of_mass, of_inertia = (scales.mass, scales.inertia) if scales else (1.0, 1.0)
-    mass = table.body["mass"] / of_mass if table.body.get("mass", 0.0) > 0 else expected
+    mass = table.body["mass"] / of_mass if table.body.get("mass", 0.0) > 0 else _mass(table)
     x_G = 0.0 if about_centre else centre
     inertia = table.body.get("yaw_inertia", 0.0) / of_inertia
     return RigidBody(mass=mass, yaw_inertia=inertia if inertia > 0 else mass * (0.25**2 + x_G**2), x_G=x_G)
@@ -429,3 +437,47 @@ def read_card_text(table: CoefficientTable, ranked: RankedReading) -> str:
         "derivatives": derivatives,
     }
     return tomlkit.dumps(document)
+
+
+_SIMULATED = 1e-3
+"""Probability from which a reading is simulated: others cannot become the first (project choice)."""
+
+
+def ranked_readings(
+    table: CoefficientTable,
+) -> tuple[list[RankedReading], dict[Reading, dict[str, float | None]]]:
+    """Every reading of a table, the most probable first, and figures of manoeuvres of those that were simulated.
+
+    Raises InputError: No reading of it is a ship.
+    """
+    weighed = with_probabilities([weigh(table, reading) for reading in possible_readings(table)])
+    if not math.isfinite(weighed[0].weight):
+        raise InputError(table.source, "", "no reading of it is a ship", "check its sizes and units")
+    # What a turn takes: surge that holds a speed, the rudder
+    ship = read_as(table, possible_readings(table)[0])
+    moves = {"Xu", "Nd"} <= {name for name, value in ship.derivatives.items() if value}
+    figures = {entry.reading: _figures(table, entry) for entry in weighed if entry.probability > _SIMULATED and moves}
+    ranked = [
+        with_diameter(entry, figures[entry.reading].get("tactical_diameter_lengths"))
+        if entry.reading in figures
+        else entry
+        for entry in weighed
+    ]
+    return with_probabilities(ranked), figures
+
+
+def _figures(table: CoefficientTable, entry: RankedReading) -> dict[str, float | None]:
+    """Figures of a turn and a zigzag of the ship by a reading; empty if it does not sail."""
+    try:
+        card = parse_card(read_card_text(table, entry), table.source)
+        assert isinstance(card, ManoeuvringCard)
+        model = build(card)
+        turn = single_figures(simulate(model, Turn(math.radians(35))).figures)
+        zigzag = single_figures(simulate(model, Zigzag(math.radians(10), math.radians(10))).figures)
+    except InputError:  # no mass matrix, or a motion without bounds: not a ship
+        return {}
+    lengths = {
+        f"{name}_lengths": turn[f"{name}_m"] / table.length_m if turn.get(f"{name}_m", 0.0) > 0 else None
+        for name in ("advance", "tactical_diameter")
+    }
+    return {**lengths, "overshoot_1_deg": zigzag.get("overshoot_1_deg")}

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
-from tank2sim.apps.programs.program_files import ProgramFiles, figure_changes
+from tank2sim.apps.programs.program_files import ProgramFiles, figure_changes, start_values
 from tank2sim.apps.programs.xdyn_body import XdynBody, read_back, values_at, written_body
 from tank2sim.arrays import Array
 from tank2sim.cards import Card, SteeredBy, SteeredCard
@@ -28,17 +28,14 @@ from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, StraightRun
 from tank2sim.simulation.trajectory import Trajectory
 
 _TURN_RAD, _ZIGZAG_RAD = math.radians(35.0), math.radians(20.0)
+
 _DIFFERENCE = 0.3
 """Difference of a craft's turn over its cruising revolutions, a wide turn of any craft (project choice)."""
 
-_VISCOSITY = 1.19e-6
-"""Kinematic viscosity of sea water at 15 degrees, m2/s: xdyn asks for it and does not use it here."""
-
+_VISCOSITY = 1.19e-6  # Kinematic viscosity of sea water at 15 degrees, m2/s: xdyn asks for it and does not use it here
+# Unit of a command to its unit in the file and the factor to that; any other is SI, and 1 for xdyn
 _UNITS = {"rad": ("deg", math.degrees(1.0)), "rad/s": ("rpm", 30 / math.pi)}
-"""Unit of a command to its unit in the file and the factor to that; any other is SI, and 1 for xdyn."""
-
-_ON_LINE = 1e-9
-"""Distance from a straight line (SI) below which a row of a table is left out."""
+_ON_LINE = 1e-9  # Distance from a straight line (SI) below which a row of a table is left out
 
 
 def xdyn_files(card: Card) -> ProgramFiles:
@@ -73,7 +70,7 @@ def _runs(card: SteeredCard, model: Model) -> dict[str, Trajectory]:
             return {"turn": simulate(model, DifferenceTurn(_DIFFERENCE * n)).trajectory}
         except InputError:  # no thrusters on both sides
             return {"straight": simulate(model, StraightRun(n)).trajectory}
-    largest = {parameter.name: parameter.start for parameter in model.parameters}.get("steering.max_angle", _TURN_RAD)
+    largest = start_values(model).get("steering.max_angle", _TURN_RAD)
     turn, zigzag = Turn(min(_TURN_RAD, largest)), Zigzag(min(_ZIGZAG_RAD, largest), _ZIGZAG_RAD)
     return {"turn": simulate(model, turn).trajectory, "zigzag": simulate(model, zigzag).trajectory}
 

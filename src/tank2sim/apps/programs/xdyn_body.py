@@ -24,6 +24,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from tank2sim.apps.programs.program_files import start_values
 from tank2sim.apps.programs.xdyn_expressions import XDYN_STATES, Definitions, read_expressions
 from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard, SteeredCard
@@ -98,15 +99,12 @@ def rolled_rates(model: Model, forces: ca.SX, rigid: Array, total: Array) -> dic
     return found
 
 
+# First parts of the names of inputs that are orders; all others are constants of the file
 _ORDERS = ("rudder.", "propeller.", "thrusters.")
-"""First parts of the names of inputs that are orders; all others are constants of the file."""
 
 
-_PLANAR = np.ix_([0, 1, 5], [0, 1, 5])
-"""Surge, sway and yaw among u v w p q r."""
-
-_ROLL_RADIUS = 0.05
-"""Radius of roll over L where it is blocked: xdyn asks for an inertia and does not use it."""
+_PLANAR = np.ix_([0, 1, 5], [0, 1, 5])  # Surge, sway and yaw among u v w p q r
+_ROLL_RADIUS = 0.05  # Radius of roll over L where it is blocked: xdyn asks for an inertia and does not use it
 
 
 @dataclass(frozen=True)
@@ -134,7 +132,7 @@ def values_at(model: Model, names: Sequence[str], run: Trajectory) -> Array:
 
 def written_body(card: SteeredCard, model: Model, run: Trajectory) -> XdynBody:
     """The equations of a model, checked at the rows of a run."""
-    values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    values = start_values(model)
     rigid, stated = _masses(model, values, run)
     total = (stated + stated.T) / 2
     states: dict[str, ca.SX] = {}

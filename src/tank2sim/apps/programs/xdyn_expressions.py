@@ -19,16 +19,16 @@ import casadi as ca
 from tank2sim.native.operations import FUNCTIONS, instructions
 
 _ADD, _MUL, _POW, _ATOM = range(4)
+
 _INLINE = 3
 """Operations up to which a term used twice is repeated and not named (project choice: v' r'^2 stays readable)."""
 
-_TINY = "1e-200"
-"""Added to denominators against division by zero; beyond 1e-184 it changes no digit."""
+_TINY = "1e-200"  # Added to denominators against division by zero; beyond 1e-184 it changes no digit
 
 _WORD = re.compile(r"[A-Za-z]\w*")
 
+# An angle by the tangent of its 16th part: at a quarter turn the rest is 1e-13
 _SERIES = "16*({0} - {0}^3/3 + {0}^5/5 - {0}^7/7 + {0}^9/9 - {0}^11/11)"
-"""An angle by the tangent of its 16th part: at a quarter turn the rest is 1e-13."""
 
 RESERVED = frozenset("X Y Z K M N t g nu rho model name commands cos sin exp abs log sqrt".split())
 """Names that xdyn has a meaning for."""
@@ -120,8 +120,7 @@ _BINARY: Mapping[int, Callable[[XdynTerm, XdynTerm], XdynTerm]] = {
     ca.OP_CONSTPOW: _power,
     ca.OP_AND: _product,
 }
-_TRUTHS = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP_OR)
-"""Operations whose value is 0 or 1."""
+_TRUTHS = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP_OR)  # Operations whose value is 0 or 1
 
 
 @dataclass

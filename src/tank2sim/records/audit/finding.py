@@ -113,11 +113,7 @@ def noted_in(
 def changed(names: Iterable[str], change: Callable[[Array], Array], notice: str) -> Repair:
     """The repair that changes the values (n,) of signals."""
     names = tuple(names)
-
-    def repaired(trial: Trial) -> Trial:
-        return with_signals(trial, {name: change(trial.signals[name]) for name in names}, notice)
-
-    return repaired
+    return lambda trial: with_signals(trial, {name: change(trial.signals[name]) for name in names}, notice)
 
 
 def negated(values: Array) -> Array:

@@ -14,9 +14,8 @@ WINDOW, DEGREE = 7, 3
 """Samples and degree of the Savitzky-Golay filter: a cubic through seven samples follows a ship at any usual rate, and
 leaves enough of the noise (0.67 of its variance) to measure it. Project choice."""
 _POWERS = np.vander(np.arange(WINDOW) - WINDOW // 2, DEGREE + 1).astype(float)
+# From a window's samples to its polynomial's values, (window, window); SciPy also fits the ends: six times as slow
 _SMOOTHED: Array = _POWERS @ np.linalg.pinv(_POWERS)
-"""The filter: from the samples of a window to the values of the polynomial through them, (window, window). SciPy's fits
-a polynomial to the ends of each record, and takes six times as long."""
 _MAD = 1.4826  # of the median absolute deviation to the standard deviation of normal noise
 
 

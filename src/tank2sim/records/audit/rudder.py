@@ -12,7 +12,7 @@ from scipy.integrate import cumulative_trapezoid
 from tank2sim.arrays import Array
 from tank2sim.records.audit.finding import Finding, changed, found_in, negated, noted_in
 from tank2sim.records.audit.noise import record_noise
-from tank2sim.records.audit.weak import FEWEST_WINDOWS, fit, on_uniform_time, windows_for, windows_of
+from tank2sim.records.audit.weak import FEWEST_WINDOWS, fit, known_rms, on_uniform_time, windows_for, windows_of
 from tank2sim.records.trials import RUDDERS, Trial
 
 SIDEWAYS = np.pi / 2
@@ -97,7 +97,7 @@ def rudder_response(trial: Trial, name: str | None = None) -> float:
     assert yaw is not None
     noise = record_noise(trial)
     if "r_radps" in signals:
-        windows = windows_for(noise["r_radps"], _rms(yaw) / 10, step, len(yaw))
+        windows = windows_for(noise["r_radps"], known_rms(yaw) / 10, step, len(yaw))
         r, change = windows.mean(yaw), windows.rate(yaw)
     else:
         windows = windows_of(yaw, noise["psi_rad"], step)
@@ -105,7 +105,7 @@ def rudder_response(trial: Trial, name: str | None = None) -> float:
     mean = windows.mean(rudder)
     steady = _steady_turn(r, mean)
     found = fit(change, [r, mean, np.ones(len(r))])
-    if found is not None and found.differs(1) and not (steady and np.nanstd(mean) < MOVES * _rms(mean)):
+    if found is not None and found.differs(1) and not (steady and np.nanstd(mean) < MOVES * known_rms(mean)):
         return float(found.values[1] / found.errors[1])
     return steady
 
@@ -113,15 +113,10 @@ def rudder_response(trial: Trial, name: str | None = None) -> float:
 def _steady_turn(rate: Array, rudder: Array) -> float:
     whole = np.isfinite(rate) & np.isfinite(rudder)
     rate, rudder = rate[whole], rudder[whole]
-    if rate.size < FEWEST_WINDOWS or _rms(rudder) < FAR_OVER:
+    if rate.size < FEWEST_WINDOWS or known_rms(rudder) < FAR_OVER:
         return 0.0
-    likeness = float(np.sum(rate * rudder) / max(_rms(rate) * _rms(rudder) * rate.size, 1e-300))
+    likeness = float(np.sum(rate * rudder) / max(known_rms(rate) * known_rms(rudder) * rate.size, 1e-300))
     return float(np.sign(likeness)) if abs(likeness) > _STEADY else 0.0
-
-
-def _rms(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(np.square(known)))) if known.size else 0.0
 
 
 def _wrong_sign(trial: Trial, name: str, response: float) -> Finding:
@@ -276,5 +271,4 @@ def _squares(move: _Move, rudder: Array, rate: Array, step: float, shifts: NDArr
     # Without the directions that rounding alone makes: where the rudder has not moved yet, its columns are empty.
     independent = weights > np.finfo(float).eps * max(table.shape[1:]) * weights[:, :1]
     explained = directions @ (np.where(independent, wanted @ directions, 0.0)[..., None])
-    squares: Array = np.sum((wanted - explained[..., 0]) ** 2, axis=1)
-    return squares
+    return np.asarray(np.sum((wanted - explained[..., 0]) ** 2, axis=1))

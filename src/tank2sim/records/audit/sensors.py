@@ -12,7 +12,7 @@ from scipy.signal import savgol_coeffs
 from scipy.stats import norm
 
 from tank2sim.arrays import Array
-from tank2sim.records.audit.finding import Finding, Repair, SeenPlaces, found_in, noted_in
+from tank2sim.records.audit.finding import Finding, Repair, SeenPlaces, changed, found_in, noted_in
 from tank2sim.records.audit.noise import DEGREE, WINDOW, record_noise, white_noise
 from tank2sim.records.audit.weak import FALSE_ALARM
 from tank2sim.records.trials import MEASURED_COLUMNS, Trial, sampling_step, with_signals
@@ -28,8 +28,9 @@ PULSE = np.deg2rad(5.0)
 """Least spike of a rudder angle, whose noise is often none; a steering gear does not go and come back in three rows.
 Project choice."""
 
+# Share of a signal below which its noise is rounding of the arithmetic: the signal was calculated, not measured
 _ROUNDING = 1e-9
-"""Share of a signal below which its noise is rounding of the arithmetic: the signal was calculated, not measured."""
+
 _SHORT = 0.05
 """Share of a record up to which failed readings of one sensor are noted rather than called its fault: they are left
 out, and nothing is lost. Project choice."""
@@ -75,12 +76,7 @@ def _runs(true: NDArray[np.bool_]) -> list[slice]:
 
 
 def _stuck(trial: Trial, name: str, values: Array) -> list[Finding]:
-    """Runs of one value that chance does not explain.
-
-    With p the share of neighbours alike outside the longest run, a run of k repeats begins somewhere among n values
-    by chance with probability n p^k at most. That holds for a signal whose steps are noise; a smooth one, or one of a
-    coarse sensor, may rest, and counts only if it is three of its larger steps away when the run ends.
-    """
+    """Runs of one value that chance (n p^k, p the share of others alike) or a smooth rest does not explain."""
     alike = np.append(np.diff(values) == 0, False)
     runs = _runs(alike)
     if not runs:
@@ -128,12 +124,9 @@ def _frozen(trial: Trial, name: str, noise: dict[str, float]) -> list[Finding]:
     measured = [noise[other] > _ROUNDING * float(np.nanmax(np.abs(trial.signals[other]))) for other in others]
     if not any(measured):
         return []
-    truth = "the sensor was not read"
-
-    def without(other: Trial) -> Trial:
-        return with_signals(other, {name: None}, f"{name} left out: {truth}")
-
-    return [found_in(trial, [name], "has one value from beginning to end", truth, repair=without)]
+    what, truth = "has one value from beginning to end", "the sensor was not read"
+    notice = f"{name} left out: {truth}"
+    return [found_in(trial, [name], what, truth, repair=lambda other: with_signals(other, {name: None}, notice))]
 
 
 def _spikes(trial: Trial, name: str, values: Array, noise: float, least: float = 0.0) -> list[Finding]:
@@ -186,9 +179,7 @@ def _of_readings(trial: Trial, found: Finding, rows: int, runs: Sequence[slice])
 
 
 def _omitted(name: str, rows: NDArray[np.int64], why: str) -> Repair:
-    def omit(trial: Trial) -> Trial:
-        values = trial.signals[name].copy()
-        values[rows] = np.nan
-        return with_signals(trial, {name: values}, f"{name}: {len(rows)} values left out, {why}")
+    def without(values: Array) -> Array:
+        return np.where(np.isin(np.arange(len(values)), rows), np.nan, values)
 
-    return omit
+    return changed([name], without, f"{name}: {len(rows)} values left out, {why}")

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from tank2sim.arrays import Array
-from tank2sim.notices import Notice
 from tank2sim.records.audit.finding import Finding, Repair, found_in, noted_in
-from tank2sim.records.trials import Trial, sampling_step, select_rows
+from tank2sim.records.trials import Trial, sampling_step, select_rows, with_signals
 
 GAP = 1.5
 """Steps between rows from which samples are missing: half-way to the first lost one."""
@@ -24,8 +23,7 @@ as far away. Project choice; it also bounds the memory that later checks take.""
 _FEW = 0.05
 """Share of rows with stray times up to which they are left out. Project choice, as for the readings of a sensor."""
 
-_UNITS = {60.0: "minutes", 3600.0: "hours", 1e-3: "milliseconds"}
-"""Seconds in a unit of time, to its name."""
+_UNITS = {60.0: "minutes", 3600.0: "hours", 1e-3: "milliseconds"}  # Seconds in a unit of time, to its name
 
 AGREEMENT = 0.03
 """How near both factors must come: 60 lies 4.7 % from the 57.3 of degrees that are radians."""
@@ -35,8 +33,8 @@ MISCALIBRATED = 0.15
 choice: three times the 5 % that IMO A.526(13) allows a rate-of-turn indicator, far above the 2 % that MSC.96(72)
 allows a speed log."""
 
+# The way is measured between this many points of a track, so that noise of the positions does not lengthen it
 _POINTS = 50
-"""The way is measured between this many points of a track, so that noise of the positions does not lengthen it."""
 
 
 def time_findings(trial: Trial) -> list[Finding]:
@@ -65,11 +63,12 @@ def _stray(trial: Trial) -> Finding | None:
 
 def _of_rows(rows: NDArray[np.int64], truth: str) -> Repair:
     """The repair that takes some rows, in this order."""
+    return _noticed(lambda trial: select_rows(trial, rows), f"time: {truth}")
 
-    def repair(trial: Trial) -> Trial:
-        return replace(select_rows(trial, rows), notices=(*trial.notices, Notice(f"time: {truth}")))
 
-    return repair
+def _noticed(change: Repair, notice: str) -> Repair:
+    """A change of a trial, and the notice of it."""
+    return lambda trial: with_signals(change(trial), {}, notice)
 
 
 def _of_steps(trial: Trial) -> list[Finding]:
@@ -140,10 +139,7 @@ def _uniform(trial: Trial, what: str, evidence: dict[str, float]) -> Finding:
     count = np.arange(len(trial.time_s))
     step = float(np.polyfit(count, trial.time_s, 1)[0])
     truth = f"times are rounded: the step is uniform, {step:.5g} s"
-
-    def repair(other: Trial) -> Trial:
-        return replace(other, time_s=other.time_s[0] + step * count, notices=(*other.notices, Notice(f"time: {truth}")))
-
+    repair = _noticed(lambda other: replace(other, time_s=other.time_s[0] + step * count), f"time: {truth}")
     return found_in(trial, ["t_s"], what, truth, {**evidence, "step_s": step}, repair)
 
 
@@ -158,14 +154,13 @@ def time_unit_findings(trial: Trial) -> list[Finding]:
         return []
     what = f"heading and track change {abs(turned):.4g} and {gone:.4g} times as fast as r and the velocities say"
     evidence = {"factor_heading": abs(turned), "factor_track": gone}
-    for factor, name in _UNITS.items():
-        if abs(gone / factor - 1) < AGREEMENT:
-            notice = Notice(f"time was in {name} and is in seconds now")
-
-            def repair(other: Trial, factor: float = factor, notice: Notice = notice) -> Trial:
-                return replace(other, time_s=factor * other.time_s, notices=(*other.notices, notice))
-
-            return [found_in(trial, ["t_s"], what, f"time is in {name}", evidence, repair)]
+    unit = next((factor for factor in _UNITS if abs(gone / factor - 1) < AGREEMENT), None)
+    if unit is not None:
+        in_seconds = _noticed(
+            lambda other: replace(other, time_s=unit * other.time_s),
+            f"time was in {_UNITS[unit]} and is in seconds now",
+        )
+        return [found_in(trial, ["t_s"], what, f"time is in {_UNITS[unit]}", evidence, in_seconds)]
     if max(gone, 1 / gone) < 1 + MISCALIBRATED:
         return []
     truth = f"a second of the file is {gone:.3g} s: its clock or its sampling rate is another"
@@ -206,5 +201,4 @@ def _integral(time: Array, values: Array) -> Array | None:
     known = np.isfinite(values)
     if np.count_nonzero(known) < 2:
         return None
-    integral: Array = cumulative_trapezoid(np.interp(time, time[known], values[known]), time, initial=0.0)
-    return integral
+    return np.asarray(cumulative_trapezoid(np.interp(time, time[known], values[known]), time, initial=0.0))

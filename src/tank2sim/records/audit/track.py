@@ -294,8 +294,8 @@ def _offset(trial: Trial, found: WeakFit) -> Finding:
 
 _NO_UNIT = "no unit has this factor: velocities, positions or the clock are not what their names say"
 FOOT_M = 0.3048
+# Factor between speed over ground and speed as given, to the unit of the velocities that it indicates
 _UNITS = {KNOT_MPS: "knots", 1 / 3.6: "km/h", FOOT_M: "ft/s"}
-"""Factor between speed over ground and speed as given, to the unit of the velocities that it indicates."""
 LENGTHS = {1e-3: "kilometres", 1 / FOOT_M: "feet", 1 / 1852: "nautical miles"}
 """The same, to the unit of the positions."""
 CERTAIN = 0.02

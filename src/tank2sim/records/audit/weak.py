@@ -83,8 +83,7 @@ class AuditWindows:
         if missing.any():
             holes = oaconvolve(missing.astype(float), np.ones(self.samples), mode="valid") > 0.5
             inside = np.where(holes, np.nan, inside)
-        picked: NDArray[AuditNumber] = inside[:: self.hop or (self.samples + 1) // 2]
-        return picked
+        return np.asarray(inside[:: self.hop or (self.samples + 1) // 2])
 
     def _kernel(self, order: int) -> Array:
         width = self.width_s
@@ -96,8 +95,7 @@ class AuditWindows:
             turn * (2 * np.sin(phase) - np.sin(2 * phase)),
             turn**2 * (2 * np.cos(phase) - 2 * np.cos(2 * phase)),
         )
-        kernel: Array = shapes[order] / (1.5 * width) * self.step_s
-        return kernel
+        return np.asarray(shapes[order] / (1.5 * width) * self.step_s)
 
 
 def windows_for(noise: float, motion: float, step_s: float, count: int) -> AuditWindows:
@@ -121,11 +119,14 @@ def windows_of(values: NDArray[AuditNumber], noise: float, step_s: float) -> Aud
     """Windows fit for the rate of a signal (n,) with this noise, by :func:`windows_for` and its own motion."""
     windows = AuditWindows(step_s, 9)
     for _ in range(2):  # narrow windows still hold noise, which the second pass does not
-        rate = np.abs(windows.rate(values))
-        rate = rate[np.isfinite(rate)]
-        motion = float(np.sqrt(np.mean(rate**2))) if rate.size else 0.0
-        windows = windows_for(noise, motion, step_s, len(values))
+        windows = windows_for(noise, known_rms(np.abs(windows.rate(values))), step_s, len(values))
     return windows
+
+
+def known_rms(values: Array) -> float:
+    """Root mean square of a signal (n,), nan left out; 0 where nothing is known."""
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(np.square(known)))) if known.size else 0.0
 
 
 @dataclass(frozen=True, eq=False)

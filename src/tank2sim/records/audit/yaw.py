@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import ndimage
 from scipy.signal import correlate, correlation_lags
 
 from tank2sim.arrays import Array
@@ -12,6 +13,7 @@ from tank2sim.records.audit.finding import Finding, Repair, changed, found_in, n
 from tank2sim.records.audit.noise import record_noise, rounding
 from tank2sim.records.audit.rudder import rudder_response
 from tank2sim.records.audit.time_base import MISCALIBRATED
+from tank2sim.records.audit.track import audited_track
 from tank2sim.records.audit.weak import AuditWindows, WeakFit, fit, on_uniform_time, windows_of
 from tank2sim.records.trials import Trial, unwrapped
 
@@ -28,6 +30,7 @@ _ROUNDED = 1.5
 """Times what rounding is expected to leave that is put down to it: errors of rounding are not quite so random (project
 choice)."""
 _ALIKE = 0.9  # correlation from which two signals are taken for the same motion
+
 _BY_CHANCE = 4.0
 """Standard errors of a correlation (Fisher's z) up to which chance makes it at one of the lags that are tried (project
 choice: p = 6e-5; slow drifts of a straight run reach 3.5, turns and zigzags 3.7 to 15)."""
@@ -129,11 +132,7 @@ class _Comparison:
 
 
 def _hidden_by_rounding(trial: Trial, rate: Array, heading: Array, step: float) -> bool:
-    """True if what r and dpsi/dt differ by in wide windows is at most what the rounding of the heading may leave.
-
-    An error that is uniform within half a unit, and one value in each half of a window, leaves sqrt(2/12) unit times
-    the largest value of the window, 4/(3/2 width), in the rate: the slower the ship, the nearer it comes to that.
-    """
+    """Whether r and dpsi/dt differ by at most sqrt(2/12) unit 4/(3/2 width), as rounding may leave."""
     unit = rounding(trial.signals["psi_rad"])
     if not unit:
         return False
@@ -153,10 +152,7 @@ def _headings(trial: Trial, heading: Array) -> list[Array]:
         or np.nanmax(np.abs(heading)) > 1.01 * turn
     ):
         return [heading]
-    known = np.isfinite(heading)
-    again = heading.copy()
-    again[known] = np.unwrap(heading[known], period=turn)
-    return [again, heading]
+    return [unwrapped(heading, turn), heading]
 
 
 def _comparison(windows: AuditWindows, rate: Array, heading: Array, step: float) -> _Comparison | None:
@@ -177,7 +173,7 @@ def _comparison(windows: AuditWindows, rate: Array, heading: Array, step: float)
 
 def _at(windows: AuditWindows, rate: Array, heading: Array, step: float, shift: int) -> _Comparison | None:
     """The comparison with r taken `shift` rows later, and the lag left over from regression on dr/dt."""
-    moved = _shifted(rate, shift)
+    moved = ndimage.shift(rate, -shift, order=0, cval=np.nan)
     r, target = windows.mean(moved), windows.rate(heading)
     found = fit(target, [r, np.ones(len(r)), windows.rate(moved)])
     if found is None or found.values[0] == 0:
@@ -196,16 +192,6 @@ def _independent(a: Array, b: Array) -> float:
     of_each = [correlate(values, values, mode="full", method="fft")[n - 1 :] for values in away]
     lags = np.prod([values / max(values[0], np.finfo(float).tiny) for values in of_each], axis=0)[1:]
     return float(n / max(1 + 2 * np.sum((1 - np.arange(1, n) / n) * lags), 1.0))
-
-
-def _shifted(values: Array, samples: int) -> Array:
-    """Values as they are `samples` rows later; nan where there are none."""
-    moved = np.full(len(values), np.nan)
-    if samples >= 0:
-        moved[: len(values) - samples] = values[samples:]
-    else:
-        moved[-samples:] = values[:samples]
-    return moved
 
 
 def _coarse_lag(windows: AuditWindows, rate: Array, heading: Array) -> int:
@@ -327,11 +313,8 @@ def _course_slope(trial: Trial) -> float | None:
     """Change of the course of the track for one of the heading, or None if there is no track or no turn."""
     if not {"x_m", "y_m", "psi_rad"} <= set(trial.signals):
         return None
-    step, signals = on_uniform_time(trial)
-    noise = record_noise(trial)
-    place = signals["x_m"] + 1j * signals["y_m"]
-    windows = windows_of(place, max(noise["x_m"], noise["y_m"]), step)
-    velocity = windows.rate(place)
+    track = audited_track(trial)
+    velocity = track.ground
     if not np.isfinite(velocity).any():
         return None
     going = np.abs(velocity) > 0.3 * np.nanmedian(np.abs(velocity))
@@ -341,8 +324,8 @@ def _course_slope(trial: Trial) -> float | None:
     if not np.nanmax(course) - np.nanmin(course) > 10 * _DEGREE:  # beyond any drift of a straight run
         return None
     spread = float(np.nanstd(course))
-    for candidate in _headings(trial, signals["psi_rad"]):
-        found = fit(course, [windows.mean(candidate), np.ones(len(course))])
+    for candidate in _headings(trial, track.signals["psi_rad"]):
+        found = fit(course, [track.windows.mean(candidate), np.ones(len(course))])
         if found is not None and found.differs(0) and found.residual < UNLIKE * spread:
             return float(found.values[0])
     return None

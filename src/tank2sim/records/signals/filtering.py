@@ -18,8 +18,8 @@ from tank2sim.records.signals.sampling import FEWEST_SAMPLES, Series
 ORDER = 4
 """Order of a Butterworth filter if none is given: 24 dB an octave, and twice that forwards and backwards."""
 
+# Part of the sum of a filter's impulse response that is still to come where its ends are called undistorted
 _SETTLED = 0.01
-"""Part of the sum of a filter's impulse response that is still to come where its ends are called undistorted."""
 
 HIGHEST_DEGREE = 10
 """Project choice: higher polynomials are high-pass filters with bad ends; a Butterworth filter is better."""
@@ -166,21 +166,18 @@ def _within(series: Series, filter_name: str, frequency_hz: float) -> float:
 
 
 def _sections_response(sections: Array, grid: Array, series: Series) -> NDArray[np.complex128]:
-    response: NDArray[np.complex128] = signal.sosfreqz(sections, worN=grid, fs=series.rate_hz)[1]
-    return response
+    return np.asarray(signal.sosfreqz(sections, worN=grid, fs=series.rate_hz)[1])
 
 
 def _sections_delay(sections: Array, grid: Array, series: Series) -> Array:
     delays = [signal.group_delay((row[:3], row[3:]), w=grid, fs=series.rate_hz)[1] for row in sections]
-    total: Array = series.step_s * np.sum(delays, axis=0)
-    return total
+    return np.asarray(series.step_s * np.sum(delays, axis=0))
 
 
 def _centred_response(taps: Array, grid: Array, series: Series) -> NDArray[np.complex128]:
     """Response of an odd number of taps, the middle one at the present sample."""
     response: NDArray[np.complex128] = signal.freqz(taps, worN=grid, fs=series.rate_hz)[1]
-    centred: NDArray[np.complex128] = response * np.exp(2j * np.pi * grid * series.step_s * (len(taps) // 2))
-    return centred
+    return np.asarray(response * np.exp(2j * np.pi * grid * series.step_s * (len(taps) // 2)))
 
 
 def _settling(sections: Array, series: Series) -> float:
@@ -303,8 +300,7 @@ class Filtered:
 def effect_frequencies(series: Series) -> Array:
     """Frequencies (Hz) at which an effect is reported, evenly spread over their logarithm, (400,)."""
     # Not quite to Nyquist, where low-pass filters have a zero and no phase.
-    grid: Array = np.geomspace(1.0 / series.duration_s, 0.499 * series.rate_hz, _FREQUENCIES)
-    return grid
+    return np.asarray(np.geomspace(1.0 / series.duration_s, 0.499 * series.rate_hz, _FREQUENCIES))
 
 
 def decibel(gain: float) -> str:

@@ -102,7 +102,9 @@ def even_series(trial: Trial, name: str, max_gap_s: float | None = None) -> Seri
         problem = f"has {known.size} values, and at least {FEWEST_SAMPLES} are needed"
         raise InputError(trial.path, column, problem, "give a longer record or leave the column out")
     time, values = trial.time_s[known], values[known]
-    notices = _ends_cut(trial, known)
+    notices = []
+    if known[0] > 0 or known[-1] < len(trial.time_s) - 1:
+        notices.append(f"is known from {time[0]:.6g} to {time[-1]:.6g} s only")
     if name in DIRECTION_COLUMNS:
         continuous: Array = np.unwrap(values)
         if not np.array_equal(continuous, values):
@@ -118,7 +120,7 @@ def even_series(trial: Trial, name: str, max_gap_s: float | None = None) -> Seri
     step = float(time[-1] - time[0]) / (count - 1)
     grid = time[0] + step * np.arange(count, dtype=np.float64)
     if count != time.size or np.max(np.abs(time - grid)) > _JITTER * step:
-        values = _at(time, values, grid, held=name in HELD_COLUMNS)
+        values = at_grid(time, values, grid, held=name in HELD_COLUMNS)
         way = "held" if name in HELD_COLUMNS else "interpolated by straight lines"
         notices.append(f"is unevenly sampled or has gaps of up to {longest:.4g} s; it was {way} at {step:.4g} s")
     messages = tuple(Notice(f"{column.removeprefix('column ')} {notice}") for notice in notices)
@@ -156,21 +158,13 @@ def _moved(series: Series, grid: Array, step: float) -> Series:
     times = series.time_s
     if len(times) == len(grid) and np.max(np.abs(times - grid)) <= _JITTER * step:
         return series
-    values = _at(times, series.values, grid, held=series.name in HELD_COLUMNS)
+    values = at_grid(times, series.values, grid, held=series.name in HELD_COLUMNS)
     return replace(series, start_s=float(grid[0]), step_s=step, values=values)
 
 
-def _at(time: Array, values: Array, grid: Array, *, held: bool) -> Array:
-    if held:
-        places = np.searchsorted(time, grid + 1e-6 * (grid[1] - grid[0]), side="right") - 1
-        held_values: Array = values[np.clip(places, 0, None)]
-        return held_values
-    between: Array = np.interp(grid, time, values)
-    return between
-
-
-def _ends_cut(trial: Trial, known: np.ndarray[tuple[int], np.dtype[np.int64]]) -> list[str]:
-    before, after = int(known[0]), len(trial.time_s) - 1 - int(known[-1])
-    if not before and not after:
-        return []
-    return [f"is known from {trial.time_s[known[0]]:.6g} to {trial.time_s[known[-1]]:.6g} s only"]
+def at_grid(time: Array, values: Array, grid: Array, *, held: bool) -> Array:
+    """Values (m,) at an even `grid` (m,), s, of `values` (n,) at `time` (n,); `held`, or by straight lines."""
+    if not held:
+        return np.interp(grid, time, values)
+    places = np.searchsorted(time, grid + 1e-6 * (grid[1] - grid[0]), side="right") - 1
+    return np.asarray(values[np.clip(places, 0, None)])

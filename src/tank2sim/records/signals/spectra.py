@@ -19,9 +19,8 @@ CONFIDENCE = 0.95
 _SEGMENTS = 8
 """Segments by default, each overlapping half of the next; project choice between scatter and resolution."""
 
+# In a default segment: a first-order spectrum bends at 1/(2 pi correlation time), three steps (project choice)
 _CORRELATION_TIMES = 20.0
-"""Correlation times that a segment lasts by default if half the record allows it, whatever that does to their number:
-the spectrum of a first-order process bends at 1/(2 pi correlation time), about three times its step. Our choice."""
 
 _FEWEST_IN_SEGMENT = 10
 
@@ -179,8 +178,7 @@ def transfer_function(source: Series, result: Series, segment_s: float | None = 
     inner = _inner(averaging)
     frequency, power = signal.welch(source.values, **options)
     _, cross = signal.csd(source.values, result.values, **options)
-    unscaled = {key: value for key, value in options.items() if key != "scaling"}
-    _, coherence = signal.coherence(source.values, result.values, **unscaled)
+    _, coherence = signal.coherence(source.values, result.values, **options)
     names = " and ".join(SignalName(item.name).file for item in (source, result))
     if not np.all(power[inner] > 0):
         raise InputError(source.source, f"columns {names}", "have no power at some frequency", "leave them out")
@@ -231,8 +229,7 @@ def _averaging(signals: Sequence[Series], segment_s: float | None) -> Averaging:
 def _options(series: Series, averaging: Averaging) -> dict[str, object]:
     samples = averaging.samples_in_segment
     return {
-        "fs": series.rate_hz, "window": "hann", "nperseg": samples, "noverlap": samples // 2,
-        "detrend": "constant", "scaling": "density",
+        "fs": series.rate_hz, "window": "hann", "nperseg": samples, "noverlap": samples // 2, "detrend": "constant",
     }  # fmt: skip
 
 

@@ -239,8 +239,7 @@ def _shape(skewness: float, kurtosis: float) -> str:
     return "heavy tails" if kurtosis > 0 else "flat"
 
 
-_NORMAL = 1.959964
-"""Two-sided 95 % point of the normal distribution."""
+_NORMAL = 1.959964  # Two-sided 95 % point of the normal distribution
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from tank2sim.errors import InputError
 from tank2sim.notices import Notice
 from tank2sim.records.signals.columns import DIRECTION_COLUMNS, HELD_COLUMNS, SignalName, file_columns
 from tank2sim.records.signals.filtering import Filtered
-from tank2sim.records.signals.sampling import even_series
+from tank2sim.records.signals.sampling import at_grid, even_series
 from tank2sim.records.trials import Trial, with_signals
 
 
@@ -58,8 +58,7 @@ def thinned(trial: Trial, filtered: Sequence[Filtered], notice: str) -> Trial:
     for name in trial.signals:
         if name in HELD_COLUMNS:
             order = even_series(trial, name)
-            places = np.searchsorted(order.time_s, time + 1e-6 * order.step_s, side="right") - 1
-            signals[name] = order.values[np.clip(places, 0, None)]
+            signals[name] = at_grid(order.time_s, order.values, time, held=True)
     return replace(trial, time_s=time, signals=signals, noise={}, notices=(*trial.notices, Notice(notice)))
 
 
