@@ -6,7 +6,6 @@ here and opened there, and its result likewise, so that Dask neither looks into 
 
 from __future__ import annotations
 
-import asyncio
 import hashlib
 import logging
 import pickle
@@ -167,6 +166,8 @@ class Cluster(Executor):
         `remote.result()` would wait for ever if the client's event loop is stopped in the meantime, and keep the
         interpreter from ending: the thread of Dask's callbacks is joined at the exit.
         """
+        import asyncio  # slow to import
+
         coroutine = self._client.gather(remote, asynchronous=True)
         try:
             gathering = asyncio.run_coroutine_threadsafe(coroutine, self._client.loop.asyncio_loop)

@@ -31,6 +31,14 @@ def test_a_simulation_loads_neither_control_nor_plots_nor_tables() -> None:
     assert not loaded_by(code) & {"control", "matplotlib", "pandas", "altair", "statsmodels", "fmpy"}
 
 
+@pytest.mark.slow
+def test_a_process_that_fits_explanations_loads_only_the_parts_of_scipy_that_start_fast() -> None:
+    code = "import tank2sim.gap.workflow, sys; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    slow = {"scipy.signal", "scipy.stats", "scipy.interpolate", "pandas", "altair", "jinja2", "asyncio", "matplotlib"}
+    assert not {*loaded} & slow
+
+
 def test_the_command_simulate_loads_no_slow_library_that_it_does_not_use() -> None:
     words = "['tank2sim', 'simulate', 'mariner', '--manoeuvre', 'turn:35', '--quiet']"
     code = f"import sys; sys.argv = {words}\nfrom tank2sim.cli import main\ntry: main()\nexcept SystemExit: pass"

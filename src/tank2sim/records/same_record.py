@@ -12,7 +12,6 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
-from scipy.signal import correlate
 
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
@@ -393,6 +392,8 @@ def _tracks(
 
 def _shifts(first: TimedSignals, other: TimedSignals, sign: float) -> Iterator[float]:
     """Shifts (s) of the second record's times to try: none, by the first rows, and as the timing signal fits best."""
+    from scipy.signal import correlate  # slow to import
+
     time = other.time_s
     yield from dict.fromkeys((0.0, float(first.time_s[0] - time[0])))
     name = next((name for name in _TIMING if name in first.signals and name in other.signals), None)

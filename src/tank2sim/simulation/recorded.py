@@ -13,7 +13,6 @@ from functools import lru_cache
 
 import casadi as ca
 import numpy as np
-from scipy.signal import savgol_coeffs, savgol_filter
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
@@ -258,6 +257,8 @@ def repeat(record: Recorded, integrator: Integrator, parameters: dict[str, float
 
 def _smoothed_noise(trial: Trial, name: str, ship_time: float) -> float:
     """Standard deviation of a signal's noise after smoothing, SI."""
+    from scipy.signal import savgol_coeffs  # slow to import
+
     window = _window(trial.time_s, ship_time)
     gain = float(savgol_coeffs(window, 3)[window // 2]) if window >= 5 else 1.0
     return math.sqrt(gain) * trial.noise.get(name, white_noise(trial.signals[name]))
@@ -362,6 +363,8 @@ def _window(time: Array, ship_time: float) -> int:
 
 
 def _smoothed(time: Array, values: Array, ship_time: float) -> Array:
+    from scipy.signal import savgol_filter  # slow to import
+
     window = _window(time, ship_time)
     if window < 5 or window > len(values):
         return values
@@ -371,6 +374,8 @@ def _smoothed(time: Array, values: Array, ship_time: float) -> Array:
 
 def _slope(time: Array, values: Array, ship_time: float) -> Array:
     """Time derivative by straight lines through windows: a higher degree would follow noise at a record's ends."""
+    from scipy.signal import savgol_filter  # slow to import
+
     window = _window(time, ship_time)
     if window < 3 or window > len(values):
         return np.asarray(np.gradient(values, time), dtype=np.float64)

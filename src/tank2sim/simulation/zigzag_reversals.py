@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from tank2sim.arrays import Array
 from tank2sim.simulation.figures import Figures
@@ -194,7 +194,7 @@ def _sides(reversals: _Reversals, noise: float) -> tuple[tuple[float, float], fl
         return None
     error = max(scatter, noise) * math.sqrt(sum(1 / len(side) for side in sides))
     # A course that is off makes one side's changes larger and the other's smaller by as much.
-    if abs(means[0] - means[1]) <= float(student.ppf(CONFIDENT, spare)) * math.hypot(error, 2 * course_error):
+    if abs(means[0] - means[1]) <= float(stdtrit(spare, CONFIDENT)) * math.hypot(error, 2 * course_error):
         return None
     return means, error
 
@@ -212,7 +212,7 @@ def _usual(reversals: _Reversals, noise: float, rudder_deg: int) -> tuple[_Fit, 
     if spare > 0:
         noise = max(noise, math.sqrt(free.squares / spare))
         free = reversals.fit(noise)
-    limit = float(student.ppf(CONFIDENT, spare if spare > 0 else np.inf)) ** 2
+    limit = float(stdtrit(spare if spare > 0 else np.inf, CONFIDENT)) ** 2
     whole = math.floor(math.degrees(free.nominal))
     choices: tuple[tuple[int, ...], ...] = (
         (rudder_deg,),

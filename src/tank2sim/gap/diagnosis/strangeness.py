@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2, gamma
+from scipy.special import chdtrc, chdtri
 
 from tank2sim.arrays import Array
 from tank2sim.gap.diagnosis.residuals import each_trial
@@ -66,6 +66,13 @@ def find_strangeness(likelihood: Likelihood, fit: ExplanationFit) -> tuple[Stran
     return tuple(sorted(rare, key=lambda strange: -strange.excess))
 
 
+def _log_chance(statistic: Array, degrees: Array | float) -> Array:
+    """Logarithm of the probability that chi squared of these degrees of freedom is larger (as the arguments)."""
+    with np.errstate(divide="ignore"):
+        logarithm: Array = np.log(chdtrc(degrees, statistic))
+    return logarithm
+
+
 def _passages(likelihood: Likelihood, e: Array) -> list[Strange]:
     """The strangest passage of each trial: sums of squares over windows, against chi squared.
 
@@ -82,7 +89,7 @@ def _passages(likelihood: Likelihood, e: Array) -> list[Strange]:
         whole = degrees > 0
         deviation = float(np.median(np.abs(sums[whole] - degrees[whole]))) / NORMAL_MEDIAN
         excess_spread = max(1.0, deviation**2 / (2 * float(np.mean(degrees[whole]))))
-        log_p = np.where(whole, chi2.logsf(sums / excess_spread, np.maximum(degrees, 1) / excess_spread), 0.0)
+        log_p = np.where(whole, _log_chance(sums / excess_spread, np.maximum(degrees, 1) / excess_spread), 0.0)
         for run, name in enumerate(motion.names):
             place = int(np.argmin(log_p[run]))
             excess = float(np.minimum(-2 * (log_p[run, place] + np.log(counts.size)), MOST))
@@ -113,9 +120,9 @@ def _pushes(likelihood: Likelihood, fit: ExplanationFit) -> list[Strange]:
             count = max(1.0, length * motion.block_s / (2 * time))
             known = np.array([np.convolve(run, window, "valid") for run in spread[..., axis, axis]])
             seen = whole & (sums > SEEN**2 * known)  # beyond the error of the smoother
-            ratio = np.where(seen, sums / max(float(np.median(sums[whole])), 1e-300) * chi2.median(count), 0.0)
+            ratio = np.where(seen, sums / max(float(np.median(sums[whole])), 1e-300) * chdtri(count, 0.5), 0.0)
             run, place = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
-            log_p = chi2.logsf(ratio[run, place], count) + np.log(FORCE_STATES * inside.sum() / length)
+            log_p = _log_chance(ratio[run, place], count) + np.log(FORCE_STATES * inside.sum() / length)
             begin, end = motion.times[run][[place, place + length - 1]]
             excess = float(min(-2 * log_p, MOST))
             found.append(Strange("push", motion.names[run], float(begin), float(end), excess))
@@ -155,7 +162,7 @@ def _periods(likelihood: Likelihood, e: Array) -> list[Strange]:
         around = np.convolve(np.pad(mean, far, mode="reflect"), ring / ring.sum(), "valid")
         above = (mean / np.maximum(around, 1.0))[LOWEST:]
         place = int(np.argmax(above))
-        log_p = gamma.logsf(len(spectra) * above[place], len(spectra)) + np.log(mean.size * e.shape[2])
+        log_p = _log_chance(2 * len(spectra) * above[place], 2 * len(spectra)) + np.log(mean.size * e.shape[2])
         period = size * motion.block_s / (LOWEST + place)
         found.append(Strange("period", "", period, period, float(min(-2 * log_p, MOST))))
     return found
@@ -224,7 +231,7 @@ def trial_consistency(trials: Mapping[str, tuple[float, float]]) -> TrialConsist
     weights = errors**-2.0
     mean = float(weights @ values / weights.sum())
     q = float(weights @ (values - mean) ** 2)
-    p = float(chi2.sf(q, len(kept) - 1)) if len(kept) > 1 else 1.0
+    p = float(chdtrc(len(kept) - 1, q)) if len(kept) > 1 else 1.0
     away = {}
     if len(kept) > 1:
         remaining_weights = weights.sum() - weights

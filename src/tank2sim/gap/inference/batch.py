@@ -15,7 +15,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.effects import EFFECTS
@@ -328,6 +327,8 @@ def _at_step(run: SampledRun, step: float) -> SampledRun:
 
 def _smooth(states: Array, ship_steps: float) -> Array:
     """States (n, 6) with heading and position smoothed like velocities: rates over a block are their differences."""
+    from scipy.signal import savgol_filter  # slow to import
+
     window = min(int(SMOOTHING * ship_steps), len(states) - 1) // 2 * 2 + 1
     if window < 5:
         return states

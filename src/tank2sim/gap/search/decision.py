@@ -16,8 +16,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import softmax
-from scipy.stats import chi2, norm
+from scipy.special import chdtrc, ndtr, softmax
 
 from tank2sim.arguments import FALSE_DISCOVERY
 from tank2sim.dynamics.effects import EFFECTS
@@ -148,7 +147,7 @@ def _differs_from_zero(fit: ExplanationFit, name: str) -> bool:
     ]
     sizes = fit.theta[places]
     statistic = float(sizes @ np.linalg.solve(fit.covariance[np.ix_(places, places)], sizes))
-    return bool(chi2.logsf(statistic, len(places)) < norm.logsf(STANDARD_ERRORS) + np.log(2))
+    return bool(chdtrc(len(places), statistic) < 2 * ndtr(-STANDARD_ERRORS))
 
 
 def _change(fit: ExplanationFit, name: str) -> float:

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.effects import EFFECTS
@@ -30,7 +30,7 @@ LOUDER = 3.0
 """Factor on the level of one slow error or one force at a time, of the noises that may hide an effect (project
 choice)."""
 
-SURE = float(norm.ppf(0.95))
+SURE = float(ndtri(0.95))
 """Standard deviations by which a size must exceed the threshold, to show in 95 of 100 such sets of trials."""
 
 _ROUNDS = 2

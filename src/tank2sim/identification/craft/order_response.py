@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize_scalar
-from scipy.signal import lfilter
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredCard
@@ -133,6 +132,8 @@ def _best_lag(runs: Sequence[_Run], band: float) -> float:
 
 def _cost(runs: Sequence[_Run], lag: float, band: float) -> float:
     """Sum of squared errors of the revolutions (rad2/s2) with the gains ahead and astern that fit best."""
+    from scipy.signal import lfilter  # slow to import
+
     columns, wanted = [], []
     for step, order, speed in runs:
         kept = np.exp(-step / lag)

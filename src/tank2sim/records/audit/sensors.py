@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import find_objects, label, median_filter
-from scipy.signal import savgol_coeffs
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from tank2sim.arrays import Array
 from tank2sim.records.audit.finding import Finding, Repair, SeenPlaces, changed, found_in, noted_in
@@ -131,13 +130,15 @@ def _frozen(trial: Trial, name: str, noise: dict[str, float]) -> list[Finding]:
 
 def _spikes(trial: Trial, name: str, values: Array, noise: float, least: float = 0.0) -> list[Finding]:
     """Values far from the median of their neighbours (Hampel 1974), on both sides."""
+    from scipy.signal import savgol_coeffs  # slow to import
+
     known = np.flatnonzero(np.isfinite(values))
     if known.size < 4 * WINDOW:
         return []
     away = values[known] - median_filter(values[known], size=2 * SPIKE_SAMPLES + 1, mode="nearest")
     noise_share = 1.0 - float(savgol_coeffs(WINDOW, DEGREE)[WINDOW // 2])
     usual = max(1.4826 * float(np.median(np.abs(away))), noise * float(np.sqrt(noise_share)))
-    limit = max(least, max(SPIKE, float(norm.isf(FALSE_ALARM / known.size / 2))) * usual)
+    limit = max(least, max(SPIKE, -float(ndtri(FALSE_ALARM / known.size / 2))) * usual)
     runs = _isolated(values[known], np.abs(away) > limit)
     # a signal that often moves as far between neighbours, the spikes left out, has none
     still = np.ones(known.size - 1, dtype=bool)

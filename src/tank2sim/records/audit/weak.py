@@ -8,8 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import oaconvolve
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from tank2sim.arrays import Array
 from tank2sim.records.trials import Trial, sampling_step
@@ -73,6 +72,8 @@ class AuditWindows:
         return self._convolved(values, 2)
 
     def _convolved(self, values: NDArray[AuditNumber], order: int) -> NDArray[AuditNumber]:
+        from scipy.signal import oaconvolve  # slow to import
+
         if len(values) < self.samples:
             return np.empty(0, dtype=values.dtype)
         missing = ~np.isfinite(values)
@@ -140,7 +141,7 @@ class WeakFit:
 
     def differs(self, place: int, expected: float = 0.0) -> bool:
         """Whether a coefficient is not the expected one, at the false-alarm probability of the audit."""
-        limit = float(student.isf(FALSE_ALARM / 2, self.freedom))
+        limit = -float(stdtrit(self.freedom, FALSE_ALARM / 2))
         return bool(abs(self.values[place] - expected) > limit * self.errors[place])
 
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import ndimage
-from scipy.signal import correlate, correlation_lags
 
 from tank2sim.arrays import Array
 from tank2sim.records.audit.finding import Finding, Repair, changed, found_in, negated, noted_in
@@ -187,6 +186,8 @@ def _at(windows: AuditWindows, rate: Array, heading: Array, step: float, shift: 
 
 def _independent(a: Array, b: Array) -> float:
     """How many independent pairs the correlation of two series (n,) is of: Bartlett (1946), J. R. Stat. Soc. 8."""
+    from scipy.signal import correlate  # slow to import
+
     n = len(a)
     away = (values - values.mean() for values in (a, b))
     of_each = [correlate(values, values, mode="full", method="fft")[n - 1 :] for values in away]
@@ -196,6 +197,8 @@ def _independent(a: Array, b: Array) -> float:
 
 def _coarse_lag(windows: AuditWindows, rate: Array, heading: Array) -> int:
     """Rows by which r is late, from the largest cross-correlation with dpsi/dt, within a tenth of the record."""
+    from scipy.signal import correlate, correlation_lags  # slow to import
+
     every = replace(windows, hop=1)
     r, target = every.mean(rate), every.rate(heading)
     r, target = (np.nan_to_num(values - np.nanmean(values)) for values in (r, target))

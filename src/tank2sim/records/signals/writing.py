@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,9 +15,11 @@ from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice
 from tank2sim.records.signals.columns import DIRECTION_COLUMNS, HELD_COLUMNS, SignalName, file_columns
-from tank2sim.records.signals.filtering import Filtered
 from tank2sim.records.signals.sampling import at_grid, even_series
 from tank2sim.records.trials import Trial, with_signals
+
+if TYPE_CHECKING:
+    from tank2sim.records.signals.filtering import Filtered
 
 
 def with_filtered(trial: Trial, filtered: Filtered, notice: str) -> Trial:

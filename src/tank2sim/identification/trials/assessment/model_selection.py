@@ -25,7 +25,6 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import correlate
 
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
@@ -109,6 +108,8 @@ def effective_samples(series: Sequence[Array]) -> float:
     The sum ends at the first that is not positive (Geyer 1992, Statistical Science 7). `series` are pieces (n, m); the
     m components are taken together, each in units of its own deviation.
     """
+    from scipy.signal import correlate  # slow to import
+
     every = np.concatenate(series)
     size = np.sqrt(np.mean(every**2, axis=0))
     sums = np.zeros(max(map(len, series)))

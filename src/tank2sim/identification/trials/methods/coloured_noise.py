@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 
 from tank2sim.arrays import Array
 
@@ -42,6 +41,8 @@ class ColouredNoise:
 
         The first sample of a piece represents the stationary past: it is divided by the deviation of the residual.
         """
+        from scipy.signal import lfilter  # slow to import
+
         if not self.phi and not self.psi:
             return residuals / self.sigma
         white: Array = lfilter([1.0, -self.phi], [1.0, -self.psi], residuals, axis=1) / self.sigma
@@ -50,6 +51,8 @@ class ColouredNoise:
 
     def whitened_transposed(self, white: Array) -> Array:
         """The transpose of :meth:`whitened` applied to `white` (pieces, n)."""
+        from scipy.signal import lfilter  # slow to import
+
         later = white.copy()
         later[:, 0] = 0.0
         result: Array = lfilter([1.0, -self.phi], [1.0, -self.psi], later[:, ::-1], axis=1)[:, ::-1] / self.sigma

@@ -24,7 +24,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.integrate import cumulative_trapezoid
-from scipy.signal import savgol_coeffs, savgol_filter
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.build import KEPT_MODELS
@@ -174,6 +173,8 @@ def _turned(forward: Array, starboard: Array, angle: Array) -> tuple[Array, Arra
 
 def _slope(column: Array, window: int, step: float) -> Array:
     """Time derivative of a smoothed signal (Savitzky and Golay 1964), nan in gaps of more than its own step."""
+    from scipy.signal import savgol_filter  # slow to import
+
     slope: Array = savgol_filter(_filled(column), window, 3, deriv=1, delta=step)
     slope[_in_gaps(column)] = np.nan
     return slope
@@ -201,6 +202,8 @@ def _in_gaps(column: Array) -> NDArray[np.bool_]:
 
 def _smoothed(column: Array, window: int) -> tuple[Array, float, float]:
     """A signal without gaps and noise; standard deviation of its noise before and after."""
+    from scipy.signal import savgol_coeffs, savgol_filter  # slow to import
+
     known = ~np.isnan(column)
     share = float(known.mean())
     if share < _SPARSE:

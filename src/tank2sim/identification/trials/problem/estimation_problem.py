@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import casadi as ca
 import numpy as np
@@ -20,9 +21,11 @@ from tank2sim.dynamics.build import KEPT_MODELS
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model, Quantity, same_symbol
 from tank2sim.identification.trials.methods.coloured_noise import ColouredNoise
-from tank2sim.identification.trials.problem.captive_tests import CaptiveTests
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
 from tank2sim.notices import Notice
+
+if TYPE_CHECKING:
+    from tank2sim.identification.trials.problem.captive_tests import CaptiveTests
 
 LITTLE_KNOWN = 0.25
 """A standard error of at least this share of the value is not widened (project choice)."""

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,12 +15,14 @@ from tank2sim.cards.form import FittedTrial
 from tank2sim.cards.reading import changed_text, parse_card
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
 from tank2sim.notices import Level, Notice
 from tank2sim.records.audit import Finding, audit_and_repair
 from tank2sim.records.reading import read_trial_file
 from tank2sim.records.same_record import refuse_copies, same_record, signature
 from tank2sim.records.trials import RUDDERS, Trial, froude_scaled
+
+if TYPE_CHECKING:
+    from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
 
 TYPICAL_SPEED = 95
 """Percentile of the speed that is taken as a trial's approach speed: some begin at rest, and all are slower later."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -19,7 +20,6 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.mmg.hull import MMG_TERMS
 from tank2sim.dynamics.roll import roll_terms
 from tank2sim.errors import ArgumentError, InputError
-from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns, captive_tests
 from tank2sim.identification.trials.problem.estimation_problem import (
     DrivenShip,
     Estimate,
@@ -31,6 +31,9 @@ from tank2sim.identification.trials.problem.sampled_runs import in_range, ordere
 from tank2sim.notices import Notice
 from tank2sim.records.trials import Trial, window
 from tank2sim.units import from_si
+
+if TYPE_CHECKING:
+    from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
 
 LOOSE = 30.0
 """Factor on the standard errors before the trials in the fit of the captive tests alone, from which their noise comes:
@@ -270,6 +273,8 @@ def with_captive(problem: Problem, card: ManoeuvringCard, captive: CaptiveRuns |
     """
     if captive is None:
         return problem
+    from tank2sim.identification.trials.problem.captive_tests import captive_tests  # slow to import
+
     tests = captive_tests(card, problem.model, problem.free, captive)
     values, prior = problem.prior_mean.copy(), problem.prior_precision(LOOSE * problem.prior_error)
     for _ in range(ROUNDS):
