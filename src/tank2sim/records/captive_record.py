@@ -114,7 +114,7 @@ def read_captive_run(
         r_radps=_yaw_rate(table, sheet, psi, time),
         speed_mps=speed,
         delta_rad=rudder,
-        **{column: test.sense * table.filled_column(column, _GIVE_VALUES) for column in FORCE_COLUMNS.values()},
+        **{column: test.sense * table.filled_column(column) for column in FORCE_COLUMNS.values()},
         y_m=y,
         psi_rad=psi,
         propeller_radps=revolutions,
@@ -140,11 +140,8 @@ def _yaw_rate(table: CsvTable, sheet: RunSheet, psi: Array | None, time: Array) 
     return np.asarray(np.gradient(np.unwrap(psi), time))
 
 
-_GIVE_VALUES = "give each row its value"
-
-
 def _optional(table: CsvTable, name: str) -> Array | None:
-    return table.filled_column(name, _GIVE_VALUES) if name in table.columns else None
+    return table.filled_column(name) if name in table.columns else None
 
 
 def _sway_velocity(table: CsvTable, sheet: RunSheet, motion: tuple[Array, Array | None, Array]) -> Array:

@@ -112,7 +112,7 @@ class CsvTable:
         InputError
             The column does not exist, a cell of it is empty, or it does not rise; the message names the first such row.
         """
-        values = self.filled_column(name, "give each row its value")
+        values = self.filled_column(name)
         falls = np.flatnonzero(np.diff(values) < SHORTEST_STEP)
         if falls.size:
             row = int(falls[0]) + 1
@@ -120,7 +120,7 @@ class CsvTable:
             raise InputError(self.path, self.place(row, name), problem, "sort the rows, and give each value once")
         return values
 
-    def filled_column(self, name: str, remedy: str) -> Array:
+    def filled_column(self, name: str, remedy: str = "give each row its value") -> Array:
         """Values of a column without empty cells, (rows,).
 
         Raises

@@ -63,25 +63,23 @@ def manoeuvre_motions(model: Model) -> Array:
     return np.vstack(found)
 
 
-def scattered_motions(
-    model: Model, motions: Array, scatter: float = SCATTER, samples: int = SCATTERED_MOTIONS
-) -> Array:
+def scattered_motions(model: Model, motions: Array, scatter: float = SCATTER) -> Array:
     """Motions near the motions of manoeuvres, within the rudder's limits and ahead of rest.
 
-    `motions` (n, 4): u, v, r, rudder, SI; `scatter`: Over :data:`SPREADS`; `samples`: Number of motions to return.
+    `motions` (n, 4): u, v, r, rudder, SI; `scatter`: Over :data:`SPREADS`. Returns :data:`SCATTERED_MOTIONS` of them.
     """
     values = start_values(model)
     u0, length = values["ship.speed"], values["ship.length"]
     largest = values.get("steering.max_angle", math.pi / 2)
     generator = np.random.default_rng(_SEED)
-    found = motions[generator.integers(0, len(motions), samples)].copy()
+    found = motions[generator.integers(0, len(motions), SCATTERED_MOTIONS)].copy()
     speed = np.hypot(found[:, 0], found[:, 1])
     sizes = np.column_stack(
         [
-            np.full(samples, SPREADS["u"] * u0),
+            np.full(len(found), SPREADS["u"] * u0),
             SPREADS["v"] * speed,
             SPREADS["r"] * speed / length,
-            np.full(samples, math.radians(SPREADS["rudder_deg"])),
+            np.full(len(found), math.radians(SPREADS["rudder_deg"])),
         ]
     )
     found += scatter * sizes * generator.normal(size=found.shape)

@@ -38,11 +38,6 @@ class Stationary(StrEnum):
     CONTRADICTORY = "contradictory"
     UNDECIDED = "undecided"
 
-    @property
-    def meaning(self) -> str:
-        """The verdict in full."""
-        return _MEANINGS[self]
-
 
 _MEANINGS = {
     Stationary.YES: "it returns to its level (Dickey-Fuller), and nothing speaks against a steady level (KPSS)",
@@ -165,7 +160,7 @@ def stationarity(series: Series, correlation: Autocorrelation) -> Stationarity:
     verdict = _verdict(level, trend)
     return Stationarity(
         verdict=verdict,
-        meaning=verdict.meaning,
+        meaning=_MEANINGS[verdict],
         about_level=level,
         about_trend=trend,
         samples_averaged=block,
