@@ -308,6 +308,15 @@ def test_the_columns_of_a_rudder_are_the_direction_of_the_one_outboard(craft, ou
         np.testing.assert_allclose(by_rudder.signals[signal], by_name.signals[signal], atol=1e-12)
 
 
+def test_trials_with_measured_and_with_ordered_directions_are_not_mixed(craft, outboard, tmp_path) -> None:
+    measured = outboard_trial(tmp_path / "a.csv", craft)
+    ordered = outboard_trial(tmp_path / "b.csv", craft | {"Nr": 2 * craft["Nr"]}, "n_rpm,delta_order_deg")
+    for verb in (t2s.identify, t2s.find_gap):
+        with pytest.raises(InputError, match=r"b\.csv: header: has the ordered direction") as raised:
+            verb(outboard, [measured, ordered])
+        assert raised.value.remedy == "give trials of one kind"
+
+
 @pytest.mark.slow
 def test_thrust_and_damping_are_found(craft, outboard, tmp_path) -> None:
     path = outboard_trial(tmp_path / "trial.csv", craft)
