@@ -50,6 +50,17 @@ def test_a_card_that_is_wrong_by_five_of_its_errors_is_followed_to_the_noise_in_
         assert after.derivatives[name] == pytest.approx(made_up_ship.TRUTH[name], rel=0.01)
 
 
+def test_a_coefficient_stays_below_its_highest_value_and_the_others_are_the_best_there(wrong) -> None:
+    trial = made_up_ship.trial(made_up_ship.turn(-25.0), name="turn", duration=100.0, step=0.5, seed=2)
+    fitted, names = Measured((trial,), "angle", ()), ("Nr", "Nv")
+    at = np.array([wrong.derivatives[name] for name in names])
+    prior = CoefficientPrior(names, at, np.abs(at), np.array([at[0], np.inf]))  # the truth is 1.1 times smaller
+    found = refined_coefficients(wrong, prior, fitted, NOISE)
+    assert found[0] == at[0]
+    held = refined_coefficients(wrong, CoefficientPrior(names[1:], at[1:], np.abs(at[1:])), fitted, NOISE)
+    assert found[1] == pytest.approx(held[0], rel=1e-3)
+
+
 def test_added_masses_that_no_ship_has_are_of_infinite_cost(wrong) -> None:
     """J_z - Nrdot would be negative; half of that step is possible."""
     names, trial = ("Nrdot", "Nr"), made_up_ship.trial(made_up_ship.turn(15.0), name="turn", duration=60.0, step=0.5)

@@ -18,7 +18,12 @@ from tank2sim.identification.craft.first_values import _by_velocities
 from tank2sim.identification.craft.fit import CoefficientVerdict, CraftFit, determination
 from tank2sim.identification.craft.order_response import order_responses
 from tank2sim.identification.craft.problem import craft_problem
-from tank2sim.identification.craft.study import _model_does_not_hold, worse_than_a_mean
+from tank2sim.identification.craft.study import (
+    CompassDeviation,
+    _instrument_notices,
+    _model_does_not_hold,
+    worse_than_a_mean,
+)
 from tank2sim.notices import Level
 from tank2sim.records.craft_trials import read_craft_trial
 from tank2sim.records.csv_table import table_of_frame
@@ -258,6 +263,12 @@ def test_the_deviation_of_the_compass_is_found_and_does_not_bend_the_coefficient
     assert not any(name.startswith("compass") for name in (*deviating.card.spelt, *deviating.study.coefficients))
 
 
+@pytest.mark.parametrize(("b_deg", "said"), [(0.007, False), (0.2, True), (-0.2, True)])
+def test_a_compass_is_to_be_swung_only_where_its_deviation_is_beyond_its_errors(b_deg: float, said: bool) -> None:
+    compass = CompassDeviation(a_deg=0.5, a_error_deg=0.03, b_deg=b_deg, b_error_deg=0.04, c_deg=0.02, c_error_deg=0.04)
+    assert any("swing the compass" in notice for notice in _instrument_notices(compass)) is said
+
+
 @pytest.mark.slow
 def test_trials_of_one_file_name_in_two_folders_are_two_trials(deviating) -> None:
     assert deviating.study.trials == ("straight", "spin", "first/steps")
@@ -295,6 +306,15 @@ def test_the_columns_of_a_rudder_are_the_direction_of_the_one_outboard(craft, ou
     by_name = read_craft_trial(outboard_trial(tmp_path / "b.csv", craft, columns, side=-1.0), outboard.card.thrusters)
     for signal in ("azimuth_outboard_rad", "n_outboard_radps"):
         np.testing.assert_allclose(by_rudder.signals[signal], by_name.signals[signal], atol=1e-12)
+
+
+def test_trials_with_measured_and_with_ordered_directions_are_not_mixed(craft, outboard, tmp_path) -> None:
+    measured = outboard_trial(tmp_path / "a.csv", craft)
+    ordered = outboard_trial(tmp_path / "b.csv", craft | {"Nr": 2 * craft["Nr"]}, "n_rpm,delta_order_deg")
+    for verb in (t2s.identify, t2s.find_gap):
+        with pytest.raises(InputError, match=r"b\.csv: header: has the ordered direction") as raised:
+            verb(outboard, [measured, ordered])
+        assert raised.value.remedy == "give trials of one kind"
 
 
 @pytest.mark.slow

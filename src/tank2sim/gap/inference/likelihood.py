@@ -520,7 +520,7 @@ class Likelihood:
         low, high = (bound - theta for bound in hypothesis.bounds)
         if np.any((whole[:k] < low) | (whole[:k] > high)):
             follow = cho_solve(held, cross)
-            move = _bounded(normal[:k, :k] - cross.T @ follow, pull[:k] - cross.T @ alone, low, high)
+            move = least_in_box(normal[:k, :k] - cross.T @ follow, pull[:k] - cross.T @ alone, low, high)
             whole = np.concatenate([move, alone - follow @ move])
         decrease = float(2 * pull @ whole - whole @ (normal @ whole))
         without = float(2 * pull[k:] @ alone - alone @ (inner @ alone))
@@ -549,8 +549,18 @@ class Likelihood:
         )
 
 
-def _bounded(normal: Array, pull: Array, low: Array, high: Array) -> Array:
-    """The x (k,) between bounds with the least x'Nx/2 - x'p: Stark and Parker (1995), Computational Statistics 10."""
+def least_in_box(normal: Array, pull: Array, low: Array, high: Array) -> Array:
+    """Return the x (k,) between bounds with the least x'Nx/2 - x'p.
+
+    Bounded least squares of Stark and Parker (1995), Computational Statistics 10.
+
+    Parameters
+    ----------
+    normal : array (k, k)
+        N, positive definite.
+    pull, low, high : array (k,)
+        p and the bounds, which may be infinite.
+    """
     size = np.sqrt(np.where(np.diag(normal) > 0, np.diag(normal), 1.0))
     root = np.linalg.cholesky(normal / np.outer(size, size) + 1e-12 * np.eye(len(size)))
     target = solve_triangular(root, pull / size, lower=True)

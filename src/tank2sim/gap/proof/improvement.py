@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tank2sim.cards.card import SteeredCard
+from tank2sim.cards.card import SteeredBy, SteeredCard
 from tank2sim.cards.reading import revised
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
@@ -23,6 +23,7 @@ from tank2sim.gap.proof.replay import TrialReplays
 from tank2sim.gap.proof.surrounded_trial import ByTrial
 from tank2sim.gap.proof.surroundings import fit_surroundings, with_surroundings
 from tank2sim.gap.result import Passed, Refitted, misfit_of
+from tank2sim.identification.craft.problem import NEVER_POSITIVE
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import with_polynomial_down_to
 
@@ -143,7 +144,9 @@ class Prover:
         if not names or proof.misfit <= BETTER_FROM:
             return proof
         spread = np.array([at_card[name].standard_error_before for name in names]) * max(proof.width, 1.0)
-        prior = CoefficientPrior(names, np.array([at_card[name].before for name in names]), spread)
+        of_craft = proof.base.steered_by is SteeredBy.THRUSTERS
+        highest = np.array([0.0 if of_craft and name in NEVER_POSITIVE else math.inf for name in names])
+        prior = CoefficientPrior(names, np.array([at_card[name].before for name in names]), spread, highest)
         sensors = sensor_faults(proof.named.estimated)
         faultless = corrected(proof.trials[0], sensors) or proof.trials[0]
         replays = self.replays

@@ -22,6 +22,7 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.ship import mass_fault
+from tank2sim.gap.inference.likelihood import least_in_box
 from tank2sim.gap.proof.open_loop import InputRecord, Replayer, difference_slopes, first_state, input_record
 from tank2sim.gap.proof.replay import replayer_of
 from tank2sim.identification.trials.problem.prepare_trials import Measured
@@ -54,11 +55,14 @@ class CoefficientPrior:
         Derivatives, as on the card.
     values, spread : array (k,)
         Values of the card and prior standard deviations, prime.
+    highest : array (k,) or float
+        Values that are not exceeded.
     """
 
     names: tuple[str, ...]
     values: Array
     spread: Array
+    highest: Array | float = math.inf
 
 
 def refined_coefficients(
@@ -106,6 +110,8 @@ def refined_coefficients(
             slope = sum((part.slope for part in parts), (at - prior.values) / prior.spread**2)
             whole = sum((part.matrix for part in parts), np.diag(prior.spread**-2.0))
             step: Array = np.linalg.solve(whole, slope).astype(np.float64)
+            if np.any(at - step > prior.highest):
+                step = least_in_box(whole, slope, at - prior.highest, np.full(len(at), np.inf))
             for share in 0.5 ** np.arange(_HALVES):
                 starts = [one.moved(share, part, step) for one, part in zip(begun, parts, strict=True)]
                 then = normal(at - share * step, starts)

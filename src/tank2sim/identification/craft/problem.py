@@ -303,7 +303,7 @@ def measured_of_craft(card: SteeredCard, *groups: Sequence[Trial]) -> tuple[Meas
     """Groups of trials of a craft, with the inputs alone that drive its model in all of them.
 
     `groups`: By :func:`tank2sim.records.craft_trials.read_craft_trial`. Raises InputError: Some trials have revolutions
-    and others orders alone, or two of a group are one record.
+    and others orders alone, or some directions are measured and others ordered, or two of a group are one record.
     """
     trials = [trial for group in groups for trial in group]
     by = craft_driven_by(card, trials)
@@ -315,8 +315,16 @@ def measured_of_craft(card: SteeredCard, *groups: Sequence[Trial]) -> tuple[Meas
 
 
 def _directions_measured(trials: Sequence[Trial]) -> bool:
-    """Whether no trial has the ordered direction of a thruster."""
-    return not any(name.startswith("azimuth_order_") for trial in trials for name in trial.signals)
+    """Whether no trial has the ordered direction of a thruster.
+
+    Raises InputError: Some trials have the direction as measured, others as ordered.
+    """
+    ordered = [any(name.startswith("azimuth_order_") for name in trial.signals) for trial in trials]
+    for trial, by_order in zip(trials, ordered, strict=True):
+        if by_order and not all(ordered):
+            problem = "has the ordered direction of a thruster, and another trial the measured one"
+            raise InputError(trial.path, "header", problem, "give trials of one kind")
+    return not any(ordered)
 
 
 def _driven(trial: Trial, driven_by: str) -> Trial:
