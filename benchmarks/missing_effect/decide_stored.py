@@ -21,7 +21,8 @@ import numpy as np
 from scipy.special import softmax
 from score import SAME, rate
 
-from tank2sim.gap.search.decision import LISTED, PRICE, TEMPER
+from tank2sim.gap.inference.prior import PRICE
+from tank2sim.gap.search.decision import LISTED, TEMPER
 
 BINS = np.linspace(0.0, 1.0, 11)
 NEVER = 1e-3

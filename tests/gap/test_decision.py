@@ -12,9 +12,10 @@ from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.gap.diagnosis.strangeness import Strange
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.hypothesis import Hypothesis
+from tank2sim.gap.inference.prior import PRICE
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY
 from tank2sim.gap.search import decision as module
-from tank2sim.gap.search.decision import LISTED, PRICE, STANDARD_ERRORS, SUREST, TEMPER, decide, is_significant
+from tank2sim.gap.search.decision import LISTED, STANDARD_ERRORS, SUREST, TEMPER, decide, is_significant
 from tank2sim.gap.search.explanations import CLOSE, Search
 from tank2sim.gap.workflow import RIVALS, _rivals
 from tests.gap.made_scores import CALM, fit

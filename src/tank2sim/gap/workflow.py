@@ -29,7 +29,7 @@ from tank2sim.gap.diagnosis.residuals import (
 from tank2sim.gap.improve_card import Found, at_rest
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.fit_all import StageReport
-from tank2sim.gap.inference.prior import candidate_explanations, likelihood_from_card
+from tank2sim.gap.inference.prior import PRICE, candidate_explanations, likelihood_from_card
 from tank2sim.gap.outcome.next_test import Explanation, next_test
 from tank2sim.gap.outcome.notices import gap_notices, of_tried_effects
 from tank2sim.gap.proof.card_fitness import improvement_objections
@@ -50,7 +50,7 @@ from tank2sim.gap.result import (
     Passed,
     Rival,
 )
-from tank2sim.gap.search.decision import PRICE, Decision, decide
+from tank2sim.gap.search.decision import Decision, decide
 from tank2sim.gap.search.detection_limit import could_hide
 from tank2sim.gap.search.explanations import CLOSE, Search, search
 from tank2sim.identification.trials.assessment.other_ship import evidence_of_other_ship, not_of_ship

@@ -50,6 +50,10 @@ CLOCK_SHARE = 0.5
 LARGEST_SHARE = 0.1
 """A group of coefficients is wrong together by no more than this share of their values (project choice)."""
 
+PRICE = 10.0
+"""-2 log of the prior odds of an effect, and so the decrease of the score from which it is more probable than not: odds
+of exp(5) = 150 to 1, "very strong" by Kass and Raftery (1995), Bayes Factors, J. Am. Stat. Assoc. 90."""
+
 BELIEVED = {"white": 0.5, "slow": 1.5, "slow_s": 0.7, "force": 2.5, "force_s": 0.7, "width": 0.7}
 """Standard deviation of the logarithm of each, prior to the trials (project choice): wide, for any
 plausible noise."""

@@ -15,7 +15,7 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.effects.effect import MEASURED_BEFOREHAND
 from tank2sim.dynamics.mmg.equivalent import linear_equivalent
 from tank2sim.dynamics.model import Input, Model, Parameter
-from tank2sim.gap.inference.prior import CLOCK_SHARE
+from tank2sim.gap.inference.prior import CLOCK_SHARE, PRICE
 from tank2sim.gap.outcome.next_test_candidates import (
     REVOLUTIONS,
     RUDDER,
@@ -27,7 +27,6 @@ from tank2sim.gap.outcome.next_test_candidates import (
 )
 from tank2sim.gap.proof.open_loop import COARSEST, INSTANTS, delays_of, shown_by
 from tank2sim.gap.result import NextTest
-from tank2sim.gap.search.decision import PRICE
 from tank2sim.identification.trials.problem.estimation_problem import driven_model
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS, means_of_held
 from tank2sim.simulation.rows import RowFunction

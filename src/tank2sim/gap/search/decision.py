@@ -24,13 +24,9 @@ from tank2sim.gap.diagnosis.residuals import estimates
 from tank2sim.gap.diagnosis.strangeness import Strange, find_strangeness
 from tank2sim.gap.improve_card import changed_derivatives
 from tank2sim.gap.inference.fit import ExplanationFit
-from tank2sim.gap.inference.prior import GEAR
+from tank2sim.gap.inference.prior import GEAR, PRICE
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY
 from tank2sim.gap.search.explanations import Search
-
-PRICE = 10.0
-"""-2 log of the prior odds of an effect, and so the decrease of the score from which it is more probable than not: odds
-of exp(5) = 150 to 1, "very strong" by Kass and Raftery (1995), Bayes Factors, J. Am. Stat. Assoc. 90."""
 
 TEMPER = 3.0
 """Scores are divided by this before they become probabilities (project choice): trials hold less information than

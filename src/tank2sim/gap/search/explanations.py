@@ -24,7 +24,7 @@ from tank2sim.gap.inference.fit_all import Fitting, HypothesisCache, Proposal, S
 from tank2sim.gap.inference.fit_waves import fit_waves
 from tank2sim.gap.inference.hypothesis import Hypothesis
 from tank2sim.gap.inference.likelihood import Likelihood
-from tank2sim.gap.inference.prior import candidate_explanations
+from tank2sim.gap.inference.prior import PRICE, candidate_explanations
 from tank2sim.gap.search.screening import Screen, Screened, Variant, variants
 
 FIRST_SINGLES, FIRST_PAIRS = 6, 2
@@ -331,9 +331,9 @@ def _at_the_noise_of(best: ExplanationFit, fits: Sequence[ExplanationFit]) -> li
 
 
 def _fit_nearly_alike(fitting: Fitting, chosen: Sequence[str]) -> None:
-    """The best with the effect that shows nearly as one of its own, in the place of that one: the screen is linear, and
-    may have proposed either alone."""
-    best = fitting.best()
+    """The most probable with the effect that shows nearly as one of its own, in the place of that one: the screen is
+    linear, and may have proposed either alone."""
+    best = min(fitting.found.values(), key=lambda fit: fit.score + PRICE * len(fit.hypothesis.effects))
     thetas = thetas_of(best)
     proposals = []
     for name in thetas:

@@ -16,6 +16,9 @@ from tank2sim.identification.craft.order_response import OrderResponse
 from tank2sim.identification.craft.problem import COMPASS_SPREADS, twins
 from tank2sim.units import from_si
 
+CRUISING_SHARE = 0.9
+"""Cruising speed over the largest one, where the card's is beyond it: room to steer by a difference (project choice)."""
+
 _KEYS = {part: key for key, part in THRUSTER_PARAMETERS.items()}
 
 
@@ -67,7 +70,7 @@ def craft_with(
     numbers = {thruster.name: number for number, thruster in enumerate(card.thrusters)}
     held = speed_held(_with_values(card, {name: value for name, (value, _) in estimates.items()}))
     if held < card.model.speed_mps and card.model.scaling == "dimensional":
-        changes["model.speed_mps"] = math.floor(held * 1000) / 1000
+        changes["model.speed_mps"] = math.floor(CRUISING_SHARE * held * 1000) / 1000
     for name, (value, error) in estimates.items():
         section, *rest = name.split(".")
         if section == "derivatives":

@@ -320,7 +320,7 @@ def _speed_notices(card: SteeredCard, found: SteeredCard) -> Iterator[Notice]:
     if found.model.speed_mps != card.model.speed_mps:
         yield caution(
             f"model.speed_mps is {found.model.speed_mps:g} in place of {card.model.speed_mps:g} m/s: with these "
-            "coefficients the largest revolutions of the thrusters hold no more; check them"
+            "coefficients the largest revolutions of the thrusters do not hold the card's; check them"
         )
 
 
