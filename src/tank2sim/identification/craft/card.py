@@ -17,7 +17,7 @@ from tank2sim.identification.craft.problem import COMPASS_SPREADS, twins
 from tank2sim.units import from_si
 
 CRUISING_SHARE = 0.9
-"""Cruising speed over the largest one, where the card's is beyond it: room to steer by a difference (project choice)."""
+"""Cruising speed over the largest one, where the card's is beyond it: room to steer (project choice)."""
 
 _KEYS = {part: key for key, part in THRUSTER_PARAMETERS.items()}
 
