@@ -59,6 +59,30 @@ def test_more_is_sought_next_to_a_single_effect_that_takes_the_place_of_the_best
     monkeypatch.setattr(explanations, "thetas_of", lambda one: {})
     explanations._explore(fitting, (), 4)
     assert asked[-1] == (NAMES[0],)
+
+
+def test_a_pair_that_becomes_best_by_leaving_one_of_three_out_is_extended_too(monkeypatch) -> None:
+    """Else a third effect is never tried next to the right two where a wrong pair was best first."""
+    wrong, three, right = (0, DRAG), (0, FORCE, DRAG), (0, FORCE)
+    scores = {wrong: -500.0, three: -900.0, right: -950.0, (FORCE, DRAG): 0.0, (0, FORCE, LAG): -1000.0}
+    fitting = Fitting(scores, (wrong,))
+    asked: list[tuple[str, ...]] = []
+
+    def extend(fitting, best, every) -> None:
+        asked.append(best.hypothesis.effects)
+        larger = {wrong: three, right: (0, FORCE, LAG)}.get(tuple(NAMES.index(name) for name in asked[-1]))
+        fitting.fit([SimpleNamespace(effects=tuple(NAMES[place] for place in larger))] if larger else [])
+
+    def fit_near(fitting, screened, best) -> None:
+        sets = [one.effects for one in screened if tuple(map(NAMES.index, one.effects)) in scores]
+        fitting.fit([SimpleNamespace(effects=effects) for effects in sets if effects not in fitting.found])
+
+    monkeypatch.setattr(explanations, "_fit_more", extend)
+    monkeypatch.setattr(explanations, "_fit_near", fit_near)
+    monkeypatch.setattr(explanations, "thetas_of", lambda one: dict.fromkeys(one.hypothesis.effects))
+    explanations._add_more(fitting, (), 4)
+    assert (NAMES[0], NAMES[FORCE]) in asked
+    assert fitting.best().hypothesis.effects == tuple(NAMES[place] for place in (0, FORCE, LAG))
     assert ((NAMES[DRAG],) in asked) == (first == (DRAG,))
 
 

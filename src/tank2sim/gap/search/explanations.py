@@ -253,11 +253,15 @@ def _sets_in_surroundings(
 
 
 def _add_more(fitting: Fitting, every: Sequence[Variant], most: int) -> None:
-    """More effects on the best pair while each gains :data:`WORTH`, and the sets without each of the others."""
-    for count in range(2, most):
+    """More effects on the best set of two or more while each gains :data:`WORTH`, and the sets without each of the
+    others, of which one may be the best now."""
+    extended: set[tuple[str, ...]] = set()
+    while True:
         best = fitting.best()
-        if len(best.hypothesis.effects) < count:
+        effects = best.hypothesis.effects
+        if not 2 <= len(effects) < most or effects in extended:
             return
+        extended.add(effects)
         _fit_more(fitting, best, every)
         larger = fitting.best()
         if larger.score > best.score - WORTH:
