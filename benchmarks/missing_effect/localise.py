@@ -74,9 +74,9 @@ def compared(intervals: tuple[Acting, ...], forces: dict[str, np.ndarray]) -> tu
     counts = np.zeros(3)
     for place, equation in enumerate(EQUATIONS):
         of_equation = [one for one in intervals if one.equation == equation]
-        if not of_equation:
-            continue
         usual = np.mean(np.concatenate([force[:, place] for force in forces.values()]) ** 2)
+        if not (of_equation and usual):  # a record that is early adds no force, and gap has the forces of the delay
+            continue
         for trial, force in forces.items():
             acts = force[:, place] ** 2 > 0.5 * usual
             t = TICK_S * np.arange(len(force))
