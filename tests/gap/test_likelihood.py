@@ -13,7 +13,7 @@ from scipy.optimize import minimize_scalar
 from tank2sim.gap.inference import form_error, kalman_kernels
 from tank2sim.gap.inference import likelihood as module
 from tank2sim.gap.inference.fit import NARROWER, Belief, ExplanationFit
-from tank2sim.gap.inference.likelihood import COUNTED, LEAST_GAIN, WIDTHS, Likelihood
+from tank2sim.gap.inference.likelihood import COUNTED, LEAST_GAIN, WIDTHS, Likelihood, least_in_box
 from tests.gap.dense import Dense
 from tests.gap.toy import WHITE, Toy, toy_motion, toy_trials
 from tests.gap.toy_likelihood import LOGS, NOISE, WIDTH, forms_of, judge
@@ -314,3 +314,16 @@ def test_the_gain_of_one_measurement_is_that_of_the_signals_that_were_seen() -> 
     assert gain[0, 0] == pytest.approx(expected, abs=1e-12)
     assert (white[0, 0].T @ white[0, 0])[np.ix_(known, known)] == pytest.approx(np.linalg.inv(S))
     assert filtered[0, 0] == pytest.approx(np.diag(start) - expected[:, known] @ S @ expected[:, known].T)
+
+
+def test_a_matrix_that_rounding_made_indefinite_has_a_least_point_in_its_box() -> None:
+    normal, pull = np.array([[1.0, 1.0], [1.0, 1.0 - 1e-9]]), np.array([3.0, 3.0])
+    low, high = np.array([-1.0, -1.0]), np.array([1.0, 2.5])
+
+    def cost(x: np.ndarray) -> float:
+        return float(x @ normal @ x / 2 - x @ pull)
+
+    found = least_in_box(normal, pull, low, high)
+    corners = [cost(np.array([a, b])) for a in np.linspace(-1, 1, 21) for b in np.linspace(-1, 2.5, 36)]
+    assert np.all((found >= low) & (found <= high))
+    assert cost(found) <= min(corners) + 1e-6

@@ -16,7 +16,7 @@ from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import lsq_linear, minimize
 
 from tank2sim.arrays import Array
@@ -557,14 +557,15 @@ def least_in_box(normal: Array, pull: Array, low: Array, high: Array) -> Array:
     Parameters
     ----------
     normal : array (k, k)
-        N, positive definite.
+        N, positive semidefinite up to rounding.
     pull, low, high : array (k,)
         p and the bounds, which may be infinite.
     """
     size = np.sqrt(np.where(np.diag(normal) > 0, np.diag(normal), 1.0))
-    root = np.linalg.cholesky(normal / np.outer(size, size) + 1e-12 * np.eye(len(size)))
-    target = solve_triangular(root, pull / size, lower=True)
-    found = lsq_linear(root.T, target, (low * size, high * size), method="bvls")
+    values, vectors = np.linalg.eigh(normal / np.outer(size, size))
+    roots = np.sqrt(np.maximum(values, 1e-12))
+    target = vectors.T @ (pull / size) / roots
+    found = lsq_linear(roots[:, None] * vectors.T, target, (low * size, high * size), method="bvls")
     x: Array = found.x / size
     return x
 
