@@ -268,7 +268,9 @@ def print_lacking(problem: Problem, values: Array, trials: Mapping[str, Trial], 
         rows.append(np.column_stack(columns)[ACCELERATION_WINDOW:-ACCELERATION_WINDOW])
     table = np.concatenate(rows)
     u, r, turning = table[:, 6], table[:, 8], table[:, 9]
-    print("accelerations that the model lacks, rms over that of the measured ones; correlation of yaw with r|r|, slope")
+    print(
+        "accelerations that the model lacks, rms over the rms of the measured ones; correlation of yaw with r|r|, slope"
+    )
     for words, chosen in (
         ("ahead, in the range of speeds", (u > slowest) & (turning > AHEAD_RADPS)),
         ("ahead, slower", (u <= slowest) & (turning > AHEAD_RADPS)),

@@ -119,7 +119,7 @@ def print_boats() -> None:
 
 
 def print_clocks(path: Path) -> None:
-    """Time of day of each source by PGN 126992 less that of the recorder, s, at the beginning and at the end: decoded
+    """Time of day of each source by PGN 126992 less the recorder's, s, at the beginning and at the end: decoded
     here from the bytes."""
     readings: dict[str, list[float]] = {}
     for line in path.read_text(encoding="utf-8", errors="replace").splitlines():

@@ -17,10 +17,8 @@ from tank2sim.identification.craft.card import CRUISING_SHARE, craft_with, ident
 from tank2sim.identification.craft.first_values import _by_velocities
 from tank2sim.identification.craft.fit import CoefficientVerdict, CraftFit, determination
 from tank2sim.identification.craft.order_response import order_responses
-from tank2sim.identification.craft.problem import craft_problem
+from tank2sim.identification.craft.problem import craft_problem, deviates
 from tank2sim.identification.craft.study import (
-    CompassDeviation,
-    _instrument_notices,
     _model_does_not_hold,
     worse_than_a_mean,
 )
@@ -265,9 +263,9 @@ def test_the_deviation_of_the_compass_is_found_and_does_not_bend_the_coefficient
 
 
 @pytest.mark.parametrize(("b_deg", "said"), [(0.007, False), (0.2, True), (-0.2, True)])
-def test_a_compass_is_to_be_swung_only_where_its_deviation_is_beyond_its_errors(b_deg: float, said: bool) -> None:
-    compass = CompassDeviation(a_deg=0.5, a_error_deg=0.03, b_deg=b_deg, b_error_deg=0.04, c_deg=0.02, c_error_deg=0.04)
-    assert any("swing the compass" in notice for notice in _instrument_notices(compass)) is said
+def test_a_compass_deviates_only_where_its_deviation_is_beyond_its_errors(b_deg: float, said: bool) -> None:
+    free, errors = ("compass.A", "compass.B", "compass.C"), np.array([0.03, 0.04, 0.04])
+    assert deviates(SimpleNamespace(free=free, values=np.array([0.5, b_deg, 0.02]), standard_errors=errors)) is said
 
 
 @pytest.mark.slow

@@ -180,7 +180,6 @@ def _thrusters(card: SteeredCard) -> list[CardParameter]:
 def _effects(card: SteeredCard, model: Model) -> list[CardParameter]:
     values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
     found = []
-
     for number, entry in enumerate(card.effects):
         effect = EFFECTS[entry.name]
         if effect.acts_on == "sensor":

@@ -145,13 +145,12 @@ def run_gap_workflow(
         forces along the measured motion are not finite.
     """
     options = options or GapOptions()
-    lowered: tuple[Notice, ...] = ()
-    lowest = math.inf
+    of_card, lowest = tuple(doubts(card)), math.inf
     if card.steered_by is SteeredBy.RUDDER:
         given = card.manoeuvring()
         card = ship = polynomial_over_trials(given, fitted.trials)
         lowest = polynomial_over_trials(given, (*fitted.trials, *held.trials)).model.low_speed_bound_mps
-        lowered = (*doubts(given), *lowered_bound_notice(given, ship))
+        of_card = (*of_card, *lowered_bound_notice(given, ship))
         fitted, held = _of_ship(ship, fitted), _of_ship(ship, held)
         if evidence := evidence_of_other_ship(ship, fitted):
             remedy = "give the card and the trials of one ship, in the same units and signs"
@@ -182,7 +181,7 @@ def run_gap_workflow(
         progress("trying the improved card")
         return replace(
             gap,
-            notices=(*lowered, *tried, *gap.notices),
+            notices=(*of_card, *tried, *gap.notices),
             objections=improvement_objections(card, gap.improved, gap.passed),
         )
 

@@ -28,7 +28,7 @@ _FORMS = {
 def javascript_function(function: ca.Function, name: str) -> str:
     """Return JavaScript of ``function name(...arguments, ...results)``: arrays of numbers, the results are filled.
 
-    The operations are the function's, in its order. Numbers equal those of C except for the last bits of sines.
+    The operations are the function's, in its order. Numbers equal C's except for the last bits of sines.
 
     `function`: Of scalar operations (SX), with dense arguments and results.
 

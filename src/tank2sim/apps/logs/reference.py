@@ -62,7 +62,7 @@ def local_metres(latitude_deg: Array, longitude_deg: Array, origin_deg: tuple[fl
     """North and east (n,), m, of an origin: the inverse of the series of :mod:`tank2sim.dynamics.geographic`.
 
     The series is solved for x and y by three fixed-point steps; the remainder is below 1 mm within 20 km. Radii of
-    curvature in the meridian and the prime vertical are those of WGS 84 (Torge & Mueller 2012, 4.1).
+    curvature in the meridian and the prime vertical as in WGS 84 (Torge & Mueller 2012, 4.1).
     """
     phi0 = math.radians(origin_deg[0])
     sine, cosine, tangent = math.sin(phi0), math.cos(phi0), math.tan(phi0)

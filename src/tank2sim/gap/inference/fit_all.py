@@ -141,11 +141,12 @@ class Fitting:
         """Hand the proposals to the executor, if there is one, those with most to be done first."""
         if self.executor is None:
             return [(proposal, partial(_fit, self.likelihood, self.hypotheses, proposal)) for proposal in proposals]
-        longest = sorted(proposals, key=lambda proposal: (-sum(proposal.rounds), -proposal.parameter_count))
-        waiting = {
-            id(proposal): self.executor.submit(_fit_in_worker, self._parts, proposal).result for proposal in longest
+        longest = sorted(enumerate(proposals), key=lambda each: (-sum(each[1].rounds), -each[1].parameter_count))
+        begun = {
+            place: (proposal, self.executor.submit(_fit_in_worker, self._parts, proposal).result)
+            for place, proposal in longest
         }
-        return [(proposal, waiting[id(proposal)]) for proposal in proposals]
+        return [begun[place] for place in range(len(proposals))]
 
     def finish(self, begun: Sequence[Begun]) -> None:
         """Wait for the fits, and keep the better of each and of any earlier fit of the same effects.

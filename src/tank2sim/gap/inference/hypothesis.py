@@ -412,14 +412,14 @@ class Hypothesis:
         return any("rudder.command" in EFFECTS[name].delays for name in self.effects)
 
     def steered(self, inputs: Array) -> Array:
-        """What steers in inputs (..., nu): the order of the rudder (rad), the direction of a craft's thruster (rad), or
-        the revolutions of its first thruster less those of its last (rad/s)."""
+        """The input that steers, in inputs (..., nu): the rudder's order (rad), a craft's thruster direction (rad), or
+        the difference in revolutions of its first and last one (rad/s)."""
         names = self.model.input_names
         for ending in ("rudder.command", ".azimuth_command"):
             if places := [place for place, name in enumerate(names) if name.endswith(ending)]:
                 return np.asarray(inputs[..., places[0]])
-        first, *_, last = [place for place, name in enumerate(names) if name.startswith("thrusters.")]
-        return np.asarray(inputs[..., first] - inputs[..., last])
+        places = [place for place, name in enumerate(names) if name.startswith("thrusters.")]
+        return np.asarray(inputs[..., places[0]] - inputs[..., places[-1]])
 
     @property
     def _command(self) -> int:

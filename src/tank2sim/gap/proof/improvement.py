@@ -11,6 +11,7 @@ import numpy as np
 from tank2sim.cards.card import SteeredBy, SteeredCard
 from tank2sim.cards.reading import revised
 from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.gap.diagnosis.residuals import estimates, surroundings_by_trial
 from tank2sim.gap.improve_card import Found, add_effects_to_card
@@ -23,7 +24,7 @@ from tank2sim.gap.proof.replay import TrialReplays
 from tank2sim.gap.proof.surrounded_trial import ByTrial
 from tank2sim.gap.proof.surroundings import fit_surroundings, with_surroundings
 from tank2sim.gap.result import Passed, Refitted, misfit_of
-from tank2sim.identification.craft.problem import NEVER_POSITIVE
+from tank2sim.identification.craft.problem import within_physics
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.identification.trials.problem.problem_from_card import with_polynomial_down_to
 
@@ -121,7 +122,7 @@ class Prover:
         if proof.misfit <= BETTER_FROM:
             return proof
         try:
-            refitted, base = refit_coefficients(card, likelihood.none.model, likelihood.coefficients_with(found))
+            refitted, base = refit_coefficients(card, self._model, likelihood.coefficients_with(found))
         except InputError:
             return proof  # no craft has these coefficients
         joint = self._replayed(card, base, proof.named)
@@ -144,8 +145,8 @@ class Prover:
         if not names or proof.misfit <= BETTER_FROM:
             return proof
         spread = np.array([at_card[name].standard_error_before for name in names]) * max(proof.width, 1.0)
-        of_craft = proof.base.steered_by is SteeredBy.THRUSTERS
-        highest = np.array([0.0 if of_craft and name in NEVER_POSITIVE else math.inf for name in names])
+        tops = (self._model[f"derivatives.{name}"].maximum for name in names)
+        highest = np.array([math.inf if top is None else top for top in tops])
         prior = CoefficientPrior(names, np.array([at_card[name].before for name in names]), spread, highest)
         sensors = sensor_faults(proof.named.estimated)
         faultless = corrected(proof.trials[0], sensors) or proof.trials[0]
@@ -193,6 +194,12 @@ class Prover:
             results=results,
             effect_alone=alone,
         )
+
+    @property
+    def _model(self) -> Model:
+        """The card's model, the coefficients of a craft within what one can have."""
+        model = self.likelihood.none.model
+        return within_physics(model) if self.card.steered_by is SteeredBy.THRUSTERS else model
 
     def _lowered(self, card: SteeredCard) -> SteeredCard:
         """The card as trials held out need it, which may be slower than those fitted."""

@@ -21,7 +21,6 @@ from tank2sim.gap.inference.prior import coefficients_of_card
 from tank2sim.gap.result import Refitted
 from tank2sim.gap.search.decision import STANDARD_ERRORS
 from tank2sim.identification.craft.card import craft_with
-from tank2sim.identification.craft.problem import within_physics
 from tank2sim.identification.trials.problem.estimation_problem import Estimate
 from tank2sim.identification.trials.problem.problem_from_card import card_with_estimate
 
@@ -102,7 +101,6 @@ def refit_coefficients(
         No craft has such coefficients: they would drive it on.
     """
     known = coefficients_of_card(card)
-    model = within_physics(model) if card.steered_by is SteeredBy.THRUSTERS else model
     values = _within_bounds(model, estimates, known)
     defaults = dict(zip(model.parameter_names, map(float, model.parameter_values()), strict=True))
     if mass_fault(model, defaults | values):

@@ -32,7 +32,7 @@ from tank2sim.identification.craft.fit import (
     predict_by_card,
 )
 from tank2sim.identification.craft.order_response import OrderResponse
-from tank2sim.identification.craft.problem import CERTAIN_ERRORS, COMPASS_SPREADS, craft_problem
+from tank2sim.identification.craft.problem import COMPASS_SPREADS, craft_problem, deviates
 from tank2sim.notices import Notice, caution
 from tank2sim.records.trials import Trial
 from tank2sim.simulation.sensitivity import Sensitivity
@@ -214,12 +214,6 @@ class CompassDeviation:
     c_deg: Number
     c_error_deg: Number
 
-    @property
-    def certain(self) -> bool:
-        """Whether a part that goes with the heading is beyond three standard errors."""
-        parts = ((self.b_deg, self.b_error_deg), (self.c_deg, self.c_error_deg))
-        return any(abs(value) > CERTAIN_ERRORS * error for value, error in parts)
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CraftIdentificationStudy:
@@ -296,7 +290,7 @@ def study_craft(
             *_fit_notices(fit, driven_by, too_short=too_short),
             *_dead_band_notices(card, responses, driven_by),
             *_speed_notices(card, found),
-            *_instrument_notices(compass),
+            *_instrument_notices(compass if deviates(fit.estimate) else None),
         ),
     )
 
@@ -325,7 +319,7 @@ def _speed_notices(card: SteeredCard, found: SteeredCard) -> Iterator[Notice]:
 
 
 def _instrument_notices(compass: CompassDeviation | None) -> Iterator[Notice]:
-    if compass is not None and compass.certain:
+    if compass is not None:
         yield Notice(
             f"the compass of these trials deviates by A {compass.a_deg:+.1f}, B {compass.b_deg:+.1f} sin(heading), "
             f"C {compass.c_deg:+.1f} cos(heading) deg: the headings were corrected by it; swing the compass"
