@@ -65,6 +65,12 @@ def test_an_estimate_whose_coefficients_are_several_times_their_size_away_is_no_
     assert far.startswith("Nd is 0.2")
 
 
+@pytest.mark.parametrize("rudder_deg", [35, -35])
+def test_one_turn_of_few_readings_raises_no_alarm(rudder_deg: int) -> None:
+    """The rudder is at its angle in all windows: yaw rate and mean explain it."""
+    assert other_ship(problem([trial(turn(rudder_deg, begin_s=0.0), step=5.0, duration=200.0)])) == ()
+
+
 @pytest.mark.parametrize("off", [0.0, 0.3])
 def test_the_cards_own_ship_and_a_run_without_rudder_raise_no_alarm(off):
     runs = [trial(zigzag(10), name="a"), trial(turn(30), name="b"), trial(lambda t: 0.0, name="straight")]
@@ -132,6 +138,9 @@ def test_a_rudder_is_another_ships_by_its_size_beyond_two_errors_of_both(measure
 
 def test_a_card_whose_rudder_turns_to_the_other_side_is_compared_by_size_too() -> None:
     assert effect(-2.0, 0.0, -1.0).less(2.0) == (0.0, pytest.approx(0.2))
+    assert effect(-1.0, 0.0, -1.0).less(0.5) == (0.5, pytest.approx(0.1))
+    assert _beyond("a", [effect(-1.0, 0.03, -1.0)], 2.0) == ""
+    assert "to the other side" in _beyond("a", [effect(1.0, 0.03, -1.0)], 2.0)
     assert effect(3.0, 0.3, 1.0, 0.2).less(2.0) == (1.0, pytest.approx(np.hypot(np.hypot(0.3, 0.4), 0.3)))
 
 

@@ -47,7 +47,8 @@ choice)."""
 RUDDER = "derivatives.Nd"
 
 _LEAST_RUDDER = np.deg2rad(1.0)
-"""Standard deviation of the rudder below which a run does not show its moment (project choice)."""
+"""Standard deviation of the rudder below which a run does not show its moment, also of the rudder's part that yaw
+rate and mean do not explain (project choice)."""
 
 _OVERLAP = 2.0
 """Windows of the weak form overlap by half: their errors count as half as many."""
@@ -170,11 +171,12 @@ class RudderEffect:
         return RudderEffect(self.measured, 1.0, self.covariance * np.outer([1, 0], [1, 0]))
 
     def less(self, factor: float) -> tuple[float, float]:
-        """The measured coefficient less `factor` times the card's, and its standard error (Fieller 1954)."""
+        """The measured coefficient less `factor` times the card's, positive to the side of the card's rudder, and
+        its standard error (Fieller 1954)."""
         weights = np.array([1.0, -factor])
         model = _MODEL_ERROR * max(abs(self.measured), abs(factor * self.modelled))
         error = np.hypot(np.sqrt(weights @ self.covariance @ weights), model)
-        return self.measured - factor * self.modelled, float(error)
+        return float(np.sign(self.modelled) * (self.measured - factor * self.modelled)), float(error)
 
 
 def _effect(problem: Problem, runs: Sequence[SampledRun]) -> RudderEffect | None:
@@ -187,6 +189,8 @@ def _effect(problem: Problem, runs: Sequence[SampledRun]) -> RudderEffect | None
     if not slope or np.linalg.matrix_rank(X) < X.shape[1] or not np.isfinite(Y).all():
         return None
     inverse = np.linalg.inv(X.T @ X)
+    if 1 / (inverse[0, 0] * len(X)) < _LEAST_RUDDER**2:  # a turn of few readings: yaw rate and mean have all of it
+        return None
     coefficients = inverse @ X.T @ Y
     left = Y - X @ coefficients
     shares = np.array([inverse[0] @ X[block == name].T @ left[block == name] for name in np.unique(block)])
