@@ -345,7 +345,7 @@ class CraftStabilityResult(ResultOnCourse[CraftStabilityStudy]):
     --------
     >>> import tank2sim as t2s
     >>> t2s.load("otter").stability().stable
-    True
+    False
     """
 
     @property

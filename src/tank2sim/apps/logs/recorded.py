@@ -144,9 +144,9 @@ def pulses_of(stream: LogStream) -> tuple[LogStream, PulseScale | None]:
     --------
     >>> import numpy as np
     >>> from tank2sim.apps.logs.streams import LogStream
-    >>> pulses, scale = pulses_of(LogStream("pwm_left", np.arange(3.0), np.array([1500.0, 1700.0, 1100.0])))
+    >>> pulses, scale = pulses_of(LogStream("pwm_left", np.arange(4.0), np.array([1500.0, 1500.0, 1700.0, 1100.0])))
     >>> scale.share(pulses.values).tolist()
-    [0.0, 0.5, -1.0]
+    [0.0, 0.0, 0.5, -1.0]
     """
     unit = stream.unit.lower()
     other = unit not in ("", *_PULSE_UNITS) or (stream.quantity and stream.quantity not in _ORDERS)

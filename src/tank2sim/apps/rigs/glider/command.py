@@ -75,7 +75,7 @@ def glide(
     >>> import tank2sim as t2s
     >>> found = t2s.load("kulikovsky-velikanov").glide([-25, -30], views=False)
     >>> found.glides["speed_mps"].round(2).tolist()
-    [0.19, 0.24]
+    [0.2, 0.24]
     """
     import numpy as np
 
