@@ -87,6 +87,17 @@ def test_a_campaign_of_ones_own_is_compared_in_place_of_the_usual_matrix(tmp_pat
 
 
 @pytest.mark.slow
+def test_a_plan_is_as_certain_as_a_matrix_that_turns_the_rudder_in_yaw(tmp_path):
+    rows = [f"0,{rudder},0,{rate}" for rudder in (0, 20) for rate in (0.2, 0.4)]
+    rows += [f"{drift},{rudder},0,0" for drift in (-10, 0, 10) for rudder in (-20, 0, 20)]
+    rows += ["0,0,0.2,0", "6,0,0,0.3"]
+    (tmp_path / "matrix.csv").write_text("\n".join(["beta_deg,delta_deg,v_prime,r_prime", *rows]) + "\n")
+    found = plan(usual=str(tmp_path / "matrix.csv"), hours=None)
+    assert any(run.oscillates and run.rudder_rad for group in found.design.usual for run in group)
+    assert (found.figures["design"] <= found.figures["usual"]).all()
+
+
+@pytest.mark.slow
 def test_ranges_of_the_gauges_leave_out_what_is_too_strong(tmp_path):
     usual = plan()
     reach = usual.design.planned.largest_forces(max(usual.design.runs, key=lambda run: abs(run.drift_rad)))

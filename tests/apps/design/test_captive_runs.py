@@ -105,6 +105,17 @@ def test_the_usual_matrix_has_every_type_to_the_limits_and_both_sides():
     assert max(run.velocity for run in found if run.type == "pure_yaw") == pytest.approx(0.6 * 1.2 / 4.0)
 
 
+def test_runs_of_a_tanks_own_matrix_are_candidates_and_yaw_with_a_rudder_angle_where_it_has_such_runs():
+    tank = runs()
+    straight = tank.steady("static_drift", share=0.3)
+    turned = tank.oscillating("pure_yaw", 0.5, 0.1, rudder=0.2)
+    assert [run.rudder_rad for run in turned] == [0.2, -0.2]
+    without, with_turned = tank.candidates([straight]), tank.candidates([straight, turned])
+    assert straight in without and turned in with_turned
+    assert not any(run.rudder_rad for run in oscillations(without))
+    assert max(run.rudder_rad for run in oscillations(with_turned)) == pytest.approx(LARGEST.rudder_rad)
+
+
 def test_checks_are_the_motions_that_a_plan_lacks_between_its_extremes():
     tank = runs()
     every = tank.check_runs(())

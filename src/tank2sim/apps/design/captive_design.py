@@ -199,7 +199,7 @@ class CaptiveDesigner:
             )
         self.planned = self._with_gauges(usual)
         self.usual = self._within_gauges(usual)
-        every = self.tank_runs.candidates()
+        every = self.tank_runs.candidates(settings.usual or ())
         candidates = self._within_gauges(every)
         self.too_strong = len(every) - len(candidates)
         # Every check that a plan may need, as without any plan.

@@ -171,12 +171,20 @@ class TankRuns:
         return (run, run.mirrored()) if drift or rudder else (run,)
 
     def oscillating(
-        self, kind: RunType, frequency: float, velocity: float, drift: float = 0.0, share: float = 1.0
+        self,
+        kind: RunType,
+        frequency: float,
+        velocity: float,
+        drift: float = 0.0,
+        share: float = 1.0,
+        *,
+        rudder: float = 0.0,
     ) -> RunGroup:
-        """An oscillating run of whole cycles, with drift also to the other side; () if the tank cannot make it."""
+        """An oscillating run of whole cycles, with drift or rudder also to the other side; () if the tank cannot make
+        it."""
         mechanism, period = self.tank.mechanism, 2 * math.pi / frequency
         cycles = math.floor(share * self.longest_s / period + 1e-9)
-        run = self.run(kind, cycles * period, drift=drift, frequency=frequency, velocity=velocity)
+        run = self.run(kind, cycles * period, drift=drift, rudder=rudder, frequency=frequency, velocity=velocity)
         too_large = (
             run.sway_amplitude_m > (mechanism.sway_amplitude_m or math.inf)
             or run.heading_amplitude_rad > (mechanism.heading_amplitude_rad or math.inf)
@@ -184,7 +192,7 @@ class TankRuns:
         )
         if too_large:
             return ()
-        return (run, run.mirrored()) if drift else (run,)
+        return (run, run.mirrored()) if drift or rudder else (run,)
 
     def run(
         self,
@@ -212,9 +220,11 @@ class TankRuns:
             tank_s=sailing + max(carriage.waiting_s, way / carriage.return_speed_mps),
         )
 
-    def candidates(self) -> tuple[RunGroup, ...]:
-        """All candidate runs."""
-        return tuple(group for group in self._candidates() if group)
+    def candidates(self, own: Sequence[RunGroup] = ()) -> tuple[RunGroup, ...]:
+        """All candidate runs: also the `own` ones of a tank, and yaw with a rudder angle if any of these has one."""
+        with_rudder = any(run.oscillates and run.rudder_rad for group in own for run in group)
+        more = self._yaw_with_rudder() if with_rudder else ()
+        return tuple(group for group in (*self._candidates(), *more, *own) if group)
 
     def _candidates(self) -> Iterator[RunGroup]:
         drifts, rudders = _levels(self.drift_rad, _DRIFTS), _levels(self.rudder_rad, _RUDDERS)
@@ -237,6 +247,13 @@ class TankRuns:
                     yield self.oscillating("pure_yaw", frequency, rate, share=share)
                     for drift in _levels(self.drift_rad, _MIXED):
                         yield self.oscillating("yaw_with_drift", frequency, rate, drift, share)
+
+    def _yaw_with_rudder(self) -> Iterator[RunGroup]:
+        for share in _OSCILLATING_RECORDS:
+            for frequency in self.frequencies("yaw", _FREQUENCIES, _FREQUENCY_RATIO):
+                for rate in _levels(self.yaw_rate_radps, _AMPLITUDES):
+                    for rudder in _levels(self.rudder_rad, _MIXED):
+                        yield self.oscillating("pure_yaw", frequency, rate, share=share, rudder=rudder)
 
     def usual_matrix(self) -> tuple[RunGroup, ...]:
         """The usual matrix: all types of test of ITTC 7.5-02-06-02, in even steps to the same limits.
