@@ -69,7 +69,7 @@ LOADED_RUDDER = Effect(
             "relative gain of inflow speed at the rudder by relative loss of the ship's speed",
             0.0,
             1.5,
-            typical=(0.6,),
+            typical=(0.6, 0.2),
         ),
         EffectParameter("straightening", "share of the cross flow that reaches the rudder", 0.0, 2.0, typical=(0.5,)),
         EffectParameter(
@@ -85,6 +85,7 @@ LOADED_RUDDER = Effect(
             0.0,
             1.0,
             0.0,
+            typical=(0.0, 1.0),
             optional=True,
             spread=1.0,  # nothing says beforehand how far a polynomial holds (project choice)
         ),

@@ -59,7 +59,7 @@ LEAST_INFORMATION = 0.02
 is estimated (project choice); the score includes all."""
 
 LEAST_GAIN = 0.1
-"""Gauss-Newton stops where the predicted decrease of the score is less than this."""
+"""The search for the parameters stops where the predicted decrease of the score is less than this."""
 
 LEAST_DECREASE = 0.02
 """The search for the noise stops where a step lowers the score by less than this (project choice): explanations are
@@ -340,38 +340,33 @@ class Likelihood:
 
         return min((replace(fit, logs=logs) for logs in starts), key=score)
 
-    def _parameters(self, fit: ExplanationFit, linear: Linear, coefficients: Array, steps: int = 4) -> ExplanationFit:
-        """Gauss-Newton in the parameters at one noise."""
+    def _parameters(self, fit: ExplanationFit, linear: Linear, coefficients: Array, steps: int = 6) -> ExplanationFit:
+        """The parameters at one noise by steps of Gauss and Newton, damped (Marquardt 1963) once a step has failed."""
         hypothesis, theta = fit.hypothesis, fit.theta
         low, high = hypothesis.bounds
         seen = self._observer(linear, fit)
-        best: ExplanationFit | None = None
-        move = np.zeros(len(theta))
+        best: tuple[ExplanationFit, _Step] | None = None
+        damping = 0.0
         for _ in range(steps if len(theta) else 1):
-            at = replace(fit, theta=theta)
+            found, gain = replace(fit, theta=theta, score=np.inf), np.inf
             try:
-                solved = self._solved(at, seen, self.columns(hypothesis, theta, coefficients))
+                solved = self._solved(found, seen, self.columns(hypothesis, theta, coefficients))
             except FloatingPointError:
                 if best is None:
                     raise
-                move = 0.3 * move
-                theta = np.clip(best.theta + move, low, high)
-                continue
-            found = replace(
-                at,
-                covariance=solved.covariance,
-                score=self._score(fit, seen, solved),
-                change=solved.change,
-            )
-            if best is None or found.score < best.score:
-                best, move = found, solved.move
-                if len(theta) == 0 or solved.gain < LEAST_GAIN:
+            else:
+                score = self._score(fit, seen, solved)
+                found = replace(found, covariance=solved.covariance, score=score, change=solved.change)
+                gain = solved.gain
+            if best is None or found.score < best[0].score:
+                best, damping = (found, solved.step), damping / 10 if damping >= 1.0 else 0.0
+                if len(theta) == 0 or gain < LEAST_GAIN:
                     break
             else:
-                move = 0.3 * move
-            theta = np.clip(best.theta + move, low, high)
+                damping = max(10 * damping, 1.0)
+            theta = np.clip(best[0].theta + best[1].move(damping), low, high)
         assert best is not None
-        return best
+        return best[0]
 
     def _noise(self, fit: ExplanationFit, linear: Linear, coefficients: Array, count: int) -> ExplanationFit:
         """Noise and width for the columns as they are; the parameters follow linearly, within their bounds."""
@@ -518,9 +513,10 @@ class Likelihood:
         held = cho_factor(inner)
         alone = cho_solve(held, pull[k:])
         low, high = (bound - theta for bound in hypothesis.bounds)
+        follow = cho_solve(held, cross)
+        step = _Step(normal[:k, :k] - cross.T @ follow, pull[:k] - cross.T @ alone, low, high, whole[:k])
         if np.any((whole[:k] < low) | (whole[:k] > high)):
-            follow = cho_solve(held, cross)
-            move = least_in_box(normal[:k, :k] - cross.T @ follow, pull[:k] - cross.T @ alone, low, high)
+            move = step.move(0.0)
             whole = np.concatenate([move, alone - follow @ move])
         decrease = float(2 * pull @ whole - whole @ (normal @ whole))
         without = float(2 * pull[k:] @ alone - alone @ (inner @ alone))
@@ -539,7 +535,7 @@ class Likelihood:
         weights *= factors[:, None]
         return _Solved(
             reduced_cost,
-            whole[:k],
+            step,
             covariance[:k, :k],
             change,
             gain,
@@ -578,13 +574,32 @@ def _mixed(columns: Array, weights: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
+class _Step:
+    """The next step of the parameters: normal matrix (k, k) and pull (k,) with the coefficients solved for, bounds of
+    the step, and the step without bounds."""
+
+    normal: Array
+    pull: Array
+    low: Array
+    high: Array
+    free: Array
+
+    def move(self, damping: float) -> Array:
+        """The step between its bounds, the diagonal of the normal matrix enlarged by a share `damping` of itself."""
+        if not damping and np.all((self.free >= self.low) & (self.free <= self.high)):
+            return self.free
+        damped = self.normal + damping * np.diag(np.diag(self.normal))
+        return least_in_box(damped, self.pull, self.low, self.high)
+
+
+@dataclass(frozen=True, eq=False)
 class _Solved:
     """Result of the least squares: cost with the log determinant of the coefficients, step of the parameters and its
     gain, their covariance, change of the coefficients, trace of their covariance afterwards, and the columns that count
     for the noise: the residual, and the root of that covariance."""
 
     reduced_cost: float
-    move: Array
+    step: _Step
     covariance: Array
     change: Array
     gain: float

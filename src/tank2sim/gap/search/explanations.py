@@ -28,7 +28,7 @@ from tank2sim.gap.inference.prior import PRICE, candidate_explanations
 from tank2sim.gap.search.screening import Screen, Screened, Variant, variants
 
 FIRST_SINGLES, FIRST_PAIRS = 6, 2
-SINGLES, PAIRS, WITH_THE_BEST, SWAPS = 8, 3, 3, 2
+SINGLES, PAIRS, WITH_THE_BEST, SWAPS = 8, 3, 3, 1
 """Number of proposals of each screen that are fitted (project choice)."""
 
 WAVES_WITH_NONE = 2
@@ -149,7 +149,7 @@ def search(
         if fitting.best().score < reached - MUCH_BETTER:
             fitting = _about_best(fitting)
     _polish(fitting)
-    _fit_nearly_alike(fitting, chosen)
+    _fit_nearly_alike(fitting, every)
     fits = sorted(fitting.found.values(), key=lambda fit: fit.score)
     return Search(fitting.likelihood, tuple(fits), every)
 
@@ -196,11 +196,8 @@ def _explore(fitting: Fitting, every: Sequence[Variant], most: int) -> None:
     if not fitting.has(2) or fitting.best(2).score > fitting.best(1).score - WORTH:
         return
     pair = fitting.best(2)
-    swapped: list[Screened] = []
-    for name, theta in thetas_of(pair).items():
-        alone = fitting.hypotheses(name)  # surroundings differ between trials only after this
-        base = ExplanationFit(alone, theta, np.zeros((len(theta), len(theta))), pair.logs, np.inf, pair.change)
-        swapped += [Screened({name: theta}, 0.0), *_on_top_of(fitting, base, every)[:SWAPS]]
+    alone = [Screened({name: theta}, 0.0) for name, theta in thetas_of(pair).items()]
+    swapped = [*alone, *_with_one_swapped(fitting, pair, every)]
     fitting.fit(_proposals(fitting, swapped, [pair.logs], limit=pair.score + _FAR))
 
 
@@ -254,7 +251,7 @@ def _sets_in_surroundings(
 
 def _add_more(fitting: Fitting, every: Sequence[Variant], most: int) -> None:
     """More effects on the best set of two or more while each gains :data:`WORTH`, and the sets without each of the
-    others, of which one may be the best now."""
+    others, or with another in its place, of which one may be the best now."""
     extended: set[tuple[str, ...]] = set()
     while True:
         best = fitting.best()
@@ -269,6 +266,25 @@ def _add_more(fitting: Fitting, every: Sequence[Variant], most: int) -> None:
         thetas = thetas_of(larger)
         smaller = [{name: theta for name, theta in thetas.items() if name != dropped} for dropped in thetas]
         _fit_near(fitting, [Screened(parts, 0.0) for parts in smaller], larger)
+        _fit_near(fitting, _with_one_swapped(fitting, fitting.best(), every), fitting.best())
+
+
+def _with_one_swapped(fitting: Fitting, fit: ExplanationFit, every: Sequence[Variant]) -> list[Screened]:
+    """Sets with another effect in the place of each of a fit's: those that the screen likes best, or nearly alike."""
+    swapped = _nearly_alike(fitting, fit, every)
+    for dropped in (thetas := thetas_of(fit)):
+        kept = {name: theta for name, theta in thetas.items() if name != dropped}
+        each = tuple(name for name in fit.hypothesis.each if name != dropped)
+        theta = np.concatenate([*kept.values(), np.zeros(0)])
+        base = replace(
+            fit,
+            hypothesis=fitting.hypotheses(*kept, each=each),
+            theta=theta,
+            covariance=np.zeros((len(theta), len(theta))),
+        )
+        others = [variant for variant in every if variant.effect != dropped]
+        swapped += _on_top_of(fitting, base, others)[:SWAPS]
+    return swapped
 
 
 def _fit_more(fitting: Fitting, best: ExplanationFit, every: Sequence[Variant]) -> None:
@@ -334,21 +350,27 @@ def _at_the_noise_of(best: ExplanationFit, fits: Sequence[ExplanationFit]) -> li
     ]
 
 
-def _fit_nearly_alike(fitting: Fitting, chosen: Sequence[str]) -> None:
-    """The most probable with the effect that shows nearly as one of its own, in the place of that one: the screen is
-    linear, and may have proposed either alone."""
+def _fit_nearly_alike(fitting: Fitting, every: Sequence[Variant]) -> None:
+    """The most probable with the effect that shows nearly as one of its own in the place of that one."""
     best = min(fitting.found.values(), key=lambda fit: fit.score + PRICE * len(fit.hypothesis.effects))
-    thetas = thetas_of(best)
-    proposals = []
+    alike = _nearly_alike(fitting, best, every)
+    fitting.fit([Proposal(one.thetas, [best.logs], ROUNDS, each=best.hypothesis.each) for one in alike])
+
+
+def _nearly_alike(fitting: Fitting, fit: ExplanationFit, every: Sequence[Variant]) -> list[Screened]:
+    """A fit's set with the effect that shows nearly as one of its own in the place of that one, at its typical size:
+    the screen is linear, and may have proposed either alone."""
+    chosen, thetas = {variant.effect for variant in every}, thetas_of(fit)
+    swapped = []
     for name in thetas:
         other = nearly_like(name)
         if other not in chosen or other in thetas:
             continue
         hypothesis = fitting.hypotheses(other)
         sizes = [estimate.parameter.typical_values(hypothesis.card)[0] for estimate in hypothesis.estimated]
-        swapped = {effect: theta for effect, theta in thetas.items() if effect != name} | {other: np.array(sizes)}
-        proposals.append(Proposal(swapped, [best.logs], ROUNDS, each=best.hypothesis.each))
-    fitting.fit(proposals)
+        kept = {effect: theta for effect, theta in thetas.items() if effect != name}
+        swapped.append(Screened(kept | {other: np.array(sizes)}, 0.0))
+    return swapped
 
 
 def _shapes(fit: ExplanationFit) -> NDArray[np.bool_]:
