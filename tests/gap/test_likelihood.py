@@ -147,6 +147,31 @@ def test_a_form_that_differs_beyond_belief_costs_its_excess(monkeypatch, largest
     assert scores[1] - scores[0] == pytest.approx(module.IMPOSSIBLE * np.maximum(away - largest, 0).sum())
 
 
+class Bent(Toy):
+    """A toy whose force grows with the logarithm of its parameter: a step of Gauss and Newton goes far too far."""
+
+    def rates_between(self, motion, theta):
+        return super().rates_between(motion, np.log(theta + 10.001))
+
+
+@pytest.mark.parametrize("start", [-9.0, 0.0, 9.0])
+def test_a_strongly_bent_force_is_found_from_either_side(start: float) -> None:
+    truth = -9.5
+    of = judge(toy_motion((np.log(truth + 10.001),)), names=())
+    fit = of.at_best(Bent((None,)), np.array([start]), [LOGS], [0, 0, 0])
+    assert fit.theta[0] == pytest.approx(truth, abs=4 * np.sqrt(fit.covariance[0, 0]))
+
+
+def test_a_damped_step_has_a_larger_diagonal_and_keeps_its_bounds() -> None:
+    normal, pull = np.array([[4.0, 1.0], [1.0, 3.0]]), np.array([1.0, 2.0])
+    free, wide = np.linalg.solve(normal, pull), np.full(2, 9.0)
+    step = module._Step(normal, pull, -wide, wide, free)
+    assert step.move(0.0) is free
+    np.testing.assert_allclose(step.move(2.0), np.linalg.solve(normal + 2 * np.diag([4.0, 3.0]), pull), rtol=1e-9)
+    narrow = replace(step, high=np.array([9.0, 0.1]))
+    np.testing.assert_allclose(narrow.move(0.0), [(1.0 - 0.1) / 4.0, 0.1], rtol=1e-9)
+
+
 def test_residuals_are_remembered_for_each_explanation_and_its_parameters(monkeypatch) -> None:
     of, asked = judge(toy_motion((0.8, -0.6))), []
     first, second, both = Toy((None,)), Toy((None,), indices=(1,)), Toy((None, None))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from tank2sim.gap.search import explanations
@@ -80,10 +82,36 @@ def test_a_pair_that_becomes_best_by_leaving_one_of_three_out_is_extended_too(mo
 
     monkeypatch.setattr(explanations, "_fit_more", extend)
     monkeypatch.setattr(explanations, "_fit_near", fit_near)
+    monkeypatch.setattr(explanations, "_with_one_swapped", lambda *given: [])
     monkeypatch.setattr(explanations, "thetas_of", lambda one: dict.fromkeys(one.hypothesis.effects))
     explanations._add_more(fitting, (), 4)
     assert (NAMES[0], NAMES[FORCE]) in asked
     assert fitting.best().hypothesis.effects == tuple(NAMES[place] for place in (0, FORCE, LAG))
+
+
+def test_in_a_larger_set_each_effect_makes_room_for_the_one_that_the_screen_likes_next_to_the_others(
+    monkeypatch,
+) -> None:
+    fitting = Fitting({}, ())
+    fitting.hypotheses = lambda *names, each=(): SimpleNamespace(effects=names)
+    seen = []
+
+    def on_top_of(fitting, base, every) -> list[Screened]:
+        kept = base.hypothesis.effects
+        seen.append((kept, base.theta.tolist()))
+        other = next(variant.effect for variant in every if variant.effect not in kept)
+        return [Screened(dict.fromkeys((*kept, other)), 9.0), Screened(dict.fromkeys((*kept, NAMES[LAG])), 8.0)]
+
+    monkeypatch.setattr(explanations, "_on_top_of", on_top_of)
+    three = replace(fit(-900.0, 0, FORCE, DRAG), theta=np.array([1.0, 2.0, 3.0]))
+    every = [SimpleNamespace(effect=NAMES[place]) for place in (0, FORCE, DRAG, BIAS)]
+    swapped = explanations._with_one_swapped(fitting, three, every)
+    assert {one.effects for one in swapped} == {
+        (NAMES[FORCE], NAMES[DRAG], NAMES[BIAS]),
+        (NAMES[0], NAMES[DRAG], NAMES[BIAS]),
+        (NAMES[0], NAMES[FORCE], NAMES[BIAS]),
+    }
+    assert [theta for _, theta in seen] == [[2.0, 3.0], [1.0, 3.0], [1.0, 2.0]]
 
 
 @pytest.mark.parametrize(("best", "other"), [(PLAY, BAND), (BAND, PLAY)])
@@ -93,7 +121,9 @@ def test_play_and_dead_band_are_each_tried_in_place_of_the_other(best: int, othe
     card = SimpleNamespace(ship=SimpleNamespace(length_m=100.0), model=SimpleNamespace(speed_mps=5.0))
     size = SimpleNamespace(parameter=SimpleNamespace(typical_values=lambda card: (0.03,)))
     fitting.hypotheses = lambda name: SimpleNamespace(card=card, estimated=(size,))
-    explanations._fit_nearly_alike(fitting, NAMES)
+    sought = [SimpleNamespace(effect=name) for name in NAMES]
+    explanations._fit_nearly_alike(fitting, sought)
     assert {frozenset(effects) for effects in fitting.found} >= {frozenset({NAMES[other], NAMES[BIAS]})}
-    explanations._fit_nearly_alike(fitting, (NAMES[best], NAMES[BIAS]))  # the other is not sought
+    without = [one for one in sought if one.effect in (NAMES[best], NAMES[BIAS])]
+    explanations._fit_nearly_alike(fitting, without)
     assert len(fitting.found) == 4
