@@ -66,7 +66,7 @@ LEAST_DECREASE = 0.02
 compared by differences of some units."""
 
 QUOTIENT = 1e-3
-"""_Step of the logarithms of the noise in a difference quotient of slopes (project choice: a thousandth of a level)."""
+"""Step of the logarithms of the noise in a difference quotient of slopes (project choice: a thousandth of a level)."""
 
 WIDTHS = (0.1, 2.5)
 """Factor on the standard errors of the card's coefficients where explanations are compared: where a card states none,
