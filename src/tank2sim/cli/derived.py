@@ -78,19 +78,7 @@ def _numbers(word: str) -> list[str]:
 def command_of(verb: Verb) -> click.Command:
     """Return the command of a verb."""
     others = variants_of(verb)
-    own: dict[str, click.Parameter] = {}
-    takers: dict[str, list[str]] = {}
-    for flag, each in {"": verb, **others}.items():
-        for parameter in _own_parameters(each):
-            if isinstance(parameter, click.Option) or not (flag and each.takes):
-                own.setdefault(parameter.name or "", parameter)
-                takers.setdefault(parameter.name or "", []).append(flag)
-    for named, flags in takers.items():
-        parameter = own[named]
-        if "" not in flags and isinstance(parameter, click.Option):
-            parameter.required = False
-            if needed := [flag for flag in flags if f"--{flag}" not in parameter.opts]:
-                parameter.help = f"{parameter.help} [only with {_either(needed, others)}]"
+    own, takers = _parameters_of_variants(verb, others)
     documented, _ = _documented(verb.function)
     usual = f"By default CARD is {verb.default_ship}." if verb.default_ship else ""
     text = "\n\n".join(filter(None, (documented.short_description, documented.long_description, usual)))
@@ -101,16 +89,6 @@ def command_of(verb: Verb) -> click.Command:
         for flag, other in others.items()
         if not other.takes and not _argument_of(flag, other)
     ]
-    main = [] if any("-o" in parameter.opts for parameter in own.values()) else ["-o"]
-    shared = [
-        _option([*main, "--page"], type=OutputFile(PAGE), metavar="FILE.html", help="Write the page.",
-                required=verb.page_required),
-        _option(["--plot"], type=OutputFile(PICTURE), metavar="FILE|DIR", help="Draw the main chart (.png, .svg, .pdf),"
-                " or each chart and the page into a folder."),
-        _option(["--json"], type=OutputFile(JSON), metavar="FILE", help="Write the full result; - is standard output."),
-        _option(["--quiet"], is_flag=True, help="Print doubts and errors alone."),
-        _option(["--verbose"], is_flag=True, help="Print every table."),
-    ]  # fmt: skip
 
     def run(**given: Any) -> int:
         first = next(iter(own), "")
@@ -125,7 +103,42 @@ def command_of(verb: Verb) -> click.Command:
             given[next(iter(inspect.signature(called.function).parameters))] = given[first]
         return _run(called, given)
 
-    return VerbCommand(verb.name, params=[*own.values(), *switches, *shared], callback=run, help=text)
+    params = [*own.values(), *switches, *_shared_options(verb, own.values())]
+    return VerbCommand(verb.name, params=params, callback=run, help=text)
+
+
+def _parameters_of_variants(
+    verb: Verb, others: Mapping[str, Verb]
+) -> tuple[dict[str, click.Parameter], dict[str, list[str]]]:
+    """Arguments and options of a verb and its variants by name, and the variants that take each ("" is the verb)."""
+    own: dict[str, click.Parameter] = {}
+    takers: dict[str, list[str]] = {}
+    for flag, each in {"": verb, **others}.items():
+        for parameter in _own_parameters(each):
+            if isinstance(parameter, click.Option) or not (flag and each.takes):
+                own.setdefault(parameter.name or "", parameter)
+                takers.setdefault(parameter.name or "", []).append(flag)
+    for named, flags in takers.items():
+        parameter = own[named]
+        if "" not in flags and isinstance(parameter, click.Option):
+            parameter.required = False
+            if needed := [flag for flag in flags if f"--{flag}" not in parameter.opts]:
+                parameter.help = f"{parameter.help} [only with {_either(needed, others)}]"
+    return own, takers
+
+
+def _shared_options(verb: Verb, own: Iterable[click.Parameter]) -> list[click.Option]:
+    """The options of every command that shows a result; -o is the page where a command writes no file of its own."""
+    main = [] if any("-o" in parameter.opts for parameter in own) else ["-o"]
+    return [
+        _option([*main, "--page"], type=OutputFile(PAGE), metavar="FILE.html", help="Write the page.",
+                required=verb.page_required),
+        _option(["--plot"], type=OutputFile(PICTURE), metavar="FILE|DIR", help="Draw the main chart (.png, .svg, .pdf),"
+                " or each chart and the page into a folder."),
+        _option(["--json"], type=OutputFile(JSON), metavar="FILE", help="Write the full result; - is standard output."),
+        _option(["--quiet"], is_flag=True, help="Print doubts and errors alone."),
+        _option(["--verbose"], is_flag=True, help="Print every table."),
+    ]  # fmt: skip
 
 
 def _own_parameters(verb: Verb) -> Iterator[click.Parameter]:
@@ -205,47 +218,60 @@ def _is_of(name: str, kind: Any) -> bool:
 def _parameters(argument: tuple[inspect.Parameter, Any], helps: Mapping[str, str], verb: Verb) -> list[click.Parameter]:
     """The argument or the options of one parameter of a verb."""
     one, kind = argument
-    several = _several(kind)
     if _is_of("Vessel", kind):
-        change = _option(["--set"], name="set", multiple=True, metavar="KEY=VALUE", help="A value in place of the "
-                         "card's, by dotted key: derivatives.Yv=-0.012.")  # fmt: skip
-        required = one.default is inspect.Parameter.empty
-        if not required or one.kind is one.KEYWORD_ONLY:
-            return [_option([f"--{one.name}"], metavar="CARD", required=required, help=helps.get(one.name))]
-        usual = verb.default_ship or None
-        card = "[CARD]" if usual else "CARD"
-        usually: dict[str, Any] = {"default": usual} if usual else {}
-        return [click.Argument([one.name], metavar=card, required=not usual, **usually), change]
+        return _vessel_parameters(one, helps.get(one.name, ""), verb)
     if written := _written(kind):
-        output = ["-o", "--output"] if one.name == "output" else [f"--{one.name.replace('_', '-')}"]
-        usual = None if one.default is inspect.Parameter.empty else one.default
-        required = usual is None and (written.by_function or one.default is inspect.Parameter.empty)
-        usually = {"default": usual, "show_default": True} if usual else {"required": required}
-        return [_option(output, type=OutputFile(written.endings), metavar=written.metavar, help=helps.get(one.name),
-                        **usually)]  # fmt: skip
-    required = one.default is inspect.Parameter.empty
-    by_position = one.kind is not inspect.Parameter.KEYWORD_ONLY and one.name not in verb.options
+        return [_written_option(one, written, helps.get(one.name, ""))]
+    by_position = one.kind is not one.KEYWORD_ONLY and one.name not in verb.options
+    required, several = one.default is one.empty, _several(kind)
     if by_position and (required or one.name == _first_list(verb.function)):
         return [click.Argument([one.name], nargs=-1 if several else 1, required=required, type=_type(kind, several))]
-    default = None if one.default in (inspect.Parameter.empty, None) else one.default
-    if several and isinstance(default, str):
-        default = (default,)
     words = "; ".join(f"{choice}: {text}" for choice, text in verb.choices.get(one.name, {}).items())
-    text = " ".join(filter(None, (helps.get(one.name), words)))
-    shown: dict[str, Any] = {"help": text, **({"required": True} if required else {"default": default})}
+    return [_value_option(one, kind, " ".join(filter(None, (helps.get(one.name), words))), verb)]
+
+
+def _vessel_parameters(one: inspect.Parameter, words: str, verb: Verb) -> list[click.Parameter]:
+    """The card of a verb, and the changes of its values; of a further card, an option."""
+    required = one.default is one.empty
+    if not required or one.kind is one.KEYWORD_ONLY:
+        return [_option([f"--{one.name}"], metavar="CARD", required=required, help=words)]
+    change = _option(["--set"], name="set", multiple=True, metavar="KEY=VALUE", help="A value in place of the "
+                     "card's, by dotted key: derivatives.Yv=-0.012.")  # fmt: skip
+    if usual := verb.default_ship:
+        return [click.Argument([one.name], metavar="[CARD]", required=False, default=usual), change]
+    return [click.Argument([one.name], metavar="CARD"), change]
+
+
+def _written_option(one: inspect.Parameter, written: Written, words: str) -> click.Option:
+    """The option of an argument that names a file to be written."""
+    names = ["-o", "--output"] if one.name == "output" else [f"--{one.name.replace('_', '-')}"]
+    usual = None if one.default is one.empty else one.default
+    settings: dict[str, Any] = {"default": usual, "show_default": True}
+    if not usual:
+        settings = {"required": usual is None and (written.by_function or one.default is one.empty)}
+    return _option(names, type=OutputFile(written.endings), metavar=written.metavar, help=words, **settings)
+
+
+def _value_option(one: inspect.Parameter, kind: Any, words: str, verb: Verb) -> click.Option:
+    """The option of an argument that is a flag, a choice, a number, a text, or several of these."""
     stem, unit = _stem(one.name)
     option = verb.options.get(one.name) or f"--{stem.replace('_', '-')}"
     names = list(dict.fromkeys((option, verb.options.get(one.name) or f"--{one.name.replace('_', '-')}")))
+    several, read = _several(kind), one.name in verb.texts
+    several = several or (read and any(get_origin(part) is Mapping for part in _parts(kind)))
+    default = None if one.default is one.empty else one.default
+    if several and isinstance(default, str):
+        default = (default,)
+    settings: dict[str, Any] = {"help": words}
+    settings |= {"required": True} if one.default is one.empty else {"default": default}
     if kind is bool:
         flags = [f"{option}/--no-{option[2:]}"] if one.default else names
-        return [_option(flags, name=one.name, is_flag=True, **shown)]
-    read = one.name in verb.texts
-    several = several or (read and any(get_origin(part) is Mapping for part in _parts(kind)))
+        return _option(flags, name=one.name, is_flag=True, **settings)
     metavar = unit.upper().replace("/", "P") if unit and not read else stem.upper() if several or read else None
-    shown |= {"multiple": bool(several), "metavar": f"{metavar} ..." if several else metavar}
+    settings |= {"multiple": bool(several), "metavar": f"{metavar} ..." if several else metavar}
     if not read:
-        shown |= {"type": _type(kind, several), "show_default": default not in (None, "", ())}
-    return [_option(names, name=one.name, **shown)]
+        settings |= {"type": _type(kind, several), "show_default": default not in (None, "", ())}
+    return _option(names, name=one.name, **settings)
 
 
 def _written(kind: Any) -> Written | None:
@@ -347,23 +373,7 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
         call = _values_for(verb.function, values, verb.texts, changes, inputs)
         if "report" in inspect.signature(verb.function).parameters:
             call["report"] = stack.enter_context(showing_stages(verb.words))
-        result = verb.function(**call)
-        contents: dict[Path, str | bytes] = {}
-        marks = (_written(kind) for _, kind in _arguments(verb.function))
-        if any(mark and not mark.by_function for mark in marks):
-            contents |= result.files
-        for output in verb.outputs:
-            if (path := _value_of(output, values)) is None:
-                continue
-            own = {one.name for one, _ in _arguments(output.write) if one.kind is inspect.Parameter.KEYWORD_ONLY}
-            options = _values_for(output.write, {name: values[name] for name in own}, {}, (), inputs)
-            if "report" in inspect.signature(output.write).parameters:
-                options["report"] = stack.enter_context(showing_stages("writing"))
-            made = output.write(result, path, **options)
-            if not isinstance(made, Mapping):
-                result, made = made, made.files
-            refuse_doubled([*contents, *made])
-            contents |= made
+        result, contents = _with_outputs(verb, verb.function(**call), values, inputs, stack)
     given_files = {name: values[name] for name in ("page", "plot", "json")}
     written = write_outputs(result, contents, [*inputs, *result.inputs], **given_files)
     show_result(result, [*result.written, *written], quiet=values["quiet"], verbose=values["verbose"])
@@ -371,6 +381,31 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
         print(f"tank2sim: {one_line(fault)}", file=sys.stderr)
     code: int = result.exit_code
     return code
+
+
+def _with_outputs(
+    verb: Verb, result: Any, values: Mapping[str, Any], inputs: list[Path], stack: ExitStack
+) -> tuple[Any, dict[Path, str | bytes]]:
+    """The result, or the one that an output made of it, and the contents of the files that were asked for."""
+    from tank2sim.cli.progress import showing_stages
+
+    contents: dict[Path, str | bytes] = {}
+    marks = (_written(kind) for _, kind in _arguments(verb.function))
+    if any(mark and not mark.by_function for mark in marks):
+        contents |= result.files
+    for output in verb.outputs:
+        if (path := _value_of(output, values)) is None:
+            continue
+        own = {one.name for one, _ in _arguments(output.write) if one.kind is inspect.Parameter.KEYWORD_ONLY}
+        options = _values_for(output.write, {name: values[name] for name in own}, {}, (), inputs)
+        if "report" in inspect.signature(output.write).parameters:
+            options["report"] = stack.enter_context(showing_stages("writing"))
+        made = output.write(result, path, **options)
+        if not isinstance(made, Mapping):
+            result, made = made, made.files
+        refuse_doubled([*contents, *made])
+        contents |= made
+    return result, contents
 
 
 def _refuse_unplaced(outputs: Iterable[Path], made: Sequence[Path | None]) -> None:
@@ -408,12 +443,7 @@ def _values_for(
         if one.name not in values or (value := values[one.name]) is None or value == ():
             continue
         if _is_of("Vessel", kind):
-            from tank2sim.cards import read_card
-            from tank2sim.cli.overrides import parse_changes
-            from tank2sim.dynamics.vessel import Vessel
-
-            of_ship = parse_changes(changes if one.default is inspect.Parameter.empty else ())
-            value = Vessel(read_card(value, of_ship))
+            value = _vessel(value, changes if one.default is one.empty else ())
             inputs.append(Path(value.card.source))
         elif one.name in texts:
             value = texts[one.name](value)
@@ -423,6 +453,15 @@ def _values_for(
             inputs += [path for path in (value if isinstance(value, tuple) else (value,)) if isinstance(path, Path)]
         call[one.name] = value
     return call
+
+
+def _vessel(card: Path | str, changes: Sequence[str]) -> Any:
+    """The vessel of a card with values changed on the command line."""
+    from tank2sim.cards import read_card
+    from tank2sim.cli.overrides import parse_changes
+    from tank2sim.dynamics.vessel import Vessel
+
+    return Vessel(read_card(card, parse_changes(changes)))
 
 
 def _literal(kind: Any) -> tuple[Any, ...]:
