@@ -47,7 +47,7 @@ def convert(
 
     An MMG ship becomes a polynomial by least squares over the motions of standard manoeuvres; between polynomial cards
     the conversions of scaling, rudder sign and origin are exact. Files of other programs are written from the equations
-    themselves.
+    themselves. Programs that run FMUs (Unity, Unreal, Simulink) take the one of export.
 
     Parameters
     ----------
