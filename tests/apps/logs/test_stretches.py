@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -11,6 +12,8 @@ import pytest
 import tank2sim as t2s
 from tank2sim.apps.logs.clock import utc_text
 from tank2sim.apps.logs.command import log
+from tank2sim.apps.logs.stretches import StretchKind
+from tank2sim.apps.logs.trial_files import _name
 from tank2sim.records.reading import read_trial_file
 from tests.apps.logs.made_logs import T0, frame, steered, truth_manoeuvres, voyage
 from tests.marks import first_fast
@@ -141,3 +144,9 @@ def test_a_current_is_found_where_the_log_determines_it(data) -> None:
         assert abs(error) < 0.04
     _, path = truth_manoeuvres(data, "usv_22", "voyage.csv")  # nothing through the water
     assert log(path).current is None
+
+
+@pytest.mark.parametrize(("level", "name"), [(-0.001, "03_steps_+0"), (-0.201, "03_steps_-20")])
+def test_a_level_that_rounds_to_zero_has_no_minus(level: float, name: str) -> None:
+    stretch = SimpleNamespace(kind=StretchKind.STEPS, rudder_rad=level)
+    assert _name(3, stretch, steered=False) == name

@@ -26,7 +26,7 @@ VOYAGE_SAMPLES = 1500
 
 NO_RUDDER_NOTICE = (
     "the vessel is steered by two thrusters: its files have columns n_port_rpm, n_starboard_rpm, order_port and "
-    "order_starboard in place of a rudder; identify takes them with a card of kind small_craft, gap and audit do not"
+    "order_starboard in place of a rudder; identify and gap take them with a card of kind small_craft, audit does not"
 )
 """Notice of a craft without a rudder."""
 
@@ -218,7 +218,7 @@ def _stretch(voyage: Voyage, stretch: Stretch, file: str | None) -> StretchStudy
     rudder = "rudder_angle" in voyage.series or "rudder_order" in voyage.series
     level = None
     if not math.isnan(stretch.rudder_rad):
-        level = f"{math.degrees(stretch.rudder_rad):+.1f} deg" if rudder else f"{100 * stretch.rudder_rad:+.0f} %"
+        level = f"{math.degrees(stretch.rudder_rad):+z.1f} deg" if rudder else f"{100 * stretch.rudder_rad:+z.0f} %"
     begin, least, most = stretch.speed_mps
     return StretchStudy(
         kind=stretch.kind,

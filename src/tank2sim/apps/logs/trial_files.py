@@ -160,7 +160,7 @@ def _name(number: int, stretch: Stretch, steered: bool) -> str:
     if math.isnan(stretch.rudder_rad) or stretch.kind.value in ("accelerate", "coast", "stop", "astern"):
         return f"{number:02d}_{stretch.kind}"
     level = math.degrees(stretch.rudder_rad) if steered else 100 * stretch.rudder_rad
-    return f"{number:02d}_{stretch.kind}_{level:+.0f}"
+    return f"{number:02d}_{stretch.kind}_{level:+z.0f}"
 
 
 def _remarks(voyage: Voyage, stretches: Sequence[Stretch], first: float) -> list[str]:
