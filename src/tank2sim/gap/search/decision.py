@@ -12,13 +12,14 @@ probable: where the innovations of the best are not noise, a name would be a gue
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtrc, ndtr, softmax
 
 from tank2sim.arguments import FALSE_DISCOVERY
+from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.diagnosis.residuals import estimates
 from tank2sim.gap.diagnosis.strangeness import Strange, find_strangeness
@@ -102,6 +103,11 @@ def decide(search: Search, false_discovery: float = FALSE_DISCOVERY) -> Decision
     return replace(decision, verdict=OUTSIDE_LIBRARY) if strange else decision
 
 
+def enough_to_name(false_discovery: float = FALSE_DISCOVERY) -> float:
+    """Decrease of the score by one more effect from which it is named alone, beyond the penalty of its parameters."""
+    return PRICE + 2 * TEMPER * float(np.log((1 - false_discovery) / false_discovery))
+
+
 def posterior(fits: list[ExplanationFit]) -> dict[tuple[str, ...], float]:
     """Probability of each explanation, by its effects; they sum to 1."""
     shares = softmax([-0.5 * (fit.score + PRICE * len(fit.hypothesis.effects)) / TEMPER for fit in fits])
@@ -129,7 +135,8 @@ def _is_effect_significant(fit: ExplanationFit, name: str) -> bool:
         return False
     if name in fit.hypothesis.each and not _differs_from_zero(fit, name):
         return False
-    if EFFECTS[name].changes_on(fit.hypothesis.card) and _change(fit, name) < STANDARD_ERRORS:
+    values = next(values for effect, values, _ in estimates(fit) if effect == name)
+    if change_of_derivatives(fit.hypothesis.card, name, values) < STANDARD_ERRORS:
         return False
     return not (EFFECTS[name].in_place_of and _change_of_gear(fit, name) < STANDARD_ERRORS)
 
@@ -146,10 +153,21 @@ def _differs_from_zero(fit: ExplanationFit, name: str) -> bool:
     return bool(chdtrc(len(places), statistic) < 2 * ndtr(-STANDARD_ERRORS))
 
 
-def _change(fit: ExplanationFit, name: str) -> float:
-    """Largest change of a derivative of the card by an effect, in standard errors of the card."""
-    card = fit.hypothesis.card
-    values = next(values for effect, values, _ in estimates(fit) if effect == name)
+def change_of_derivatives(card: SteeredCard, name: str, values: Mapping[str, float]) -> float:
+    """Largest change of a derivative of the card by an effect, in standard errors of the card.
+
+    Infinite for an effect that changes none.
+
+    Parameters
+    ----------
+    card : SteeredCard
+    name : str
+        Name of the effect.
+    values : mapping
+        Its parameters, SI.
+    """
+    if not EFFECTS[name].changes_on(card):
+        return float(np.inf)
     changes = [
         abs(after - card.derivatives.get(term, 0.0)) / error if (error := card.standard_error(term)) > 0 else np.inf
         for term, after, *_ in changed_derivatives(card, name, values, {})

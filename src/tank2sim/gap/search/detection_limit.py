@@ -1,8 +1,9 @@
 """Detection limits: the size of each effect below which the trials could not show it.
 
 By the linear screen, at the noise of the best explanation and at other noises of little additional cost: without the
-effect the noise is estimated as well, and may absorb an effect as a slow sensor error or an unmodelled force. An effect
-that is not linear in its size is evaluated again at the size that was found.
+effect the noise is estimated as well, and may absorb an effect as a slow sensor error or an unmodelled force, and wider
+coefficients of the card may absorb it. An effect that is not linear in its size is evaluated again at the size that was
+found.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from tank2sim.arrays import Array
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.kalman_filter import FORCE_STATES
-from tank2sim.gap.inference.likelihood import COUNTED, Likelihood
+from tank2sim.gap.inference.likelihood import COUNTED, WIDTHS, Likelihood
+from tank2sim.gap.search.decision import STANDARD_ERRORS, change_of_derivatives
 from tank2sim.gap.search.explanations import Search
 from tank2sim.gap.search.screening import Screen, Variant, resized, variants_at
 
@@ -27,14 +29,18 @@ SIZES = (1 / 8, 1 / 4, 1 / 2, 2.0, 4.0, 8.0)
 """Shares of its typical value at which an effect without amplitude is tested for visibility."""
 
 LOUDER = 3.0
-"""Factor on the level of one slow error or one force at a time, of the noises that may hide an effect (project
-choice)."""
+"""Factor on the level of one slow error or force, or on the width of the card's coefficients, of the noises that may
+hide an effect (project choice)."""
 
 SURE = float(ndtri(0.95))
 """Standard deviations by which a size must exceed the threshold, to show in 95 of 100 such sets of trials."""
 
+_BEYOND_CARD = STANDARD_ERRORS + SURE
+"""Standard errors of the card by which an effect must change a derivative: its estimate errs by one of them."""
+
 _ROUNDS = 2
-"""Iterations on the size at which an effect shows (project choice): its force need not be linear in it."""
+"""Iterations on the size at which an effect shows, or is beyond the errors of the card (project choice): it need not be
+linear in it."""
 
 _NEAR = 1.2
 """A size that the next round would change by less than this factor is found."""
@@ -72,7 +78,7 @@ def could_hide(search: Search, best: ExplanationFit, enough: float) -> _Sizes:
         for amplitude, share in zip(variant.amplitudes, variant_shares, strict=True):
             parameter = variant.hypothesis.estimated[amplitude].parameter
             largest = max(abs(parameter.lowest(variant.hypothesis.card)), abs(parameter.maximum))
-            size = min(float(abs(variant.theta[amplitude]) * share), largest)
+            size = min(_beyond_card(variant, amplitude, float(abs(variant.theta[amplitude]) * share)), largest)
             known = sizes.setdefault(variant.effect, {})
             known[parameter.name] = max(size, known.get(parameter.name, 0.0))
     replacing = {variant.effect: variant for variant in search.variants if not variant.amplitudes}
@@ -82,6 +88,22 @@ def could_hide(search: Search, best: ExplanationFit, enough: float) -> _Sizes:
         if value is not None:
             sizes[variant.effect] = {variant.hypothesis.estimated[0].parameter.name: value}
     return sizes
+
+
+def _beyond_card(variant: Variant, amplitude: int, size: float) -> float:
+    """The size of an amplitude, at least the one that changes a derivative by more than the card may be wrong.
+
+    A smaller one is within the errors of the card, and is not named (:func:`.decision.is_significant`).
+    """
+    hypothesis, theta = variant.hypothesis, variant.theta.copy()
+    for _ in range(_ROUNDS):
+        theta[amplitude] = np.copysign(size, variant.theta[amplitude])
+        names = [estimate.parameter.name for estimate in hypothesis.estimated]
+        change = change_of_derivatives(hypothesis.card, variant.effect, dict(zip(names, theta.tolist(), strict=True)))
+        if change >= _BEYOND_CARD or change == 0.0:
+            return size
+        size *= _BEYOND_CARD / change
+    return size
 
 
 def _at_its_size(likelihood: Likelihood, variant: Variant, shares: Array) -> Variant:
@@ -103,13 +125,17 @@ def _beyond_rest(likelihood: Likelihood, variant: Variant) -> Variant:
 
 
 def _louder(likelihood: Likelihood, best: ExplanationFit) -> Iterator[ExplanationFit]:
-    """Copies of a fit with the level of one slow sensor error, or of one unmodelled force, increased."""
+    """Copies of a fit with the level of one slow sensor error, of one unmodelled force, or the width of the
+    coefficients increased, and one with the largest width."""
     low, high = likelihood.belief.bounds
     sensors = len(likelihood.motion.seen)
     for place in (*range(sensors, 2 * sensors), *range(3 * sensors, 3 * sensors + FORCE_STATES)):
         logs = best.logs.copy()
         logs[place] += np.log(LOUDER)
         yield replace(best, logs=np.clip(logs, low, high))
+    for width in {min(LOUDER * best.width, WIDTHS[1]), WIDTHS[1]}:
+        if width > best.width:
+            yield replace(best, logs=np.append(best.logs[:-1], np.log(width)))
 
 
 def _shares(
