@@ -25,7 +25,7 @@ from tank2sim.apps.rigs.tow.output_error import AT_ONCE, TowOptions
 from tank2sim.apps.rigs.tow.records import Tows, as_force, checked_force, force_words, mean_force
 from tank2sim.apps.rigs.tow.surge import DRAG_POWERS
 from tank2sim.arrays import Array
-from tank2sim.cards.writing import SurgeResult, surge_card_text
+from tank2sim.cards.writing import card_text
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import SINGULAR_CONDITION, correlation_matrix, scaled_condition
 from tank2sim.notices import Notice
@@ -267,14 +267,12 @@ def tow_card_text(
     `fit` is one of ``result.methods``; name of the body, source of the numbers, and length if known.
     """
     values = {key: value for key, value in fit.estimates.items() if key not in ("added_mass_kg", "start_delay_s")}
-    return surge_card_text(
-        SurgeResult(
-            name=name,
-            source=source,
-            values={**values, "force_N": result.force_N, "dry_mass_kg": result.mass_kg},
-            standard_errors={key: value for key, value in fit.standard_errors.items() if key in values},
-            top_speed_mps=result.top_speed_mps,
-            length_m=length_m,
-            notes=" ".join(result.notices),
-        )
+    notes = " ".join(result.notices) or None
+    return card_text(
+        {
+            "ship": {"name": name, "length_m": length_m, "source": source, "notes": notes},
+            "model": {"kind": "surge", "valid_speed_mps": [0.0, result.top_speed_mps]},
+            "surge": {**values, "force_N": result.force_N, "dry_mass_kg": result.mass_kg},
+            "uncertainty": {key: value for key, value in fit.standard_errors.items() if key in values},
+        }
     )

@@ -13,7 +13,7 @@ from tank2sim.apps.rigs.yaw.model import UNKNOWN_RIG
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.cards.reading import changed_text
 from tank2sim.cards.scaling import Scales
-from tank2sim.cards.writing import YawRigResult, yaw_rig_card_text
+from tank2sim.cards.writing import card_text
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.files import BYTE_ORDER_MARK
 
@@ -112,18 +112,22 @@ def rig_card_text(found: YawIdentification, method: str, *, name: str, source: s
             rows[key] = value, estimate.friction_standard_errors[key]
     values |= {key: float(f"{value:.6g}") for key, (value, _) in rows.items()} | _gravity(estimate, base)
     programme = found.records[0].programme
-    motion = {"kind": programme.kind, "max_rate_degps": float(f"{math.degrees(programme.max_rate_radps):.9g}")}
-    return yaw_rig_card_text(
-        YawRigResult(
-            name=name,
-            source=source,
-            notes=" ".join(study.notices),
-            values=values | {"torque_constant_NmpA": study.torque_constant_NmpA},
-            standard_errors={key: float(f"{error:.3g}") for key, (_, error) in rows.items() if error},
-            programme={**motion, "rise_s": programme.rise_s, "settle_s": programme.settle_s, "humps": programme.humps},
-            water_density_kgpm3=_tank_density(found) if wet else None,
-            length_m=_stated(found, "length_m"),
-        )
+    notes = " ".join(study.notices) or None
+    return card_text(
+        {
+            "ship": {"name": name, "length_m": _stated(found, "length_m"), "source": source, "notes": notes},
+            "environment": {"water_density_kgpm3": _tank_density(found)} if wet else None,
+            "model": {"kind": "yaw_rig"},
+            "yaw_rig": values | {"torque_constant_NmpA": study.torque_constant_NmpA},
+            "programme": {
+                "kind": programme.kind,
+                "max_rate_degps": float(f"{math.degrees(programme.max_rate_radps):.9g}"),
+                "rise_s": programme.rise_s,
+                "settle_s": programme.settle_s,
+                "humps": programme.humps,
+            },
+            "uncertainty": {key: float(f"{error:.3g}") for key, (_, error) in rows.items() if error},
+        }
     )
 
 
