@@ -180,6 +180,31 @@ def refuse_set(function: Callable[..., Any], given: Mapping[str, Any], problem: 
             raise ArgumentError(name, "", problem, "leave it out")
 
 
+def chosen_names(argument: str, given: str | Sequence[str], known: Iterable[str]) -> tuple[str, ...]:
+    """The `known` names that are given, in their order.
+
+    Parameters
+    ----------
+    argument : str
+        For messages.
+    given : str or sequence of str
+        Names, with commas between them in a text; ``"none"`` is no name.
+    known : iterable of str
+
+    Raises
+    ------
+    InputError
+        A name is unknown or repeated.
+    """
+    text, names = given if isinstance(given, str) else ",".join(given), tuple(known)
+    words = [word for word in map(str.strip, text.split(",")) if word not in ("", "none")]
+    for word in words:
+        if word not in names or words.count(word) > 1:
+            remedy = f"take any of {', '.join(names)}, once each"
+            raise ArgumentError(argument, "", f"{word!r} is unknown, or is repeated", remedy)
+    return tuple(name for name in names if name in words)
+
+
 class UnknownType(type):
     """A type that only type checkers know, with whatever members it has."""
 

@@ -70,9 +70,9 @@ def test_a_stopped_search_of_tows_gives_no_fit(monkeypatch) -> None:
     times = np.linspace(0, 60, 31)
     readings = (0.2 * np.tanh(times / 20))[:, None]
     tows = Tows(Path("made.csv"), ("speed_1_mps",), times, readings)
-    assert tow.fit_speeds(tows, 11.6, ("B3",)) is not None
+    assert tow.fit_speeds(tows, 11.6, tow.TowModel(("B3",))) is not None
     monkeypatch.setattr(search, "least_squares", _stays)
-    assert tow.fit_speeds(tows, 11.6, ("B3",)) is None
+    assert tow.fit_speeds(tows, 11.6, tow.TowModel(("B3",))) is None
 
 
 def test_a_stopped_search_of_a_yaw_rig_gives_no_fit(monkeypatch) -> None:

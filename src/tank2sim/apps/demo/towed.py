@@ -13,6 +13,7 @@ from tank2sim.answer.parts import Column, Illustration, KeyFigure, Section, Tabl
 from tank2sim.answer.study import study_values
 from tank2sim.apps.demo.fmu_helpers import DemoOutcome, Workshop, error_words, largest_error
 from tank2sim.apps.rigs.tow.identify import TowIdentification, identify_tow, tow_card_text
+from tank2sim.apps.rigs.tow.output_error import TowModel
 from tank2sim.apps.rigs.tow.records import Tows, read_tows
 from tank2sim.arrays import Array
 from tank2sim.bundled import bundled
@@ -23,7 +24,7 @@ from tank2sim.fmu.check import CheckReport
 from tank2sim.fmu.manoeuvre import InputSequence
 from tank2sim.fmu.running import replay
 
-WELL_POSED = ("B3",)
+WELL_POSED = TowModel(("B3",))
 """Drag terms that these tows determine (with M); the B1 and B2 of the paper in addition cannot be identified."""
 
 
@@ -37,7 +38,7 @@ def towed_vehicle(workshop: Workshop) -> DemoOutcome:
     """Identify, write the card, export and check the FMU, and tow it through fmpy next to the measured tows."""
     workshop.begin("five tows of an underwater vehicle: identifying mass and drag")
     tows = read_tows(bundled("models", "wilinski-zellman", "tows.csv"))
-    paper, chosen = identify_tow(tows), identify_tow(tows, terms=WELL_POSED)
+    paper, chosen = identify_tow(tows), identify_tow(tows, model=WELL_POSED)
     text = tow_card_text(chosen, chosen.methods["output_error"], name=NAME, source=SOURCE, length_m=LENGTH_M)
     card = parse_card(text, workshop.write("towed-vehicle.toml", text).name)
     model = build(card)

@@ -21,8 +21,9 @@ from tank2sim.apps.rigs.tow.equation_error import (
     solve_normal_equations,
 )
 from tank2sim.apps.rigs.tow.identify import identify_tow, tow_card_text
-from tank2sim.apps.rigs.tow.output_error import TowOptions, fit_speeds
+from tank2sim.apps.rigs.tow.output_error import TowModel, fit_speeds
 from tank2sim.apps.rigs.tow.records import Tows, force_words, parse_force
+from tank2sim.apps.rigs.tow.study import SIMPLE, SIMPLE_LATE
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import scaled_condition
 
@@ -172,9 +173,6 @@ def test_too_few_readings_for_the_polynomial_are_refused():
         fit_mean_speed(tows)
 
 
-LATE = TowOptions(start_delay=True)
-
-
 def exact(force, *, mass=3000.0, b3=150.0, delay=0.0, end=60.0):
     times = np.linspace(0, end, 31)
     found = solve_ivp(
@@ -186,31 +184,31 @@ def exact(force, *, mass=3000.0, b3=150.0, delay=0.0, end=60.0):
 
 @pytest.mark.parametrize("force", [Polynomial([11.63]), VARYING])
 def test_output_error_finds_mass_drag_and_start(force):
-    fit = fit_speeds(exact(force, delay=3.3), force, ("B3",), LATE)
+    fit = fit_speeds(exact(force, delay=3.3), force, SIMPLE_LATE)
     np.testing.assert_allclose(fit.estimates, [3000, 150, 3.3], rtol=2e-6)
 
 
 def test_both_methods_know_a_force_that_varies():
     tows = exact(VARYING)
-    result = identify_tow(tows, VARYING, 2243.0, terms=("B3",), speed_degree=9)
+    result = identify_tow(tows, VARYING, 2243.0, model=SIMPLE, speed_degree=9)
     for name in ("paper", "qr", "output_error"):
         np.testing.assert_allclose(result.methods[name].values, [3000, 150], rtol=2e-5)
     assert result.force_N == pytest.approx(12 + 0.1 * 30 - 0.0015 * 1200)  # the mean over 60 s
     assert result.force_polynomial == (12.0, 0.1, -0.0015)
     # the mean alone is another force
-    assert abs(identify_tow(tows, result.force_N, 2243.0, terms=("B3",)).methods["output_error"].values[1] - 150) > 15
+    assert abs(identify_tow(tows, result.force_N, 2243.0, model=SIMPLE).methods["output_error"].values[1] - 150) > 15
 
 
 @settings(max_examples=8, deadline=None)
 @given(pull=st.floats(0.2, 5), pace=st.floats(0.2, 5))
 def test_estimates_scale_with_force_speed_and_not_with_the_delay(table_1, pull, pace):
-    one = fit_speeds(table_1, 11.63, ("B3",), LATE).estimates
-    other = fit_speeds(replace(table_1, speed_mps=pace * table_1.speed_mps), 11.63 * pull, ("B3",), LATE).estimates
+    one = fit_speeds(table_1, 11.63, SIMPLE_LATE).estimates
+    other = fit_speeds(replace(table_1, speed_mps=pace * table_1.speed_mps), 11.63 * pull, SIMPLE_LATE).estimates
     np.testing.assert_allclose(other, [one[0] * pull / pace, one[1] * pull / pace**2, one[2]], rtol=1e-5)
 
 
 def test_a_delay_explains_table_1_and_is_in_the_result(table_1):
-    result = identify_tow(table_1, terms=("B3",), options=LATE)
+    result = identify_tow(table_1, model=SIMPLE_LATE)
     fit = result.methods["output_error"]
     assert fit.unknowns == fit.estimated == ("M", "B3", "delay")
     np.testing.assert_allclose(fit.values, [2772, 185, 2.1], rtol=0.02)
@@ -222,7 +220,7 @@ def test_a_delay_explains_table_1_and_is_in_the_result(table_1):
 
 
 def test_a_known_mass_leaves_the_drag(table_1):
-    result = identify_tow(table_1, terms=("B3",), options=TowOptions(total_mass_kg=2800.0))
+    result = identify_tow(table_1, model=TowModel(("B3",), total_mass_kg=2800.0))
     read = ~np.isnan(table_1.speed_mps) & (table_1.time_s > 0)[:, None]
 
     def squares(b3):
@@ -259,8 +257,8 @@ def test_what_is_no_polynomial_is_refused(text):
     [
         ({"force": Polynomial([11.63, -1.0])}, r"force_N: is -38\.37 N at 50 s, and must pull forward"),
         ({"force": Polynomial([0.0])}, "force_N: is 0 N"),
-        ({"terms": (), "options": TowOptions(total_mass_kg=2800.0)}, "--total-mass-kg: leaves nothing to estimate"),
-        ({"options": TowOptions(total_mass_kg=-1.0)}, "--total-mass-kg: is -1; a positive number was expected"),
+        ({"model": TowModel((), total_mass_kg=2800.0)}, "total_mass_kg: leaves nothing to estimate"),
+        ({"force": 0.0}, "force_N: is 0 N"),
     ],
 )
 def test_faulty_assumptions_are_refused(table_1, asked, said):

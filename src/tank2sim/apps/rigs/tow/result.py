@@ -19,10 +19,11 @@ from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, records_table, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.rigs.tow import paper as tow_paper
-from tank2sim.apps.rigs.tow.findings import TOW_PARAMETERS, TowFit
+from tank2sim.apps.rigs.tow.findings import TowFit
 from tank2sim.apps.rigs.tow.identify import tow_card_text
 from tank2sim.apps.rigs.tow.records import force_words
 from tank2sim.apps.rigs.tow.study import Ellipse, FittedModel, TowByTow, TowSpeeds, TowStudy
+from tank2sim.apps.rigs.tow.surge import TOW_PARAMETERS
 from tank2sim.apps.rigs.tow.theory import DragPolynomial, TowedBody, drag_polynomial
 from tank2sim.cards import Card, parse_card
 from tank2sim.identification.conditioning import COLLINEAR

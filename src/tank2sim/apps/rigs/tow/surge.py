@@ -8,6 +8,7 @@ well, where the even powers of the print would push the body on.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +18,18 @@ from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
 
 DRAG_POWERS: dict[str, int] = {"B1": 4, "B2": 3, "B3": 2}
 """Drag terms of (1.5), in its order, and the power of the speed that each multiplies."""
+
+DELAY = "delay"
+"""Unknown that (1.5) does not have: time from t = 0 to the start of the body, s."""
+
+TOW_PARAMETERS = {
+    "M": "total_mass_kg",
+    "B1": "B1_kgs2pm3",
+    "B2": "B2_kgspm2",
+    "B3": "B3_kgpm",
+    DELAY: "start_delay_s",
+}
+"""Unknown of (1.5) to its name with unit, as in :class:`SurgeCoefficients`, the card and the JSON."""
 
 # The step of the paper's own integration. The time constant M / (dR/dv) of a towed body is 1 s for a 1 m model at
 # 1 m/s and 10 s or more for the vehicle of the paper; a Runge-Kutta step of a tenth of it errs by less than 1e-7 of
@@ -36,6 +49,11 @@ class SurgeCoefficients:
     B1_kgs2pm3: float = 0.0
     B2_kgspm2: float = 0.0
     B3_kgpm: float = 0.0
+
+    @classmethod
+    def of(cls, estimates: Mapping[str, float]) -> SurgeCoefficients:
+        """Coefficients from unknowns (``M``, ``B3``) and their values, SI; a delay among them is left out."""
+        return cls(**{TOW_PARAMETERS[name]: value for name, value in estimates.items() if name != DELAY})
 
     def drag_N(self, speed_mps: Any) -> Any:
         """Drag in N at speeds in m/s."""
