@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from tank2sim.apps.rigs.yaw.energy import EnergyFit, YawMethodEstimate, term_and_unit
+from tank2sim.apps.rigs.yaw.output_error import AngleFit
 from tank2sim.apps.rigs.yaw.records import YawRecord
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice, caution
@@ -131,8 +132,9 @@ def check_added_inertia(
         )
 
 
-def check_explained(records: tuple[YawRecord, ...], misfit_rad: float) -> Iterator[Notice]:
+def check_explained(records: tuple[YawRecord, ...], angle: AngleFit | None) -> Iterator[Notice]:
     """Notes if (3) does not explain the record's motion, or a single hump cannot show it."""
+    misfit_rad = float(np.sqrt(np.mean(angle.residual_rad**2))) if angle else 0.0
     if misfit_rad > _PULSE_RAD:
         yield Notice(
             f"(3) leaves {misfit_rad:.2g} rad of the angle (rms), more than an encoder's pulse: gravity, walls or "

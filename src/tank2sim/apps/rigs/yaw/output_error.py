@@ -58,10 +58,16 @@ class _Hump(NamedTuple):
     noise_A2: float
 
 
-def fit_angle(
-    records: tuple[YawRecord, ...], rig: YawRig, first: EnergyFit, ideal: Interval
-) -> tuple[YawMethodEstimate, Array, Array] | None:
-    """Fit (3) to the angle of all humps: the estimate, times (s) and residuals (rad); None if it does not converge.
+class AngleFit(NamedTuple):
+    """The estimate, and the residuals of the angle (n,) of all humps with their times."""
+
+    estimate: YawMethodEstimate
+    time_s: Array
+    residual_rad: Array
+
+
+def fit_angle(records: tuple[YawRecord, ...], rig: YawRig, first: EnergyFit, ideal: Interval) -> AngleFit | None:
+    """Fit (3) to the angle of all humps; None if it does not converge.
 
     `rig` has the torque constant and known effects beyond (3), `first` the start values and the terms; the dissipation
     reported belongs to the programme's interval `ideal`.
@@ -96,7 +102,7 @@ def fit_angle(
     gain = rig.torque_constant_NmpA / best["inertia"], decay
     covariance = _covariance(found.fun, misfit(found.x)[1], humps, gain)[:count, :count] * np.outer(scale, scale)
     estimate = estimate_from(terms, values, covariance, ideal)
-    return estimate, np.concatenate([hump.time_s for hump in humps]), found.fun
+    return AngleFit(estimate, np.concatenate([hump.time_s for hump in humps]), found.fun)
 
 
 def _search(misfit: WithSlopes, begin: Array, count: int) -> OptimizeResult | None:

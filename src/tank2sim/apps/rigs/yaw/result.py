@@ -27,7 +27,8 @@ from tank2sim.answer.result import Result
 from tank2sim.apps.rigs.yaw.card import YawRigCard
 from tank2sim.apps.rigs.yaw.energy import YawMethodEstimate, term_and_unit
 from tank2sim.apps.rigs.yaw.found_card import nrdot_prime, rig_card_text, with_nrdot
-from tank2sim.apps.rigs.yaw.identify import YAW_METHODS, EnergyBalance, EnergyResidual, YawIdentification, YawStudy
+from tank2sim.apps.rigs.yaw.identify import YAW_METHODS, EnergyBalance, EnergyResidual, YawStudy
+from tank2sim.apps.rigs.yaw.records import YawRecord
 from tank2sim.arrays import Columns
 from tank2sim.cards import Card, parse_card
 from tank2sim.errors import ArgumentError, InputError
@@ -74,8 +75,8 @@ class YawResult(Result[YawStudy]):
     study : YawStudy
     method : str
         Method whose numbers a card gets.
-    identification : YawIdentification, optional
-        None if the result was read from its JSON.
+    records : tuple of YawRecord
+        Records of the study; empty if the result was read from its JSON.
     rig : YawRigCard, optional
         What is known of the rig.
     files : mapping, optional
@@ -84,16 +85,15 @@ class YawResult(Result[YawStudy]):
 
     study: YawStudy
     method: str = YAW_METHODS[0]
-    identification: YawIdentification | None = None
+    records: tuple[YawRecord, ...] = ()
     rig: YawRigCard | None = None
     files: Mapping[Path, str | bytes] = field(default_factory=dict)
     command: ClassVar[str] = "yaw"
 
-    @property
-    def _identified(self) -> YawIdentification:
-        if self.identification is None:
+    def _read_records(self) -> tuple[YawRecord, ...]:
+        if not self.records:
             raise InputError(self.study.records[0], "", "was not read with this result", "evaluate the records again")
-        return self.identification
+        return self.records
 
     def _known_method(self) -> str:
         if self.method not in self.study.methods:
@@ -135,7 +135,7 @@ class YawResult(Result[YawStudy]):
         InputError
             The added inertia or the length is not known, or the added inertia is negative.
         """
-        return nrdot_prime(self._identified, self._known_method(), length_m)
+        return nrdot_prime(self.study, self._read_records(), self._known_method(), length_m)
 
     def with_nrdot(self, card: Any, length_m: float | None = None) -> Any:
         """A ship with N_rdot of the body on the rig on its card, the value before in a comment.
@@ -165,10 +165,9 @@ class YawResult(Result[YawStudy]):
         InputError
             The method gives no friction, or the added inertia is not known or negative.
         """
-        found, method = self._identified, self._known_method()
-        source = f"tank2sim yaw {' '.join(record.path.name for record in found.records)}, method {method}"
+        records, method = self._read_records(), self._known_method()
         known = self.rig.yaw_rig if self.rig else None
-        return parse_card(rig_card_text(found, method, name=name, source=source, known=known), "the card found")
+        return parse_card(rig_card_text(self.study, records, method, name=name, known=known), "the card found")
 
     @property
     def title(self) -> str:

@@ -25,7 +25,7 @@ from tank2sim.apps.rigs.yaw.programme import (
     inertia_from_work,
     programme_of,
 )
-from tank2sim.apps.rigs.yaw.records import Medium, YawRecord, yaw_record_text
+from tank2sim.apps.rigs.yaw.records import Medium, YawRecord
 from tank2sim.apps.rigs.yaw.theory import numbers_of
 from tank2sim.arrays import Array
 from tank2sim.cards import Card
@@ -288,33 +288,40 @@ def yaw_record(
     )
 
 
-def simulated_record(
-    card: YawRigCard,
-    path: Path,
-    current_noise_A: float = 0.0,
-    *,
-    medium: Medium = "water",
-    controller: Controller | None = None,
-    programme: YawProgramme | None = None,
-) -> YawRecord:
-    """Simulate the record of a programme on the card's rig, including its encoder, for the file `path`.
+@dataclass(frozen=True)
+class RigRun:
+    """A run to simulate on a card's rig; `controller` is ``tuned`` (4), with the true inertia, or ``adaptive`` (6).
 
-    In ``air`` the rig is given by :func:`rig_in_air`. The controller is by default (4), with the true inertia, the
-    programme the card's; the noise of the recorded current is a standard deviation. InputError if the motor
-    saturates, or the card lacks a programme.
+    `similar_to` (``L,B,R,T``) is a ship's motion that the body follows at its size, in place of the card's programme;
+    `noise_A` the standard deviation of the recorded current.
     """
-    wet, programme = card.yaw_rig, programme or programme_of(card)
-    rig = rig_in_air(wet) if medium == "air" else wet
-    controller = controller or TunedController(inertia_kgm2=rig.inertia_kgm2 + rig.added_inertia_kgm2)
-    run = run_yaw_rig(rig, programme, controller, Measuring(current_noise_A=current_noise_A))
-    constants = {}
-    if medium == "water":
-        constants = {"inertia_kgm2": rig.inertia_kgm2, "water_density_kgpm3": card.environment.water_density_kgpm3}
-        if error := card.uncertainty.get("inertia_kgm2"):
-            constants["inertia_error_kgm2"] = error
-    if card.ship.length_m is not None:
-        constants["length_m"] = card.ship.length_m
-    return yaw_record(run, rig, path, constants, medium=medium)
+
+    medium: Medium = "water"
+    controller: str = "tuned"
+    similar_to: str | None = None
+    noise_A: float = 0.0
+
+
+def simulated_record(card: YawRigCard, path: Path, run: RigRun) -> YawRecord:
+    """Simulate a run on the card's rig, including its encoder, as the record of the file `path`.
+
+    In ``air`` the rig is given by :func:`rig_in_air`. InputError if the file exists or the motor saturates.
+    """
+    if path.exists():
+        raise InputError(path, "", "exists, and may be a measurement", "give the simulated record a new name")
+    air = run.medium == "air"
+    rig = rig_in_air(card.yaw_rig) if air else card.yaw_rig
+    programme = similar_programme(card, run.similar_to) if run.similar_to else programme_of(card)
+    tuned = TunedController(inertia_kgm2=rig.inertia_kgm2 + rig.added_inertia_kgm2)
+    controller = AdaptiveController() if run.controller == "adaptive" else tuned
+    found = run_yaw_rig(rig, programme, controller, Measuring(current_noise_A=run.noise_A))
+    water: dict[str, float | None] = {
+        "inertia_kgm2": rig.inertia_kgm2,
+        "water_density_kgpm3": card.environment.water_density_kgpm3,
+        "inertia_error_kgm2": card.uncertainty.get("inertia_kgm2"),
+    }
+    known = ({} if air else water) | {"length_m": card.ship.length_m}
+    return yaw_record(found, rig, path, {key: value for key, value in known.items() if value}, medium=run.medium)
 
 
 def rig_in_air(rig: YawRig) -> YawRig:
@@ -325,23 +332,6 @@ def rig_in_air(rig: YawRig) -> YawRig:
     """
     water = ("added_inertia_kgm2", "quadratic_Nms2", "inertia_accelerating_kgm2", "inertia_braking_kgm2")
     return rig.model_copy(update={**dict.fromkeys(water, 0.0), "braking_quadratic_Nms2": None, "walls": None})
-
-
-def simulated_file(
-    rig: YawRigCard,
-    path: Path,
-    medium: Medium,
-    controller: str,
-    similar_to: str | None,
-    noise_A: float,
-) -> tuple[YawRecord, str]:
-    """A simulated record, and the text of its file; `controller` and `similar_to` as of :func:`tank2sim.yaw`."""
-    if path.exists():
-        raise InputError(path, "", "exists, and may be a measurement", "give the simulated record a new name")
-    chosen = AdaptiveController() if controller == "adaptive" else None
-    programme = similar_programme(rig, similar_to) if similar_to else None
-    record = simulated_record(rig, path, noise_A, medium=medium, controller=chosen, programme=programme)
-    return record, yaw_record_text(record)
 
 
 def rig_card_of(given: Vessel | Card | str | Path, argument: str) -> YawRigCard:
