@@ -188,7 +188,7 @@ def chosen_names(argument: str, given: str | Sequence[str], known: Iterable[str]
     argument : str
         For messages.
     given : str or sequence of str
-        Names, with commas between them in a text; ``"none"`` is no name.
+        Names, with commas between them in a text; ``"none"`` gives an empty list.
     known : iterable of str
 
     Raises

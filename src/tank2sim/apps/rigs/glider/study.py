@@ -180,7 +180,7 @@ class GlideState:
 
     @classmethod
     def of(cls, glide: SteadyGlide, **more: Any) -> Self:
-        """The glide in degrees, with the fields that a subclass adds."""
+        """The glide in degrees, with `more` fields of a subclass."""
         return cls(**{part.name: _field(glide, part.name) for part in fields(GlideState)}, **more)
 
 

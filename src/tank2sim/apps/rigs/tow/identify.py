@@ -22,7 +22,7 @@ from numpy.polynomial import Polynomial
 
 from tank2sim.apps.rigs.tow import equation_error, output_error
 from tank2sim.apps.rigs.tow.findings import TowFit, tow_findings
-from tank2sim.apps.rigs.tow.output_error import ALL_TERMS, TowModel
+from tank2sim.apps.rigs.tow.output_error import WHOLE_EQUATION, TowModel
 from tank2sim.apps.rigs.tow.records import Tows, as_force, checked_force, force_words, mean_force
 from tank2sim.apps.rigs.tow.surge import DELAY, TOW_PARAMETERS, SurgeCoefficients
 from tank2sim.arrays import Array
@@ -87,7 +87,7 @@ def identify_tow(
     tows: Tows,
     force: float | Polynomial | None = None,
     mass_kg: float | None = None,
-    model: TowModel = ALL_TERMS,
+    model: TowModel = WHOLE_EQUATION,
     *,
     speed_degree: int = 2,
 ) -> TowIdentification:

@@ -41,7 +41,7 @@ class TowModel:
         return ("M", *self.terms, *([DELAY] if self.start_delay else []))
 
 
-ALL_TERMS = TowModel()
+WHOLE_EQUATION = TowModel()
 """As in the paper."""
 
 

@@ -52,7 +52,7 @@ class SurgeCoefficients:
 
     @classmethod
     def of(cls, estimates: Mapping[str, float]) -> SurgeCoefficients:
-        """Coefficients from unknowns (``M``, ``B3``) and their values, SI; a delay among them is left out."""
+        """Coefficients from `estimates`, unknowns (``M``, ``B3``) with their values, SI; a delay is left out."""
         return cls(**{TOW_PARAMETERS[name]: value for name, value in estimates.items() if name != DELAY})
 
     def drag_N(self, speed_mps: Any) -> Any:
