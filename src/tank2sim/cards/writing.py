@@ -13,7 +13,10 @@ from tank2sim.escaping import one_line
 
 
 def card_text(sections: Mapping[str, Mapping[str, Any] | None]) -> str:
-    """TOML text of a card: section to its keys and values, SI; sections and values that are None are left out."""
+    """TOML text of a card: section to its keys and values, SI.
+
+    A section that is None is left out, as is a value that is None or an empty text.
+    """
     return tomlkit.dumps(_document(sections))
 
 
@@ -22,7 +25,7 @@ def _document(sections: Mapping[str, Mapping[str, Any] | None]) -> tomlkit.TOMLD
     document["format"] = "tank2sim-ship/1"
     for name, values in sections.items():
         if values is not None:
-            document[name] = {key: value for key, value in values.items() if value is not None}
+            document[name] = {key: value for key, value in values.items() if value not in (None, "")}
     return document
 
 

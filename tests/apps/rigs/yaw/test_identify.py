@@ -321,7 +321,7 @@ def test_gravity_is_found_by_itself_and_reported(folder):
         assert found.methods[method].friction["gravity_sine_Nm"] == pytest.approx(1.5e-3 * np.cos(1.0), rel=0.03)
         assert found.methods[method].friction["gravity_cosine_Nm"] == pytest.approx(-1.5e-3 * np.sin(1.0), rel=0.03)
     assert any("moment of gravity of 0.0015 N m" in note for note in found.notices)
-    card = parse_card(rig_card_text(found, [made], "output_error", name="rig", known=None), "rig.toml")
+    card = parse_card(rig_card_text(found, [made], "output_error", name="rig", known=UNKNOWN_RIG), "rig.toml")
     assert card.yaw_rig.gravity_Nm == pytest.approx(1.5e-3, rel=0.02)
     assert card.yaw_rig.gravity_angle_rad == pytest.approx(1.0, abs=0.03)
 

@@ -43,8 +43,8 @@ def test_estimates_are_within_their_bars(result, charts):
 def test_every_subinterval_has_its_residual(result, charts):
     rows = [row for row in rows_of(charts["energy_balance_2"]) if "hump" in row]
     assert len(rows) == 12 and {row["run"] for row in rows} == {"accelerating", "braking"}
-    assert [row["v"] for row in rows] == pytest.approx(
-        [1e6 * one.left_J for one in result.study.energy_residuals], rel=1e-5
+    assert sorted(row["v"] for row in rows) == pytest.approx(
+        sorted(1e6 * one.left_J for one in result.study.energy_residuals), rel=1e-5
     )
 
 

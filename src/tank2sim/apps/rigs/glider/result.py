@@ -441,27 +441,31 @@ def _plane(
     arms: Sequence[ChartRecord] = (),
 ) -> ChartSpec:
     """Lines in a plane with one scale; with `arms`, lines of reference with a name at their end, there are no axes."""
-    across = np.concatenate([*(outline[1] for outline in drawn), vector([arm["x"] for arm in arms])])
-    up = np.concatenate([*(outline[2] for outline in drawn), vector([arm["v"] for arm in arms])])
+    across = np.concatenate([*(x for _, x, _ in drawn), vector([arm["x"] for arm in arms])])
+    up = np.concatenate([*(y for _, _, y in drawn), vector([arm["v"] for arm in arms])])
     frame = equal_frame(across, up, width_px=680, height_px=height_px)
     place = frame.axes(across=("x", titles[0]), up=("v", titles[1]))
     if arms:
         place = {name: axis | {"axis": None} for name, axis in place.items()}
     series = [PlotSeries(label, x=x, y=y, closed=True) for label, x, y in drawn]
     look = look_of(series)
-    rows = [row for each in series for row in each.rows]
     marks = {**place, "color": look.colour, "strokeDash": look.dash, "order": "i:Q"}
-    layers = [layer("line", rows, marks, clip=True)]
-    if arms:
-        along = {**place, "detail": "axis:N", "order": "i:Q"}
-        layers.append(layer("line", arms, along, style="reference", strokeWidth=0.8, clip=True))
-        text = {**place, "text": "name:N"}
-        layers.append(layer("text", arms, text, style="reference", dx=5, align="left", clip=True))
     return layered(
-        layers,
+        [layer("line", [row for each in series for row in each.rows], marks, clip=True), *_arm_layers(arms, place)],
         size=(frame.width_px, frame.height_px),
         window=["x", "y"],
         title=title,
         description="Paths of " + ", ".join(label for label, _, _ in drawn) + "; both axes have one scale.",
         usermeta={"equal_scales": True},
     )
+
+
+def _arm_layers(arms: Sequence[ChartRecord], place: ChartSpec) -> list[ChartSpec]:
+    """Lines of reference with their names, if there are any."""
+    if not arms:
+        return []
+    along, text = {**place, "detail": "axis:N", "order": "i:Q"}, {**place, "text": "name:N"}
+    return [
+        layer("line", arms, along, style="reference", strokeWidth=0.8, clip=True),
+        layer("text", arms, text, style="reference", dx=5, align="left", clip=True),
+    ]

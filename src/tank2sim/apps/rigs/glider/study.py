@@ -399,15 +399,19 @@ def _paths(card: GliderCard, question: GlideQuestion, integrator: Integrator | N
         "steps": tuple(StepGlide.of(glide, duration_s=duration) for glide, duration in flown),
         "path": _places(path),
         "length_m": path.length_m if path else None,
-        "path_histories": path.histories() if path else {},
+        "path_histories": _histories(path),
         "path_as_printed": _places(printed),
-        "path_as_printed_histories": printed.histories() if printed else {},
+        "path_as_printed_histories": _histories(printed),
         "transient": _transient(compare_with_steady(integrator, path)) if path and integrator else None,
     }
 
 
 def _places(path: GlidePath | None) -> tuple[PathPlace, ...]:
     return tuple(PathPlace(*place[:4], math.degrees(place.heading_rad)) for place in (path.places if path else ()))
+
+
+def _histories(path: GlidePath | None) -> Columns:
+    return path.histories() if path else {}
 
 
 def _transient(found: Compared) -> TransientPath:

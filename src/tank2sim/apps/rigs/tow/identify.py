@@ -227,10 +227,9 @@ def tow_card_text(
     `fit` is one of ``result.methods``; name of the body, source of the numbers, and length if known.
     """
     values = {key: value for key, value in fit.estimates.items() if key not in ("added_mass_kg", "start_delay_s")}
-    notes = " ".join(result.notices) or None
     return card_text(
         {
-            "ship": {"name": name, "length_m": length_m, "source": source, "notes": notes},
+            "ship": {"name": name, "length_m": length_m, "source": source, "notes": " ".join(result.notices)},
             "model": {"kind": "surge", "valid_speed_mps": [0.0, result.top_speed_mps]},
             "surge": {**values, "force_N": result.force_N, "dry_mass_kg": result.mass_kg},
             "uncertainty": {key: value for key, value in fit.standard_errors.items() if key in values},

@@ -364,6 +364,11 @@ class FittedModel:
         return SurgeCoefficients.of(self.estimates)
 
     @property
+    def mass_words(self) -> str:
+        """M with the half-width of its 95 % interval, kg: ``2772 ± 226``."""
+        return f"{self.estimates['M']:.0f} ± {self.half_widths_95['M']:.0f}"
+
+    @property
     def mass_interval_kg(self) -> tuple[float, float]:
         """95 % interval of M, for independent readings of equal variance."""
         middle, half = self.estimates["M"], self.half_widths_95["M"]

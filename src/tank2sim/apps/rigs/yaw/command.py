@@ -151,26 +151,23 @@ def yaw(
     from tank2sim.apps.rigs.yaw.result import YawResult
     from tank2sim.apps.rigs.yaw.simulation import RigRun, rig_card_of
     from tank2sim.apps.rigs.yaw.theory import parse_body, theory_values
-    from tank2sim.records.csv_table import is_frame, table_or_path
+    from tank2sim.records.csv_table import tables_or_paths
 
-    error = 0.0
+    constant = torque_constant_NmpA, 0.0
     if reference is not None or reference_inertia_kgm2 is not None:
-        torque_constant_NmpA, error = _torque_constant(reference, reference_inertia_kgm2)
+        constant = _torque_constant(reference, reference_inertia_kgm2)
     known = None if rig is None else rig_card_of(rig, "rig")
     options = YawOptions(
         inertia_kgm2=inertia_kgm2,
         inertia_error_kgm2=inertia_error_kgm2,
-        torque_constant_NmpA=torque_constant_NmpA,
-        torque_constant_error=error,
+        torque_constant_NmpA=constant[0],
+        torque_constant_error=constant[1],
         known=known.yaw_rig if known else None,
-        terms=parse_yaw_terms(terms) if terms else None,
+        terms=parse_yaw_terms(terms or ()),
         mirror_limit=mirror_percent / 100,
     )
     body = parse_body(theory) if theory else None
-    if isinstance(records, str | Path) or is_frame(records):
-        sources = [table_or_path(records, "records")]
-    else:
-        sources = [table_or_path(source, f"records[{number}]") for number, source in enumerate(records)]
+    sources = tables_or_paths(records, "records")
 
     def result(read: Sequence[YawRecord]) -> YawResult:
         found = identify_yaw(read, options)
@@ -178,12 +175,12 @@ def yaw(
         values = theory_values(body, used[0].programme.max_rate_radps) if body else []
         return YawResult(replace(found, theory=tuple(values)), method, used, known)
 
-    run, usual = RigRun(medium, controller, similar_to, noise_A), vars(RigRun())
+    run = RigRun(medium, controller, similar_to, noise_A)
     if simulate is not None:
         return _simulated(simulate, sources, run, result)
-    for argument, value in vars(run).items():
-        if value != usual[argument]:
-            raise ArgumentError(argument, "", "is of a simulated rig", "give the card to simulate as well")
+    if run != RigRun():
+        argument = next(name for name, value in vars(RigRun()).items() if getattr(run, name) != value)
+        raise ArgumentError(argument, "", "is of a simulated rig", "give the card to simulate as well")
     return result([read_yaw_record(source) for source in sources])
 
 

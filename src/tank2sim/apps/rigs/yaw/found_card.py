@@ -10,7 +10,6 @@ import tomlkit
 from tank2sim.apps.rigs.yaw.card import YawRig
 from tank2sim.apps.rigs.yaw.energy import YawMethodEstimate, term_and_unit
 from tank2sim.apps.rigs.yaw.identify import YawEstimates
-from tank2sim.apps.rigs.yaw.model import UNKNOWN_RIG
 from tank2sim.apps.rigs.yaw.records import YawRecord
 from tank2sim.cards import ManoeuvringCard, parse_card
 from tank2sim.cards.reading import changed_text
@@ -95,14 +94,12 @@ def _replaced(text: str, source: str, key: tuple[str, str], value: float, method
     return changed_text(text, source, changes, comment=f"yaw rig, {method}; {was}")
 
 
-def rig_card_text(
-    found: YawEstimates, records: Sequence[YawRecord], method: str, *, name: str, known: YawRig | None
-) -> str:
+def rig_card_text(found: YawEstimates, records: Sequence[YawRecord], method: str, *, name: str, known: YawRig) -> str:
     """TOML text of a rig card with the numbers of one method; the notes come from the result.
 
     InputError if the method gives no friction, or as :func:`known_added_inertia`.
     """
-    estimate, base = found.methods[method], known or UNKNOWN_RIG
+    estimate = found.methods[method]
     if not estimate.friction:
         remedy = "take energy_least_squares, as_many_equations or output_error"
         raise ArgumentError("method", "", f"{method} gives no friction, and a rig card needs it", remedy)
@@ -111,18 +108,14 @@ def rig_card_text(
         for key, value in estimate.friction.items()
         if term_and_unit(key)[0] in ("coulomb", "viscous", "quadratic")
     }
-    values = {key: getattr(base, key) for key in _OF_THE_RIG}
-    values |= {key: float(f"{value:.6g}") for key, (value, _) in rows.items()} | _gravity(estimate, base)
+    values = {key: getattr(known, key) for key in _OF_THE_RIG}
+    values |= {key: float(f"{value:.6g}") for key, (value, _) in rows.items()} | _gravity(estimate, known)
     programme, files = records[0].programme, " ".join(record.path.name for record in records)
-    ship = {"name": name, "length_m": _stated(records, "length_m")}
-    wet = found.medium == "water"
+    wet, notes = found.medium == "water", " ".join(found.notices)
+    source, length = f"tank2sim yaw {files}, method {method}", _stated(records, "length_m")
     return card_text(
         {
-            "ship": {
-                **ship,
-                "source": f"tank2sim yaw {files}, method {method}",
-                "notes": " ".join(found.notices) or None,
-            },
+            "ship": {"name": name, "length_m": length, "source": source, "notes": notes},
             "environment": {"water_density_kgpm3": _tank_density(records)} if wet else None,
             "model": {"kind": "yaw_rig"},
             "yaw_rig": {**values, "torque_constant_NmpA": found.torque_constant_NmpA},

@@ -82,11 +82,11 @@ class YawOptions:
 
 
 class _BodyInertia(NamedTuple):
-    """J_zz in kg m2, its standard error (None if unknown), its source, and True if it depends on the records' k_t."""
+    """J_zz in kg m2, its standard error, its source (None if unknown), and True if it depends on the records' k_t."""
 
-    value_kgm2: float
-    error_kgm2: float | None
-    source: str
+    value_kgm2: float | None = None
+    error_kgm2: float | None = None
+    source: str | None = None
     by_torque_constant: bool = False
 
 
@@ -125,13 +125,13 @@ def torque_constant(reference: YawEstimates, known_inertia_kgm2: float) -> tuple
     return reference.torque_constant_NmpA * known_inertia_kgm2 / best.total_inertia_kgm2, error
 
 
-def parse_yaw_terms(given: str | Sequence[str]) -> tuple[str, ...]:
-    """Terms from names (``"coulomb,viscous,quadratic"``); the inertia is always among them.
+def parse_yaw_terms(given: str | Sequence[str]) -> tuple[str, ...] | None:
+    """Terms from names (``"coulomb,viscous,quadratic"``), with the inertia; None without a name.
 
     InputError if a term is unknown or repeated.
     """
-    inertia, *others = ENERGY_TERMS
-    return (inertia, *(term for term in chosen_names("terms", given, ENERGY_TERMS) if term in others))
+    chosen = chosen_names("terms", given, ENERGY_TERMS)
+    return tuple(term for term in ENERGY_TERMS if term in ("inertia", *chosen)) if given else None
 
 
 Fits = tuple[EnergyFit, EnergyFit]
@@ -154,20 +154,19 @@ def _estimates(records: tuple[YawRecord, ...], options: YawOptions, air: YawEsti
     methods = _energy_estimates(fits, ideal)
     driven = (options.known or UNKNOWN_RIG).model_copy(update={"torque_constant_NmpA": constant})
     angle, omissions = _angle(records, driven, fit, ideal)
-    if angle:
-        methods["output_error"] = angle.estimate
+    methods |= {"output_error": angle.estimate} if angle else {}
     body, remarks = _body(records, options, air)
-    if body:
-        methods = {name: _added(found, body, options.torque_constant_error) for name, found in methods.items()}
-    methods = {name: methods[name] for name in YAW_METHODS if name in methods}
-    doubts = check_added_inertia(first, body.value_kgm2, methods) if body else ()
+    methods = {
+        name: _added(methods[name], body, options.torque_constant_error) for name in YAW_METHODS if name in methods
+    }
+    doubts = check_added_inertia(first, body.value_kgm2, methods)
     return YawEstimates(
         records=tuple(str(record.path) for record in records),
         medium=first.medium,
         torque_constant_NmpA=constant,
-        body_inertia_kgm2=body.value_kgm2 if body else None,
-        body_inertia_standard_error_kgm2=body.error_kgm2 if body else None,
-        body_inertia_source=body.source if body else None,
+        body_inertia_kgm2=body.value_kgm2,
+        body_inertia_standard_error_kgm2=body.error_kgm2,
+        body_inertia_source=body.source,
         added_inertia_kgm2={name: found.added_inertia_kgm2 for name, found in methods.items()},
         dissipation_J={name: found.dissipation_J for name, found in methods.items()},
         methods=methods,
@@ -213,10 +212,12 @@ def _energy_estimates(fits: Fits, ideal: Interval) -> dict[str, YawMethodEstimat
 
 
 def _added(found: YawMethodEstimate, body: _BodyInertia, constant_error: float) -> YawMethodEstimate:
-    """An estimate with lambda661 and its standard error, by the errors of the total, J_zz and k_t together.
+    """An estimate with lambda661, where J_zz is known; its error is by the errors of the total, J_zz and k_t together.
 
     The last is proportional to the total, or to the difference where J_zz was found in air with the same k_t.
     """
+    if body.value_kgm2 is None:
+        return found
     added, error = found.total_inertia_kgm2 - body.value_kgm2, found.total_inertia_standard_error_kgm2
     scaled = added if body.by_torque_constant else found.total_inertia_kgm2
     parts = (error, body.error_kgm2, constant_error * scaled)
@@ -277,11 +278,11 @@ def _torque_constant(records: tuple[YawRecord, ...], options: YawOptions) -> tup
 
 def _body(
     records: tuple[YawRecord, ...], options: YawOptions, air: YawEstimates | None
-) -> tuple[_BodyInertia | None, list[Notice]]:
+) -> tuple[_BodyInertia, list[Notice]]:
     """J_zz of a body in water, as given, from air or from a file; and what is missing of it."""
     stated = next((record for record in records if "inertia_kgm2" in record.constants), None)
     if records[0].medium == "air":
-        return None, []
+        return _BodyInertia(), []
     if options.inertia_kgm2 is not None:
         body = _BodyInertia(options.inertia_kgm2, options.inertia_error_kgm2, "as given")
     elif air is not None:
@@ -293,7 +294,7 @@ def _body(
         body = _BodyInertia(stated.constants["inertia_kgm2"], error, f"comment of {stated.path.name}")
     else:
         problem = "J_zz is unknown, so that the added inertia cannot be separated from the total"
-        return None, [Notice(f"{problem}: give a record in air as well, or inertia_kgm2.")]
+        return _BodyInertia(), [Notice(f"{problem}: give a record in air as well, or inertia_kgm2.")]
     problem = "J_zz has no standard error, and the error of the added inertia does not include one"
     remedy = "give inertia_error_kgm2, or a line '# inertia_error_kgm2: 0.0002'."
     return body, [] if body.error_kgm2 is not None else [Notice(f"{problem}: {remedy}")]

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 
@@ -87,35 +87,47 @@ def yaw_rig_model(name: str, rig: YawRig, *, with_current_loop: bool = True) -> 
         derivative="motion.rdot",
         start=p["initial.r"],
     )
-    recorded = Input(name="motor.current", unit="A", description="Current of the motor, + turns clockwise")
-    motor = _current_loop(p) if with_current_loop else (recorded,)
+    motor = _current_loop(p) if with_current_loop else _recorded_current()
     pulse = 2 * math.pi / p["encoder.pulses"]
-    current = motor[0]
     quantities = [
         Quantity(name="motion.psidot", unit="rad/s", description="Rate of the yaw angle", value=rate.symbol),
-        *_mechanics(heading.symbol, rate.symbol, current.symbol, p, rig.walls),
+        *_mechanics(heading.symbol, rate.symbol, motor.current, p, rig.walls),
         Quantity(
             name="encoder.angle",
             unit="rad",
             description="Yaw angle as the encoder counts it, whole pulses",
             value=ca.floor(heading.symbol / pulse) * pulse,
         ),
-        *(variable for variable in motor if isinstance(variable, Quantity)),
+        *motor.quantities,
     ]
     outputs = [heading.name, rate.name, "motion.rdot", "encoder.angle", "moment.motor", "moment.resistance"]
     return Model(
         name=name,
         description="Body turned by a motor about a fixed vertical axis, equation (3) of Alyshev (2019)",
-        states=(heading, rate, *(variable for variable in motor if isinstance(variable, State))),
-        inputs=tuple(variable for variable in motor if isinstance(variable, Input)),
+        states=(heading, rate, *motor.states),
+        inputs=motor.inputs,
         parameters=tuple(parameters.values()),
         quantities=tuple(quantities),
-        outputs=(*outputs, current.name) if with_current_loop else tuple(outputs),
+        outputs=(*outputs, *(state.name for state in motor.states)),
         step_s=_STEP_S,
     )
 
 
-def _current_loop(p: dict[str, ca.SX]) -> tuple[State, Input, Quantity]:
+class _Motor(NamedTuple):
+    """The current, and the variables that it follows from."""
+
+    current: ca.SX
+    inputs: tuple[Input, ...]
+    states: tuple[State, ...] = ()
+    quantities: tuple[Quantity, ...] = ()
+
+
+def _recorded_current() -> _Motor:
+    recorded = Input(name="motor.current", unit="A", description="Current of the motor, + turns clockwise")
+    return _Motor(recorded.symbol, (recorded,))
+
+
+def _current_loop(p: dict[str, ca.SX]) -> _Motor:
     command = Input(name="motor.command", unit="A", description="Current asked of the amplifier, + turns clockwise")
     current = State(
         name="motor.current",
@@ -133,7 +145,7 @@ def _current_loop(p: dict[str, ca.SX]) -> tuple[State, Input, Quantity]:
         description="Rate of the current: the amplifier's loop is a first-order lag",
         value=(allowed - current.symbol) / p["motor.lag"],
     )
-    return current, command, loop
+    return _Motor(current.symbol, (command,), (current,), (loop,))
 
 
 def _mechanics(

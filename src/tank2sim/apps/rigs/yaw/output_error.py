@@ -22,6 +22,7 @@ from tank2sim.apps.rigs.yaw.model import yaw_rig_model
 from tank2sim.apps.rigs.yaw.records import YawRecord
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
+from tank2sim.records.audit.weak import newey_west
 from tank2sim.simulation.scheme import runge_kutta_step
 from tank2sim.simulation.sensitivity import augmented_step
 
@@ -129,7 +130,7 @@ def _covariance(residuals: Array, design: Array, humps: list[_Hump], gain: tuple
     for part in parts:
         folded[:, : part.shape[1]] += part
     lags = max(1, round(_MEMORY * folded.shape[1]))
-    along = [_newey_west(folded, lags), sum(_newey_west(part, lags) for part in parts)]
+    along = [newey_west(folded.T, lags), sum(newey_west(part.T, lags) for part in parts)]
     noise = _from_current(np.split(inverse, ends, axis=1), humps, gain)
     variances = [np.diag(alone) + noise, *(np.diag(matrix) / (1 - _MEMORY) for matrix in along)]
     if len(humps) > 1:
@@ -151,15 +152,6 @@ def _from_current(parts: list[Array], humps: list[_Hump], gain: tuple[float, flo
         response = gain[0] * np.diff(hump.time_s) * swung
         variances += hump.noise_A2 * np.sum((part @ response) ** 2, axis=1)
     return variances
-
-
-def _newey_west(scores: Array, lags: int) -> Array:
-    """Covariance of the sum of the columns, with Bartlett's weights up to `lags`."""
-    covariance: Array = scores @ scores.T
-    for lag in range(1, lags + 1):
-        cross = scores[:, lag:] @ scores[:, :-lag].T
-        covariance = covariance + (1 - lag / (lags + 1)) * (cross + cross.T)
-    return covariance
 
 
 def _humps(record: YawRecord) -> list[_Hump]:
