@@ -79,28 +79,22 @@ def conditions(bridge: Bridge, ballast: Bridge | None) -> tuple[str, str]:
 
 def draughts(bridge: Bridge, ballast: Bridge | None) -> Box:
     """Draughts at which the data were obtained, and what else is of those draughts: a card has the mean one alone."""
-    cards = [condition.card if condition else None for condition in (bridge, ballast)]
-    bases = [condition.basis if condition else None for condition in (bridge, ballast)]
-    means = [mean_draught(card) if card else None for card in cards]
-    # Displacement and block coefficient of a card hold at its own draught.
-    ships = [
-        card.ship if card and mean == card.ship.draught_m else None for card, mean in zip(cards, means, strict=True)
-    ]
-    rows = (
-        Row("Forward", tuple(_number(basis.forward_m, "m") if basis else None for basis in bases)),
-        Row("Aft", tuple(_number(basis.aft_m, "m") if basis else None for basis in bases)),
-        Row("Mean", tuple(_number(mean, "m") for mean in means)),
-        Row("Displacement", tuple(_tonnes(ship.displacement_kg) if ship else None for ship in ships)),
-        Row("Block coefficient", tuple(_number(ship.block_coefficient, "") if ship else None for ship in ships)),
-        Row("Trial / estimated", tuple(_basis_words(condition) for condition in (bridge, ballast))),
-    )
+    labels = ("Forward", "Aft", "Mean", "Displacement", "Block coefficient", "Trial / estimated")
+    columns = zip(_draught_values(bridge), _draught_values(ballast), strict=True)
+    rows = tuple(Row(label, values) for label, values in zip(labels, columns, strict=True))
     return Box("Draught of the manoeuvring data", rows, conditions(bridge, ballast))
 
 
-def _basis_words(condition: Bridge | None) -> str | None:
+def _draught_values(condition: Bridge | None) -> tuple[str | None, ...]:
+    """Values of a condition in the order of the box."""
     if condition is None:
-        return None
-    return condition.basis.words if condition.basis else "estimated"
+        return (None,) * 6
+    basis, ship, mean = condition.basis, condition.card.ship, mean_draught(condition.card)
+    ends = (_number(basis.forward_m, "m"), _number(basis.aft_m, "m")) if basis else (None, None)
+    # Displacement and block coefficient of a card hold at its own draught.
+    own = mean == ship.draught_m
+    form = (_tonnes(ship.displacement_kg), _number(ship.block_coefficient, "")) if own else (None, None)
+    return (*ends, _number(mean, "m"), *form, basis.words if basis else "estimated")
 
 
 def _tonnes(kilograms: float | None) -> str | None:

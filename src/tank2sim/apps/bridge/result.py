@@ -7,12 +7,11 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
-import jinja2
 from markupsafe import Markup
 
 from tank2sim.analysis.validation.ship_track import ShipTrack
 from tank2sim.answer.charts.motion import TrackData, track_chart
-from tank2sim.answer.page import resource_text
+from tank2sim.answer.page import filled_template, resource_text
 from tank2sim.answer.parts import Illustration, Section, Table, records_table
 from tank2sim.answer.result import Result
 from tank2sim.apps.bridge import boxes
@@ -21,7 +20,6 @@ from tank2sim.apps.bridge.drawings import Drawing, circles_drawing, stops_drawin
 from tank2sim.apps.bridge.study import SHALLOW, Bridge, BridgeStudy
 from tank2sim.dynamics.effects.loading import mean_draught
 from tank2sim.notices import Notice
-from tank2sim.version import __version__
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -116,6 +114,10 @@ class BridgeResult(Result[BridgeStudy]):
 
     @cached_property
     def _html(self) -> str:
+        assert self.bridge is not None, "the JSON of a sheet does not hold its card"
+        return self._sheet(self.bridge)
+
+    def _sheet(self, bridge: Bridge) -> str:
         raise NotImplementedError
 
 
@@ -127,12 +129,8 @@ class PosterResult(BridgeResult):
 
     command: ClassVar[str] = "poster"
 
-    @cached_property
-    def _html(self) -> str:
-        from tank2sim.apps.bridge.result import poster_page
-
-        assert self.bridge is not None, "the JSON of a poster does not hold its card"
-        return poster_page(self.bridge, self.ballast)
+    def _sheet(self, bridge: Bridge) -> str:
+        return poster_page(bridge, self.ballast)
 
 
 class PilotCardResult(BridgeResult):
@@ -143,12 +141,8 @@ class PilotCardResult(BridgeResult):
 
     command: ClassVar[str] = "pilotcard"
 
-    @cached_property
-    def _html(self) -> str:
-        from tank2sim.apps.bridge.result import pilot_card_page
-
-        assert self.bridge is not None, "the JSON of a pilot card does not hold its card"
-        return pilot_card_page(self.bridge, self.ballast)
+    def _sheet(self, bridge: Bridge) -> str:
+        return pilot_card_page(bridge, self.ballast)
 
 
 @dataclass(frozen=True)
@@ -191,7 +185,7 @@ def poster_page(bridge: Bridge, ballast: Bridge | None = None) -> str:
     )
     stops = stops_drawing(bridge.stops, width=STOPS_MM[0], height=STOPS_MM[1]) if bridge.stops else None
     return _rendered(
-        "bridge/poster.html.j2",
+        "apps/bridge/poster.html.j2",
         bridge,
         left=left_column,
         right=right,
@@ -223,7 +217,7 @@ def pilot_card_page(bridge: Bridge, ballast: Bridge | None = None) -> str:
             _turning_title(bridge, f"Deep water,{_draught(bridge)}"), drawing, boxes.turning(bridge, bridge.deep)
         )
     return _rendered(
-        "bridge/pilotcard.html.j2",
+        "apps/bridge/pilotcard.html.j2",
         bridge,
         boxes=shown,
         circles=circles,
@@ -291,12 +285,8 @@ def _circles(bridge: Bridge, circles: Sequence[ShipTrack], size: tuple[float, fl
 
 
 def _rendered(template: str, bridge: Bridge, **content: object) -> str:
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("tank2sim", "apps"), autoescape=True, undefined=jinja2.StrictUndefined
-    )
-    environment.trim_blocks = environment.lstrip_blocks = True
-    return environment.get_template(template).render(
-        version=__version__,
+    return filled_template(
+        template,
         style=Markup(resource_text("apps/bridge/sheet.css")),
         name=_cut(bridge.card.ship.name, _NAME),
         source=_cut(bridge.card.ship.source, _SOURCE),

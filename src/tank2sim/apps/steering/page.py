@@ -10,10 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import jinja2
 from markupsafe import Markup
 
-from tank2sim.answer.page import resource_text
+from tank2sim.answer.page import filled_template, resource_text
 from tank2sim.apps.steering.ghost import Ghost
 from tank2sim.apps.steering.members import NO_COVARIANCE
 from tank2sim.apps.steering.scenario import Scenario
@@ -31,7 +30,6 @@ from tank2sim.dynamics.model import Input, Model, Parameter
 from tank2sim.errors import InputError
 from tank2sim.escaping import json_in_html
 from tank2sim.notices import Notice
-from tank2sim.version import __version__
 
 LONGEST_ZIGZAG = 150.0
 """A zigzag that has not ended after so many ship lengths is given up, as in the simulation."""
@@ -157,9 +155,6 @@ def steering_page(
     if "rudder.command" not in model.input_names and not thrusters:
         remedy = "a ship (kind linear, abkowitz or mmg) can be steered, and a craft with fixed thrusters at both sides"
         raise InputError(model.origin, "", "has no rudder and no thrusters that steer", remedy)
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("tank2sim", "apps"), autoescape=True, undefined=jinja2.StrictUndefined
-    )
     names = [thruster.name for thruster in thrusters]
     found = _controls(model, ghost)
     rudder = None if thrusters else found[0]
@@ -167,12 +162,11 @@ def steering_page(
     levers = levers_of(model)
     engine = next((control for control in controls_left if control.name == "propeller.speed"), None)
     set_by_hand = [control for control in controls_left if control is not engine and control.name not in names]
-    environment.trim_blocks = environment.lstrip_blocks = True
     equations = ship_equations(model)
-    return environment.get_template("steering/page.html.j2").render(
+    return filled_template(
+        "apps/steering/page.html.j2",
         name=model.name,
         description=model.description,
-        version=__version__,
         notices=notices,
         ghost=ghost,
         controls=set_by_hand,
