@@ -7,7 +7,7 @@ leaves the card's range is OUTSIDE, and not printed: on a bridge a wrong number 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -139,13 +139,13 @@ def steering(bridge: Bridge, *, units: bool = True) -> Box:
 
 def telegraph(bridge: Bridge, ballast: Bridge | None) -> Box:
     """Engine orders with revolutions and steady speeds straight ahead; astern by hand."""
-    given = {entry.order.casefold(): entry for entry in bridge.telegraph if entry.order}
-    known = {order.casefold(): order for order in ORDERS_AHEAD}
-    rows = [Row(None, _speeds(entry, ballast)) for entry in bridge.telegraph if not entry.order]
-    if not rows:
-        blank = (None, None, None)
-        rows = [Row(name, _speeds(given[key], ballast) if key in given else blank) for key, name in known.items()]
-    rows += [Row(entry.order, _speeds(entry, ballast)) for key, entry in given.items() if key not in known]
+    unnamed = [Row(None, _speeds(entry, ballast)) for entry in bridge.telegraph if not entry.order]
+    given = {
+        entry.order.casefold(): Row(_name_on_form(entry.order), _speeds(entry, ballast))
+        for entry in bridge.telegraph
+        if entry.order
+    }
+    rows = unnamed or _orders_ahead(given, blanks=3)
     rows += [Row(order, (None, None, None)) for order in ORDERS_ASTERN]
     first, second = conditions(bridge, ballast)
     note = ""
@@ -153,6 +153,17 @@ def telegraph(bridge: Bridge, ballast: Bridge | None) -> Box:
         note = "Steady speed straight ahead in deep calm water."
         note += "" if given else " The ship's own names of these revolutions are to be filled in."
     return Box("Engine order", tuple(rows), ("Rpm / pitch", f"kn, {first}", f"kn, {second}"), note)
+
+
+def _name_on_form(order: str) -> str:
+    """The form's spelling of an order, or the ship's own."""
+    return next((name for name in ORDERS_AHEAD if name.casefold() == order.casefold()), order)
+
+
+def _orders_ahead(given: Mapping[str, Row], *, blanks: int) -> list[Row]:
+    """Rows of the form's orders, blank where none is given, and of the ship's further orders; keys are casefolded."""
+    on_form = {order.casefold(): Row(order, (None,) * blanks) for order in ORDERS_AHEAD}
+    return list({**on_form, **given}.values())
 
 
 def _speeds(order: Telegraph, ballast: Bridge | None) -> tuple[_Value, ...]:
@@ -230,17 +241,14 @@ def _distance(value: float, length: float) -> str:
 
 def stopping(bridge: Bridge) -> Box:
     """Full astern from the speeds of the telegraph."""
-    known = {order.casefold(): order for order in ORDERS_AHEAD}
     given: dict[str, Row] = {}
     for stop in bridge.stops_from:
         reach = None if stop.track_reach_m is None else _distance(stop.track_reach_m, bridge.card.ship.length_m)
         time = None if stop.time_s is None else clock(stop.time_s)
         values = (reach, time) if stop.within else (OUTSIDE, OUTSIDE)
-        key = stop.order.casefold()
-        given[key] = Row(f"{known.get(key, stop.order)} ({knots(stop.speed_mps)} kn)", values)
+        given[stop.order.casefold()] = Row(f"{_name_on_form(stop.order)} ({knots(stop.speed_mps)} kn)", values)
     named = not given or any(stop.order for stop in bridge.telegraph)
-    rows = [given.pop(key, Row(order, (None, None))) for key, order in known.items()] if named else []
-    rows += list(given.values())
+    rows = _orders_ahead(given, blanks=2) if named else list(given.values())
     note = ""
     if bridge.stops:
         effects = [EFFECTS[entry.name] for entry in bridge.card.effects]

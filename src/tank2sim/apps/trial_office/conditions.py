@@ -103,8 +103,7 @@ def trial_conditions(state: TrialState, notes: TrialNotes, trials: Sequence[Trie
     """
     turns = [one for one in trials if isinstance(one.manoeuvre, Turn) and one.record is not None]
     depth = notes.depth_m and notes.depth_m / state.draught_m
-    away = 100 * (state.draught_m / state.full_load_draught_m - 1) if state.draughts_recorded else None
-    trim = state.trim_m if state.draughts_recorded else None
+    away, trim = 100 * (state.draught_m / state.full_load_draught_m - 1), state.trim_m
     approach = min((time for one in trials if (time := _approach(one)) is not None), default=None)
     turned = min((angle for one in turns if (angle := one.turned_deg) is not None), default=None)
     rudder = min((_first_rudder_deg(one) for one in turns), default=None)
@@ -122,6 +121,8 @@ def trial_conditions(state: TrialState, notes: TrialNotes, trials: Sequence[Trie
         "both sides": (_both_sides(trials), bool),
         "engine": (notes.engine_untouched, bool),
     }
+    if not state.draughts_recorded:
+        found |= dict.fromkeys(("draught", "trim by the stern"), (None, bool))
     return tuple(_condition(name, *found[name]) for name in _REQUIRED)
 
 

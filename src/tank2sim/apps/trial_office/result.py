@@ -61,12 +61,10 @@ class TrialOfficeResult(Result[TrialOffice]):
     def headline(self) -> tuple[str, ...]:
         """Verdicts at full load, and the corrections."""
         study = self.study
-        failed = [one for one in study.tried if one.verdict.startswith("fail")]
-        open_ones = [one for one in study.tried if one.verdict.startswith("undecided")]
         lines = [self._first_line]
-        for words, ones in (("Not met", failed), ("Undecided", open_ones)):
-            if ones:
-                lines.append(f"{words}: {'; '.join(_named(one) for one in ones)}.")
+        for words, verdict in (("Not met", "fail"), ("Undecided", "undecided")):
+            if names := [_named(one) for one in study.tried if one.verdict.startswith(verdict)]:
+                lines.append(f"{words}: {'; '.join(names)}.")
         if study.conditions_not_met:
             lines.append(f"Conditions not met: {study.conditions_not_met}.")
         lines += self._current_line

@@ -63,6 +63,11 @@ class TurnDrift:
     by_wind_north_mps: float | None
     by_wind_east_mps: float | None
 
+    @property
+    def by_wind(self) -> tuple[float, float]:
+        """Drift by the model in the wind, north and east, m/s; 0 without a measured wind."""
+        return self.by_wind_north_mps or 0.0, self.by_wind_east_mps or 0.0
+
 
 @dataclass(frozen=True, kw_only=True)
 class SiteCurrent:
@@ -417,17 +422,16 @@ def site_current(drifts: Sequence[TurnDrift]) -> SiteCurrent:
     """
     modelled = all(drift.by_wind_north_mps is not None for drift in drifts)
     measured = np.array([drift.measured.vector for drift in drifts])
-    wind = [(drift.by_wind_north_mps, drift.by_wind_east_mps) if modelled else (0.0, 0.0) for drift in drifts]
-    left = measured - np.array(wind, dtype=float)
+    left = measured - np.array([drift.by_wind if modelled else (0.0, 0.0) for drift in drifts])
     sides = [[row for row, drift in enumerate(drifts) if drift.side == side] for side in _sides(drifts)]
+    both = len(sides) > 1
     found = np.mean([left[rows].mean(axis=0) for rows in sides], axis=0)
-    raw = [measured[rows].mean(axis=0) for rows in sides]
-    apart = 0.5 * (raw[0] - raw[-1]) if len(raw) > 1 else None
+    apart = 0.5 * (measured[sides[0]].mean(axis=0) - measured[sides[-1]].mean(axis=0))
     spreads = [drift.measured.spread_mps for drift in drifts if drift.measured.spread_mps is not None]
     # Of turns of one side, and of the two sides after the model's part: what is left is not understood. Without a model
     # the two sides differ by the wind, which the mean does not hold.
     unexplained = 0.0
-    if len(drifts) > 1 and (modelled or len(raw) == 1):
+    if len(drifts) > 1 and (modelled or not both):
         unexplained = float(np.sqrt(np.mean((left - found) ** 2) / (len(drifts) - 1)))
     ways = {(True, True): "by both sides and the model", (True, False): "by both sides", (False, True): "by the model"}
     return SiteCurrent(
@@ -435,8 +439,8 @@ def site_current(drifts: Sequence[TurnDrift]) -> SiteCurrent:
         towards_deg=math.degrees(math.atan2(found[1], found[0])) % 360.0,
         error_mps=math.hypot(max(spreads, default=0.0) / math.sqrt(2), unexplained),
         spread_mps=max(spreads, default=None),
-        wind_share_mps=None if apart is None else float(np.hypot(*apart)),
-        separated=ways.get((len(raw) > 1, modelled), ""),
+        wind_share_mps=float(np.hypot(*apart)) if both else None,
+        separated=ways.get((both, modelled), ""),
     )
 
 
