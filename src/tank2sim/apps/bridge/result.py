@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
@@ -12,12 +12,12 @@ from markupsafe import Markup
 from tank2sim.analysis.validation.ship_track import ShipTrack
 from tank2sim.answer.charts.motion import TrackData, track_chart
 from tank2sim.answer.page import filled_template, resource_text
-from tank2sim.answer.parts import Illustration, Section, Table, records_table
+from tank2sim.answer.parts import Illustration, Section, Table, records_frame, records_table
 from tank2sim.answer.result import Result
 from tank2sim.apps.bridge import boxes
 from tank2sim.apps.bridge.boxes import Box, Row
 from tank2sim.apps.bridge.drawings import Drawing, circles_drawing, stops_drawing
-from tank2sim.apps.bridge.study import SHALLOW, Bridge, BridgeStudy
+from tank2sim.apps.bridge.study import SHALLOW, Bridge, BridgeStudy, Telegraph
 from tank2sim.dynamics.effects.loading import mean_draught
 from tank2sim.notices import Notice
 
@@ -72,9 +72,7 @@ class BridgeResult(Result[BridgeStudy]):
     @property
     def telegraph(self) -> pd.DataFrame:
         """Orders of the engine telegraph ahead: revolutions (rpm) and steady speed (m/s), nan where it is not known."""
-        import pandas as pd
-
-        return pd.DataFrame([asdict(order) for order in self.study.telegraph])
+        return records_frame(self.study.telegraph, Telegraph)
 
     @property
     def title(self) -> str:

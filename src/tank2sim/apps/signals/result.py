@@ -13,7 +13,7 @@ from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_p
 from tank2sim.answer.charts.motion import columns_chart
 from tank2sim.answer.charts.parts import LINE_SAMPLES, POINT_SAMPLES, with_unit
 from tank2sim.answer.charts.vega import ChartSpec, PlotAxis, Rule
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, table
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, data_frame, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.signals.study import FilterStudy, SignalsStudy, SignalStudy, Steering, TrialSignals
 from tank2sim.arrays import Array
@@ -60,8 +60,6 @@ class SignalsResult(Result[SignalsStudy]):
         Mean and standard deviation are in the unit of the column, of directions on the circle. A constant column has
         nothing after the standard deviation; ``peak_hz`` is missing where the spectrum has no peak.
         """
-        import pandas as pd
-
         rows = [
             {
                 "trial": PurePath(trial.trial).stem,
@@ -77,7 +75,7 @@ class SignalsResult(Result[SignalsStudy]):
             for trial in self.study.trials
             for name, column in trial.columns.items()
         ]
-        return pd.DataFrame(rows)
+        return data_frame(rows)
 
     def spectrum(self, column: str, trial: str | None = None) -> pd.DataFrame:
         """One-sided power spectral density of a column: ``frequency_hz``, ``density`` and its 95 % limits (per Hz).
@@ -94,14 +92,12 @@ class SignalsResult(Result[SignalsStudy]):
         LookupError
             No signal that varies has this name.
         """
-        import pandas as pd
-
         varying = []
         for record in self.study.trials:
             for name, signal in _varying(record):
                 if name == column and trial in (None, PurePath(record.trial).stem) and signal.spectrum:
                     keys = ("frequency_hz", "density", "low", "high")
-                    return pd.DataFrame({key: getattr(signal.spectrum, key) for key in keys})
+                    return data_frame({key: getattr(signal.spectrum, key) for key in keys})
                 varying.append(name)
         raise LookupError(f"no spectrum of {column}; there are: {', '.join(dict.fromkeys(varying))}")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -13,7 +13,17 @@ from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, look_of
 from tank2sim.answer.charts.motion import History, Signal, history_chart
 from tank2sim.answer.charts.parts import equal_frame, vector
 from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, layer, layered
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, records_table, table
+from tank2sim.answer.parts import (
+    Cell,
+    Column,
+    Illustration,
+    KeyFigure,
+    Section,
+    Table,
+    records_frame,
+    records_table,
+    table,
+)
 from tank2sim.answer.result import Result
 from tank2sim.apps.rigs.glider.study import (
     BalancedGlide,
@@ -21,6 +31,7 @@ from tank2sim.apps.rigs.glider.study import (
     GlideStudy,
     PathPlace,
     QuasiSteadyErrors,
+    Range,
     TransientPath,
 )
 from tank2sim.apps.rigs.glider.transient import ProgrammeError, SwingError
@@ -102,24 +113,17 @@ class GlideResult(Result[GlideStudy]):
     @property
     def glides(self) -> pd.DataFrame:
         """The steady glides at the angles that were given: deg, m/s, m, kg; + up, and starboard side down."""
-        import pandas as pd
-
-        names = [part.name for part in fields(GlideState)]
-        return pd.DataFrame([{name: getattr(glide, name) for name in names} for glide in self.study.states])
+        return records_frame(self.study.states, GlideState)
 
     @property
     def path(self) -> pd.DataFrame:
         """The path of the programme by steady glides, at the ends of its steps; empty without a programme."""
-        import pandas as pd
-
-        return pd.DataFrame([asdict(place) for place in self.study.path])
+        return records_frame(self.study.path, PathPlace)
 
     @property
     def ranges(self) -> pd.DataFrame:
         """How far the ballast carries, for the best and the fastest glide and those given; empty without ballast."""
-        import pandas as pd
-
-        return pd.DataFrame([asdict(each) for each in self.study.design.ranges])
+        return records_frame(self.study.design.ranges, Range)
 
     @property
     def title(self) -> str:

@@ -16,7 +16,18 @@ from tank2sim.answer.charts.parts import plain, series_look, vector
 from tank2sim.answer.charts.rows import RowPlot, row_layers
 from tank2sim.answer.charts.vega import STACKS, ChartRecord, ChartSpec, PlotAxis, Rule, layered
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, records_table, table
+from tank2sim.answer.parts import (
+    Cell,
+    Column,
+    Illustration,
+    KeyFigure,
+    Section,
+    Table,
+    Verdict,
+    data_frame,
+    records_table,
+    table,
+)
 from tank2sim.answer.result import Result
 from tank2sim.apps.rigs.tow import paper as tow_paper
 from tank2sim.apps.rigs.tow.findings import TowFit
@@ -92,14 +103,12 @@ class TowResult(Result[TowStudy]):
     @property
     def estimates(self) -> pd.DataFrame:
         """Estimates, a row each: method, name with unit (``total_mass_kg``), value, standard error."""
-        import pandas as pd
-
         rows = [
             (method, name, value, fit.standard_errors.get(name))
             for method, fit in self.study.methods.items()
             for name, value in fit.estimates.items()
         ]
-        return pd.DataFrame(rows, columns=["method", "name", "value", "standard_error"])
+        return data_frame(rows, ["method", "name", "value", "standard_error"])
 
     @property
     def total_mass_kg(self) -> float:

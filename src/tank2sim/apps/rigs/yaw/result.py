@@ -23,7 +23,7 @@ from tank2sim.answer.charts.vega import (
     tooltips,
 )
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, records_frame, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.rigs.yaw.card import YawRigCard
 from tank2sim.apps.rigs.yaw.energy import YawMethodEstimate, term_and_unit
@@ -110,15 +110,12 @@ class YawResult(Result[YawStudy]):
 
         ``added_inertia_kgm2`` is missing where J_zz is not known; ``total_inertia_kgm2`` is J_zz + lambda661.
         """
-        import pandas as pd
-
         columns = [
             f"{name}{error}_{unit}"
             for name, unit in (("added_inertia", "kgm2"), ("total_inertia", "kgm2"), ("dissipation", "J"))
             for error in ("", "_standard_error")
         ]
-        rows = [[getattr(found, column) for column in columns] for found in self.study.methods.values()]
-        return pd.DataFrame(rows, columns=columns, index=pd.Index(self.study.methods, name="method"))
+        return records_frame(self.study.methods, columns, index="method")
 
     @property
     def added_inertia_kgm2(self) -> float | None:
