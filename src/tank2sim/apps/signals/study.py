@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -280,25 +281,28 @@ def parse_filter(text: str) -> FilterRequest:
     """
     kind, _, parameters = text.strip().partition(":")
     words = [word.strip() for word in parameters.split(",") if word.strip()]
-    causal = bool(words) and words[-1] == "causal" and kind in set(FilterType)
+    causal = words[-1:] == ["causal"] and kind in set(FilterType)
     try:
         numbers = [float(word) for word in (words[:-1] if causal else words)]
-        whole = [int(number) for number in numbers if number == int(number)]
-    except (ValueError, OverflowError):
-        raise _refusal(text) from None
-    match kind, len(numbers), len(whole) == len(numbers):
-        case ("lowpass" | "highpass", 1, _) | ("bandpass", 2, _):
-            return FilterRequest(text, lambda series: butterworth(series, FilterType(kind), numbers, causal=causal))
-        case "savgol", 2, True:
-            return FilterRequest(text, lambda series: savitzky_golay(series, whole[0], whole[1]))
-        case "spline", 1, _:
-            return FilterRequest(text, lambda series: smoothing_spline(series, numbers[0]))
-        case "detrend", 1, True:
-            return FilterRequest(text, lambda series: detrend(series, whole[0]))
-        case "decimate", 1, True:
-            return FilterRequest(text, lambda series: decimate(series, whole[0]), thins=True)
-    raise _refusal(text)
+    except ValueError:
+        numbers = [math.nan]
+    count, whole, apply = _FILTERS.get(kind, (0, False, None))
+    fits = all(number.is_integer() if whole else math.isfinite(number) for number in numbers)
+    if apply is None or len(numbers) != count or not fits:
+        raise ArgumentError("filter", "", f"{text!r} is not a filter", f"write one of {REQUEST_FORMS}")
+    if kind in set(FilterType):
+        return FilterRequest(text, lambda series: butterworth(series, FilterType(kind), numbers, causal=causal))
+    given = [int(number) if whole else number for number in numbers]
+    return FilterRequest(text, lambda series: apply(series, *given), thins=apply is decimate)
 
 
-def _refusal(text: str) -> InputError:
-    return ArgumentError("filter", "", f"{text!r} is not a filter", f"write one of {REQUEST_FORMS}")
+_FILTERS: dict[str, tuple[int, bool, Callable[..., Filtered]]] = {
+    "lowpass": (1, False, butterworth),
+    "highpass": (1, False, butterworth),
+    "bandpass": (2, False, butterworth),
+    "savgol": (2, True, savitzky_golay),
+    "spline": (1, False, smoothing_spline),
+    "detrend": (1, True, detrend),
+    "decimate": (1, True, decimate),
+}
+"""Filter to how many numbers it takes, whether they are whole, and its function."""

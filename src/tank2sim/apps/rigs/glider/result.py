@@ -445,9 +445,10 @@ def _plane(
     arms: Sequence[ChartRecord] = (),
 ) -> ChartSpec:
     """Lines in a plane with one scale; with `arms`, lines of reference with a name at their end, there are no axes."""
-    across = np.concatenate([*(x for _, x, _ in drawn), vector([arm["x"] for arm in arms])])
-    up = np.concatenate([*(y for _, _, y in drawn), vector([arm["v"] for arm in arms])])
-    frame = equal_frame(across, up, width_px=680, height_px=height_px)
+    labels, across, up = zip(*drawn, strict=True)
+    ends = vector([arm["x"] for arm in arms]), vector([arm["v"] for arm in arms])
+    both = np.concatenate([*across, ends[0]]), np.concatenate([*up, ends[1]])
+    frame = equal_frame(*both, width_px=680, height_px=height_px)
     place = frame.axes(across=("x", titles[0]), up=("v", titles[1]))
     if arms:
         place = {name: axis | {"axis": None} for name, axis in place.items()}
@@ -459,7 +460,7 @@ def _plane(
         size=(frame.width_px, frame.height_px),
         window=["x", "y"],
         title=title,
-        description="Paths of " + ", ".join(label for label, _, _ in drawn) + "; both axes have one scale.",
+        description=f"Paths of {', '.join(labels)}; both axes have one scale.",
         usermeta={"equal_scales": True},
     )
 

@@ -153,9 +153,7 @@ def yaw(
     from tank2sim.apps.rigs.yaw.theory import parse_body, theory_values
     from tank2sim.records.csv_table import tables_or_paths
 
-    constant = torque_constant_NmpA, 0.0
-    if reference is not None or reference_inertia_kgm2 is not None:
-        constant = _torque_constant(reference, reference_inertia_kgm2)
+    constant = _torque_constant(torque_constant_NmpA, reference, reference_inertia_kgm2)
     known = None if rig is None else rig_card_of(rig, "rig")
     options = YawOptions(
         inertia_kgm2=inertia_kgm2,
@@ -185,13 +183,15 @@ def yaw(
 
 
 def _torque_constant(
-    reference: str | Path | pd.DataFrame | None, reference_inertia_kgm2: float | None
-) -> tuple[float, float]:
-    """k_t (N m/A) and its relative standard error, from a body of known inertia in air."""
+    given_NmpA: float | None, reference: str | Path | pd.DataFrame | None, reference_inertia_kgm2: float | None
+) -> tuple[float | None, float]:
+    """k_t (N m/A) and its relative standard error: from a body of known inertia in air, else as given."""
     from tank2sim.apps.rigs.yaw.identify import identify_yaw, torque_constant
     from tank2sim.apps.rigs.yaw.records import read_yaw_record
     from tank2sim.records.csv_table import table_or_path
 
+    if reference is None and reference_inertia_kgm2 is None:
+        return given_NmpA, 0.0
     if reference is None or reference_inertia_kgm2 is None:
         missing = "reference" if reference is None else "reference_inertia_kgm2"
         raise ArgumentError(missing, "", "is missing", "give both, the reference and its inertia, or neither")

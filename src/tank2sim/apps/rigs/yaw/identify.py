@@ -26,6 +26,7 @@ from tank2sim.apps.rigs.yaw.energy import (
     EnergyFit,
     Interval,
     IntervalPair,
+    Speeds,
     YawMethodEstimate,
     as_many_equations,
     energy_balance,
@@ -144,8 +145,8 @@ def _estimates(records: tuple[YawRecord, ...], options: YawOptions, air: YawEsti
     current = tuple(check_current(records))
     for record in records:
         check_turn(record)
-    pairs = [pair for record in records for pair in intervals(record)]
-    mirror = tuple(mirror_difference(pair) for pair in pairs)
+    pairs = _pairs(records, "actual")
+    mirror = tuple(map(mirror_difference, pairs))
     unlike = tuple(check_mirror(records, mirror, options.mirror_limit))
     fits, gravity = _energy_fits(records, pairs, constant, options)
     fit = fits[0]
@@ -174,7 +175,7 @@ def _estimates(records: tuple[YawRecord, ...], options: YawOptions, air: YawEsti
         histories=record_histories(records, fit),
         energy_balance=energy_balance_means(fit),
         energy_residuals=energy_residuals(fit),
-        angle_residual=angle_residual(angle) if angle else None,
+        angle_residual=angle_residual(angle),
         notices=(
             *(*doubts, *unknown, *current, *unlike, *gravity, *omissions),
             *(*check_explained(records, angle), *remarks, *estimate_notes(methods)),
@@ -182,12 +183,17 @@ def _estimates(records: tuple[YawRecord, ...], options: YawOptions, air: YawEsti
     )
 
 
+def _pairs(records: Sequence[YawRecord], speeds: Speeds) -> list[IntervalPair]:
+    """Mirror pairs of all records."""
+    return [pair for record in records for pair in intervals(record, speeds)]
+
+
 def _energy_fits(
     records: tuple[YawRecord, ...], pairs: Sequence[IntervalPair], constant: float, options: YawOptions
 ) -> tuple[Fits, tuple[Notice, ...]]:
     """Least squares of the energy with measured speeds and with the programme's; a note on a moment of gravity."""
     first, rig = records[0], options.known
-    programmed = [pair for record in records for pair in intervals(record, "reference")]
+    programmed = _pairs(records, "reference")
 
     def fitted(terms: tuple[str, ...]) -> Fits:
         expected = energy_balance(programmed, terms, constant, rig)
@@ -447,8 +453,10 @@ def energy_residuals(fit: EnergyFit) -> tuple[EnergyResidual, ...]:
     )
 
 
-def angle_residual(fit: AngleFit) -> Columns:
-    """Residual angle of the integrated equation, with a gap (nan) between fitted parts."""
+def angle_residual(fit: AngleFit | None) -> Columns | None:
+    """Residual angle of the integrated equation, with a gap (nan) between fitted parts; None without a fit."""
+    if fit is None:
+        return None
     breaks = np.flatnonzero(np.abs(np.diff(fit.time_s)) > 1.0) + 1
     time = np.insert(fit.time_s, breaks, fit.time_s[breaks - 1] + 0.01)
     return drawn_columns({"t_s": time, "residual_rad": np.insert(fit.residual_rad, breaks, np.nan)}, peaks=True)
