@@ -205,6 +205,16 @@ def chosen_names(argument: str, given: str | Sequence[str], known: Iterable[str]
     return tuple(name for name in names if name in words)
 
 
+def numbers_in(text: str, counts: Collection[int] = ()) -> list[float]:
+    """Finite numbers of a `text` with commas; none unless all are such, and as many as one of the `counts`."""
+    try:
+        numbers = [float(word) for word in text.split(",")]
+    except ValueError:
+        return []
+    fits = not counts or len(numbers) in counts
+    return numbers if fits and all(map(math.isfinite, numbers)) else []
+
+
 class UnknownType(type):
     """A type that only type checkers know, with whatever members it has."""
 

@@ -258,25 +258,25 @@ def _signal_charts(label: str, name: SignalName, signal: SignalStudy) -> Iterato
 
 
 def _statistics(label: str, trial: TrialSignals) -> Table:
-    rows: list[list[Cell]] = []
-    for name, signal in trial.columns.items():
-        row: list[Cell] = [name, f"{signal.mean:.4g}", f"{signal.standard_deviation:.4g}"]
-        if signal.autocorrelation and signal.stationarity and signal.normality and signal.spectrum:
-            row += [signal.autocorrelation.correlation_time_s, signal.stationarity.verdict.value]
-            row += [signal.normality.verdict, signal.spectrum.peak_in_words]
-        else:
-            row += [None, "constant", "-", "-"]
-        rows.append(row)
-    notes = []
-    if any(signal.on_circle for signal in trial.columns.values()):
-        notes.append("Mean and standard deviation of directions are on the circle, 0 to 360 deg.")
-    notes.append("corr.: correlation time. normal: tested on samples two correlation times apart, number in brackets.")
+    rows = [_statistics_row(name, signal) for name, signal in trial.columns.items()]
     tested = [signal.stationarity for signal in trial.columns.values() if signal.stationarity]
-    notes += dict.fromkeys(f"{found.verdict.value}: {found.meaning}" for found in tested)
-    if trial.rudder_to_yaw_rate:
-        notes.append(_steering_text(trial.rudder_to_yaw_rate))
+    circle = any(signal.on_circle for signal in trial.columns.values())
+    notes = [
+        *(["Mean and standard deviation of directions are on the circle, 0 to 360 deg."] if circle else []),
+        "corr.: correlation time. normal: tested on samples two correlation times apart, number in brackets.",
+        *dict.fromkeys(f"{found.verdict.value}: {found.meaning}" for found in tested),
+        *([_steering_text(trial.rudder_to_yaw_rate)] if trial.rudder_to_yaw_rate else []),
+    ]
     heads = ("column", "mean", "std", "corr. (s)", "stationarity", "normal", "peak (Hz)")
     return replace(table(label, heads, rows, *notes), wide=True)
+
+
+def _statistics_row(name: str, signal: SignalStudy) -> list[Cell]:
+    row: list[Cell] = [name, f"{signal.mean:.4g}", f"{signal.standard_deviation:.4g}"]
+    if signal.autocorrelation and signal.stationarity and signal.normality and signal.spectrum:
+        row += [signal.autocorrelation.correlation_time_s, signal.stationarity.verdict.value]
+        return [*row, signal.normality.verdict, signal.spectrum.peak_in_words]
+    return [*row, None, "constant", "-", "-"]
 
 
 def _steering_text(steering: Steering) -> str:

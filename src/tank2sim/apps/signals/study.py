@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tank2sim.arguments import numbers_in
 from tank2sim.arrays import Columns, Number
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.notices import Notice
@@ -280,20 +280,16 @@ def parse_filter(text: str) -> FilterRequest:
     InputError if the filter does not exist, or its numbers are not as many and of the kind that it takes.
     """
     kind, _, parameters = text.strip().partition(":")
-    words = [word.strip() for word in parameters.split(",") if word.strip()]
-    causal = words[-1:] == ["causal"] and kind in set(FilterType)
-    try:
-        numbers = [float(word) for word in (words[:-1] if causal else words)]
-    except ValueError:
-        numbers = [math.nan]
-    count, whole, apply = _FILTERS.get(kind, (0, False, None))
-    fits = all(number.is_integer() if whole else math.isfinite(number) for number in numbers)
-    if apply is None or len(numbers) != count or not fits:
+    numbers, _, last = parameters.rpartition(",")
+    causal = last.strip() == "causal" and kind in set(FilterType)
+    count, whole, apply = _FILTERS.get(kind, (0, False, butterworth))
+    given = numbers_in(numbers if causal else parameters, (count,))
+    if not given or (whole and not all(number.is_integer() for number in given)):
         raise ArgumentError("filter", "", f"{text!r} is not a filter", f"write one of {REQUEST_FORMS}")
-    if kind in set(FilterType):
-        return FilterRequest(text, lambda series: butterworth(series, FilterType(kind), numbers, causal=causal))
-    given = [int(number) if whole else number for number in numbers]
-    return FilterRequest(text, lambda series: apply(series, *given), thins=apply is decimate)
+    if apply is butterworth:
+        return FilterRequest(text, lambda series: butterworth(series, FilterType(kind), given, causal=causal))
+    kept = [int(number) if whole else number for number in given]
+    return FilterRequest(text, lambda series: apply(series, *kept), thins=apply is decimate)
 
 
 _FILTERS: dict[str, tuple[int, bool, Callable[..., Filtered]]] = {

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
+from tank2sim.arguments import numbers_in
 from tank2sim.arrays import Array
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.records.csv_table import LONGEST_RUN_S, CsvTable, read_table
@@ -144,11 +145,8 @@ def as_force(force: float | Polynomial) -> Polynomial:
 
 def parse_force(text: str) -> Polynomial:
     """T(t) from an option's text ``c0,c1,...``: T = c0 + c1 t + ..., N over s; InputError for any other text."""
-    try:
-        coefficients = [float(word) for word in text.split(",")]
-    except ValueError:
-        coefficients = [np.nan]
-    if not np.isfinite(coefficients).all():
+    coefficients = numbers_in(text)
+    if not coefficients:
         raise ArgumentError("force_N", "", f"{text!r} is not a polynomial", "give numbers: 11.6,0.02,-1e-4")
     return Polynomial(coefficients)
 

@@ -26,7 +26,7 @@ from tank2sim.apps.rigs.yaw.programme import (
     programme_of,
 )
 from tank2sim.apps.rigs.yaw.records import Medium, YawRecord
-from tank2sim.apps.rigs.yaw.theory import numbers_of
+from tank2sim.arguments import numbers_in
 from tank2sim.arrays import Array
 from tank2sim.cards import Card
 from tank2sim.dynamics.vessel import Vessel, as_vessel
@@ -357,7 +357,7 @@ def similar_programme(card: YawRigCard, text: str) -> YawProgramme:
 
 def _ship_motion(text: str) -> tuple[float, ...]:
     """Length and beam (m), yaw rate (deg/min) and time (s) of a text ``L,B,R,T``."""
-    numbers = numbers_of(text, (4,))
+    numbers = numbers_in(text, (4,))
     if not numbers or not numbers[2] or min(numbers[0], numbers[1], numbers[3]) <= 0:
         remedy = "write length and beam in m, yaw rate in deg/min and time in s: 38,8,100,120"
         raise ArgumentError("similar_to", "", f"{text!r} is not a motion of a ship", remedy)

@@ -11,6 +11,7 @@ from typing import Literal
 
 from scipy.special import ellipeinc, ellipkinc
 
+from tank2sim.arguments import numbers_in
 from tank2sim.dynamics.ellipsoid import lamb_coefficients
 from tank2sim.dynamics.vessel import as_vessel
 from tank2sim.errors import ArgumentError
@@ -181,19 +182,10 @@ def theory_values(body: FloatingBody, rate_radps: float) -> tuple[TheoryValue, .
     return tuple(values)
 
 
-def numbers_of(text: str, counts: tuple[int, ...]) -> list[float]:
-    """Finite numbers of a `text` with commas; none unless there are as many as one of `counts`."""
-    try:
-        numbers = [float(word) for word in text.split(",")]
-    except ValueError:
-        return []
-    return numbers if len(numbers) in counts and all(map(math.isfinite, numbers)) else []
-
-
 def parse_body(text: str) -> FloatingBody:
     """From a text ``L,B,T,H`` or ``L,B,T,H,CB``, or from a card that states these."""
     if "," in text:
-        sizes: list[float | None] = [*numbers_of(text, (4, 5))]
+        sizes: list[float | None] = [*numbers_in(text, (4, 5))]
     else:
         ship = as_vessel(text).card.ship
         sizes = [ship.length_m, ship.beam_m, ship.draught_m, ship.water_depth_m, ship.block_coefficient]
