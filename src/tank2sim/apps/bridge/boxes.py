@@ -122,10 +122,10 @@ def steering(bridge: Bridge, *, units: bool = True) -> Box:
     gear = bridge.card.steering_gear
     largest = math.degrees(gear.max_angle_rad) if gear and gear.max_angle_rad else None
     neutral = None
-    if bridge.neutral_deg is not None:
-        side = "starboard" if bridge.neutral_deg > 0 else "port"
-        neutral = f"{abs(bridge.neutral_deg):.2g}° {side}"
-    over = None if bridge.hard_over_s is None else f"{bridge.hard_over_s:.3g} s"
+    if bridge.study.rudder_neutral_deg is not None:
+        side = "starboard" if bridge.study.rudder_neutral_deg > 0 else "port"
+        neutral = f"{abs(bridge.study.rudder_neutral_deg):.2g}° {side}"
+    over = None if bridge.study.hard_over_to_hard_over_s is None else f"{bridge.study.hard_over_to_hard_over_s:.3g} s"
     rows = (
         Row("Type of rudder(s)", (None,)),
         Row("Maximum rudder angle", (_number(largest, "°"),)),
@@ -139,17 +139,17 @@ def steering(bridge: Bridge, *, units: bool = True) -> Box:
 
 def telegraph(bridge: Bridge, ballast: Bridge | None) -> Box:
     """Engine orders with revolutions and steady speeds straight ahead; astern by hand."""
-    unnamed = [Row(None, _speeds(entry, ballast)) for entry in bridge.telegraph if not entry.order]
+    unnamed = [Row(None, _speeds(entry, ballast)) for entry in bridge.study.telegraph if not entry.order]
     given = {
         entry.order.casefold(): Row(_name_on_form(entry.order), _speeds(entry, ballast))
-        for entry in bridge.telegraph
+        for entry in bridge.study.telegraph
         if entry.order
     }
     rows = unnamed or _orders_ahead(given, blanks=3)
     rows += [Row(order, (None, None, None)) for order in ORDERS_ASTERN]
     first, second = conditions(bridge, ballast)
     note = ""
-    if any(entry.speed_mps is not None for entry in bridge.telegraph):
+    if any(entry.speed_mps is not None for entry in bridge.study.telegraph):
         note = "Steady speed straight ahead in deep calm water."
         note += "" if given else " The ship's own names of these revolutions are to be filled in."
     return Box("Engine order", tuple(rows), ("Rpm / pitch", f"kn, {first}", f"kn, {second}"), note)
@@ -168,7 +168,7 @@ def _orders_ahead(given: Mapping[str, Row], *, blanks: int) -> list[Row]:
 
 def _speeds(order: Telegraph, ballast: Bridge | None) -> tuple[_Value, ...]:
     """Revolutions, speed, and the other condition's speed at the same revolutions."""
-    same = (row for row in ballast.telegraph if math.isclose(row.rpm, order.rpm)) if ballast else ()
+    same = (row for row in ballast.study.telegraph if math.isclose(row.rpm, order.rpm)) if ballast else ()
     rpm = f"{order.rpm:.0f}" if order.rpm >= 100 else f"{order.rpm:.3g}"
     return (rpm, _speed(order), _speed(next(iter(same), None)))
 
@@ -242,12 +242,12 @@ def _distance(value: float, length: float) -> str:
 def stopping(bridge: Bridge) -> Box:
     """Full astern from the speeds of the telegraph."""
     given: dict[str, Row] = {}
-    for stop in bridge.stops_from:
+    for stop in bridge.study.full_astern_from:
         reach = None if stop.track_reach_m is None else _distance(stop.track_reach_m, bridge.card.ship.length_m)
         time = None if stop.time_s is None else clock(stop.time_s)
         values = (reach, time) if stop.within else (OUTSIDE, OUTSIDE)
         given[stop.order.casefold()] = Row(f"{_name_on_form(stop.order)} ({knots(stop.speed_mps)} kn)", values)
-    named = not given or any(stop.order for stop in bridge.telegraph)
+    named = not given or any(stop.order for stop in bridge.study.telegraph)
     rows = _orders_ahead(given, blanks=2) if named else list(given.values())
     note = ""
     if bridge.stops:
@@ -290,7 +290,7 @@ def squat(bridge: Bridge) -> Box:
     heads = ("under-keel clearance", "speed, kn", "largest squat")
     rows = tuple(
         Row("", (_number(row.clearance_m, "m", 3), knots(row.speed_mps), _number(row.squat_m, "m", 2)))
-        for row in bridge.squat
+        for row in bridge.study.squat
     )
     note = "Larger of Barrass and ICORELS." if rows else ""
     return Box("Draught increase by squat, estimated", rows or (Row("", (None,) * 3),) * 2, heads, note)

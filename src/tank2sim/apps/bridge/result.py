@@ -249,7 +249,7 @@ def _panels(bridge: Bridge, ballast: Bridge | None) -> tuple[Panel, ...]:
 
 
 def _turning_title(bridge: Bridge, where: str) -> str:
-    return f"{where} rudder {bridge.rudder_deg:.3g}°, from {boxes.approach(bridge)}".strip()
+    return f"{where} rudder {bridge.study.rudder_deg:.3g}°, from {boxes.approach(bridge)}".strip()
 
 
 def _draught(bridge: Bridge) -> str:
@@ -262,12 +262,14 @@ def _circles_title(bridge: Bridge) -> str:
     gear = bridge.card.steering_gear
     if gear and gear.max_angle_rad:
         return "Turning circles at maximum rudder angle"
-    return f"Turning circles at {bridge.rudder_deg:.3g}° rudder: the card states no maximum angle"
+    return f"Turning circles at {bridge.study.rudder_deg:.3g}° rudder: the card states no maximum angle"
 
 
 def _notices(*bridges: Bridge | None) -> list[Notice]:
     """As many notices as a sheet has room for; the command prints all."""
-    cut = (Notice(_cut(each.line, _NOTICE), each.level) for bridge in bridges if bridge for each in bridge.notices)
+    cut = (
+        Notice(_cut(each.line, _NOTICE), each.level) for bridge in bridges if bridge for each in bridge.study.notices
+    )
     texts = list(dict.fromkeys(cut))
     omitted = len(texts) - _NOTICES
     return texts if omitted <= 0 else [*texts[:_NOTICES], Notice(f"and {omitted} more, which the command prints")]
