@@ -2,19 +2,18 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tank2sim.apps.rigs.tow.identify import identify_tow
 from tank2sim.apps.rigs.tow.output_error import TowModel, simulated_speeds
-from tank2sim.apps.rigs.tow.records import Tows
 from tank2sim.apps.rigs.tow.study import SIMPLE
 from tank2sim.apps.rigs.tow.surge import SurgeCoefficients
 from tank2sim.cards import read_card
 from tank2sim.errors import InputError
 from tank2sim.notices import foremost
+from tests.apps.rigs.tow.made_tows import tows_of
 
 # what the paper prints as its solution, which is none of its own equations (papers.md 1.5)
 PRINTED = np.array([2550.0, 92418.0, -26096.0, 2015.0])
@@ -34,8 +33,7 @@ def synthetic(coefficients, times, *, tows=5, scatter=0.0, force=11.63):
     rng = np.random.default_rng(11)
     readings = simulated_speeds(coefficients, force, times)[:, None] + scatter * rng.standard_normal((len(times), tows))
     readings[times == 0] = 0
-    names = tuple(f"speed_{k}_mps" for k in range(1, tows + 1))
-    return Tows(Path("synthetic.csv"), names, times, readings)
+    return tows_of(times, readings)
 
 
 def test_the_paper_and_qr_agree_and_differ_from_the_printed_solution(four_unknowns):
@@ -169,7 +167,7 @@ def test_force_and_mass_must_be_known(table_1):
 
 def speeds_of(function):
     times = np.arange(0, 51, 5.0)
-    return Tows(Path("tow.csv"), ("speed_1_mps",), times, np.array([[function(t)] for t in times]))
+    return tows_of(times, [function(t) for t in times], "tow.csv")
 
 
 @pytest.mark.parametrize(

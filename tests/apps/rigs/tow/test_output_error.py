@@ -1,8 +1,5 @@
 """The fit of the integrated speeds: the re-analysis of the tows, closed forms, sensitivities."""
 
-from dataclasses import replace
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
@@ -10,11 +7,11 @@ from scipy import stats
 from scipy.integrate import solve_ivp
 
 from tank2sim.apps.rigs.tow.output_error import TowModel, fit_speeds, simulated_speeds, speed_predictor
-from tank2sim.apps.rigs.tow.records import Tows
 from tank2sim.apps.rigs.tow.study import SIMPLE
 from tank2sim.apps.rigs.tow.surge import SurgeCoefficients
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import scaled_condition
+from tests.apps.rigs.tow.made_tows import tows_of
 
 FORCE_N = 11.63
 
@@ -41,9 +38,7 @@ def test_table_1_gives_the_estimates_of_the_reanalysis(table_1, terms, estimates
 def test_each_tow_alone(table_1):
     expected = [(3374, 56), (3350, 37), (3100, 89), (2898, 185), (3067, 103)]
     for number, pair in enumerate(expected):
-        read = ~np.isnan(table_1.speed_mps[:, number])
-        one = replace(table_1, time_s=table_1.time_s[read], speed_mps=table_1.speed_mps[read][:, [number]])
-        np.testing.assert_allclose(fit_speeds(one, FORCE_N, SIMPLE).estimates, pair, atol=0.6)
+        np.testing.assert_allclose(fit_speeds(table_1.only(number), FORCE_N, SIMPLE).estimates, pair, atol=0.6)
 
 
 def test_speeds_are_those_of_the_closed_form_at_uneven_times():
@@ -93,7 +88,7 @@ def test_the_truth_comes_back_from_exact_tows(truth, force, end_s):
     speeds = solve_ivp(rate, (0, end_s), [0.0], t_eval=times, rtol=1e-11, atol=1e-13).y[0]
     readings = np.column_stack([speeds, speeds])
     readings[3, 1] = np.nan
-    tows = Tows(Path("exact.csv"), ("speed_1_mps", "speed_2_mps"), times, readings)
+    tows = tows_of(times, readings)
     fit = fit_speeds(tows, force, TowModel(tuple(name for name in truth if name != "M")))
     np.testing.assert_allclose(fit.estimates, list(truth.values()), rtol=1e-5)
 
@@ -108,14 +103,13 @@ def test_standard_errors_are_the_spread_of_repeated_tows():
     for _ in range(150):
         noise = 0.006 * rng.standard_normal((11, 5))
         noise[0] = 0
-        tows = Tows(Path("noisy.csv"), tuple("12345"), times, exact[:, None] + noise)
-        fits.append(fit_speeds(tows, FORCE_N, SIMPLE))
+        fits.append(fit_speeds(tows_of(times, exact[:, None] + noise), FORCE_N, SIMPLE))
     spread = np.std([fit.estimates for fit in fits], axis=0)
     reported = np.median([np.sqrt(np.diag(fit.covariance)) for fit in fits], axis=0)
     np.testing.assert_allclose(reported, spread, rtol=0.2)
 
 
 def test_too_few_readings_are_refused():
-    tows = Tows(Path("few.csv"), ("speed_1_mps",), np.arange(3.0), np.array([[0.0], [0.1], [0.2]]))
+    tows = tows_of(np.arange(3.0), [0.0, 0.1, 0.2], "few.csv")
     with pytest.raises(InputError, match=r"few\.csv: 2 readings after the release do not test 2 estimates"):
         fit_speeds(tows, FORCE_N, SIMPLE)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import printed_tows
@@ -30,6 +29,7 @@ from tank2sim.apps.rigs.tow.study import (
     towed_body,
 )
 from tests.answer.drawn import panels, rows_of, whole_panel
+from tests.apps.rigs.tow.made_tows import tows_of
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,7 @@ def study(table_1):
 
 
 def test_speed_polynomials_of_the_printed_means_next_to_table_2():
-    tows = Tows(tow_paper.__file__, ("speed_1_mps",), tow_paper.TIMES_S, tow_paper.MEANS_MPS[:, None])
+    tows = tows_of(tow_paper.TIMES_S, tow_paper.MEANS_MPS)
     rows = list(speed_polynomials(tows))
     expected = [(0.05499, 0.05768), (0.00438, 0.00460), (0.00318, 0.00334), (0.00282, 0.00296)]
     for row, (by_n, by_less) in zip(rows, expected, strict=True):
@@ -185,7 +185,7 @@ SCATTER = 0.01
 def tows(readings: list[list[float]]) -> Tows:
     """Readings of two tows at 0, 1, 2 ... s; at rest at first."""
     table = np.array([[0.0, 0.0], *readings])
-    return Tows(Path("made_up.csv"), ("speed_1_mps", "speed_2_mps"), np.arange(len(table), dtype=float), table)
+    return tows_of(np.arange(len(table)), table)
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -23,6 +23,9 @@ from tests.yaw_truth import Truth, mirrored, record, written
 
 TRUTH = Truth()
 AIR = Truth(total=0.0204, coulomb=10.9e-4, viscous=7.6e-4, quadratic=0.0, stiffness=8.0, damping=12.0)
+WALLS = TankWalls(
+    body_length_m=0.67, bow_inertia_kgm2=4e-3, stern_inertia_kgm2=4e-3, bow_damping_Nms=5e-3, stern_damping_Nms=5e-3
+)
 DISSIPATION = 8.497e-4  # papers.md 3.4, the ellipsoid
 
 
@@ -137,8 +140,6 @@ def test_what_is_known_beyond_the_equation_is_taken_off(folder):
     truth = Truth(
         inertia_a=0.02, inertia_d=0.05, braking_quadratic=0.06, wall_inertia=4e-3, wall_damping=5e-3, gravity=1e-3
     )
-    walls = TankWalls(body_length_m=0.67, **{f"{end}_{what}": value for end in ("bow", "stern")
-                  for what, value in (("inertia_kgm2", 4e-3), ("damping_Nms", 5e-3))})  # fmt: skip
     known = UNKNOWN_RIG.model_copy(
         update={
             "quadratic_Nms2": 0.0381,
@@ -146,7 +147,7 @@ def test_what_is_known_beyond_the_equation_is_taken_off(folder):
             "inertia_accelerating_kgm2": 0.02,
             "inertia_braking_kgm2": 0.05,
             "gravity_Nm": 1e-3,
-            "walls": walls,
+            "walls": WALLS,
         }
     )
     made = read_yaw_record(written(folder / "full.csv", truth))
@@ -193,9 +194,7 @@ def test_known_work_gives_the_corrections_of_the_printed_formulas(water):
 def test_reversing_programmes_are_paired_through_the_same_angles(folder):
     truth = replace(TRUTH, reversing=True, wall_inertia=4e-3, wall_damping=5e-3)
     made = read_yaw_record(written(folder / "reversing.csv", truth))
-    walls = TankWalls(body_length_m=0.67, **{f"{end}_{what}": value for end in ("bow", "stern")
-                  for what, value in (("inertia_kgm2", 4e-3), ("damping_Nms", 5e-3))})  # fmt: skip
-    found = identify_yaw([made], YawOptions(known=UNKNOWN_RIG.model_copy(update={"walls": walls})))
+    found = identify_yaw([made], YawOptions(known=UNKNOWN_RIG.model_copy(update={"walls": WALLS})))
     assert found.methods["energy_least_squares"].total_inertia_kgm2 == pytest.approx(0.0504, rel=2e-3)
     assert found.methods["output_error"].total_inertia_kgm2 == pytest.approx(0.0504, rel=2e-3)
 
