@@ -23,6 +23,7 @@ from tank2sim.apps.rigs.yaw.diagnostics import (
 )
 from tank2sim.apps.rigs.yaw.energy import (
     ENERGY_TERMS,
+    PARTS,
     EnergyFit,
     Interval,
     IntervalPair,
@@ -422,7 +423,7 @@ def record_histories(records: Sequence[YawRecord], fit: EnergyFit) -> dict[str, 
 def energy_balance_means(fit: EnergyFit) -> EnergyBalance:
     """Work of the motor and of each term in each part of the intervals, means over all pairs."""
     balance = fit.balance
-    shape = (len(balance.pairs), 2, balance.parts)
+    shape = (len(balance.pairs), 2, PARTS)
     # Braking parts are numbered as mirror images.
     order = (slice(None), slice(None, None, -1))
 
@@ -444,12 +445,12 @@ def energy_residuals(fit: EnergyFit) -> tuple[EnergyResidual, ...]:
         EnergyResidual(
             stage=STAGES[interval.braking],
             hump=interval.number + 1,
-            rate_degps=float(np.degrees(np.mean(interval.part(part, balance.parts).rate_radps))),
+            rate_degps=float(np.degrees(np.mean(interval.part(part).rate_radps))),
             left_J=next(residuals),
         )
         for pair in balance.pairs
         for interval in pair
-        for part in range(balance.parts)
+        for part in range(PARTS)
     )
 
 

@@ -48,8 +48,8 @@ class TunedController:
 
     `inertia_kgm2` is a10 = J* + lambda66, from which the first gains are taken, with a20 = 0.1 a10 (N m s) for the
     friction; `divisor` is n1, `integral_gain` K_I, `filter_s` T_o. `tune` takes new gains after every pair of
-    intervals. `as_printed` takes the first gains as they are printed, with a10 and a20 exchanged, and t4, t5 for the
-    limits of braking where t5, t6 are meant.
+    intervals. (The print exchanges a10 and a20 in the first gains, and has t4, t5 as limits of braking where t5, t6
+    are meant.)
     """
 
     inertia_kgm2: float
@@ -57,13 +57,11 @@ class TunedController:
     integral_gain: float = 1.0
     filter_s: float = 0.1
     tune: bool = True
-    as_printed: bool = False
 
     def first_gains(self, lag_s: float, torque_constant_NmpA: float) -> tuple[float, float]:
         """K_P and K_D of the first run: a20 and a10 over n1 T_c k_t."""
         scale = self.divisor * lag_s * torque_constant_NmpA
-        proportional, derivative = 0.1 * self.inertia_kgm2 / scale, self.inertia_kgm2 / scale
-        return (derivative, proportional) if self.as_printed else (proportional, derivative)
+        return 0.1 * self.inertia_kgm2 / scale, self.inertia_kgm2 / scale
 
     def tuned_gains(
         self, programme: YawProgramme, time_s: Array, current: Array, lag_s: float
@@ -76,9 +74,6 @@ class TunedController:
         if not pairs:
             return None
         speeding, braking = pairs[-1]
-        if self.as_printed:  # t4 to t5, where the rate has hardly begun to fall
-            t4 = braking[0] - programme.settle_s - programme.rise_s / 6
-            braking = t4, t4 + programme.rise_s / 6
         works: list[float] = []  # int w I dt, A rad
         for ends in (braking, speeding):
             times = np.linspace(*ends, 401)
