@@ -38,6 +38,7 @@ from tank2sim.apps.rigs.tow.surge import TOW_PARAMETERS
 from tank2sim.apps.rigs.tow.theory import DragPolynomial, TowedBody, drag_polynomial
 from tank2sim.cards import Card, parse_card
 from tank2sim.identification.conditioning import COLLINEAR
+from tank2sim.units import in_words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,7 +47,7 @@ if TYPE_CHECKING:
 _LARGEST_CONDITION = COLLINEAR**2
 """Scaled condition number up to which the unknowns can be distinguished."""
 
-_UNITS = {"M": "kg", "B1": "kg s²/m³", "B2": "kg s/m²", "B3": "kg/m", "delay": "s"}
+_UNITS = {name: in_words(key)[1] for name, key in TOW_PARAMETERS.items()}
 _METHODS = {"paper": "as published", "qr": "least squares", "output_error": "output error"}
 _ESTIMATES = (
     "M dv/dt + B1 v⁴ + B2 v³ + B3 v² = T. The published method and least squares put a polynomial through the mean "

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from tank2sim.api.verbs import Output, verb
+from tank2sim.apps.rigs.yaw import YawMethod
 from tank2sim.arguments import NonNegativeArgument, Percent, PositiveArgument, checked
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.files import CARD, write_together
@@ -22,16 +23,6 @@ if TYPE_CHECKING:
     from tank2sim.cards import Card
     from tank2sim.dynamics.vessel import Vessel
     from tank2sim.records.csv_table import CsvTable
-
-YawMethod = Literal[
-    "energy_least_squares",
-    "as_many_equations",
-    "two_intervals",
-    "output_error",
-    "energy_least_squares_reference",
-    "two_intervals_reference",
-]
-"""Methods, the best one first."""
 
 
 def write_yaw_card(

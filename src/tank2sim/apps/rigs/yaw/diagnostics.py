@@ -7,11 +7,12 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from tank2sim.apps.rigs.yaw.energy import EnergyFit, YawMethodEstimate, term_and_unit
+from tank2sim.apps.rigs.yaw.energy import EnergyFit, YawMethodEstimate
 from tank2sim.apps.rigs.yaw.output_error import AngleFit
 from tank2sim.apps.rigs.yaw.records import YawRecord
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice, caution
+from tank2sim.units import in_words
 
 _NOT_QUITE_MIRRORED = 0.03
 _FULL = 0.995
@@ -171,7 +172,7 @@ def estimate_notes(methods: Mapping[str, YawMethodEstimate]) -> Iterator[Notice]
             "tuned, a hump differs."
         )
     for name, value in best.friction.items():
-        error, (term, unit) = best.friction_standard_errors[name], term_and_unit(name)
+        error, (term, unit) = best.friction_standard_errors[name], in_words(name)
         if error is not None and abs(value) < 2 * error:
             yield Notice(f"{term} does not differ from zero: {value:.3g} ± {error:.2g} {unit}.")
     yield from _methods_apart(methods)

@@ -105,12 +105,6 @@ inertia is J + lambda661, braking_quadratic f_662d - f_662a; the moment of gravi
 """
 
 
-def term_and_unit(name: str) -> tuple[str, str]:
-    """Term of :data:`ENERGY_TERMS` and unit of a name with its unit, as ``coulomb_Nm``."""
-    term, _, unit = name.rpartition("_")
-    return term, unit
-
-
 @dataclass(frozen=True, kw_only=True)
 class YawMethodEstimate:
     """Estimates by one method, SI.

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import tomlkit
 
 from tank2sim.apps.rigs.yaw.card import YawRig
-from tank2sim.apps.rigs.yaw.energy import YawMethodEstimate, term_and_unit
+from tank2sim.apps.rigs.yaw.energy import YawMethodEstimate
 from tank2sim.apps.rigs.yaw.identify import YawEstimates
 from tank2sim.apps.rigs.yaw.records import YawRecord
 from tank2sim.cards import ManoeuvringCard, parse_card
@@ -106,7 +106,7 @@ def rig_card_text(found: YawEstimates, records: Sequence[YawRecord], method: str
     rows = _inertias(found, method) | {
         key: (value, estimate.friction_standard_errors[key])
         for key, value in estimate.friction.items()
-        if term_and_unit(key)[0] in ("coulomb", "viscous", "quadratic")
+        if key in ("coulomb_Nm", "viscous_Nms", "quadratic_Nms2")
     }
     values = {key: getattr(known, key) for key in _OF_THE_RIG}
     values |= {key: float(f"{value:.6g}") for key, (value, _) in rows.items()} | _gravity(estimate, known)

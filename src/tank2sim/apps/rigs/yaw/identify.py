@@ -6,11 +6,12 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 import numpy as np
 from scipy.stats import f as f_test
 
+from tank2sim.apps.rigs.yaw import YawMethod
 from tank2sim.apps.rigs.yaw.card import YawRig
 from tank2sim.apps.rigs.yaw.diagnostics import (
     check_added_inertia,
@@ -47,14 +48,7 @@ from tank2sim.errors import ArgumentError, InputError
 from tank2sim.notices import Notice
 from tank2sim.records.thinning import drawn_columns
 
-YAW_METHODS = (
-    "energy_least_squares",
-    "as_many_equations",
-    "two_intervals",
-    "output_error",
-    "energy_least_squares_reference",
-    "two_intervals_reference",
-)
+YAW_METHODS: tuple[str, ...] = get_args(YawMethod)
 """The first gives the numbers of a card; ``_reference`` uses the programme's speeds instead of the body's."""
 
 AIR_TERMS = ("inertia", "coulomb", "viscous")

@@ -26,7 +26,7 @@ from tank2sim.answer.numbers import format_number
 from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, records_frame, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.rigs.yaw.card import YawRigCard
-from tank2sim.apps.rigs.yaw.energy import YawMethodEstimate, term_and_unit
+from tank2sim.apps.rigs.yaw.energy import YawMethodEstimate
 from tank2sim.apps.rigs.yaw.found_card import nrdot_prime, rig_card_text, with_nrdot
 from tank2sim.apps.rigs.yaw.identify import STAGES, YAW_METHODS, EnergyBalance, EnergyResidual, YawStudy
 from tank2sim.apps.rigs.yaw.model import UNKNOWN_RIG
@@ -35,6 +35,7 @@ from tank2sim.apps.rigs.yaw.theory import TheoryValue
 from tank2sim.arrays import Columns
 from tank2sim.cards import Card, parse_card
 from tank2sim.errors import ArgumentError, InputError
+from tank2sim.units import in_words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -66,7 +67,6 @@ _ANGLE = (
     "The equation of motion is integrated under the recorded current, each hump from its own start; the recorded angle "
     "is subtracted."
 )
-_UNITS = {"Nm": "N m", "Nms": "N m s", "Nms2": "N m s²", "kgm2": "kg m²"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -304,13 +304,13 @@ def _friction(methods: Mapping[str, YawMethodEstimate]) -> Table:
     terms = dict.fromkeys(term for found in given.values() for term in found.friction)
     rows: list[list[Cell]] = []
     for term in terms:
-        words, unit = term_and_unit(term)
+        words, unit = in_words(term)
         cells: list[Cell] = []
         for found in given.values():
             value, error = _scaled(found.friction.get(term)), found.friction_standard_errors.get(term)
             shown = None if value is None else format_number(value)
             cells.append(shown if error is None else f"{shown} ± {format_number(1e4 * error, 2)}")
-        rows.append([words.replace("_", " "), _UNITS[unit], *cells])
+        rows.append([words, unit, *cells])
     heads = ("term", "unit", *(name.replace("_", " ") for name in given))
     return table("Friction and water, times 10⁴", heads, rows, folded=True)
 
