@@ -249,16 +249,17 @@ def stopping(bridge: Bridge) -> Box:
         given[stop.order.casefold()] = Row(f"{_name_on_form(stop.order)} ({knots(stop.speed_mps)} kn)", values)
     named = not given or any(stop.order for stop in bridge.study.telegraph)
     rows = _orders_ahead(given, blanks=2) if named else list(given.values())
-    note = ""
-    if bridge.stops:
-        effects = [EFFECTS[entry.name] for entry in bridge.card.effects]
-        lags = any("propeller.speed" in effect.states_behind.values() for effect in effects)
-        lag = "with the card's engine lag" if lags else "at once"
-        note = (
-            f"Simulated with {FULL_ASTERN:.0%} of the nominal revolutions astern, {lag}: an assumption, to be replaced "
-            "by trials."
-        )
+    note = _assumed(bridge) if bridge.stops else ""
     return Box("Full astern from", tuple(rows), ("track reach", "time"), note)
+
+
+def _assumed(bridge: Bridge) -> str:
+    """How the stops were simulated."""
+    effects = [EFFECTS[entry.name] for entry in bridge.card.effects]
+    lags = any("propeller.speed" in effect.states_behind.values() for effect in effects)
+    lag = "with the card's engine lag" if lags else "at once"
+    share = f"{FULL_ASTERN:.0%} of the nominal revolutions astern"
+    return f"Simulated with {share}, {lag}: an assumption, to be replaced by trials."
 
 
 def zigzags(bridge: Bridge) -> Box:

@@ -219,8 +219,6 @@ def bridge_of(
     stops, troubles = _stops(ship, depths["deep"])
     zigzags = _zigzags(ship, depths["deep"])
     telegraph = _telegraph(ship, orders)
-    gear = card.steering_gear
-    largest, rate = (gear.max_angle_rad, gear.max_rate_radps) if gear else (None, None)
     study = BridgeStudy(
         ship=card.ship.name,
         source=card.ship.source,
@@ -233,7 +231,7 @@ def bridge_of(
         },
         telegraph=telegraph,
         full_astern_from=_stops_from(ship, telegraph, depths["deep"]),
-        hard_over_to_hard_over_s=2 * largest / rate if largest and rate else None,
+        hard_over_to_hard_over_s=_hard_over_s(card),
         rudder_neutral_deg=_neutral(ship),
         squat=squat_of(card),
         notices=tuple(dict.fromkeys((*doubts(card), *circle_notes, *troubles))),
@@ -279,6 +277,14 @@ def _check_orders(card: ManoeuvringCard, orders: Mapping[str, float]) -> None:
             nominal = f" (the card's nominal ones are {largest / _LARGEST_SHARE:.4g})" if engine else ""
             problem = f"is beyond {largest:,.0f} revolutions a minute{nominal}"
             raise ArgumentError("order", f"{order}={rpm:g}", problem, "give the propeller's revolutions, rpm")
+
+
+def _hard_over_s(card: ManoeuvringCard) -> float | None:
+    """Time from hard over to hard over, by the rate of the gear."""
+    gear = card.steering_gear
+    if gear is None or not gear.max_angle_rad or not gear.max_rate_radps:
+        return None
+    return 2 * gear.max_angle_rad / gear.max_rate_radps
 
 
 def _rudder(card: ManoeuvringCard) -> float:

@@ -181,10 +181,7 @@ def ship_tables(model: Model, drawn: Iterable[str] = ()) -> dict[str, Any]:
     bounds = {each.name: each.accepted or (each.minimum, each.maximum) for each in set_by_page}
     return {
         "places": places,
-        "bounds": {
-            name: [-UNBOUNDED if low is None else low, UNBOUNDED if high is None else high]
-            for name, (low, high) in bounds.items()
-        },
+        "bounds": {name: list(map(_bound, ends, (-UNBOUNDED, UNBOUNDED))) for name, ends in bounds.items()},
         "inputs": model.input_values().tolist(),
         "parameters": model.parameter_values().tolist(),
         "constants": ca.vertcat(ca.SX(0, 1), *ca.extract_parametric(model.rates, model.p)[1]).numel(),
@@ -193,6 +190,10 @@ def ship_tables(model: Model, drawn: Iterable[str] = ()) -> dict[str, Any]:
         "nominal": [state.nominal for state in model.states],
         "trimSwitch": model.parameter_names.index("initial.trim") if "initial.trim" in model.parameter_names else None,
     }
+
+
+def _bound(value: float | None, without: float) -> float:
+    return without if value is None else value
 
 
 def _places(model: Model, drawn: Iterable[str]) -> dict[str, tuple[str, int]]:
