@@ -23,7 +23,7 @@ from paper_numbers import PaperNumbers
 from tank2sim.apps.rigs.yaw import theory
 from tank2sim.apps.rigs.yaw.card import YawRig, YawRigCard
 from tank2sim.apps.rigs.yaw.energy import Speeds, YawMethodEstimate, energy_balance, fit_energy, intervals
-from tank2sim.apps.rigs.yaw.identify import GRAVITY, WATER_TERMS, YawIdentification, YawOptions, identify_yaw
+from tank2sim.apps.rigs.yaw.identify import GRAVITY, WATER_TERMS, YawOptions, YawStudy, identify_yaw
 from tank2sim.apps.rigs.yaw.programme import (
     PAPER_PROGRAMME,
     Similarity,
@@ -37,6 +37,7 @@ from tank2sim.apps.rigs.yaw.simulation import (
     AdaptiveController,
     Controller,
     Measuring,
+    RigRun,
     TunedController,
     YawRun,
     run_yaw_rig,
@@ -176,7 +177,7 @@ def identified(
     measuring: Measuring,
     programme: YawProgramme = PAPER_PROGRAMME,
     known: YawRig | None = None,
-) -> tuple[YawRun, YawIdentification]:
+) -> tuple[YawRun, YawStudy]:
     run = run_yaw_rig(rig, programme, controller, measuring, allow_saturation=True)
     options = YawOptions(inertia_kgm2=rig.inertia_kgm2, known=known, mirror_limit=10.0)
     return run, identify_yaw([recorded(run, rig)], options)
@@ -199,7 +200,7 @@ def print_methods() -> None:
                 run, result = identified(rig, controller, measuring)
                 settled = run.time_s > 4 * PAPER_PROGRAMME.period_s
                 worst = np.abs(run.error_rad[settled]).max()
-                mirror = max(result.estimates.mirror_difference)
+                mirror = max(result.mirror_difference)
                 full = f", saturated from {run.saturation.first_s:.2f} s" if run.saturation else ""
                 print(f"  {control} {condition}: |e| up to {worst:.4f} rad{full}; mirror {100 * mirror:.0f} %")
                 print_estimates(result.methods, true)
@@ -306,7 +307,7 @@ def print_readme() -> None:
         read = {}
         for medium in get_args(Medium):
             path = Path(folder, f"{medium}.csv")
-            path.write_text(yaw_record_text(simulated_record(card, path, 0.003, medium=medium)))
+            path.write_text(yaw_record_text(simulated_record(card, path, RigRun(medium, noise_A=0.003))))
             read[medium] = read_yaw_record(path)
     for records in ([read["water"]], [read["water"], read["air"]]):
         print_estimates(identify_yaw(records).methods, 302.0)

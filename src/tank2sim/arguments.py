@@ -180,6 +180,41 @@ def refuse_set(function: Callable[..., Any], given: Mapping[str, Any], problem: 
             raise ArgumentError(name, "", problem, "leave it out")
 
 
+def chosen_names(argument: str, given: str | Sequence[str], known: Iterable[str]) -> tuple[str, ...]:
+    """The `known` names that are given, in their order.
+
+    Parameters
+    ----------
+    argument : str
+        For messages.
+    given : str or sequence of str
+        Names, with commas between them in a text; ``"none"`` gives an empty list.
+    known : iterable of str
+
+    Raises
+    ------
+    InputError
+        A name is unknown or repeated.
+    """
+    text, names = given if isinstance(given, str) else ",".join(given), tuple(known)
+    words = [word for word in map(str.strip, text.split(",")) if word not in ("", "none")]
+    for word in words:
+        if word not in names or words.count(word) > 1:
+            remedy = f"take any of {', '.join(names)}, once each"
+            raise ArgumentError(argument, "", f"{word!r} is unknown, or is repeated", remedy)
+    return tuple(name for name in names if name in words)
+
+
+def numbers_in(text: str, counts: Collection[int] = ()) -> list[float]:
+    """Finite numbers of a `text` with commas; none unless all are such, and as many as one of the `counts`."""
+    try:
+        numbers = [float(word) for word in text.split(",")]
+    except ValueError:
+        return []
+    fits = not counts or len(numbers) in counts
+    return numbers if fits and all(map(math.isfinite, numbers)) else []
+
+
 class UnknownType(type):
     """A type that only type checkers know, with whatever members it has."""
 

@@ -58,6 +58,7 @@ _WRITTEN = {
     "m2ps": "m²/s",
     "kgm2": "kg m²",
     "deg2s": "deg² s",
+    "Nms2": "N m s²",
     "NmpA": "N m/A",
     "Nmps": "N m/s",
     "kgpm": "kg/m",

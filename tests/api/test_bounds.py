@@ -24,6 +24,8 @@ from tank2sim.arguments import (
     annotated_kind,
     bounds_of,
     checked,
+    chosen_names,
+    numbers_in,
 )
 from tank2sim.cli import COMMANDS
 from tank2sim.cli import tank2sim as group
@@ -262,3 +264,19 @@ def test_the_command_line_calls_an_argument_by_its_option(arguments: str, option
 def test_the_command_line_says_how_a_number_is_written(text: str, tmp_path: Path) -> None:
     words = f"guess --length 320 --beam 58 --draught 20 --block 0.8 --speed {text}".split()
     refused(tank2sim(*words, cwd=tmp_path), "--speed", f"{text!r} is not a number", "point for decimals")
+
+
+def test_names_are_taken_in_their_order_from_a_text_or_a_list_and_unknown_or_repeated_ones_are_refused() -> None:
+    for given in ("c, a", ["c", "a"], ("c,a",)):
+        assert chosen_names("terms", given, "abc") == ("a", "c")
+    assert chosen_names("terms", "none", "abc") == chosen_names("terms", (), "abc") == ()
+    for given in ("d", "a,a"):
+        with pytest.raises(t2s.InputError) as refusal:
+            chosen_names("terms", given, "abc")
+        assert refusal.value.source == "terms" and "a, b, c" in refusal.value.remedy
+
+
+@pytest.mark.parametrize("text", ["", "1,,2", "one", "1,nan", "1,inf", "1,2,3"])
+def test_a_text_holds_numbers_only_if_all_are_finite_and_as_many_as_asked(text: str) -> None:
+    assert numbers_in(text, (1, 2)) == []
+    assert numbers_in(" 1, -2e3", (1, 2)) == numbers_in("1,-2000") == [1.0, -2000.0]

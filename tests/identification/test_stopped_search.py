@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import craft_log
 import numpy as np
 import pytest
@@ -12,7 +10,6 @@ from scipy.optimize import OptimizeResult
 import tank2sim as t2s
 from tank2sim.apps.rigs import search
 from tank2sim.apps.rigs.tow import output_error as tow
-from tank2sim.apps.rigs.tow.records import Tows
 from tank2sim.apps.rigs.yaw import output_error as yaw
 from tank2sim.errors import InputError
 from tank2sim.identification.craft import first_values
@@ -21,6 +18,7 @@ from tank2sim.identification.trials.methods.equation_error import equation_error
 from tank2sim.identification.trials.methods.gauss_newton import StoppedSearchError, is_minimum
 from tank2sim.identification.trials.methods.kalman import kalman
 from tank2sim.identification.trials.methods.output_error import output_error
+from tests.apps.rigs.tow.made_tows import tows_of
 from tests.craft_trials import written
 from tests.identification.trials import made_up_ship, pushed_ship
 
@@ -68,11 +66,10 @@ def _stays(residuals, start, jacobian, *_, **__) -> OptimizeResult:
 
 def test_a_stopped_search_of_tows_gives_no_fit(monkeypatch) -> None:
     times = np.linspace(0, 60, 31)
-    readings = (0.2 * np.tanh(times / 20))[:, None]
-    tows = Tows(Path("made.csv"), ("speed_1_mps",), times, readings)
-    assert tow.fit_speeds(tows, 11.6, ("B3",)) is not None
+    tows = tows_of(times, 0.2 * np.tanh(times / 20))
+    assert tow.fit_speeds(tows, 11.6, tow.TowModel(("B3",))) is not None
     monkeypatch.setattr(search, "least_squares", _stays)
-    assert tow.fit_speeds(tows, 11.6, ("B3",)) is None
+    assert tow.fit_speeds(tows, 11.6, tow.TowModel(("B3",))) is None
 
 
 def test_a_stopped_search_of_a_yaw_rig_gives_no_fit(monkeypatch) -> None:

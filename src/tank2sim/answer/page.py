@@ -59,24 +59,36 @@ def render_page(page: Page) -> str:
     # A section whose notices are at the top of the page may have nothing left.
     sections = list(filter(_has_content, sections))
     specifications = [chart["specification"] for section in sections for chart in section["charts"]]
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("tank2sim", "answer"), autoescape=True, undefined=jinja2.StrictUndefined
-    )
-    environment.trim_blocks = environment.lstrip_blocks = True
-    environment.filters["paragraphs"] = _paragraphs
-    return environment.get_template("page.html.j2").render(
+    return filled_template(
+        "answer/page.html.j2",
         page=page,
         cautions=[notice.line for notice in cautions],
         notes_shown=_NOTES_SHOWN,
         cards_across=_cards_across(len(page.figures)),
         figures=[(figure, _shown(figure.value)) for figure in page.figures],
         sections=sections,
-        version=__version__,
         style=Markup(resource_text("answer/page.css")),
         script=Markup(resource_text("answer/page.js")),
         library=Markup(_vega()) if specifications else None,
         drawings=json_in_html({"light": LIGHT, "dark": DARK, "locale": LOCALE, "charts": specifications}),
     )
+
+
+def filled_template(path: str, **content: object) -> str:
+    """Return a template of the package (``"answer/page.html.j2"``) with its content, which is escaped, and the version.
+
+    Parameters
+    ----------
+    path : str
+    **content
+        Values by their names in the template.
+    """
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("tank2sim", ""), autoescape=True, undefined=jinja2.StrictUndefined
+    )
+    environment.trim_blocks = environment.lstrip_blocks = True
+    environment.filters["paragraphs"] = _paragraphs
+    return environment.get_template(path).render(version=__version__, **content)
 
 
 def _has_content(section: Mapping[str, Any]) -> bool:

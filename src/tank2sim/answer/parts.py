@@ -230,15 +230,16 @@ def data_frame(rows: Any, columns: Sequence[str] | None = None, *, index: str = 
 
 
 def records_frame(
-    records: Mapping[str, Any] | Iterable[Any], fields: Iterable[str], *, index: str = ""
+    records: Mapping[str, Any] | Iterable[Any], fields: type | Iterable[str], *, index: str = ""
 ) -> pd.DataFrame:
     """Return a data frame with one row a record, whose columns are fields of it.
 
-    `index`: name of the index, of records that are a mapping.
+    `fields`: their names, or a dataclass, of which all are taken; `index`: name of the index, of records that are a
+    mapping.
     """
     import pandas as pd
 
-    names = list(fields)
+    names = [field.name for field in dataclasses.fields(fields)] if isinstance(fields, type) else list(fields)
     named = records if isinstance(records, Mapping) else dict(enumerate(records))
     rows = [[getattr(record, name) for name in names] for record in named.values()]
     if not isinstance(records, Mapping):

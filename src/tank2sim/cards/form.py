@@ -141,10 +141,23 @@ class MmgModel(ShipModel):
 
 
 class BodyModel(CardSection):
-    """``[model]`` of a body that is neither a ship nor a craft; the form of its kind says more of `kind`."""
+    """``[model]`` of a body that is neither a ship nor a craft."""
 
     kind: str
     valid_speed_mps: SpeedRange | None = None
+
+
+class BodyForm(CardSection):
+    """The card of such a body, as in its file; each kind has sections of its own in addition."""
+
+    format: Literal["tank2sim-ship/1"]
+    ship: BodySection
+    environment: Environment = Environment()
+    model: BodyModel
+
+
+Uncertainty = dict[str, Annotated[float, Field(ge=0)]]
+"""``[uncertainty]``: key of a coefficient to its standard error, in the coefficient's unit."""
 
 
 class CraftModel(CardSection):

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from dataclasses import MISSING, dataclass, fields, replace
+from typing import Any, get_type_hints
 
-from pydantic import BaseModel
+from pydantic import BaseModel, Field, create_model
 
 from tank2sim.cards.card import OPPOSITE, Card, CraftCard, ManoeuvringCard, MmgCard, scales_of_file
-from tank2sim.cards.form import CardSection, CraftForm, EffectEntry, MmgForm, Propulsion, RigidBody, Roll, ShipCard
+from tank2sim.cards.form import (
+    BodyForm,
+    CardSection,
+    CraftForm,
+    EffectEntry,
+    MmgForm,
+    Propulsion,
+    RigidBody,
+    Roll,
+    ShipCard,
+)
 from tank2sim.cards.form_faults import suggestion
 from tank2sim.cards.mmg import mmg_fields, nominal_revolutions, refuse_other_scaling
 from tank2sim.cards.scaling import LARGEST_PRIME, FileScales, file_factor
@@ -17,8 +28,6 @@ from tank2sim.cards.small_craft import craft_card
 from tank2sim.cards.terms import known_term, parse_term
 from tank2sim.errors import InputError
 from tank2sim.plugins import Registry
-
-_C = TypeVar("_C", bound=Card)
 
 
 @dataclass(frozen=True)
@@ -51,27 +60,43 @@ class CardKind:
     angles: tuple[str, ...] = ()
 
 
-def si_card(kind: type[_C], section: str) -> Callable[[BaseModel, str, str, Mapping[str, str]], _C]:
-    """Return the `card` of a kind whose numbers stay as the form has them, in SI.
+def body_kind(
+    name: str, description: str, card: type[Card], model: Callable[[Any], Any], *, angles: tuple[str, ...] = ()
+) -> CardKind:
+    """Return the kind of a card that holds the sections of its file under their names, in SI and rad.
 
     Parameters
     ----------
-    kind : type of Card
-        Its fields have the names of the form.
-    section : str
-        The section of coefficients; ``[uncertainty]`` may name them.
+    name, description : str
+        As of :class:`CardKind`.
+    card : type of Card
+        A dataclass. Its fields beyond :class:`tank2sim.cards.card.Card` are the sections of the file; the one called
+        `name` has the coefficients, and ``uncertainty`` may name them.
+    model, angles
+        As of :class:`CardKind`.
     """
+    common, hints = {each.name for each in fields(Card)}, get_type_hints(card, include_extras=True)
+    sections: dict[str, Any] = {
+        each.name: (hints[each.name], Field(**_default(each))) for each in fields(card) if each.name not in common
+    }
+    form = create_model(f"{card.__name__}Form", __base__=BodyForm, **sections)
 
-    def card(form: BaseModel, text: str, source: str, spelt: Mapping[str, str]) -> _C:
-        fields = {name: value for name, value in form if name != "format"}
-        known = list(type(fields[section]).model_fields)
-        for key in fields.get("uncertainty", {}):
+    def read(form: BaseModel, text: str, source: str, spelt: Mapping[str, str]) -> Card:
+        values = {key: value for key, value in form if key != "format"}
+        known = list(type(values[name]).model_fields)
+        for key in values.get("uncertainty", {}):
             if key not in known:
-                problem = f"is not a coefficient of [{section}]"
+                problem = f"is not a coefficient of [{name}]"
                 raise InputError(source, f"uncertainty.{key}", problem, suggestion(key, known))
-        return kind(source=source, text=text, **fields)
+        return card(source=source, text=text, **values)
 
-    return card
+    return CardKind(name, description, form, read, model, angles)
+
+
+def _default(each: dataclasses.Field[Any]) -> dict[str, Any]:
+    """Default of the field of a dataclass, as pydantic takes it; empty if it is required."""
+    given = {"default": each.default, "default_factory": each.default_factory}
+    return {name: value for name, value in given.items() if value is not MISSING}
 
 
 def _ship(form: ShipCard, text: str, source: str, spelt: Mapping[str, str]) -> ManoeuvringCard:

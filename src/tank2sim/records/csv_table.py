@@ -11,7 +11,7 @@ import csv
 import difflib
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn, TypeGuard
@@ -147,6 +147,10 @@ class CsvTable:
             raise InputError(self.path, f"comment {key}", f"is {value:g}", "a positive number was expected")
         return value
 
+    def positive_comments(self, keys: Iterable[str]) -> dict[str, float]:
+        """Positive numbers of the comments among `keys` that the file has. Raises as :meth:`positive_comment`."""
+        return {key: value for key in keys if (value := self.positive_comment(key)) is not None}
+
     def comment_number(self, key: str) -> float | None:
         """The finite number in the comment line ``# key: number``; None without such a line.
 
@@ -215,6 +219,15 @@ def is_frame(given: object) -> TypeGuard[pd.DataFrame]:
 def table_or_path(given: pd.DataFrame | str | Path, name: str) -> CsvTable | Path:
     """Return what :func:`read_table` takes: the table of a data frame, or a path. Raises as :func:`table_of_frame`."""
     return table_of_frame(given, name) if is_frame(given) else Path(given)
+
+
+def tables_or_paths(
+    given: pd.DataFrame | str | Path | Iterable[pd.DataFrame | str | Path], name: str
+) -> list[CsvTable | Path]:
+    """Return one source, or several, as :func:`table_or_path` does."""
+    if isinstance(given, str | Path) or is_frame(given):
+        return [table_or_path(given, name)]
+    return [table_or_path(source, f"{name}[{number}]") for number, source in enumerate(given)]
 
 
 def table_of_frame(frame: pd.DataFrame, name: str) -> CsvTable:

@@ -12,15 +12,13 @@ from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import Integrator
-from tank2sim.simulation.straight_course import straight_course
+from tank2sim.simulation.straight_course import steady_motion, straight_course
 from tank2sim.simulation.trajectory import Trajectory, bracketed_root
 
 RUNAWAY = "the motion leaves all bounds"
 """The message about a motion that is not finite."""
 
 _CHUNK = 256  # steps between searches for an event: long enough for efficient machine code, short against a manoeuvre
-_TRIM_STEPS = 50
-_TRIM_ACCURACY = 1e-13  # of the change in a Newton step, relative to the nominal size of a state
 
 
 @dataclass(frozen=True)
@@ -72,7 +70,7 @@ class Running:
         self._steps_done = 0
         self._x: Array = np.array(self.model.initial(self._p)).ravel()
         if "initial.trim" in self.model and self._p[self.model.parameter_names.index("initial.trim")]:
-            self._trim()
+            self._x = steady_motion(self.model, self._x, self._u, self._p)
         self._t_parts: list[Array] = []
         self._x_parts: list[Array] = []
         self._u_parts: list[Array] = []
@@ -200,22 +198,6 @@ class Running:
         self._time, self._x = float(times[last]) + h, self._integrator.step(before, self._u, self._p, h)
         self._steps_done += last
         return True
-
-    def _trim(self) -> None:
-        step = self.model.trim_step
-        if step is None:
-            return
-        nominal = np.array([state.nominal for state in self.model.states])
-        for _ in range(_TRIM_STEPS):
-            following = np.array(step(self._x, self._u, self._p)).ravel()
-            change = np.max(np.abs(following - self._x) / nominal)
-            self._x = following
-            if not np.isfinite(change) or change < _TRIM_ACCURACY:
-                break
-        if not change < 1e-9:
-            raise InputError(
-                self.model.origin, "initial.trim", "no steady motion exists near the start", "start without it"
-            )
 
 
 class SwitchedManoeuvre:

@@ -1,4 +1,4 @@
-"""The straight course of a ship, and its neutral rudder angle."""
+"""Steady motions: the one that inputs lead to, and the straight course of a ship with its neutral rudder angle."""
 
 from __future__ import annotations
 
@@ -11,6 +11,9 @@ from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 
+_TRIM_STEPS = 50
+_TRIM_ACCURACY = 1e-13  # of the change in a Newton step, relative to the nominal size of a state
+
 
 @dataclass(frozen=True)
 class OperatingPoint:
@@ -22,6 +25,28 @@ class OperatingPoint:
     x: Array
     u: Array
     p: Array
+
+
+def steady_motion(model: Model, x: Array, u: Array, p: Array) -> Array:
+    """States (nx,) of the steady motion with inputs (nu,) and parameters (np,), by Newton's method from states near it.
+
+    A model without steady states keeps its states.
+
+    Raises InputError: No steady motion exists near the start.
+    """
+    step = model.trim_step
+    if step is None:
+        return x
+    nominal = np.array([state.nominal for state in model.states])
+    for _ in range(_TRIM_STEPS):
+        following = np.array(step(x, u, p)).ravel()
+        change = np.max(np.abs(following - x) / nominal)
+        x = following
+        if not np.isfinite(change) or change < _TRIM_ACCURACY:
+            break
+    if not change < 1e-9:
+        raise InputError(model.origin, "initial.trim", "no steady motion exists near the start", "start without it")
+    return x
 
 
 def straight_course(

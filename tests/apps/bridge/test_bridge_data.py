@@ -71,31 +71,33 @@ def test_steady_speeds_are_those_that_the_ship_settles_at(card) -> None:
 
 
 def test_stops_begin_at_the_speed_of_their_order(bridge, card) -> None:
-    full, half = bridge.telegraph
+    full, half = bridge.study.telegraph
     assert full.order == "Full sea speed" and half.speed_mps < full.speed_mps
-    assert bridge.stops_from[0].track_reach_m == pytest.approx(bridge.stops[0].figures["track_reach_m"], rel=1e-6)
-    assert bridge.stops_from[1].track_reach_m < bridge.stops_from[0].track_reach_m
+    assert bridge.study.full_astern_from[0].track_reach_m == pytest.approx(
+        bridge.stops[0].figures["track_reach_m"], rel=1e-6
+    )
+    assert bridge.study.full_astern_from[1].track_reach_m < bridge.study.full_astern_from[0].track_reach_m
     assert bridge.stops[0].marks[-1].time_s == pytest.approx(bridge.stops[0].figures["time_to_stop_s"])
 
 
 def test_the_gear_tells_hard_over_to_hard_over_and_asymmetry_the_neutral_rudder(bridge) -> None:
-    assert bridge.hard_over_s == pytest.approx(2 * 40 / 5)
-    assert bridge.neutral_deg == pytest.approx(-1.1, abs=0.1)  # to port
+    assert bridge.study.hard_over_to_hard_over_s == pytest.approx(2 * 40 / 5)
+    assert bridge.study.rudder_neutral_deg == pytest.approx(-1.1, abs=0.1)  # to port
 
 
 @pytest.mark.slow
 def test_what_a_card_does_not_tell_is_none(mariner_card) -> None:
     bare = bridge_of(mariner_card)
-    assert bare.telegraph == () and bare.stops == () and bare.stops_from == ()
+    assert bare.study.telegraph == () and bare.stops == () and bare.study.full_astern_from == ()
     tanker = bridge_of(read_card("esso-osaka-estimated"))
-    assert tanker.hard_over_s is None and tanker.neutral_deg is None
-    assert [one.order for one in tanker.telegraph] == [""] * 5
-    assert [one.within for one in tanker.telegraph] == [True, True, True, False, False]
+    assert tanker.study.hard_over_to_hard_over_s is None and tanker.study.rudder_neutral_deg is None
+    assert [one.order for one in tanker.study.telegraph] == [""] * 5
+    assert [one.within for one in tanker.study.telegraph] == [True, True, True, False, False]
 
 
 def test_a_speed_that_does_not_follow_the_revolutions_is_outside_the_card() -> None:
     """The KVLCC2 at 40 % of its revolutions: 8.6 knots by the polynomial, 6.2 in proportion."""
-    shown = {round(one.rpm, 1): (one.speed_mps, one.within) for one in bridge_of(read_card("kvlcc2")).telegraph}
+    shown = {round(one.rpm, 1): (one.speed_mps, one.within) for one in bridge_of(read_card("kvlcc2")).study.telegraph}
     assert shown[55.0][1] is True
     assert shown[36.7][0] > 1.3 * 0.4 * 7.97 and shown[36.7][1] is False
 
@@ -119,7 +121,7 @@ def test_a_card_that_holds_throughout_has_all_its_figures(mariner_card) -> None:
     assert found.study.turning_circles_deep[0].outside_card_range == ()
     tanker = bridge_of(read_card("kvlcc2-captive", {"model.valid_yaw_rate_prime": 1.0, "model.valid_rudder_deg": 40.0}))
     assert tanker.study.turning_circles_deep[0].left_card_range_s == pytest.approx(91.6, abs=1)
-    assert any("60° of heading" in one for one in tanker.notices)
+    assert any("60° of heading" in one for one in tanker.study.notices)
 
 
 def test_absurd_revolutions_are_refused() -> None:
@@ -127,13 +129,13 @@ def test_absurd_revolutions_are_refused() -> None:
         bridge_of(read_card("esso-osaka-estimated"), {"Full": 7e6})
     with pytest.raises(InputError, match="beyond 10,000 revolutions"):
         bridge_of(read_card("mariner"), {"Full": 7e6})
-    given = bridge_of(read_card("mariner"), {"Full ahead": 84.0}).telegraph
+    given = bridge_of(read_card("mariner"), {"Full ahead": 84.0}).study.telegraph
     assert [(one.order, one.rpm, one.speed_mps) for one in given] == [("Full ahead", 84.0, None)]
 
 
 def test_squat_is_the_larger_of_two_formulas_worked_by_hand(card) -> None:
     """Mariner, C_B 0.6, 160.93 x 23.17 x 7.468 m: at 75 % of 7.7175 m/s, 20 % of the draught under the keel."""
-    first = bridge_of(card).squat[0]
+    first = bridge_of(card).study.squat[0]
     speed, depth = 0.75 * 7.7175, 1.2 * 7.468
     barrass = 0.6 * (speed / 0.514444) ** 2 / 100
     froude = speed / math.sqrt(9.80665 * depth)

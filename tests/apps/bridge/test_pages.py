@@ -45,7 +45,8 @@ def crowded(bridge) -> Bridge:
         update={"name": "Motor tanker " + "Verylong" * 9, "source": "S" * 60 + " words" * 99}
     )
     notices = tuple(Notice(f"{place} {'a long notice ' * 30}") for place in range(12))
-    return replace(own, card=replace(own.card, ship=ship), notices=notices)
+    study = replace(own.study, notices=notices)
+    return replace(own, card=replace(own.card, ship=ship), study=study)
 
 
 def test_known_values_are_printed_and_unknown_ones_are_blanks(mariner_bridge) -> None:
@@ -128,7 +129,7 @@ def test_a_stop_ends_where_the_card_does(bridge) -> None:
 
 def test_circles_are_with_the_largest_rudder_and_say_so(mariner_bridge, bridge) -> None:
     page = poster_page(mariner_bridge)
-    assert mariner_bridge.rudder_deg == pytest.approx(40) and "rudder 40°" in page
+    assert mariner_bridge.study.rudder_deg == pytest.approx(40) and "rudder 40°" in page
     assert "Turning circles at maximum rudder angle" in page
     assert "Turning circles at 35° rudder: the card states no maximum angle" in poster_page(bridge)
 

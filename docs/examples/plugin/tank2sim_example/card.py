@@ -1,21 +1,15 @@
 """A kind of card: a body that drifts under a force, M dv/dt = F - B v |v|."""
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated
 
 import casadi as ca
 from pydantic import Field
 
 from tank2sim.cards.card import Card
-from tank2sim.cards.form import BodyModel, BodySection, CardSection, Environment
-from tank2sim.cards.kinds import CardKind, si_card
+from tank2sim.cards.form import CardSection
+from tank2sim.cards.kinds import body_kind
 from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
-
-
-class DriftModel(BodyModel):
-    """``[model]``."""
-
-    kind: Literal["drifter"]
 
 
 class Drift(CardSection):
@@ -25,21 +19,10 @@ class Drift(CardSection):
     drag_kgpm: Annotated[float, Field(gt=0)]
 
 
-class DriftForm(CardSection):
-    """The card as in its file: sections, keys, bounds."""
-
-    format: Literal["tank2sim-ship/1"]
-    ship: BodySection
-    environment: Environment = Environment()
-    model: DriftModel
-    drifter: Drift
-
-
 @dataclass(frozen=True)
 class DriftCard(Card):
-    """The card: fields are called as the sections."""
+    """The card: its fields are sections of the file."""
 
-    model: DriftModel
     drifter: Drift
 
 
@@ -70,4 +53,4 @@ def drift_model(card):
     )
 
 
-DRIFTER = CardKind("drifter", "a body that drifts under a force", DriftForm, si_card(DriftCard, "drifter"), drift_model)
+DRIFTER = body_kind("drifter", "a body that drifts under a force", DriftCard, drift_model)

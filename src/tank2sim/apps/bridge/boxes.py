@@ -7,7 +7,7 @@ leaves the card's range is OUTSIDE, and not printed: on a bridge a wrong number 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -79,28 +79,22 @@ def conditions(bridge: Bridge, ballast: Bridge | None) -> tuple[str, str]:
 
 def draughts(bridge: Bridge, ballast: Bridge | None) -> Box:
     """Draughts at which the data were obtained, and what else is of those draughts: a card has the mean one alone."""
-    cards = [condition.card if condition else None for condition in (bridge, ballast)]
-    bases = [condition.basis if condition else None for condition in (bridge, ballast)]
-    means = [mean_draught(card) if card else None for card in cards]
-    # Displacement and block coefficient of a card hold at its own draught.
-    ships = [
-        card.ship if card and mean == card.ship.draught_m else None for card, mean in zip(cards, means, strict=True)
-    ]
-    rows = (
-        Row("Forward", tuple(_number(basis.forward_m, "m") if basis else None for basis in bases)),
-        Row("Aft", tuple(_number(basis.aft_m, "m") if basis else None for basis in bases)),
-        Row("Mean", tuple(_number(mean, "m") for mean in means)),
-        Row("Displacement", tuple(_tonnes(ship.displacement_kg) if ship else None for ship in ships)),
-        Row("Block coefficient", tuple(_number(ship.block_coefficient, "") if ship else None for ship in ships)),
-        Row("Trial / estimated", tuple(_basis_words(condition) for condition in (bridge, ballast))),
-    )
+    labels = ("Forward", "Aft", "Mean", "Displacement", "Block coefficient", "Trial / estimated")
+    columns = zip(_draught_values(bridge), _draught_values(ballast), strict=True)
+    rows = tuple(Row(label, values) for label, values in zip(labels, columns, strict=True))
     return Box("Draught of the manoeuvring data", rows, conditions(bridge, ballast))
 
 
-def _basis_words(condition: Bridge | None) -> str | None:
+def _draught_values(condition: Bridge | None) -> tuple[str | None, ...]:
+    """Values of a condition in the order of the box."""
     if condition is None:
-        return None
-    return condition.basis.words if condition.basis else "estimated"
+        return (None,) * 6
+    basis, ship, mean = condition.basis, condition.card.ship, mean_draught(condition.card)
+    ends = (_number(basis.forward_m, "m"), _number(basis.aft_m, "m")) if basis else (None, None)
+    # Displacement and block coefficient of a card hold at its own draught.
+    own = mean == ship.draught_m
+    form = (_tonnes(ship.displacement_kg), _number(ship.block_coefficient, "")) if own else (None, None)
+    return (*ends, _number(mean, "m"), *form, basis.words if basis else "estimated")
 
 
 def _tonnes(kilograms: float | None) -> str | None:
@@ -128,10 +122,10 @@ def steering(bridge: Bridge, *, units: bool = True) -> Box:
     gear = bridge.card.steering_gear
     largest = math.degrees(gear.max_angle_rad) if gear and gear.max_angle_rad else None
     neutral = None
-    if bridge.neutral_deg is not None:
-        side = "starboard" if bridge.neutral_deg > 0 else "port"
-        neutral = f"{abs(bridge.neutral_deg):.2g}° {side}"
-    over = None if bridge.hard_over_s is None else f"{bridge.hard_over_s:.3g} s"
+    if bridge.study.rudder_neutral_deg is not None:
+        side = "starboard" if bridge.study.rudder_neutral_deg > 0 else "port"
+        neutral = f"{abs(bridge.study.rudder_neutral_deg):.2g}° {side}"
+    over = None if bridge.study.hard_over_to_hard_over_s is None else f"{bridge.study.hard_over_to_hard_over_s:.3g} s"
     rows = (
         Row("Type of rudder(s)", (None,)),
         Row("Maximum rudder angle", (_number(largest, "°"),)),
@@ -145,25 +139,36 @@ def steering(bridge: Bridge, *, units: bool = True) -> Box:
 
 def telegraph(bridge: Bridge, ballast: Bridge | None) -> Box:
     """Engine orders with revolutions and steady speeds straight ahead; astern by hand."""
-    given = {entry.order.casefold(): entry for entry in bridge.telegraph if entry.order}
-    known = {order.casefold(): order for order in ORDERS_AHEAD}
-    rows = [Row(None, _speeds(entry, ballast)) for entry in bridge.telegraph if not entry.order]
-    if not rows:
-        blank = (None, None, None)
-        rows = [Row(name, _speeds(given[key], ballast) if key in given else blank) for key, name in known.items()]
-    rows += [Row(entry.order, _speeds(entry, ballast)) for key, entry in given.items() if key not in known]
+    unnamed = [Row(None, _speeds(entry, ballast)) for entry in bridge.study.telegraph if not entry.order]
+    given = {
+        entry.order.casefold(): Row(_name_on_form(entry.order), _speeds(entry, ballast))
+        for entry in bridge.study.telegraph
+        if entry.order
+    }
+    rows = unnamed or _orders_ahead(given, blanks=3)
     rows += [Row(order, (None, None, None)) for order in ORDERS_ASTERN]
     first, second = conditions(bridge, ballast)
     note = ""
-    if any(entry.speed_mps is not None for entry in bridge.telegraph):
+    if any(entry.speed_mps is not None for entry in bridge.study.telegraph):
         note = "Steady speed straight ahead in deep calm water."
         note += "" if given else " The ship's own names of these revolutions are to be filled in."
     return Box("Engine order", tuple(rows), ("Rpm / pitch", f"kn, {first}", f"kn, {second}"), note)
 
 
+def _name_on_form(order: str) -> str:
+    """The form's spelling of an order, or the ship's own."""
+    return next((name for name in ORDERS_AHEAD if name.casefold() == order.casefold()), order)
+
+
+def _orders_ahead(given: Mapping[str, Row], *, blanks: int) -> list[Row]:
+    """Rows of the form's orders, blank where none is given, and of the ship's further orders; keys are casefolded."""
+    on_form = {order.casefold(): Row(order, (None,) * blanks) for order in ORDERS_AHEAD}
+    return list({**on_form, **given}.values())
+
+
 def _speeds(order: Telegraph, ballast: Bridge | None) -> tuple[_Value, ...]:
     """Revolutions, speed, and the other condition's speed at the same revolutions."""
-    same = (row for row in ballast.telegraph if math.isclose(row.rpm, order.rpm)) if ballast else ()
+    same = (row for row in ballast.study.telegraph if math.isclose(row.rpm, order.rpm)) if ballast else ()
     rpm = f"{order.rpm:.0f}" if order.rpm >= 100 else f"{order.rpm:.3g}"
     return (rpm, _speed(order), _speed(next(iter(same), None)))
 
@@ -236,27 +241,25 @@ def _distance(value: float, length: float) -> str:
 
 def stopping(bridge: Bridge) -> Box:
     """Full astern from the speeds of the telegraph."""
-    known = {order.casefold(): order for order in ORDERS_AHEAD}
     given: dict[str, Row] = {}
-    for stop in bridge.stops_from:
+    for stop in bridge.study.full_astern_from:
         reach = None if stop.track_reach_m is None else _distance(stop.track_reach_m, bridge.card.ship.length_m)
         time = None if stop.time_s is None else clock(stop.time_s)
         values = (reach, time) if stop.within else (OUTSIDE, OUTSIDE)
-        key = stop.order.casefold()
-        given[key] = Row(f"{known.get(key, stop.order)} ({knots(stop.speed_mps)} kn)", values)
-    named = not given or any(stop.order for stop in bridge.telegraph)
-    rows = [given.pop(key, Row(order, (None, None))) for key, order in known.items()] if named else []
-    rows += list(given.values())
-    note = ""
-    if bridge.stops:
-        effects = [EFFECTS[entry.name] for entry in bridge.card.effects]
-        lags = any("propeller.speed" in effect.states_behind.values() for effect in effects)
-        lag = "with the card's engine lag" if lags else "at once"
-        note = (
-            f"Simulated with {FULL_ASTERN:.0%} of the nominal revolutions astern, {lag}: an assumption, to be replaced "
-            "by trials."
-        )
+        given[stop.order.casefold()] = Row(f"{_name_on_form(stop.order)} ({knots(stop.speed_mps)} kn)", values)
+    named = not given or any(stop.order for stop in bridge.study.telegraph)
+    rows = _orders_ahead(given, blanks=2) if named else list(given.values())
+    note = _assumed(bridge) if bridge.stops else ""
     return Box("Full astern from", tuple(rows), ("track reach", "time"), note)
+
+
+def _assumed(bridge: Bridge) -> str:
+    """How the stops were simulated."""
+    effects = [EFFECTS[entry.name] for entry in bridge.card.effects]
+    lags = any("propeller.speed" in effect.states_behind.values() for effect in effects)
+    lag = "with the card's engine lag" if lags else "at once"
+    share = f"{FULL_ASTERN:.0%} of the nominal revolutions astern"
+    return f"Simulated with {share}, {lag}: an assumption, to be replaced by trials."
 
 
 def zigzags(bridge: Bridge) -> Box:
@@ -288,7 +291,7 @@ def squat(bridge: Bridge) -> Box:
     heads = ("under-keel clearance", "speed, kn", "largest squat")
     rows = tuple(
         Row("", (_number(row.clearance_m, "m", 3), knots(row.speed_mps), _number(row.squat_m, "m", 2)))
-        for row in bridge.squat
+        for row in bridge.study.squat
     )
     note = "Larger of Barrass and ICORELS." if rows else ""
     return Box("Draught increase by squat, estimated", rows or (Row("", (None,) * 3),) * 2, heads, note)

@@ -114,7 +114,7 @@ def sheet_data(
         second = bridge_of(light, orders, ballast_basis)
     text = "the card has no [propulsion]: stops and speeds by revolutions are blank"
     missing = () if loaded.propulsion else (Notice(text),)
-    said = dict.fromkeys((*notices, *first.notices, *(second.notices if second else ()), *missing))
+    said = dict.fromkeys((*notices, *first.study.notices, *(second.study.notices if second else ()), *missing))
     study = replace(first.study, notices=tuple(said), ballast=second.study if second else None)
     return study, first, second
 

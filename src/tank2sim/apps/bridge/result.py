@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
-import jinja2
 from markupsafe import Markup
 
 from tank2sim.analysis.validation.ship_track import ShipTrack
 from tank2sim.answer.charts.motion import TrackData, track_chart
-from tank2sim.answer.page import resource_text
-from tank2sim.answer.parts import Illustration, Section, Table, records_table
+from tank2sim.answer.page import filled_template, resource_text
+from tank2sim.answer.parts import Illustration, Section, Table, records_frame, records_table
 from tank2sim.answer.result import Result
 from tank2sim.apps.bridge import boxes
 from tank2sim.apps.bridge.boxes import Box, Row
 from tank2sim.apps.bridge.drawings import Drawing, circles_drawing, stops_drawing
-from tank2sim.apps.bridge.study import SHALLOW, Bridge, BridgeStudy
+from tank2sim.apps.bridge.study import SHALLOW, Bridge, BridgeStudy, Telegraph
 from tank2sim.dynamics.effects.loading import mean_draught
 from tank2sim.notices import Notice
-from tank2sim.version import __version__
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -74,9 +72,7 @@ class BridgeResult(Result[BridgeStudy]):
     @property
     def telegraph(self) -> pd.DataFrame:
         """Orders of the engine telegraph ahead: revolutions (rpm) and steady speed (m/s), nan where it is not known."""
-        import pandas as pd
-
-        return pd.DataFrame([asdict(order) for order in self.study.telegraph])
+        return records_frame(self.study.telegraph, Telegraph)
 
     @property
     def title(self) -> str:
@@ -116,6 +112,10 @@ class BridgeResult(Result[BridgeStudy]):
 
     @cached_property
     def _html(self) -> str:
+        assert self.bridge is not None, "the JSON of a sheet does not hold its card"
+        return self._sheet(self.bridge)
+
+    def _sheet(self, bridge: Bridge) -> str:
         raise NotImplementedError
 
 
@@ -127,12 +127,8 @@ class PosterResult(BridgeResult):
 
     command: ClassVar[str] = "poster"
 
-    @cached_property
-    def _html(self) -> str:
-        from tank2sim.apps.bridge.result import poster_page
-
-        assert self.bridge is not None, "the JSON of a poster does not hold its card"
-        return poster_page(self.bridge, self.ballast)
+    def _sheet(self, bridge: Bridge) -> str:
+        return poster_page(bridge, self.ballast)
 
 
 class PilotCardResult(BridgeResult):
@@ -143,12 +139,8 @@ class PilotCardResult(BridgeResult):
 
     command: ClassVar[str] = "pilotcard"
 
-    @cached_property
-    def _html(self) -> str:
-        from tank2sim.apps.bridge.result import pilot_card_page
-
-        assert self.bridge is not None, "the JSON of a pilot card does not hold its card"
-        return pilot_card_page(self.bridge, self.ballast)
+    def _sheet(self, bridge: Bridge) -> str:
+        return pilot_card_page(bridge, self.ballast)
 
 
 @dataclass(frozen=True)
@@ -191,7 +183,7 @@ def poster_page(bridge: Bridge, ballast: Bridge | None = None) -> str:
     )
     stops = stops_drawing(bridge.stops, width=STOPS_MM[0], height=STOPS_MM[1]) if bridge.stops else None
     return _rendered(
-        "bridge/poster.html.j2",
+        "apps/bridge/poster.html.j2",
         bridge,
         left=left_column,
         right=right,
@@ -223,7 +215,7 @@ def pilot_card_page(bridge: Bridge, ballast: Bridge | None = None) -> str:
             _turning_title(bridge, f"Deep water,{_draught(bridge)}"), drawing, boxes.turning(bridge, bridge.deep)
         )
     return _rendered(
-        "bridge/pilotcard.html.j2",
+        "apps/bridge/pilotcard.html.j2",
         bridge,
         boxes=shown,
         circles=circles,
@@ -257,7 +249,7 @@ def _panels(bridge: Bridge, ballast: Bridge | None) -> tuple[Panel, ...]:
 
 
 def _turning_title(bridge: Bridge, where: str) -> str:
-    return f"{where} rudder {bridge.rudder_deg:.3g}°, from {boxes.approach(bridge)}".strip()
+    return f"{where} rudder {bridge.study.rudder_deg:.3g}°, from {boxes.approach(bridge)}".strip()
 
 
 def _draught(bridge: Bridge) -> str:
@@ -270,12 +262,14 @@ def _circles_title(bridge: Bridge) -> str:
     gear = bridge.card.steering_gear
     if gear and gear.max_angle_rad:
         return "Turning circles at maximum rudder angle"
-    return f"Turning circles at {bridge.rudder_deg:.3g}° rudder: the card states no maximum angle"
+    return f"Turning circles at {bridge.study.rudder_deg:.3g}° rudder: the card states no maximum angle"
 
 
 def _notices(*bridges: Bridge | None) -> list[Notice]:
     """As many notices as a sheet has room for; the command prints all."""
-    cut = (Notice(_cut(each.line, _NOTICE), each.level) for bridge in bridges if bridge for each in bridge.notices)
+    cut = (
+        Notice(_cut(each.line, _NOTICE), each.level) for bridge in bridges if bridge for each in bridge.study.notices
+    )
     texts = list(dict.fromkeys(cut))
     omitted = len(texts) - _NOTICES
     return texts if omitted <= 0 else [*texts[:_NOTICES], Notice(f"and {omitted} more, which the command prints")]
@@ -291,12 +285,8 @@ def _circles(bridge: Bridge, circles: Sequence[ShipTrack], size: tuple[float, fl
 
 
 def _rendered(template: str, bridge: Bridge, **content: object) -> str:
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("tank2sim", "apps"), autoescape=True, undefined=jinja2.StrictUndefined
-    )
-    environment.trim_blocks = environment.lstrip_blocks = True
-    return environment.get_template(template).render(
-        version=__version__,
+    return filled_template(
+        template,
         style=Markup(resource_text("apps/bridge/sheet.css")),
         name=_cut(bridge.card.ship.name, _NAME),
         source=_cut(bridge.card.ship.source, _SOURCE),

@@ -112,73 +112,6 @@ class DataBasis:
     checked: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class Bridge:
-    """Data of a ship in the loading condition of its card.
-
-    Parameters
-    ----------
-    card : ManoeuvringCard
-    rudder_deg : float
-        Rudder of the turning circles: the largest that the gear allows (A.601(15)), or 35 deg without one on the card.
-    deep, shallow : tuple of ShipTrack
-        Circles to starboard and port; `shallow` at :data:`SHALLOW` times the draught, empty without the effect.
-    stops : tuple of ShipTrack
-        Full astern, and the engine stopped; empty without propulsion.
-    zigzags : mapping
-        Name to figures; empty for a zigzag that could not be run.
-    telegraph : tuple of Telegraph
-        Empty without propulsion and without given orders.
-    stops_from : tuple of StopFrom
-        Full astern from each speed of the telegraph.
-    hard_over_s : float or None
-        From hard over to hard over, by the gear's rate.
-    neutral_deg : float or None
-        Rudder that keeps a straight course, + to starboard; None without one.
-    squat : tuple of Squat
-        Empty without block coefficient, beam and draught.
-    notices : tuple of Notice
-    basis : DataBasis, optional
-        By default the data are estimated, and the form's draughts stay blank.
-    """
-
-    card: ManoeuvringCard
-    rudder_deg: float
-    deep: tuple[ShipTrack, ...]
-    shallow: tuple[ShipTrack, ...]
-    stops: tuple[ShipTrack, ...]
-    zigzags: Mapping[str, CardRangeReading]
-    telegraph: tuple[Telegraph, ...]
-    stops_from: tuple[StopFrom, ...]
-    hard_over_s: float | None
-    neutral_deg: float | None
-    squat: tuple[Squat, ...] = ()
-    notices: tuple[Notice, ...] = ()
-    basis: DataBasis | None = None
-
-    @property
-    def study(self) -> BridgeStudy:
-        """All values as numbers."""
-        return BridgeStudy(
-            ship=self.card.ship.name,
-            source=self.card.ship.source,
-            rudder_deg=self.rudder_deg,
-            turning_circles_deep=tuple(track.study for track in self.deep),
-            turning_circles_shallow=tuple(track.study for track in self.shallow),
-            stops=tuple(stop.study for stop in self.stops),
-            zigzags={
-                name: ZigzagStudy(one.figures, one.exit_s, one.how, one.outside_names)
-                for name, one in self.zigzags.items()
-            },
-            telegraph=self.telegraph,
-            full_astern_from=self.stops_from,
-            hard_over_to_hard_over_s=self.hard_over_s,
-            rudder_neutral_deg=self.neutral_deg,
-            squat=self.squat,
-            notices=self.notices,
-        )
-
-
 @dataclass(frozen=True)
 class ZigzagStudy:
     """Figures of a zigzag, the end of the card's range, and the figures outside it."""
@@ -191,7 +124,32 @@ class ZigzagStudy:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BridgeStudy:
-    """Data of a bridge as numbers; fields as in :class:`Bridge`, `ballast` is the other condition."""
+    """Data of a bridge as numbers.
+
+    Parameters
+    ----------
+    rudder_deg : float
+        Rudder of the turning circles: the largest that the gear allows (A.601(15)), or 35 deg without one on the card.
+    turning_circles_deep, turning_circles_shallow : tuple of TrackStudy
+        Circles to starboard and port; `shallow` at :data:`SHALLOW` times the draught, empty without the effect.
+    stops : tuple of TrackStudy
+        Full astern, and the engine stopped; empty without propulsion.
+    zigzags : dict
+        Name to figures; empty for a zigzag that could not be run.
+    telegraph : tuple of Telegraph
+        Empty without propulsion and without given orders.
+    full_astern_from : tuple of StopFrom
+        Full astern from each speed of the telegraph.
+    hard_over_to_hard_over_s : float or None
+        By the gear's rate.
+    rudder_neutral_deg : float or None
+        Rudder that keeps a straight course, + to starboard; None without one.
+    squat : tuple of Squat
+        Empty without block coefficient, beam and draught.
+    notices : tuple of Notice
+    ballast : BridgeStudy, optional
+        The other condition.
+    """
 
     ship: str
     source: str
@@ -207,6 +165,31 @@ class BridgeStudy:
     squat: tuple[Squat, ...]
     notices: tuple[Notice, ...]
     ballast: BridgeStudy | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Bridge:
+    """Data of a ship in the loading condition of its card, with the runs that its sheets draw.
+
+    Parameters
+    ----------
+    card : ManoeuvringCard
+    study : BridgeStudy
+    deep, shallow, stops : tuple of ShipTrack
+        Runs of the circles and stops of the study.
+    zigzags : mapping
+        Name to what was read in a zigzag.
+    basis : DataBasis, optional
+        By default the data are estimated, and the form's draughts stay blank.
+    """
+
+    card: ManoeuvringCard
+    study: BridgeStudy
+    deep: tuple[ShipTrack, ...]
+    shallow: tuple[ShipTrack, ...]
+    stops: tuple[ShipTrack, ...]
+    zigzags: Mapping[str, CardRangeReading]
+    basis: DataBasis | None = None
 
 
 def bridge_of(
@@ -232,26 +215,28 @@ def bridge_of(
     depths = _depths(ship)
     rudder = _rudder(card)
     circles, circle_notes = _circles(ship, rudder, depths)
-    deep = depths["deep"]
-    stops, troubles = _stops(ship, deep)
+    deep, shallow = (tuple(circles.get(where, ())) for where in ("deep", "shallow"))
+    stops, troubles = _stops(ship, depths["deep"])
+    zigzags = _zigzags(ship, depths["deep"])
     telegraph = _telegraph(ship, orders)
-    gear = card.steering_gear
-    largest, rate = (gear.max_angle_rad, gear.max_rate_radps) if gear else (None, None)
-    return Bridge(
-        card=card,
+    study = BridgeStudy(
+        ship=card.ship.name,
+        source=card.ship.source,
         rudder_deg=math.degrees(rudder),
-        deep=tuple(circles.get("deep", ())),
-        shallow=tuple(circles.get("shallow", ())),
-        stops=stops,
-        zigzags=_zigzags(ship, deep),
+        turning_circles_deep=tuple(track.study for track in deep),
+        turning_circles_shallow=tuple(track.study for track in shallow),
+        stops=tuple(stop.study for stop in stops),
+        zigzags={
+            name: ZigzagStudy(one.figures, one.exit_s, one.how, one.outside_names) for name, one in zigzags.items()
+        },
         telegraph=telegraph,
-        stops_from=_stops_from(ship, telegraph, deep),
-        hard_over_s=2 * largest / rate if largest and rate else None,
-        neutral_deg=_neutral(ship),
+        full_astern_from=_stops_from(ship, telegraph, depths["deep"]),
+        hard_over_to_hard_over_s=_hard_over_s(card),
+        rudder_neutral_deg=_neutral(ship),
         squat=squat_of(card),
-        basis=basis,
         notices=tuple(dict.fromkeys((*doubts(card), *circle_notes, *troubles))),
     )
+    return Bridge(card, study, deep, shallow, stops, zigzags, basis)
 
 
 def _checked_ship(card: ManoeuvringCard, checked: Sequence[str]) -> TrialShip:
@@ -292,6 +277,14 @@ def _check_orders(card: ManoeuvringCard, orders: Mapping[str, float]) -> None:
             nominal = f" (the card's nominal ones are {largest / _LARGEST_SHARE:.4g})" if engine else ""
             problem = f"is beyond {largest:,.0f} revolutions a minute{nominal}"
             raise ArgumentError("order", f"{order}={rpm:g}", problem, "give the propeller's revolutions, rpm")
+
+
+def _hard_over_s(card: ManoeuvringCard) -> float | None:
+    """Time from hard over to hard over, by the rate of the gear."""
+    gear = card.steering_gear
+    if gear is None or not gear.max_angle_rad or not gear.max_rate_radps:
+        return None
+    return 2 * gear.max_angle_rad / gear.max_rate_radps
 
 
 def _rudder(card: ManoeuvringCard) -> float:

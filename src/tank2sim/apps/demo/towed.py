@@ -13,7 +13,9 @@ from tank2sim.answer.parts import Column, Illustration, KeyFigure, Section, Tabl
 from tank2sim.answer.study import study_values
 from tank2sim.apps.demo.fmu_helpers import DemoOutcome, Workshop, error_words, largest_error
 from tank2sim.apps.rigs.tow.identify import TowIdentification, identify_tow, tow_card_text
+from tank2sim.apps.rigs.tow.output_error import TowModel
 from tank2sim.apps.rigs.tow.records import Tows, read_tows
+from tank2sim.apps.rigs.tow.surge import TOW_PARAMETERS
 from tank2sim.arrays import Array
 from tank2sim.bundled import bundled
 from tank2sim.cards import parse_card
@@ -22,8 +24,9 @@ from tank2sim.dynamics.model import Model
 from tank2sim.fmu.check import CheckReport
 from tank2sim.fmu.manoeuvre import InputSequence
 from tank2sim.fmu.running import replay
+from tank2sim.units import in_words
 
-WELL_POSED = ("B3",)
+WELL_POSED = TowModel(("B3",))
 """Drag terms that these tows determine (with M); the B1 and B2 of the paper in addition cannot be identified."""
 
 
@@ -37,7 +40,7 @@ def towed_vehicle(workshop: Workshop) -> DemoOutcome:
     """Identify, write the card, export and check the FMU, and tow it through fmpy next to the measured tows."""
     workshop.begin("five tows of an underwater vehicle: identifying mass and drag")
     tows = read_tows(bundled("models", "wilinski-zellman", "tows.csv"))
-    paper, chosen = identify_tow(tows), identify_tow(tows, terms=WELL_POSED)
+    paper, chosen = identify_tow(tows), identify_tow(tows, model=WELL_POSED)
     text = tow_card_text(chosen, chosen.methods["output_error"], name=NAME, source=SOURCE, length_m=LENGTH_M)
     card = parse_card(text, workshop.write("towed-vehicle.toml", text).name)
     model = build(card)
@@ -154,7 +157,6 @@ def _miss_table(misses: list[dict[str, float]]) -> Table:
 
 
 def _estimates(result: TowIdentification, caption: str) -> Table:
-    units = {"M": "kg", "B1": "kg s²/m³", "B2": "kg s/m²", "B3": "kg/m"}
     unknowns = next(iter(result.methods.values())).unknowns
     rows = []
     for method, fit in result.methods.items():
@@ -163,5 +165,6 @@ def _estimates(result: TowIdentification, caption: str) -> Table:
         rows.append([method.replace("_", " "), *pairs, fit.condition_scaled])
     columns = [Column("method")]
     for name in unknowns:
-        columns += [Column(name, units[name]), Column("±", units[name], digits=2)]
+        unit = in_words(TOW_PARAMETERS[name])[1]
+        columns += [Column(name, unit), Column("±", unit, digits=2)]
     return Table(caption=caption, columns=[*columns, Column("condition", digits=2)], rows=rows, folded=True)

@@ -84,9 +84,7 @@ def fleet_in(folder: Path, output: Path) -> Fleet:
     if output.exists() and (output.samefile(folder) or (output.parent.samefile(folder) and _cards(output))):
         raise InputError(output, "", "is the folder of a ship's card and trials", "give a folder of its own with -o")
     ships, faults, passed_over = [], {}, []
-    for path in _folders_in(folder):
-        if output.exists() and output.samefile(path):
-            continue
+    for path in _folders_in(folder, output):
         try:
             ship = ship_in(path)
         except InputError as error:
@@ -148,9 +146,10 @@ def ship_alone(folder: Path) -> ShipFolder | None:
     return ship_in(folder)
 
 
-def _folders_in(folder: Path) -> list[Path]:
-    """Sub-folders in the order of their names, without folders of results."""
-    return [path for path in sorted(_visible(folder)) if path.is_dir() and not _is_of_results(path)]
+def _folders_in(folder: Path, output: Path | None = None) -> list[Path]:
+    """Sub-folders in the order of their names, without folders of results, and without the one for these."""
+    found = [path for path in sorted(_visible(folder)) if path.is_dir() and not _is_of_results(path)]
+    return [path for path in found if output is None or not output.exists() or not output.samefile(path)]
 
 
 def _is_of_results(folder: Path) -> bool:

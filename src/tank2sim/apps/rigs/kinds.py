@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING
 
-from pydantic import Field
-
-from tank2sim.apps.rigs.glider.card import GliderCard, GliderForm
-from tank2sim.apps.rigs.yaw.card import YawRigCard, YawRigForm
+from tank2sim.apps.rigs.glider.card import GliderCard
+from tank2sim.apps.rigs.yaw.card import YawRigCard
 from tank2sim.cards.card import Card
-from tank2sim.cards.form import BodyModel, BodySection, CardSection, Environment, Mass
-from tank2sim.cards.kinds import CardKind, si_card
+from tank2sim.cards.form import CardSection, Mass, Uncertainty
+from tank2sim.cards.kinds import body_kind
 
 if TYPE_CHECKING:
     from tank2sim.dynamics.model import Model
-
-
-class SurgeModel(BodyModel):
-    """``[model]`` of a body that only surges (eq. 1.5)."""
-
-    kind: Literal["surge"]
 
 
 class Surge(CardSection):
@@ -35,24 +26,12 @@ class Surge(CardSection):
     dry_mass_kg: Mass | None = None
 
 
-class SurgeForm(CardSection):
-    """The card of a body that only surges, as in its file."""
-
-    format: Literal["tank2sim-ship/1"]
-    ship: BodySection
-    environment: Environment = Environment()
-    model: SurgeModel
-    surge: Surge
-    uncertainty: dict[str, Annotated[float, Field(ge=0)]] = Field(default_factory=dict)
-
-
 @dataclass(frozen=True)
 class SurgeBodyCard(Card):
     """Card of a body that only surges: (1.5) of paper 1, SI."""
 
-    model: SurgeModel
     surge: Surge
-    uncertainty: Mapping[str, float] = field(default_factory=dict)
+    uncertainty: Uncertainty = field(default_factory=dict)
 
 
 def _tow_model(card: SurgeBodyCard) -> Model:
@@ -63,9 +42,7 @@ def _tow_model(card: SurgeBodyCard) -> Model:
     return surge_model(card.ship.name, coefficients, card.surge.force_N, valid_speed_mps=card.model.valid_speed_mps)
 
 
-SURGE = CardKind(
-    "surge", "a body that only surges, from accelerating tows", SurgeForm, si_card(SurgeBodyCard, "surge"), _tow_model
-)
+SURGE = body_kind("surge", "a body that only surges, from accelerating tows", SurgeBodyCard, _tow_model)
 
 
 def _glider_model(card: GliderCard) -> Model:
@@ -75,7 +52,7 @@ def _glider_model(card: GliderCard) -> Model:
     return glider_model(card)
 
 
-GLIDER = CardKind("glider", "an underwater glider", GliderForm, si_card(GliderCard, "glider"), _glider_model)
+GLIDER = body_kind("glider", "an underwater glider", GliderCard, _glider_model)
 
 
 def _yaw_model(card: YawRigCard) -> Model:
@@ -85,11 +62,6 @@ def _yaw_model(card: YawRigCard) -> Model:
     return yaw_rig_model(card.ship.name, card.yaw_rig)
 
 
-YAW_RIG = CardKind(
-    "yaw_rig",
-    "a body that a motor turns in a tank",
-    YawRigForm,
-    si_card(YawRigCard, "yaw_rig"),
-    _yaw_model,
-    angles=("yaw_rig", "programme"),
+YAW_RIG = body_kind(
+    "yaw_rig", "a body that a motor turns in a tank", YawRigCard, _yaw_model, angles=("yaw_rig", "programme")
 )

@@ -94,15 +94,13 @@ def _filter(trials: Sequence[Trial], request: FilterRequest, settings: SignalSet
     if len(trials) != 1:
         raise ArgumentError("filter", "", f"filters one trial, and {len(trials)} are given", "filter them one by one")
     trial = trials[0]
-    if len(settings.columns) != 1 and not (request.thins and not settings.columns):
+    if request.thins and settings.columns:
+        raise ArgumentError("columns", "", f"{request.text} thins the whole trial", "leave the column out")
+    if len(settings.columns) != 1 and not request.thins:
         remedy = "filter each column in a separate run; decimate takes no column: it thins the whole trial"
         raise ArgumentError("filter", "", "filters one column, which must be named", remedy)
-    if request.thins:
-        if settings.columns:
-            raise ArgumentError("columns", "", f"{request.text} thins the whole trial", "leave the column out")
-        names = [name for name in trial.signals if name not in HELD_COLUMNS]
-    else:
-        names = [find_signal(settings.columns[0], trial)]
+    every = [name for name in trial.signals if name not in HELD_COLUMNS]
+    names = every if request.thins else [find_signal(settings.columns[0], trial)]
     before = [even_series(trial, name, settings.max_gap_s) for name in names]
     after = [request.apply(series) for series in before]
     what = "all columns but orders" if request.thins else SignalName(names[0]).file

@@ -13,7 +13,7 @@ from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, curve_p
 from tank2sim.answer.charts.motion import columns_chart
 from tank2sim.answer.charts.parts import LINE_SAMPLES, POINT_SAMPLES, with_unit
 from tank2sim.answer.charts.vega import ChartSpec, PlotAxis, Rule
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, table
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, data_frame, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.signals.study import FilterStudy, SignalsStudy, SignalStudy, Steering, TrialSignals
 from tank2sim.arrays import Array
@@ -60,8 +60,6 @@ class SignalsResult(Result[SignalsStudy]):
         Mean and standard deviation are in the unit of the column, of directions on the circle. A constant column has
         nothing after the standard deviation; ``peak_hz`` is missing where the spectrum has no peak.
         """
-        import pandas as pd
-
         rows = [
             {
                 "trial": PurePath(trial.trial).stem,
@@ -77,7 +75,7 @@ class SignalsResult(Result[SignalsStudy]):
             for trial in self.study.trials
             for name, column in trial.columns.items()
         ]
-        return pd.DataFrame(rows)
+        return data_frame(rows)
 
     def spectrum(self, column: str, trial: str | None = None) -> pd.DataFrame:
         """One-sided power spectral density of a column: ``frequency_hz``, ``density`` and its 95 % limits (per Hz).
@@ -94,14 +92,12 @@ class SignalsResult(Result[SignalsStudy]):
         LookupError
             No signal that varies has this name.
         """
-        import pandas as pd
-
         varying = []
         for record in self.study.trials:
             for name, signal in _varying(record):
                 if name == column and trial in (None, PurePath(record.trial).stem) and signal.spectrum:
                     keys = ("frequency_hz", "density", "low", "high")
-                    return pd.DataFrame({key: getattr(signal.spectrum, key) for key in keys})
+                    return data_frame({key: getattr(signal.spectrum, key) for key in keys})
                 varying.append(name)
         raise LookupError(f"no spectrum of {column}; there are: {', '.join(dict.fromkeys(varying))}")
 
@@ -262,25 +258,25 @@ def _signal_charts(label: str, name: SignalName, signal: SignalStudy) -> Iterato
 
 
 def _statistics(label: str, trial: TrialSignals) -> Table:
-    rows: list[list[Cell]] = []
-    for name, signal in trial.columns.items():
-        row: list[Cell] = [name, f"{signal.mean:.4g}", f"{signal.standard_deviation:.4g}"]
-        if signal.autocorrelation and signal.stationarity and signal.normality and signal.spectrum:
-            row += [signal.autocorrelation.correlation_time_s, signal.stationarity.verdict.value]
-            row += [signal.normality.verdict, signal.spectrum.peak_in_words]
-        else:
-            row += [None, "constant", "-", "-"]
-        rows.append(row)
-    notes = []
-    if any(signal.on_circle for signal in trial.columns.values()):
-        notes.append("Mean and standard deviation of directions are on the circle, 0 to 360 deg.")
-    notes.append("corr.: correlation time. normal: tested on samples two correlation times apart, number in brackets.")
+    rows = [_statistics_row(name, signal) for name, signal in trial.columns.items()]
     tested = [signal.stationarity for signal in trial.columns.values() if signal.stationarity]
-    notes += dict.fromkeys(f"{found.verdict.value}: {found.meaning}" for found in tested)
-    if trial.rudder_to_yaw_rate:
-        notes.append(_steering_text(trial.rudder_to_yaw_rate))
+    circle = any(signal.on_circle for signal in trial.columns.values())
+    notes = [
+        *(["Mean and standard deviation of directions are on the circle, 0 to 360 deg."] if circle else []),
+        "corr.: correlation time. normal: tested on samples two correlation times apart, number in brackets.",
+        *dict.fromkeys(f"{found.verdict.value}: {found.meaning}" for found in tested),
+        *([_steering_text(trial.rudder_to_yaw_rate)] if trial.rudder_to_yaw_rate else []),
+    ]
     heads = ("column", "mean", "std", "corr. (s)", "stationarity", "normal", "peak (Hz)")
     return replace(table(label, heads, rows, *notes), wide=True)
+
+
+def _statistics_row(name: str, signal: SignalStudy) -> list[Cell]:
+    row: list[Cell] = [name, f"{signal.mean:.4g}", f"{signal.standard_deviation:.4g}"]
+    if signal.autocorrelation and signal.stationarity and signal.normality and signal.spectrum:
+        row += [signal.autocorrelation.correlation_time_s, signal.stationarity.verdict.value]
+        return [*row, signal.normality.verdict, signal.spectrum.peak_in_words]
+    return [*row, None, "constant", "-", "-"]
 
 
 def _steering_text(steering: Steering) -> str:

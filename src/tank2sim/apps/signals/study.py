@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tank2sim.arguments import numbers_in
 from tank2sim.arrays import Columns, Number
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.notices import Notice
@@ -279,26 +280,25 @@ def parse_filter(text: str) -> FilterRequest:
     InputError if the filter does not exist, or its numbers are not as many and of the kind that it takes.
     """
     kind, _, parameters = text.strip().partition(":")
-    words = [word.strip() for word in parameters.split(",") if word.strip()]
-    causal = bool(words) and words[-1] == "causal" and kind in set(FilterType)
-    try:
-        numbers = [float(word) for word in (words[:-1] if causal else words)]
-        whole = [int(number) for number in numbers if number == int(number)]
-    except (ValueError, OverflowError):
-        raise _refusal(text) from None
-    match kind, len(numbers), len(whole) == len(numbers):
-        case ("lowpass" | "highpass", 1, _) | ("bandpass", 2, _):
-            return FilterRequest(text, lambda series: butterworth(series, FilterType(kind), numbers, causal=causal))
-        case "savgol", 2, True:
-            return FilterRequest(text, lambda series: savitzky_golay(series, whole[0], whole[1]))
-        case "spline", 1, _:
-            return FilterRequest(text, lambda series: smoothing_spline(series, numbers[0]))
-        case "detrend", 1, True:
-            return FilterRequest(text, lambda series: detrend(series, whole[0]))
-        case "decimate", 1, True:
-            return FilterRequest(text, lambda series: decimate(series, whole[0]), thins=True)
-    raise _refusal(text)
+    numbers, _, last = parameters.rpartition(",")
+    causal = last.strip() == "causal" and kind in set(FilterType)
+    count, whole, apply = _FILTERS.get(kind, (0, False, butterworth))
+    given = numbers_in(numbers if causal else parameters, (count,))
+    if not given or (whole and not all(number.is_integer() for number in given)):
+        raise ArgumentError("filter", "", f"{text!r} is not a filter", f"write one of {REQUEST_FORMS}")
+    if apply is butterworth:
+        return FilterRequest(text, lambda series: butterworth(series, FilterType(kind), given, causal=causal))
+    kept = [int(number) if whole else number for number in given]
+    return FilterRequest(text, lambda series: apply(series, *kept), thins=apply is decimate)
 
 
-def _refusal(text: str) -> InputError:
-    return ArgumentError("filter", "", f"{text!r} is not a filter", f"write one of {REQUEST_FORMS}")
+_FILTERS: dict[str, tuple[int, bool, Callable[..., Filtered]]] = {
+    "lowpass": (1, False, butterworth),
+    "highpass": (1, False, butterworth),
+    "bandpass": (2, False, butterworth),
+    "savgol": (2, True, savitzky_golay),
+    "spline": (1, False, smoothing_spline),
+    "detrend": (1, True, detrend),
+    "decimate": (1, True, decimate),
+}
+"""Filter to how many numbers it takes, whether they are whole, and its function."""

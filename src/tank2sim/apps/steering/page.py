@@ -10,10 +10,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import jinja2
 from markupsafe import Markup
 
-from tank2sim.answer.page import resource_text
+from tank2sim.answer.page import filled_template, resource_text
 from tank2sim.apps.steering.ghost import Ghost
 from tank2sim.apps.steering.members import NO_COVARIANCE
 from tank2sim.apps.steering.scenario import Scenario
@@ -31,7 +30,6 @@ from tank2sim.dynamics.model import Input, Model, Parameter
 from tank2sim.errors import InputError
 from tank2sim.escaping import json_in_html
 from tank2sim.notices import Notice
-from tank2sim.version import __version__
 
 LONGEST_ZIGZAG = 150.0
 """A zigzag that has not ended after so many ship lengths is given up, as in the simulation."""
@@ -45,17 +43,47 @@ _WINDOWS = (10, 20, 30, 60, 120, 300, 600, 1200, 1800, 3600, 7200)
 FASTEST_APPROACH = 2.0
 """Fastest approach that the page takes, in highest speeds of the card: beyond it nothing is known (project choice)."""
 
-SHIP_PREDICTED_S = (60, 120, 180, 240, 300, 360), 180
-"""Times ahead that the page of a ship predicts, and the one at first, s. Project choice."""
 
-CRAFT_PREDICTED_S = (5, 10, 20, 30, 60, 120), 10
-"""The same of a craft with thrusters, which comes through several of its lengths in seconds. Project choice."""
+@dataclass(frozen=True, kw_only=True)
+class _Scale:
+    """How quickly a vessel answers, and in which units the page shows it.
 
-OUTLINES_S, CRAFT_OUTLINES_S = 60, 5
-"""Time between outlines on the predicted curve, s. Project choice."""
+    `pace`: times real time of the page at first; `predicted_s`, `predicted_first_s`: times ahead that the page
+    predicts, and the one at first; `outlines_s`: time between outlines on the predicted curve; `units`: units of the
+    vessel in place of a ship's.
+    """
 
-PACE, CRAFT_PACE = 5, 1
-"""Times real time of the page at first: a ship takes minutes to answer. Project choice."""
+    pace: int
+    predicted_s: tuple[int, ...]
+    predicted_first_s: int
+    outlines_s: int
+    speed_digits: int
+    units: Mapping[str, str]
+
+    def unit(self, of_a_ship: str) -> str:
+        """The unit of this vessel for a unit of a ship."""
+        return self.units.get(of_a_ship, of_a_ship)
+
+
+_SHIP = _Scale(
+    pace=5,
+    predicted_s=(60, 120, 180, 240, 300, 360),
+    predicted_first_s=180,
+    outlines_s=60,
+    speed_digits=1,
+    units={},
+)
+"""A ship takes minutes to answer. Project choice."""
+
+_CRAFT = _Scale(
+    pace=1,
+    predicted_s=(5, 10, 20, 30, 60, 120),
+    predicted_first_s=10,
+    outlines_s=5,
+    speed_digits=2,
+    units={"knots": "m/s", "deg/min": "deg/s"},
+)
+"""A craft with thrusters comes through several of its lengths in seconds. Project choice."""
 
 CRAFT_ZIGZAG = 0.25
 """Difference of revolutions of the zigzag that the page of a craft offers, over the largest. Project choice."""
@@ -65,9 +93,6 @@ _TURNING = (10.0, 20.0, 30.0, 60.0, 90.0, 120.0, 180.0, 300.0, 600.0, 1200.0, 18
 
 _USUAL_TURNING = 0.5
 """Yaw rate in ship lengths, r L/u0, that the dial shows at first: a hard turn of most ships. Project choice."""
-
-_CRAFT_UNITS = {"knots": "m/s", "deg/min": "deg/s"}
-"""Units of a craft, in place of a ship's."""
 
 _DIALS = ("motion.psi", "motion.r", "rudder.angle")
 """Signals with an instrument of their own."""
@@ -153,38 +178,18 @@ def steering_page(
         The model has no rudder.
     """
     model = ship.model
-    thrusters = thrusters_of(model)
-    if "rudder.command" not in model.input_names and not thrusters:
-        remedy = "a ship (kind linear, abkowitz or mmg) can be steered, and a craft with fixed thrusters at both sides"
-        raise InputError(model.origin, "", "has no rudder and no thrusters that steer", remedy)
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("tank2sim", "apps"), autoescape=True, undefined=jinja2.StrictUndefined
-    )
-    names = [thruster.name for thruster in thrusters]
-    found = _controls(model, ghost)
-    rudder = None if thrusters else found[0]
-    controls_left = found if thrusters else found[1:]
-    levers = levers_of(model)
-    engine = next((control for control in controls_left if control.name == "propeller.speed"), None)
-    set_by_hand = [control for control in controls_left if control is not engine and control.name not in names]
-    environment.trim_blocks = environment.lstrip_blocks = True
+    scale = _scale_of(model)
     equations = ship_equations(model)
-    return environment.get_template("steering/page.html.j2").render(
+    return filled_template(
+        "apps/steering/page.html.j2",
         name=model.name,
         description=model.description,
-        version=__version__,
         notices=notices,
         ghost=ghost,
-        controls=set_by_hand,
-        rudder=rudder,
-        engine=engine,
-        levers=levers,
-        thrusters=[control for control in found if control.name in names],
-        zigzag=round(CRAFT_ZIGZAG * (levers[1].maximum or 0.0), -1) if levers else 20,
-        zigzag_most=levers[1].maximum if levers else 89,
-        pace=CRAFT_PACE if levers else PACE,
-        speed_unit=_speed_unit(model),
-        turning_unit=_turning_unit(model),
+        **_hand(model, ghost),
+        pace=scale.pace,
+        speed_unit=scale.unit("knots"),
+        turning_unit=scale.unit("deg/min"),
         approach=_approach(model, ghost, scenario),
         windows=_windows(model),
         telegraph=telegraph_of(model),
@@ -192,7 +197,7 @@ def steering_page(
         no_members=NO_COVARIANCE,
         autopilot=ship.autopilot,
         scenario=scenario,
-        ahead=_predicted(CRAFT_PREDICTED_S if levers else SHIP_PREDICTED_S),
+        ahead=([(one, _in_words(one, 60)) for one in scale.predicted_s], scale.predicted_first_s),
         dials=_DIALS,
         readouts=_readouts(model),
         fails="steering.failed" in model.input_names,
@@ -201,6 +206,33 @@ def steering_page(
         script=Markup("\n".join([equations, *(resource_text(f"apps/steering/{name}") for name in _scripts(view_3d))])),
         data=json_in_html(_data(ship, equations, ghost, scenario)),
     )
+
+
+def _scale_of(model: Model) -> _Scale:
+    """The scale of a vessel; InputError for one that cannot be steered."""
+    if thrusters_of(model):
+        return _CRAFT
+    if "rudder.command" not in model.input_names:
+        remedy = "a ship (kind linear, abkowitz or mmg) can be steered, and a craft with fixed thrusters at both sides"
+        raise InputError(model.origin, "", "has no rudder and no thrusters that steer", remedy)
+    return _SHIP
+
+
+def _hand(model: Model, ghost: Ghost | None) -> dict[str, Any]:
+    """What the user sets: rudder and engine, or thrusters with their two levers; and all other inputs."""
+    found, levers = _controls(model, ghost), levers_of(model)
+    names = {thruster.name for thruster in thrusters_of(model)}
+    by_name = {control.name: control for control in found}
+    taken = {*names, "propeller.speed", "rudder.command"}
+    return {
+        "rudder": by_name.get("rudder.command"),
+        "engine": by_name.get("propeller.speed"),
+        "levers": levers,
+        "thrusters": [control for control in found if control.name in names],
+        "controls": [control for control in found if control.name not in taken],
+        "zigzag": round(CRAFT_ZIGZAG * (levers[1].maximum or 0.0), -1) if levers else 20,
+        "zigzag_most": levers[1].maximum if levers else 89,
+    }
 
 
 def _styles(view_3d: bool) -> list[str]:
@@ -220,7 +252,7 @@ def _data(ship: PageShip, equations: str, ghost: Ghost | None, scenario: Scenari
 
 
 def _ship_data(ship: PageShip, ghost: Ghost | None, scenario: Scenario | None) -> dict[str, Any]:
-    model = ship.model
+    model, scale = ship.model, _scale_of(ship.model)
     length, speed = _start(model, "ship.length"), _start(model, "ship.speed")
     gear = [math.degrees(parameter.start) for parameter in model.parameters if parameter.name == "steering.max_angle"]
     return {
@@ -228,11 +260,11 @@ def _ship_data(ship: PageShip, ghost: Ghost | None, scenario: Scenario | None) -
         **ship_tables(model, {name for member in ship.members for name in member}),
         "members": [dict(member) for member in ship.members],
         "telegraph": [{"name": order.name, "value": order.value} for order in telegraph_of(model)],
-        "turning": _turning(shown_in(model["motion.r"], _turning_unit(model))[1] * _USUAL_TURNING * speed / length),
+        "turning": _turning(shown_in(model["motion.r"], scale.unit("deg/min"))[1] * _USUAL_TURNING * speed / length),
         "thrusters": [dataclasses.asdict(thruster) for thruster in thrusters_of(model)],
         "levers": [dataclasses.asdict(lever) for lever in levers_of(model)],
         "largestRudder": (levers_of(model)[-1:] or _controls(model, ghost))[0].maximum,
-        "outlines": CRAFT_OUTLINES_S if thrusters_of(model) else OUTLINES_S,
+        "outlines": scale.outlines_s,
         "speed": speed,
         "step": model.step_s,
         "start": {"initial.u": _start(model, "initial.u")} | _begin(ghost, scenario),
@@ -242,8 +274,11 @@ def _ship_data(ship: PageShip, ghost: Ghost | None, scenario: Scenario | None) -
         "draught": ship.draught_m,
         "longest": LONGEST_ZIGZAG * length / speed,
         "stop": gear[0] if gear else None,
-        "speeds": {"unit": _speed_unit(model), "factor": shown_in(model["initial.u"], _speed_unit(model))[1]}
-        | {"digits": 2 if thrusters_of(model) else 1},
+        "speeds": {
+            "unit": scale.unit("knots"),
+            "factor": shown_in(model["initial.u"], scale.unit("knots"))[1],
+            "digits": scale.speed_digits,
+        },
         "controls": [dataclasses.asdict(control) for control in _controls(model, ghost)],
         "readouts": _readouts(model),
         "ghost": None if ghost is None else {"label": ghost.label, "angle": ghost.by_angle, **_series(ghost)},
@@ -269,21 +304,12 @@ def _windows(model: Model) -> tuple[list[tuple[int, str]], int]:
     wanted = HISTORY * _start(model, "ship.length") / _start(model, "ship.speed")
     place = min(range(1, len(_WINDOWS) - 2), key=lambda index: abs(math.log(_WINDOWS[index] / wanted)))
     shown = _WINDOWS[place - 1 : place + 3]
-    return [(index, f"{index} s" if index < 120 else f"{index / 60:g} min") for index in shown], _WINDOWS[place]
+    return [(window, _in_words(window, 120)) for window in shown], _WINDOWS[place]
 
 
-def _predicted(times: tuple[Sequence[int], int]) -> tuple[list[tuple[int, str]], int]:
-    """Times ahead that the page predicts (s, in words), and the one at first, s."""
-    offered, first = times
-    return [(one, f"{one} s" if one < 60 else f"{one / 60:g} min") for one in offered], first
-
-
-def _speed_unit(model: Model) -> str:
-    return _CRAFT_UNITS["knots"] if thrusters_of(model) else "knots"
-
-
-def _turning_unit(model: Model) -> str:
-    return _CRAFT_UNITS["deg/min"] if thrusters_of(model) else "deg/min"
+def _in_words(time_s: int, from_s: int) -> str:
+    """A time in words, in minutes from a time on."""
+    return f"{time_s} s" if time_s < from_s else f"{time_s / 60:g} min"
 
 
 def _turning(usual: float) -> list[float]:
@@ -308,10 +334,8 @@ def _series(ghost: Ghost) -> dict[str, list[float | None]]:
 
 def _readouts(model: Model) -> list[dict[str, Any]]:
     names = {*model.outputs, *model.state_names, *model.input_names}
-    thrusters = thrusters_of(model)
-    units = _CRAFT_UNITS if thrusters else {}
-    wanted = [*_READOUTS]
-    for thruster in thrusters:
+    scale, wanted = _scale_of(model), [*_READOUTS]
+    for thruster in thrusters_of(model):
         prefix = thruster.name.removesuffix(".command")
         wanted += [
             (f"{prefix}.speed", thruster.label, "rpm", 0),
@@ -320,14 +344,14 @@ def _readouts(model: Model) -> list[dict[str, Any]]:
     return [
         {"name": name, "label": label, "unit": shown, "digits": digits, "factor": shown_in(model[name], shown)[1]}
         for name, label, unit, digits in wanted
-        for shown in [units.get(unit, unit)]
+        for shown in [scale.unit(unit)]
         if name in names
     ]
 
 
 def _approach(model: Model, ghost: Ghost | None, scenario: Scenario | None) -> dict[str, float]:
     """Approach speed of the trial or the scenario, else of the card, and its bounds, knots, of a craft m/s."""
-    factor = shown_in(model["initial.u"], _speed_unit(model))[1]
+    factor = shown_in(model["initial.u"], _scale_of(model).unit("knots"))[1]
     measured = _begin(ghost, scenario).get("initial.u")
     speed = _start(model, "initial.u") if measured is None else measured
     fastest = max(FASTEST_APPROACH * _start(model, "ship.fastest"), speed)

@@ -175,8 +175,30 @@ def ship_tables(model: Model, drawn: Iterable[str] = ()) -> dict[str, Any]:
     drawn : iterable of str
         Parameters in which the members of a page differ.
     """
+    places = _places(model, drawn)
     described = interface(model)
-    rest = set(model.state_names) | set(model.input_names) | set(model.parameter_names)
+    set_by_page = (described.by_name[name] for name, (block, _) in places.items() if block in "up")
+    bounds = {each.name: each.accepted or (each.minimum, each.maximum) for each in set_by_page}
+    return {
+        "places": places,
+        "bounds": {name: list(map(_bound, ends, (-UNBOUNDED, UNBOUNDED))) for name, ends in bounds.items()},
+        "inputs": model.input_values().tolist(),
+        "parameters": model.parameter_values().tolist(),
+        "constants": ca.vertcat(ca.SX(0, 1), *ca.extract_parametric(model.rates, model.p)[1]).numel(),
+        "outputs": len(model.outputs),
+        "limits": [TIMES_BEYOND * UNITS[state.unit].extent for state in model.states],
+        "nominal": [state.nominal for state in model.states],
+        "trimSwitch": model.parameter_names.index("initial.trim") if "initial.trim" in model.parameter_names else None,
+    }
+
+
+def _bound(value: float | None, without: float) -> float:
+    return without if value is None else value
+
+
+def _places(model: Model, drawn: Iterable[str]) -> dict[str, tuple[str, int]]:
+    """Name of a variable that the page reads or sets to its block (``x``, ``u``, ``p``, ``y``) and its place there."""
+    rest = {*model.state_names, *model.input_names, *model.parameter_names}
     blocks = {
         "x": model.state_names,
         "u": model.input_names,
@@ -185,29 +207,11 @@ def ship_tables(model: Model, drawn: Iterable[str] = ()) -> dict[str, Any]:
     }
     wanted = ("initial.", "motion.", "rudder.", "thrusters.", "steering.failed", "propeller.", "validity")
     named = {*model.input_names, *drawn, AUTOPILOT_ORDER}
-    places: dict[str, tuple[str, int]] = {
+    return {
         name: (block, place)
         for block, names in blocks.items()
         for place, name in enumerate(names)
         if name in named or name.startswith(wanted)
-    }
-    bounds = {
-        name: [-UNBOUNDED if low is None else low, UNBOUNDED if high is None else high]
-        for name, (block, _) in places.items()
-        if block in "up"
-        for variable in [described.by_name[name]]
-        for low, high in [variable.accepted or (variable.minimum, variable.maximum)]
-    }
-    return {
-        "places": places,
-        "bounds": bounds,
-        "inputs": model.input_values().tolist(),
-        "parameters": model.parameter_values().tolist(),
-        "constants": ca.vertcat(ca.SX(0, 1), *ca.extract_parametric(model.rates, model.p)[1]).numel(),
-        "outputs": len(model.outputs),
-        "limits": [TIMES_BEYOND * UNITS[state.unit].extent for state in model.states],
-        "nominal": [state.nominal for state in model.states],
-        "trimSwitch": model.parameter_names.index("initial.trim") if "initial.trim" in model.parameter_names else None,
     }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -102,78 +102,73 @@ def trial_conditions(state: TrialState, notes: TrialNotes, trials: Sequence[Trie
         Without the current: the test speed is a speed through the water.
     """
     turns = [one for one in trials if isinstance(one.manoeuvre, Turn) and one.record is not None]
-    speeds = [one.speed_mps for one in trials if one.trial is not None]
-    slowest = min(speeds, default=None)
-    stated = notes.speed_85_mcr_mps
-    test = stated and slowest and slowest / stated
     depth = notes.depth_m and notes.depth_m / state.draught_m
+    away, trim = 100 * (state.draught_m / state.full_load_draught_m - 1), state.trim_m
+    approach = min((time for one in trials if (time := _approach(one)) is not None), default=None)
     turned = min((angle for one in turns if (angle := one.turned_deg) is not None), default=None)
-    rudder = min((abs(one.manoeuvre.rudder) for one in turns if not isinstance(one.manoeuvre, Stop)), default=None)
+    rudder = min((_first_rudder_deg(one) for one in turns), default=None)
+    least_rudder = _RUDDER_SHARE * math.degrees(state.largest_rudder_rad)
+    found: dict[str, tuple[float | None, Callable[[float], bool]]] = {
+        "deep water": (depth, lambda value: value > DEPTH_OVER_DRAUGHT),
+        "wind speed": (state.wind_speed_mps, lambda value: value < STRONGEST_WIND),
+        "sea state": (notes.sea_state, lambda value: value <= HIGHEST_SEA_STATE),
+        "draught": (away, lambda value: abs(value) <= 100 * DRAUGHT_SHARE),
+        "trim by the stern": (trim, lambda value: abs(value) <= DRAUGHT_SHARE * state.draught_m),
+        "test speed": (_test_speed(notes, trials), lambda value: value >= 100 * TEST_SPEED_SHARE),
+        "approach": (approach, lambda value: value >= APPROACH_S),
+        "turns": (turned, lambda value: value >= FULL_CIRCLES_DEG - 1),
+        "rudder of the turns": (rudder, lambda value: value >= least_rudder),
+        "both sides": (_both_sides(trials), bool),
+        "engine": (notes.engine_untouched, bool),
+    }
+    if not state.draughts_recorded:
+        found |= dict.fromkeys(("draught", "trim by the stern"), (None, bool))
+    return tuple(_condition(name, *found[name]) for name in _REQUIRED)
+
+
+_REQUIRED = {
+    "deep water": (f"depth over {DEPTH_OVER_DRAUGHT:g} draughts", "MSC/Circ.1053", "{:.1f} draughts"),
+    "wind speed": (f"below {STRONGEST_WIND:g} m/s (Beaufort 5)", "MSC/Circ.1053", "{:.1f} m/s"),
+    "sea state": (f"up to sea state {HIGHEST_SEA_STATE}", "MSC/Circ.1053", "sea state {:d}"),
+    "draught": ("full load within 5 %", "MSC/Circ.1053", "{:+.1f} %"),
+    "trim by the stern": ("even keel", "MSC.137(76)", "{:+.2f} m"),
+    "test speed": ("at least 90 % of that at 85 % MCR", "MSC.137(76)", "{:.0f} %"),
+    "approach": (f"steady for {APPROACH_S:g} s", "ISO 13643-2", "{:.0f} s"),
+    "turns": (f"{FULL_CIRCLES_DEG:g} deg of heading", "MSC/Circ.1053", "{:.0f} deg"),
+    "rudder of the turns": ("35 deg, or the largest", "MSC.137(76)", "{:.1f} deg"),
+    "both sides": ("each manoeuvre to port and starboard", "MSC.137(76)", ""),
+    "engine": ("its setting left alone", "ISO 13643-2", ""),
+}
+"""Condition to its requirement, who asks for it, and the form of its value; a truth value has none."""
+
+
+def _condition(name: str, value: float | None, met: Callable[[float], bool]) -> TrialCondition:
+    """A condition of :data:`_REQUIRED` by its value."""
+    required, source, form = _REQUIRED[name]
+    if value is None:
+        return TrialCondition(name=name, required=required, found="", met=Met.UNKNOWN, source=source)
+    found = form.format(value) if form else "yes" if value else "no"
+    verdict = Met.MET if met(value) else Met.NOT_MET
+    return TrialCondition(name=name, required=required, found=found, met=verdict, source=source)
+
+
+def _test_speed(notes: TrialNotes, trials: Sequence[Tried]) -> float | None:
+    """The slowest approach over the speed at 85 % of the largest output, %."""
+    slowest = min((one.speed_mps for one in trials if one.trial is not None), default=None)
+    return 100 * slowest / notes.speed_85_mcr_mps if slowest and notes.speed_85_mcr_mps else None
+
+
+def _both_sides(trials: Sequence[Tried]) -> bool | None:
+    """Whether each turn and zigzag was made to both sides; None without one."""
     sides: dict[tuple[int, ...], set[str]] = {}
     for one in trials:
         if not isinstance(one.manoeuvre, Stop):
             sides.setdefault(_to_five_degrees(one.manoeuvre), set()).add(one.side)
-    both = all(len(each) == 2 for each in sides.values()) if sides else None
-    away, trim = state.draught_m / state.full_load_draught_m - 1, state.trim_m
-    shown = (100 * away, trim) if state.draughts_recorded else (None, None)
-    circular, standards, iso = "MSC/Circ.1053", "MSC.137(76)", "ISO 13643-2"
-    approaches = [_approach(one) for one in trials]
-    known = [one for one in approaches if one is not None]
-    return (
-        _judged("deep water", f"depth over {DEPTH_OVER_DRAUGHT:g} draughts", depth, "{:.1f} draughts", circular).when(
-            depth is not None and depth > DEPTH_OVER_DRAUGHT
-        ),
-        _judged(
-            "wind speed",
-            f"below {STRONGEST_WIND:g} m/s (Beaufort 5)",
-            state.wind_speed_mps,
-            "{:.1f} m/s",
-            circular,
-        ).when(state.wind_speed_mps is not None and state.wind_speed_mps < STRONGEST_WIND),
-        _judged("sea state", f"up to sea state {HIGHEST_SEA_STATE}", notes.sea_state, "sea state {:d}", circular).when(
-            notes.sea_state is not None and notes.sea_state <= HIGHEST_SEA_STATE
-        ),
-        _judged("draught", "full load within 5 %", shown[0], "{:+.1f} %", circular).when(abs(away) <= DRAUGHT_SHARE),
-        _judged("trim by the stern", "even keel", shown[1], "{:+.2f} m", standards).when(
-            abs(trim) <= DRAUGHT_SHARE * state.draught_m
-        ),
-        _judged("test speed", "at least 90 % of that at 85 % MCR", test and 100 * test, "{:.0f} %", standards).when(
-            bool(test and test >= TEST_SPEED_SHARE)
-        ),
-        _judged("approach", f"steady for {APPROACH_S:g} s", min(known, default=None), "{:.0f} s", iso).when(
-            bool(known) and min(known) >= APPROACH_S
-        ),
-        _judged("turns", f"{FULL_CIRCLES_DEG:g} deg of heading", turned, "{:.0f} deg", circular).when(
-            turned is not None and turned >= FULL_CIRCLES_DEG - 1
-        ),
-        _judged(
-            "rudder of the turns", "35 deg, or the largest", rudder and math.degrees(rudder), "{:.1f} deg", standards
-        ).when(bool(rudder and rudder >= _RUDDER_SHARE * state.largest_rudder_rad)),
-        _judged("both sides", "each manoeuvre to port and starboard", both, "{}", standards).when(bool(both)),
-        _judged("engine", "its setting left alone", notes.engine_untouched, "{}", iso).when(
-            bool(notes.engine_untouched)
-        ),
-    )
+    return all(len(each) == 2 for each in sides.values()) if sides else None
 
 
-@dataclass(frozen=True)
-class _judged:
-    """A condition, with its value if known."""
-
-    name: str
-    required: str
-    value: float | int | bool | None
-    form: str
-    source: str
-
-    def when(self, met: bool) -> TrialCondition:
-        """The condition, met or not."""
-        if self.value is None:
-            found, verdict = "", Met.UNKNOWN
-        else:
-            words = {True: "yes", False: "no"}.get(self.value) if isinstance(self.value, bool) else None
-            found, verdict = words or self.form.format(self.value), Met.MET if met else Met.NOT_MET
-        return TrialCondition(name=self.name, required=self.required, found=found, met=verdict, source=self.source)
+def _first_rudder_deg(turn: Tried) -> float:
+    return 0.0 if isinstance(turn.manoeuvre, Stop) else abs(math.degrees(turn.manoeuvre.rudder))
 
 
 def _to_five_degrees(manoeuvre: Turn | Zigzag) -> tuple[int, ...]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-import jinja2
 from markupsafe import Markup
 
 from tank2sim.analysis.stability.imo import (
@@ -18,11 +17,10 @@ from tank2sim.analysis.stability.imo import (
     TRACK_REACH,
 )
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.page import resource_text
+from tank2sim.answer.page import filled_template, resource_text
 from tank2sim.apps.bridge.boxes import Box, Row
 from tank2sim.apps.trial_office.conditions import BEAUFORT
 from tank2sim.apps.trial_office.study import TrialOffice
-from tank2sim.version import __version__
 
 _ROWS = {
     ADVANCE: "Turning circle: advance, ship lengths",
@@ -143,12 +141,8 @@ def form_page(study: TrialOffice) -> str:
     ----------
     study : TrialOffice
     """
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("tank2sim", "apps"), autoescape=True, undefined=jinja2.StrictUndefined
-    )
-    environment.trim_blocks = environment.lstrip_blocks = True
-    return environment.get_template("trial_office/form.html.j2").render(
-        version=__version__,
+    return filled_template(
+        "apps/trial_office/form.html.j2",
         style=Markup(resource_text("apps/bridge/sheet.css")),
         name=study.ship,
         source=study.source,

@@ -48,20 +48,13 @@ class TriedShips:
 def tried_ships(card: ManoeuvringCard, state: TrialState, count: int) -> tuple[TriedShips, list[Notice]]:
     """The ship in both conditions, and members with the errors of the card and of the formulas for the loading."""
     own = model_particular(card, "draught_m")
-    listed = {entry.name for entry in card.effects}
-    loadings = {"tried": (state.draught_m, state.trim_m), "full": (state.full_load_draught_m, 0.0)}
-    if state.at_full_load:
-        loadings["tried"] = loadings["full"]
-    cards = {}
-    for name, (draught, trim) in loadings.items():
-        entries: list[Found] = []
-        if not math.isclose(draught, own, rel_tol=1e-6) or abs(trim) > 1e-6:
-            if LOADING.name in listed:
-                raise card.fault("effects", "has the effect loading already", "give the card of one loading condition")
-            entries.append((LOADING.name, {"mean_draught_m": draught, "trim_m": trim}, {}))
-        if name == "tried" and state.wind_speed_mps and state.wind_from_rad is not None and WIND.name not in listed:
-            entries.append((WIND.name, {}, {}))
-        cards[name] = add_effects_to_card(card, entries).manoeuvring() if entries else card
+    full = state.full_load_draught_m, 0.0
+    loadings = {"tried": full if state.at_full_load else (state.draught_m, state.trim_m), "full": full}
+    windy = bool(state.wind_speed_mps) and state.wind_from_rad is not None
+    cards = {
+        name: _loaded(card, draught, trim, own, wind=windy and name == "tried")
+        for name, (draught, trim) in loadings.items()
+    }
     models = {name: build(steerable(one)) for name, one in cards.items()}
     drawn, messages = members(cards["tried"], models["tried"], count)
     changes = {name: math.hypot(draught / own - 1, trim / own) for name, (draught, trim) in loadings.items()}
@@ -80,6 +73,19 @@ def tried_ships(card: ManoeuvringCard, state: TrialState, count: int) -> tuple[T
     )
     assumed = joint_errors(card, card_parameters(card, study_model(card))).in_words if count else []
     return ships, [*messages, *assumed]
+
+
+def _loaded(card: ManoeuvringCard, draught: float, trim: float, own_draught: float, *, wind: bool) -> ManoeuvringCard:
+    """The card at a draught and a trim (m), where they differ from its own, and in the wind."""
+    listed = {entry.name for entry in card.effects}
+    entries: list[Found] = []
+    if not math.isclose(draught, own_draught, rel_tol=1e-6) or abs(trim) > 1e-6:
+        if LOADING.name in listed:
+            raise card.fault("effects", "has the effect loading already", "give the card of one loading condition")
+        entries.append((LOADING.name, {"mean_draught_m": draught, "trim_m": trim}, {}))
+    if wind and WIND.name not in listed:
+        entries.append((WIND.name, {}, {}))
+    return add_effects_to_card(card, entries).manoeuvring() if entries else card
 
 
 def _with_formula_errors(values: Mapping[str, float], model: Model, errors: Array, change: float) -> dict[str, float]:

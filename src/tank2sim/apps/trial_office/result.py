@@ -61,27 +61,32 @@ class TrialOfficeResult(Result[TrialOffice]):
     def headline(self) -> tuple[str, ...]:
         """Verdicts at full load, and the corrections."""
         study = self.study
-        failed = [one for one in study.tried if one.verdict.startswith("fail")]
-        open_ones = [one for one in study.tried if one.verdict.startswith("undecided")]
         lines = [self._first_line]
-        for words, ones in (("Not met", failed), ("Undecided", open_ones)):
-            if ones:
-                lines.append(f"{words}: {'; '.join(_named(one) for one in ones)}.")
+        for words, verdict in (("Not met", "fail"), ("Undecided", "undecided")):
+            if names := [_named(one) for one in study.tried if one.verdict.startswith(verdict)]:
+                lines.append(f"{words}: {'; '.join(names)}.")
         if study.conditions_not_met:
             lines.append(f"Conditions not met: {study.conditions_not_met}.")
-        if (current := study.current) is not None:
-            how = f"separated from the wind {current.separated}" if current.separated else "together with any wind"
-            if any(one.measured.spread_mps is None for one in study.drifts):
-                how += ", by a circle in a moving frame (a turn of less than 540 deg)"
-            if (spread := current.spread_mps or 0.0) > CURRENT_CHANGES:
-                how += f"; it changes during a turn (spread {spread:.3f} m/s)"
-            lines.append(f"Current {current.speed_mps:.2f} m/s towards {current.towards_deg:.0f} deg, {how}.")
+        lines += self._current_line
         known = self._agreements
         if known and not study.tested_at_full_load:
             lines.append(f"In the condition of the trial the model agrees with {sum(known)} of {len(known)} figures.")
         if not study.applies:
             lines.append("The ship is shorter than 100 m: the standards do not bind it.")
         return tuple(lines)
+
+    @property
+    def _current_line(self) -> list[str]:
+        """The current, and how it was found; empty without one."""
+        study, current = self.study, self.study.current
+        if current is None:
+            return []
+        how = f"separated from the wind {current.separated}" if current.separated else "together with any wind"
+        if any(one.measured.spread_mps is None for one in study.drifts):
+            how += ", by a circle in a moving frame (a turn of less than 540 deg)"
+        if (spread := current.spread_mps or 0.0) > CURRENT_CHANGES:
+            how += f"; it changes during a turn (spread {spread:.3f} m/s)"
+        return [f"Current {current.speed_mps:.2f} m/s towards {current.towards_deg:.0f} deg, {how}."]
 
     @property
     def _first_line(self) -> str:

@@ -9,9 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tank2sim.analysis.ensemble.results import EnsembleRequest, named_bands
-from tank2sim.analysis.stability.imo import (
-    SHORTEST_SHIP_M,
-)
+from tank2sim.analysis.stability.imo import SHORTEST_SHIP_M
 from tank2sim.analysis.validation.standard_trials import SEED
 from tank2sim.apps.guess.study import OVERSHOOT_ERROR_DEG, TRIAL_ERROR
 from tank2sim.apps.trial_office.conditions import Met, TrialCondition, TrialState, trial_conditions
@@ -64,6 +62,11 @@ class TurnDrift:
     measured: CircleDrift
     by_wind_north_mps: float | None
     by_wind_east_mps: float | None
+
+    @property
+    def by_wind(self) -> tuple[float, float]:
+        """Drift by the model in the wind, north and east, m/s; 0 without a measured wind."""
+        return self.by_wind_north_mps or 0.0, self.by_wind_east_mps or 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -417,32 +420,33 @@ def site_current(drifts: Sequence[TurnDrift]) -> SiteCurrent:
     ----------
     drifts : sequence of TurnDrift
     """
-    measured: dict[str, list[Array]] = {}
-    left: dict[str, list[Array]] = {}
     modelled = all(drift.by_wind_north_mps is not None for drift in drifts)
-    for drift in drifts:
-        measured.setdefault(drift.side, []).append(drift.measured.vector)
-        part = np.array([drift.by_wind_north_mps, drift.by_wind_east_mps]) if modelled else np.zeros(2)
-        left.setdefault(drift.side, []).append(drift.measured.vector - part)
-    sides = [np.mean(vectors, axis=0) for vectors in left.values()]
-    found = np.mean(sides, axis=0)
-    raw = [np.mean(vectors, axis=0) for vectors in measured.values()]
-    apart = 0.5 * (raw[0] - raw[-1]) if len(raw) > 1 else None
+    measured = np.array([drift.measured.vector for drift in drifts])
+    left = measured - np.array([drift.by_wind if modelled else (0.0, 0.0) for drift in drifts])
+    sides = [[row for row, drift in enumerate(drifts) if drift.side == side] for side in _sides(drifts)]
+    both = len(sides) > 1
+    found = np.mean([left[rows].mean(axis=0) for rows in sides], axis=0)
+    apart = 0.5 * (measured[sides[0]].mean(axis=0) - measured[sides[-1]].mean(axis=0))
     spreads = [drift.measured.spread_mps for drift in drifts if drift.measured.spread_mps is not None]
-    # Of turns of one side, and of the two sides after the model's part: what is left is not understood.
-    scatter = [vector - found for vectors in left.values() for vector in vectors]
-    unexplained = float(np.sqrt(np.mean(np.square(scatter)) / max(1, len(scatter) - 1))) if len(scatter) > 1 else 0.0
-    if len(raw) > 1 and not modelled:
-        unexplained = 0.0  # the two sides differ by the wind, which the mean does not hold
+    # Of turns of one side, and of the two sides after the model's part: what is left is not understood. Without a model
+    # the two sides differ by the wind, which the mean does not hold.
+    unexplained = 0.0
+    if len(drifts) > 1 and (modelled or not both):
+        unexplained = float(np.sqrt(np.mean((left - found) ** 2) / (len(drifts) - 1)))
     ways = {(True, True): "by both sides and the model", (True, False): "by both sides", (False, True): "by the model"}
     return SiteCurrent(
         speed_mps=float(np.hypot(*found)),
         towards_deg=math.degrees(math.atan2(found[1], found[0])) % 360.0,
         error_mps=math.hypot(max(spreads, default=0.0) / math.sqrt(2), unexplained),
         spread_mps=max(spreads, default=None),
-        wind_share_mps=None if apart is None else float(np.hypot(*apart)),
-        separated=ways.get((len(raw) > 1, modelled), ""),
+        wind_share_mps=float(np.hypot(*apart)) if both else None,
+        separated=ways.get((both, modelled), ""),
     )
+
+
+def _sides(drifts: Sequence[TurnDrift]) -> list[str]:
+    """Sides to which there are turns, in the order of the drifts."""
+    return list(dict.fromkeys(drift.side for drift in drifts))
 
 
 def _figures(raw: Tried, still: Tried, found: Prediction) -> list[OfficeFigure]:
@@ -560,24 +564,7 @@ def _cautions(
         found.append(caution(f"DRAUGHTS ARE NOT RECORDED: {taken}; give draught_fore_m and draught_aft_m"))
     if not count and not state.at_full_load:
         found.append(caution("without members, intervals and probabilities hold the errors of reading alone"))
-    if current is not None and not current.separated:
-        found.append(
-            caution(
-                "CURRENT AND WIND ARE NOT SEPARATED: the turns go to one side and no wind is known; the drift that is "
-                "taken off holds both"
-            )
-        )
-    if (
-        current is not None
-        and (apart := current.wind_share_mps or 0.0) > WIND_SHOWS
-        and "model" not in current.separated
-    ):
-        found.append(
-            caution(
-                f"WIND IS NOT TAKEN OFF: turns to port and starboard drift apart by {2 * apart:.2f} m/s, which a wind "
-                "does that nobody recorded; figures hold its effect: give wind_speed_mps and wind_from_deg"
-            )
-        )
+    found += _of_current(current) if current is not None else []
     if current is None and any(one.trial is not None for one in trials):
         least = math.degrees(STEADY_FROM + LEAST_ARC)
         reason = f"no record is of a turn of {least:.0f} deg or more, which would show it"
@@ -587,6 +574,26 @@ def _cautions(
             caution(
                 f"EXTRAPOLATED to full load: the formulas for the loading do not hold from {state.draught_m:.3g} m to "
                 f"{state.full_load_draught_m:.3g} m ({validity:.2f} of 1), and no criterion is certified"
+            )
+        )
+    return found
+
+
+def _of_current(current: SiteCurrent) -> list[Notice]:
+    """Cautions on a wind that is taken off with the current, or is not taken off."""
+    found = []
+    if not current.separated:
+        found.append(
+            caution(
+                "CURRENT AND WIND ARE NOT SEPARATED: the turns go to one side and no wind is known; the drift that is "
+                "taken off holds both"
+            )
+        )
+    if (apart := current.wind_share_mps or 0.0) > WIND_SHOWS and "model" not in current.separated:
+        found.append(
+            caution(
+                f"WIND IS NOT TAKEN OFF: turns to port and starboard drift apart by {2 * apart:.2f} m/s, which a wind "
+                "does that nobody recorded; figures hold its effect: give wind_speed_mps and wind_from_deg"
             )
         )
     return found

@@ -151,6 +151,22 @@ def _judged(
     known = [load for load in loads if load is not None]
     if len(known) < len(loads):
         return judged
+    middle, spread = _worse_side(chosen, known, figure)
+    probability = _probability(math.log(limit) - middle, spread)
+    words = _verdict(probability)
+    if validity < LOADING_HOLDS:
+        words = f"{'undecided' if words == 'pass' else words}, {EXTRAPOLATED}"
+    at_load = max(centre for centre, _ in known) / scale
+    return replace(judged, full_load=at_load, probability=probability, verdict=words)
+
+
+def _worse_side(
+    chosen: Sequence[tuple[Tried, Tried, Prediction]], known: Sequence[tuple[float, float]], figure: str
+) -> tuple[float, float]:
+    """Logarithm of the worse side at full load and its standard deviation; errors that both sides share do not add up.
+
+    `known` is each side with the standard error of its logarithm.
+    """
     draws = []
     for place, ((_, still, prediction), (centre, _)) in enumerate(zip(chosen, known, strict=True)):
         ratios = prediction.ratios.get(figure, np.zeros(0))
@@ -158,16 +174,10 @@ def _judged(
         share = still.errors.get(figure, 0.0) / still.figures[figure]
         draws.append(math.log(centre) + ratios - np.median(ratios) + share * noise if len(ratios) else np.zeros(0))
     shortest = min(len(draw) for draw in draws)
-    middle, spread = max((math.log(centre), error) for centre, error in known)
-    if shortest > 1:  # errors that both sides share do not add up
+    if shortest > 1:
         worst = np.max([draw[:shortest] for draw in draws], axis=0)
-        middle, spread = float(np.median(worst)), robust_deviation(worst)
-    probability = _probability(math.log(limit) - middle, spread)
-    words = _verdict(probability)
-    if validity < LOADING_HOLDS:
-        words = f"{'undecided' if words == 'pass' else words}, {EXTRAPOLATED}"
-    at_load = max(centre for centre, _ in known) / scale
-    return replace(judged, full_load=at_load, probability=probability, verdict=words)
+        return float(np.median(worst)), robust_deviation(worst)
+    return max((math.log(centre), error) for centre, error in known)
 
 
 def _is_trial_of(criterion: str, one: Tried) -> bool:

@@ -179,13 +179,13 @@ def fit(target: Array | Complex, regressors: Sequence[Array | Complex]) -> WeakF
     inverse = np.linalg.inv(design.T @ design)
     rows, terms = design.shape
     plain = inverse * (residual @ residual) / (rows - terms)
-    robust = inverse @ _newey_west(design * residual[:, None], lags) @ inverse * rows / (rows - terms)
+    robust = inverse @ newey_west(design * residual[:, None], lags) @ inverse * rows / (rows - terms)
     errors = np.sqrt(np.maximum(np.diag(plain), np.diag(robust)))
     return WeakFit(values / size, errors / size, float(np.sqrt(np.mean(residual**2))), freedom)
 
 
-def _newey_west(scores: Array, lags: int) -> Array:
-    """Covariance of the sum of scores (n, k) that are correlated over some rows (statsmodels takes 65 MB for it)."""
+def newey_west(scores: Array, lags: int) -> Array:
+    """Covariance (k, k) of the sum of `scores` (n, k) that correlate over up to `lags` rows (Newey & West 1987)."""
     found = scores.T @ scores
     for lag in range(1, min(lags, len(scores) - 1) + 1):
         product = scores[lag:].T @ scores[:-lag]

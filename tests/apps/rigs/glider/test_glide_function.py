@@ -42,6 +42,9 @@ def test_what_cannot_be_asked_is_refused_at_its_place(glider: t2s.Ship, tmp_path
     with pytest.raises(t2s.InputError) as refusal:
         glider.glide(programme=tmp_path / "none.csv", views=False)
     assert str(refusal.value.source).endswith("none.csv")
+    for budget, depth in ((0, 100), (-1, 100), (10, 0), (math.nan, 100), (10, math.inf)):
+        with pytest.raises(t2s.InputError, match="give a finite number above 0"):
+            glider.glide(budget_kg=budget, depth_m=depth, views=False)
     for angle in (20, 95, math.nan):
         with pytest.raises(t2s.InputError) as refusal:
             glider.glide(angle, views=False)

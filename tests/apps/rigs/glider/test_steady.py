@@ -220,9 +220,3 @@ def test_the_work_of_the_pump_is_what_the_drag_takes() -> None:
     assert found.range_m == pytest.approx(60 * 2 * 150 / math.tan(math.radians(33)))
     assert found.duration_s == pytest.approx(found.range_m / glide.horizontal_speed_mps)
     assert found.energy_J == pytest.approx(glide.drag_N * glide.speed_mps * found.duration_s, rel=1e-12)
-
-
-@pytest.mark.parametrize(("budget", "depth"), [(0, 100), (-1, 100), (10, 0), (math.nan, 100), (10, math.inf)])
-def test_budgets_and_depths_that_are_none_are_refused(budget, depth) -> None:
-    with pytest.raises(InputError, match="positive"):
-        glide_range(PROBE, best_glide(PROBE), budget_kg=budget, depth_m=depth)

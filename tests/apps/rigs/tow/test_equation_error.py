@@ -1,7 +1,6 @@
 """The paper's method, by constant and varying forces: polynomial, inner products, solution; the truth comes back."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,10 +20,12 @@ from tank2sim.apps.rigs.tow.equation_error import (
     solve_normal_equations,
 )
 from tank2sim.apps.rigs.tow.identify import identify_tow, tow_card_text
-from tank2sim.apps.rigs.tow.output_error import TowOptions, fit_speeds
-from tank2sim.apps.rigs.tow.records import Tows, force_words, parse_force
+from tank2sim.apps.rigs.tow.output_error import TowModel, fit_speeds
+from tank2sim.apps.rigs.tow.records import force_words, parse_force
+from tank2sim.apps.rigs.tow.study import SIMPLE, SIMPLE_LATE
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import scaled_condition
+from tests.apps.rigs.tow.made_tows import tows_of
 
 TERMS = ("B1", "B2", "B3")
 TIMES_S = np.arange(0, 51, 5.0)
@@ -91,7 +92,7 @@ def test_speed_polynomial_of_table_1(table_1):
 )
 def test_speed_polynomials_of_the_printed_means(degree, expected):
     means = np.array([0, 0.0148, 0.0282, 0.0536, 0.074, 0.095, 0.11, 0.1224, 0.1408, 0.1524, 0.169])
-    tows = Tows(Path("means.csv"), ("speed_1_mps",), TIMES_S, means[:, None])
+    tows = tows_of(TIMES_S, means)
     np.testing.assert_allclose(fit_mean_speed(tows, degree).polynomial.coef, expected, rtol=5e-4)
 
 
@@ -102,9 +103,7 @@ def test_mass_of_the_mean_tow_and_of_each_tow(table_1):
 
     assert mass(table_1) == pytest.approx(2857, abs=0.5)
     for number, expected in enumerate([3063, 3124, 2742, 2687, 2816]):
-        read = ~np.isnan(table_1.speed_mps[:, number])
-        one = replace(table_1, time_s=table_1.time_s[read], speed_mps=table_1.speed_mps[read][:, [number]])
-        assert mass(one) == pytest.approx(expected, abs=0.6)
+        assert mass(table_1.only(number)) == pytest.approx(expected, abs=0.6)
 
 
 @pytest.mark.parametrize("solve", [solve_normal_equations, solve_by_qr])
@@ -112,7 +111,7 @@ def test_the_truth_comes_back_from_a_tow_in_closed_form(solve):
     mass, b3, force = 3000.0, 150.0, 11.63
     top, time_constant = np.sqrt(force / b3), mass / np.sqrt(force * b3)
     times = np.linspace(0, 80, 81)
-    tows = Tows(Path("exact.csv"), ("speed_1_mps",), times, (top * np.tanh(times / time_constant))[:, None])
+    tows = tows_of(times, top * np.tanh(times / time_constant))
     speed = fit_mean_speed(tows, 9).polynomial
     np.testing.assert_allclose(solve(discretise(speed, times, ("B3",), force)), [mass, b3], rtol=1e-5)
 
@@ -160,19 +159,16 @@ def test_scatter_is_that_of_the_readings():
     rng = np.random.default_rng(7)
     times = np.linspace(0, 50, 101)
     speeds = PAPER_SPEED(times)[:, None] + 0.006 * rng.standard_normal((101, 20))
-    tows = Tows(Path("noisy.csv"), tuple(f"speed_{k}_mps" for k in range(1, 21)), times, speeds)
+    tows = tows_of(times, speeds)
     assert fit_mean_speed(tows).scatter_mps == pytest.approx(0.006, rel=0.05)
 
 
 def test_too_few_readings_for_the_polynomial_are_refused():
-    tows = Tows(Path("few.csv"), ("speed_1_mps",), np.arange(4.0), np.arange(4.0)[:, None])
+    tows = tows_of(np.arange(4.0), np.arange(4.0), "few.csv")
     with pytest.raises(
         InputError, match=r"few\.csv: 3 readings after the release do not test a polynomial of degree 2"
     ):
         fit_mean_speed(tows)
-
-
-LATE = TowOptions(start_delay=True)
 
 
 def exact(force, *, mass=3000.0, b3=150.0, delay=0.0, end=60.0):
@@ -181,36 +177,36 @@ def exact(force, *, mass=3000.0, b3=150.0, delay=0.0, end=60.0):
         lambda t, v: (force(t) - b3 * v * abs(v)) / mass, (delay, end), [0.0], rtol=1e-11, atol=1e-13, dense_output=True
     )
     speed = np.where(times > delay, found.sol(np.maximum(times, delay))[0], 0.0)
-    return Tows(Path("exact.csv"), ("speed_1_mps",), times, speed[:, None])
+    return tows_of(times, speed)
 
 
 @pytest.mark.parametrize("force", [Polynomial([11.63]), VARYING])
 def test_output_error_finds_mass_drag_and_start(force):
-    fit = fit_speeds(exact(force, delay=3.3), force, ("B3",), LATE)
+    fit = fit_speeds(exact(force, delay=3.3), force, SIMPLE_LATE)
     np.testing.assert_allclose(fit.estimates, [3000, 150, 3.3], rtol=2e-6)
 
 
 def test_both_methods_know_a_force_that_varies():
     tows = exact(VARYING)
-    result = identify_tow(tows, VARYING, 2243.0, terms=("B3",), speed_degree=9)
+    result = identify_tow(tows, VARYING, 2243.0, model=SIMPLE, speed_degree=9)
     for name in ("paper", "qr", "output_error"):
         np.testing.assert_allclose(result.methods[name].values, [3000, 150], rtol=2e-5)
     assert result.force_N == pytest.approx(12 + 0.1 * 30 - 0.0015 * 1200)  # the mean over 60 s
     assert result.force_polynomial == (12.0, 0.1, -0.0015)
     # the mean alone is another force
-    assert abs(identify_tow(tows, result.force_N, 2243.0, terms=("B3",)).methods["output_error"].values[1] - 150) > 15
+    assert abs(identify_tow(tows, result.force_N, 2243.0, model=SIMPLE).methods["output_error"].values[1] - 150) > 15
 
 
 @settings(max_examples=8, deadline=None)
 @given(pull=st.floats(0.2, 5), pace=st.floats(0.2, 5))
 def test_estimates_scale_with_force_speed_and_not_with_the_delay(table_1, pull, pace):
-    one = fit_speeds(table_1, 11.63, ("B3",), LATE).estimates
-    other = fit_speeds(replace(table_1, speed_mps=pace * table_1.speed_mps), 11.63 * pull, ("B3",), LATE).estimates
+    one = fit_speeds(table_1, 11.63, SIMPLE_LATE).estimates
+    other = fit_speeds(replace(table_1, speed_mps=pace * table_1.speed_mps), 11.63 * pull, SIMPLE_LATE).estimates
     np.testing.assert_allclose(other, [one[0] * pull / pace, one[1] * pull / pace**2, one[2]], rtol=1e-5)
 
 
 def test_a_delay_explains_table_1_and_is_in_the_result(table_1):
-    result = identify_tow(table_1, terms=("B3",), options=LATE)
+    result = identify_tow(table_1, model=SIMPLE_LATE)
     fit = result.methods["output_error"]
     assert fit.unknowns == fit.estimated == ("M", "B3", "delay")
     np.testing.assert_allclose(fit.values, [2772, 185, 2.1], rtol=0.02)
@@ -222,7 +218,7 @@ def test_a_delay_explains_table_1_and_is_in_the_result(table_1):
 
 
 def test_a_known_mass_leaves_the_drag(table_1):
-    result = identify_tow(table_1, terms=("B3",), options=TowOptions(total_mass_kg=2800.0))
+    result = identify_tow(table_1, model=TowModel(("B3",), total_mass_kg=2800.0))
     read = ~np.isnan(table_1.speed_mps) & (table_1.time_s > 0)[:, None]
 
     def squares(b3):
@@ -259,8 +255,8 @@ def test_what_is_no_polynomial_is_refused(text):
     [
         ({"force": Polynomial([11.63, -1.0])}, r"force_N: is -38\.37 N at 50 s, and must pull forward"),
         ({"force": Polynomial([0.0])}, "force_N: is 0 N"),
-        ({"terms": (), "options": TowOptions(total_mass_kg=2800.0)}, "--total-mass-kg: leaves nothing to estimate"),
-        ({"options": TowOptions(total_mass_kg=-1.0)}, "--total-mass-kg: is -1; a positive number was expected"),
+        ({"model": TowModel((), total_mass_kg=2800.0)}, "total_mass_kg: leaves nothing to estimate"),
+        ({"force": 0.0}, "force_N: is 0 N"),
     ],
 )
 def test_faulty_assumptions_are_refused(table_1, asked, said):

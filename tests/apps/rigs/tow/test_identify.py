@@ -2,18 +2,18 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tank2sim.apps.rigs.tow.identify import identify_tow, parse_terms
-from tank2sim.apps.rigs.tow.output_error import simulated_speeds
-from tank2sim.apps.rigs.tow.records import Tows
+from tank2sim.apps.rigs.tow.identify import identify_tow
+from tank2sim.apps.rigs.tow.output_error import TowModel, simulated_speeds
+from tank2sim.apps.rigs.tow.study import SIMPLE
 from tank2sim.apps.rigs.tow.surge import SurgeCoefficients
 from tank2sim.cards import read_card
 from tank2sim.errors import InputError
 from tank2sim.notices import foremost
+from tests.apps.rigs.tow.made_tows import tows_of
 
 # what the paper prints as its solution, which is none of its own equations (papers.md 1.5)
 PRINTED = np.array([2550.0, 92418.0, -26096.0, 2015.0])
@@ -26,15 +26,14 @@ def four_unknowns(table_1):
 
 @pytest.fixture(scope="module")
 def two_unknowns(table_1):
-    return identify_tow(table_1, terms=("B3",))
+    return identify_tow(table_1, model=SIMPLE)
 
 
 def synthetic(coefficients, times, *, tows=5, scatter=0.0, force=11.63):
     rng = np.random.default_rng(11)
     readings = simulated_speeds(coefficients, force, times)[:, None] + scatter * rng.standard_normal((len(times), tows))
     readings[times == 0] = 0
-    names = tuple(f"speed_{k}_mps" for k in range(1, tows + 1))
-    return Tows(Path("synthetic.csv"), names, times, readings)
+    return tows_of(times, readings)
 
 
 def test_the_paper_and_qr_agree_and_differ_from_the_printed_solution(four_unknowns):
@@ -76,7 +75,7 @@ def test_warnings_on_table_1_with_four_unknowns(four_unknowns):
 
 
 def test_three_unknowns_are_still_too_many(table_1):
-    text = "\n".join(identify_tow(table_1, terms=("B3", "B2")).notices)
+    text = "\n".join(identify_tow(table_1, model=TowModel(("B2", "B3"))).notices)
     assert "M, B2, B3 cannot all be identified" in text
     assert "output_error: not distinguishable from zero at 95 %: B2" in text
 
@@ -90,7 +89,7 @@ def test_two_unknowns_only_show_the_late_start(two_unknowns):
 def test_tows_that_follow_the_model_give_no_warning_and_their_coefficients():
     truth = SurgeCoefficients(total_mass_kg=3000.0, B3_kgpm=150.0)
     tows = synthetic(truth, np.arange(0, 81, 5.0), scatter=0.001)
-    result = identify_tow(tows, 11.63, 2243.0, terms=("B3",), speed_degree=4)
+    result = identify_tow(tows, 11.63, 2243.0, model=SIMPLE, speed_degree=4)
     assert result.notices == ()
     for name in ("qr", "output_error"):
         fit = result.methods[name]
@@ -102,7 +101,7 @@ def test_tows_that_follow_the_model_give_no_warning_and_their_coefficients():
 def test_a_polynomial_that_cannot_follow_the_speed_is_reported():
     truth = SurgeCoefficients(total_mass_kg=3000.0, B3_kgpm=150.0)
     tows = synthetic(truth, np.arange(0, 401, 5.0), scatter=0.001)
-    warnings = identify_tow(tows, 11.63, 2243.0, terms=("B3",)).notices
+    warnings = identify_tow(tows, 11.63, 2243.0, model=SIMPLE).notices
     assert any("a speed polynomial of degree 2 does not follow the tows" in warning for warning in warnings)
 
 
@@ -119,19 +118,19 @@ def test_a_polynomial_that_cannot_follow_the_speed_is_reported():
 )
 def test_an_added_mass_that_no_body_has_is_marked_with_the_likely_unit(table_1, force, mass, unit, named):
     tows = replace(table_1, speed_mps=unit * table_1.speed_mps)
-    found = foremost(identify_tow(tows, force, mass, terms=("B3",)).notices)
+    found = foremost(identify_tow(tows, force, mass, model=SIMPLE).notices)
     assert found and all(message.leads and "added mass" in message and named in message for message in found)
 
 
 def test_the_added_mass_of_the_paper_is_not_marked(table_1):
-    for terms in (("B3",), ("B3", "B2", "B1")):
-        assert not foremost(identify_tow(table_1, terms=terms).notices)
+    for terms in (("B3",), ("B1", "B2", "B3")):
+        assert not foremost(identify_tow(table_1, model=TowModel(terms)).notices)
 
 
 def test_what_is_given_comes_before_the_file_and_is_reported(table_1):
-    result = identify_tow(table_1, 2 * 11.63, terms=("B3",))
+    result = identify_tow(table_1, 2 * 11.63, model=SIMPLE)
     # (1.5) is linear in the force: twice the force with the same speeds gives twice of everything
-    reference = identify_tow(table_1, terms=("B3",))
+    reference = identify_tow(table_1, model=SIMPLE)
     for name, fit in result.methods.items():
         np.testing.assert_allclose(fit.values, 2 * reference.methods[name].values, rtol=1e-6)
     assert "The file of the tows states force_N 11.63; 23.26 was given and used." in result.notices
@@ -158,33 +157,17 @@ def test_the_bundled_card_holds_the_output_error_fit(two_unknowns):
     assert card.model.valid_speed_mps == (0.0, two_unknowns.top_speed_mps)
 
 
-def test_terms_from_text():
-    assert parse_terms("B3,B2,B1") == ("B1", "B2", "B3")
-    assert parse_terms(" B3 ") == ("B3",)
-    assert parse_terms("none") == ()
-    for text, name in (("B3,B4", "B4"), ("B3,B3", "B3")):
-        with pytest.raises(InputError) as refusal:
-            parse_terms(text)
-        assert refusal.value.source == "--terms" and name in refusal.value.problem and refusal.value.remedy
-
-
-@pytest.mark.parametrize(
-    ("force", "mass", "said"),
-    [
-        (None, 1.0, "does not state force_N; give --force-N, or add a line '# force_N: VALUE'"),
-        (1.0, None, "does not state mass_kg; give --mass-kg"),
-        (0.0, 1.0, "--force-N: is 0; a positive number was expected"),
-        (1.0, float("nan"), "--mass-kg: is nan; a positive number was expected"),
-    ],
-)
-def test_force_and_mass_must_be_known_and_positive(table_1, force, mass, said):
-    with pytest.raises(InputError, match=re.escape(said)):
-        identify_tow(replace(table_1, force_N=None, mass_kg=None), force, mass)
+def test_force_and_mass_must_be_known(table_1):
+    bare = replace(table_1, force_N=None, mass_kg=None)
+    for force, mass, name in ((None, 1.0, "force_N"), (1.0, None, "mass_kg")):
+        said = f"does not state {name}; give {name}, or add a line '# {name}: VALUE'"
+        with pytest.raises(InputError, match=re.escape(said)):
+            identify_tow(bare, force, mass)
 
 
 def speeds_of(function):
     times = np.arange(0, 51, 5.0)
-    return Tows(Path("tow.csv"), ("speed_1_mps",), times, np.array([[function(t)] for t in times]))
+    return tows_of(times, [function(t) for t in times], "tow.csv")
 
 
 @pytest.mark.parametrize(

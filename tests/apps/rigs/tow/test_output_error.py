@@ -1,19 +1,17 @@
 """The fit of the integrated speeds: the re-analysis of the tows, closed forms, sensitivities."""
 
-from dataclasses import replace
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 from scipy import stats
 from scipy.integrate import solve_ivp
 
-from tank2sim.apps.rigs.tow.output_error import TowOptions, fit_speeds, simulated_speeds, speed_predictor
-from tank2sim.apps.rigs.tow.records import Tows
+from tank2sim.apps.rigs.tow.output_error import TowModel, fit_speeds, simulated_speeds, speed_predictor
+from tank2sim.apps.rigs.tow.study import SIMPLE
 from tank2sim.apps.rigs.tow.surge import SurgeCoefficients
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import scaled_condition
+from tests.apps.rigs.tow.made_tows import tows_of
 
 FORCE_N = 11.63
 
@@ -29,7 +27,7 @@ FORCE_N = 11.63
     ],
 )
 def test_table_1_gives_the_estimates_of_the_reanalysis(table_1, terms, estimates, half_widths, scatter, condition):
-    fit = fit_speeds(table_1, FORCE_N, terms)
+    fit = fit_speeds(table_1, FORCE_N, TowModel(terms))
     found = stats.t.ppf(0.975, 48 - len(estimates)) * np.sqrt(np.diag(fit.covariance))
     np.testing.assert_allclose(fit.estimates, estimates, rtol=0.01)
     np.testing.assert_allclose(found, half_widths, rtol=0.04)
@@ -40,9 +38,7 @@ def test_table_1_gives_the_estimates_of_the_reanalysis(table_1, terms, estimates
 def test_each_tow_alone(table_1):
     expected = [(3374, 56), (3350, 37), (3100, 89), (2898, 185), (3067, 103)]
     for number, pair in enumerate(expected):
-        read = ~np.isnan(table_1.speed_mps[:, number])
-        one = replace(table_1, time_s=table_1.time_s[read], speed_mps=table_1.speed_mps[read][:, [number]])
-        np.testing.assert_allclose(fit_speeds(one, FORCE_N, ("B3",)).estimates, pair, atol=0.6)
+        np.testing.assert_allclose(fit_speeds(table_1.only(number), FORCE_N, SIMPLE).estimates, pair, atol=0.6)
 
 
 def test_speeds_are_those_of_the_closed_form_at_uneven_times():
@@ -56,17 +52,17 @@ def test_speeds_are_those_of_the_closed_form_at_uneven_times():
 
 
 @pytest.mark.parametrize(
-    ("terms", "force", "options", "point"),
+    ("model", "force", "point"),
     [
-        (("B1", "B2", "B3"), FORCE_N, TowOptions(), [3000.0, 20000.0, 500.0, 100.0]),
-        (("B2", "B3"), Polynomial([12.0, 0.1, -0.0015]), TowOptions(start_delay=True), [3000.0, 500.0, 100.0, 6.3]),
+        (TowModel(), FORCE_N, [3000.0, 20000.0, 500.0, 100.0]),
+        (TowModel(("B2", "B3"), start_delay=True), Polynomial([12.0, 0.1, -0.0015]), [3000.0, 500.0, 100.0, 6.3]),
     ],
 )
-def test_sensitivities_are_those_of_differences(terms, force, options, point):
+def test_sensitivities_are_those_of_differences(model, force, point):
     point = np.array(point)
-    predict = speed_predictor(np.array([0.0, 5, 20, 50]), force, terms, options)
+    predict = speed_predictor(np.array([0.0, 5, 20, 50]), force, model)
     sensitivity = predict(point)[1]
-    at_rest = 2 if options.start_delay else 1
+    at_rest = 2 if model.start_delay else 1
     assert np.all(sensitivity[:at_rest] == 0)
     for k, value in enumerate(point):
         change = np.zeros(4)
@@ -92,8 +88,8 @@ def test_the_truth_comes_back_from_exact_tows(truth, force, end_s):
     speeds = solve_ivp(rate, (0, end_s), [0.0], t_eval=times, rtol=1e-11, atol=1e-13).y[0]
     readings = np.column_stack([speeds, speeds])
     readings[3, 1] = np.nan
-    tows = Tows(Path("exact.csv"), ("speed_1_mps", "speed_2_mps"), times, readings)
-    fit = fit_speeds(tows, force, tuple(name for name in truth if name != "M"))
+    tows = tows_of(times, readings)
+    fit = fit_speeds(tows, force, TowModel(tuple(name for name in truth if name != "M")))
     np.testing.assert_allclose(fit.estimates, list(truth.values()), rtol=1e-5)
 
 
@@ -107,14 +103,13 @@ def test_standard_errors_are_the_spread_of_repeated_tows():
     for _ in range(150):
         noise = 0.006 * rng.standard_normal((11, 5))
         noise[0] = 0
-        tows = Tows(Path("noisy.csv"), tuple("12345"), times, exact[:, None] + noise)
-        fits.append(fit_speeds(tows, FORCE_N, ("B3",)))
+        fits.append(fit_speeds(tows_of(times, exact[:, None] + noise), FORCE_N, SIMPLE))
     spread = np.std([fit.estimates for fit in fits], axis=0)
     reported = np.median([np.sqrt(np.diag(fit.covariance)) for fit in fits], axis=0)
     np.testing.assert_allclose(reported, spread, rtol=0.2)
 
 
 def test_too_few_readings_are_refused():
-    tows = Tows(Path("few.csv"), ("speed_1_mps",), np.arange(3.0), np.array([[0.0], [0.1], [0.2]]))
+    tows = tows_of(np.arange(3.0), [0.0, 0.1, 0.2], "few.csv")
     with pytest.raises(InputError, match=r"few\.csv: 2 readings after the release do not test 2 estimates"):
-        fit_speeds(tows, FORCE_N, ("B3",))
+        fit_speeds(tows, FORCE_N, SIMPLE)

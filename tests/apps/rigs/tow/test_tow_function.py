@@ -65,8 +65,10 @@ def test_a_force_is_a_number_or_a_polynomial(path):
     ("options", "source"),
     [
         ({"method": "magic"}, "method"),
-        ({"terms": ["B4"]}, "--terms"),
-        ({"length_m": -3.0}, "--length-m"),
+        ({"terms": ["B4"]}, "terms"),
+        ({"terms": "B3,B3"}, "terms"),
+        ({"length_m": -3.0}, "length_m"),
+        ({"mass_kg": float("nan")}, "mass_kg"),
         ({"force_N": [1.0, -1.0]}, "force_N"),
     ],
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -13,8 +12,10 @@ from tank2sim.errors import InputError
 
 def found(value: float | None, error: float | None = None) -> SimpleNamespace:
     estimate = SimpleNamespace(added_inertia_kgm2=value, added_inertia_standard_error_kgm2=error)
-    record = SimpleNamespace(path=Path("yaw.csv"), constants={"water_density_kgpm3": 1000.0})
-    return SimpleNamespace(records=[record], methods={"output_error": estimate})
+    return SimpleNamespace(records=["yaw.csv"], methods={"output_error": estimate})
+
+
+RECORDS = [SimpleNamespace(constants={"water_density_kgpm3": 1000.0})]
 
 
 @pytest.mark.parametrize(("value", "error"), [(-0.01, 0.02), (0.0, 0.02), (-0.01, None)])
@@ -31,10 +32,10 @@ def test_an_added_inertia_that_is_not_known_is_refused() -> None:
 
 def test_nrdot_is_less_than_zero_and_its_error_has_the_same_scale() -> None:
     """1/2 rho L^5 is 16000 kg m2 in water of 1000 kg/m3 at 2 m."""
-    assert nrdot_prime(found(0.32, 0.016), "output_error", 2.0) == pytest.approx((-2e-5, 1e-6))
-    assert nrdot_prime(found(0.32), "output_error", 2.0) == (pytest.approx(-2e-5), None)
+    assert nrdot_prime(found(0.32, 0.016), RECORDS, "output_error", 2.0) == pytest.approx((-2e-5, 1e-6))
+    assert nrdot_prime(found(0.32), RECORDS, "output_error", 2.0) == (pytest.approx(-2e-5), None)
 
 
 def test_the_length_of_the_model_must_be_known() -> None:
     with pytest.raises(InputError, match="does not state the length of the model"):
-        nrdot_prime(found(0.32), "output_error", None)
+        nrdot_prime(found(0.32), RECORDS, "output_error", None)

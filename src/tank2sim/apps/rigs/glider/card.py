@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field
 
 from tank2sim.cards.card import Card
-from tank2sim.cards.form import BodyModel, BodySection, CardSection, Environment, Mass, Positive, TimeConstant
-
-
-class GliderModel(BodyModel):
-    """``[model]`` of an underwater glider."""
-
-    kind: Literal["glider"]
+from tank2sim.cards.form import CardSection, Mass, Positive, TimeConstant
 
 
 class Glider(CardSection):
@@ -41,19 +35,8 @@ class Glider(CardSection):
     roll_time_constant_s: TimeConstant = 5.0
 
 
-class GliderForm(CardSection):
-    """The card of an underwater glider, as in its file."""
-
-    format: Literal["tank2sim-ship/1"]
-    ship: BodySection
-    environment: Environment = Environment()
-    model: GliderModel
-    glider: Glider
-
-
 @dataclass(frozen=True)
 class GliderCard(Card):
     """Card of an underwater glider: paper 5 (Kulikovsky and Velikanov 2012), SI."""
 
-    model: GliderModel
     glider: Glider

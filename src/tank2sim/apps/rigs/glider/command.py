@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tank2sim.api.verbs import verb
-from tank2sim.arguments import AngleArgument, NumberArgument, PositiveArgument
+from tank2sim.arguments import AngleArgument, PositiveArgument
 
 if TYPE_CHECKING:
     from tank2sim.apps.rigs.glider.path import GlideProgramme
@@ -34,8 +34,8 @@ def glide(
     reference_area_m2: PositiveArgument | None = None,
     programme: GlideProgramme | str | Path | None = None,
     as_printed: bool = False,
-    budget_kg: NumberArgument | None = None,
-    depth_m: NumberArgument | None = None,
+    budget_kg: PositiveArgument | None = None,
+    depth_m: PositiveArgument | None = None,
     views: bool = True,
 ) -> GlideResult:
     """Fly an underwater glider: steady glides, the path of a programme, the best glides and their range.

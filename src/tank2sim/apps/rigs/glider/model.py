@@ -105,23 +105,23 @@ def _inputs(card: GliderCard) -> tuple[Input, ...]:
     def angle(name: str, description: str, start: float, nominal: float) -> Input:
         half = math.pi / 2
         return Input(
-            name=f"{name}.command",
-            unit="rad",
+            f"{name}.command",
+            "rad",
+            description,
             display_unit="deg",
             start=start,
             nominal=nominal,
             minimum=-half,
             maximum=half,
-            description=description,
         )
 
     return (
         Input(
-            name="buoyancy.command",
-            unit="kg",
+            "buoyancy.command",
+            "kg",
+            "Ordered net buoyancy, displaced mass less own mass: + rises, - sinks",
             start=-card.glider.buoyancy_kg,
             nominal=card.glider.buoyancy_kg,
-            description="Ordered net buoyancy, displaced mass less own mass: + rises, - sinks",
         ),
         angle("pitch", "Ordered pitch, + nose up", -_PITCH, _PITCH),
         angle("roll", "Ordered roll, + starboard side down", 0.0, 0.1),
@@ -132,12 +132,10 @@ def _parameters(card: GliderCard) -> tuple[Parameter, ...]:
     glider = card.glider
 
     def constant(name: str, unit: str, description: str, start: float, least: float = 0.0) -> Parameter:
-        return Parameter(
-            name=name, unit=unit, description=description, start=start, nominal=abs(start) or 1.0, minimum=least
-        )
+        return Parameter(name, unit, description, start=start, nominal=abs(start) or 1.0, minimum=least)
 
     def initial(name: str, unit: str, description: str, start: float = 0.0) -> Parameter:
-        return Parameter(name=f"initial.{name}", unit=unit, description=description, start=start, tunable=False)
+        return Parameter(f"initial.{name}", unit, description, start=start, tunable=False)
 
     seconds = "Time in which {} comes within 37 % of its order"
     return (
@@ -166,9 +164,9 @@ def _parameters(card: GliderCard) -> tuple[Parameter, ...]:
         initial("pitch", "rad", "Pitch at the start, + nose up", -_PITCH),
         initial("roll", "rad", "Roll at the start, + starboard side down"),
         Parameter(
-            name="initial.trim",
-            unit="1",
-            description="True: start in the steady glide of the inputs given (initial.u and .w are then a first guess)",
+            "initial.trim",
+            "1",
+            "True: start in the steady glide of the inputs given (initial.u and .w are then a first guess)",
             boolean=True,
             start=0.0,
             tunable=False,
@@ -197,9 +195,9 @@ def _step(card: GliderCard) -> float:
 def _states(card: GliderCard, inputs: dict[str, Input], parameters: dict[str, Parameter]) -> tuple[State, ...]:
     def motion(name: str, unit: str, description: str, steady: bool = False, nominal: float = 1.0) -> State:
         return State(
-            name=f"motion.{name}",
-            unit=unit,
-            description=description,
+            f"motion.{name}",
+            unit,
+            description,
             nominal=nominal,
             derivative=f"motion.{name}dot",
             start=parameters[f"initial.{name}"].symbol,
@@ -210,9 +208,9 @@ def _states(card: GliderCard, inputs: dict[str, Input], parameters: dict[str, Pa
     def ordered(name: str, what: str, description: str, nominal: float) -> State:
         order = inputs[f"{name}.command"]
         return State(
-            name=f"{name}.{what}",
-            unit=order.unit,
-            description=description,
+            f"{name}.{what}",
+            order.unit,
+            description,
             nominal=nominal,
             derivative=f"{name}.rate",
             start=parameters[f"initial.{name}"].symbol,
@@ -238,9 +236,9 @@ def _rates_of_orders(symbols: dict[str, ca.SX]) -> list[Quantity]:
     """Each control follows its order with a first-order lag."""
     return [
         Quantity(
-            name=f"{name}.rate",
-            unit=unit,
-            description=f"Rate of the {name}",
+            f"{name}.rate",
+            unit,
+            f"Rate of the {name}",
             nominal=nominal,
             value=(symbols[f"{name}.command"] - symbols[state]) / symbols[f"{name}.time_constant"],
         )
@@ -273,7 +271,7 @@ def _dynamics(symbols: dict[str, ca.SX], card: GliderCard) -> list[Quantity]:
 
     def quantity(name: str, unit: str, description: str, value: ca.SX, nominal: float = 1.0) -> Quantity:
         shown = {"rad": "deg", "rad/s": "deg/s"}.get(unit)
-        return Quantity(name=name, unit=unit, description=description, value=value, nominal=nominal, display_unit=shown)
+        return Quantity(name, unit, description, value=value, nominal=nominal, display_unit=shown)
 
     return [
         quantity("motion.xdot", "m/s", "Velocity north", at.horizontal * ca.cos(course)),
@@ -290,9 +288,9 @@ def _dynamics(symbols: dict[str, ca.SX], card: GliderCard) -> list[Quantity]:
         ),
         quantity("force.drag", "N", "Drag, + when it acts against the motion", drag_area * at.speed**2, 0.5 * weight),
         Quantity(
-            name="validity",
-            unit="1",
-            description="1 up to 10 deg of incidence, where the coefficients hold, falling to 0 at 30 deg",
+            "validity",
+            "1",
+            "1 up to 10 deg of incidence, where the coefficients hold, falling to 0 at 30 deg",
             minimum=0.0,
             maximum=1.0,
             value=ca.fmin(1, ca.fmax(0, worth)),

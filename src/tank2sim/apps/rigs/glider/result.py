@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -13,7 +13,17 @@ from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart, look_of
 from tank2sim.answer.charts.motion import History, Signal, history_chart
 from tank2sim.answer.charts.parts import equal_frame, vector
 from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, layer, layered
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, records_table, table
+from tank2sim.answer.parts import (
+    Cell,
+    Column,
+    Illustration,
+    KeyFigure,
+    Section,
+    Table,
+    records_frame,
+    records_table,
+    table,
+)
 from tank2sim.answer.result import Result
 from tank2sim.apps.rigs.glider.study import (
     BalancedGlide,
@@ -21,6 +31,7 @@ from tank2sim.apps.rigs.glider.study import (
     GlideStudy,
     PathPlace,
     QuasiSteadyErrors,
+    Range,
     TransientPath,
 )
 from tank2sim.apps.rigs.glider.transient import ProgrammeError, SwingError
@@ -102,24 +113,17 @@ class GlideResult(Result[GlideStudy]):
     @property
     def glides(self) -> pd.DataFrame:
         """The steady glides at the angles that were given: deg, m/s, m, kg; + up, and starboard side down."""
-        import pandas as pd
-
-        names = [part.name for part in fields(GlideState)]
-        return pd.DataFrame([{name: getattr(glide, name) for name in names} for glide in self.study.states])
+        return records_frame(self.study.states, GlideState)
 
     @property
     def path(self) -> pd.DataFrame:
         """The path of the programme by steady glides, at the ends of its steps; empty without a programme."""
-        import pandas as pd
-
-        return pd.DataFrame([asdict(place) for place in self.study.path])
+        return records_frame(self.study.path, PathPlace)
 
     @property
     def ranges(self) -> pd.DataFrame:
         """How far the ballast carries, for the best and the fastest glide and those given; empty without ballast."""
-        import pandas as pd
-
-        return pd.DataFrame([asdict(each) for each in self.study.design.ranges])
+        return records_frame(self.study.design.ranges, Range)
 
     @property
     def title(self) -> str:
@@ -441,27 +445,32 @@ def _plane(
     arms: Sequence[ChartRecord] = (),
 ) -> ChartSpec:
     """Lines in a plane with one scale; with `arms`, lines of reference with a name at their end, there are no axes."""
-    across = np.concatenate([*(outline[1] for outline in drawn), vector([arm["x"] for arm in arms])])
-    up = np.concatenate([*(outline[2] for outline in drawn), vector([arm["v"] for arm in arms])])
-    frame = equal_frame(across, up, width_px=680, height_px=height_px)
+    labels, across, up = zip(*drawn, strict=True)
+    ends = vector([arm["x"] for arm in arms]), vector([arm["v"] for arm in arms])
+    both = np.concatenate([*across, ends[0]]), np.concatenate([*up, ends[1]])
+    frame = equal_frame(*both, width_px=680, height_px=height_px)
     place = frame.axes(across=("x", titles[0]), up=("v", titles[1]))
     if arms:
         place = {name: axis | {"axis": None} for name, axis in place.items()}
     series = [PlotSeries(label, x=x, y=y, closed=True) for label, x, y in drawn]
     look = look_of(series)
-    rows = [row for each in series for row in each.rows]
     marks = {**place, "color": look.colour, "strokeDash": look.dash, "order": "i:Q"}
-    layers = [layer("line", rows, marks, clip=True)]
-    if arms:
-        along = {**place, "detail": "axis:N", "order": "i:Q"}
-        layers.append(layer("line", arms, along, style="reference", strokeWidth=0.8, clip=True))
-        text = {**place, "text": "name:N"}
-        layers.append(layer("text", arms, text, style="reference", dx=5, align="left", clip=True))
     return layered(
-        layers,
+        [layer("line", [row for each in series for row in each.rows], marks, clip=True), *_arm_layers(arms, place)],
         size=(frame.width_px, frame.height_px),
         window=["x", "y"],
         title=title,
-        description="Paths of " + ", ".join(label for label, _, _ in drawn) + "; both axes have one scale.",
+        description=f"Paths of {', '.join(labels)}; both axes have one scale.",
         usermeta={"equal_scales": True},
     )
+
+
+def _arm_layers(arms: Sequence[ChartRecord], place: ChartSpec) -> list[ChartSpec]:
+    """Lines of reference with their names, if there are any."""
+    if not arms:
+        return []
+    along, text = {**place, "detail": "axis:N", "order": "i:Q"}, {**place, "text": "name:N"}
+    return [
+        layer("line", arms, along, style="reference", strokeWidth=0.8, clip=True),
+        layer("text", arms, text, style="reference", dx=5, align="left", clip=True),
+    ]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -30,6 +31,7 @@ from tank2sim.apps.rigs.glider.transient import (
 )
 from tank2sim.arrays import Array, Columns, Number, Unbounded
 from tank2sim.dynamics.build import build
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.notices import Notice
 from tank2sim.simulation.integrator import NO_COMPILER, Integrator
@@ -95,11 +97,8 @@ class Range:
 def glide_range(card: GliderCard, glide: SteadyGlide, *, budget_kg: float, depth_m: float) -> Range:
     """The range of dives and climbs at the angle and net buoyancy of a glide.
 
-    InputError if budget or depth is not positive, or the glide has no buoyancy or turns.
+    InputError if the glide has no buoyancy or turns.
     """
-    for name, value in (("budget_kg", budget_kg), ("depth_m", depth_m)):
-        if not 0 < value < math.inf:
-            raise ArgumentError(name, "", f"is {value:g}", "a positive number was expected")
     if not glide.buoyancy_kg or glide.turn_rate_radps:
         raise InputError(card.source, "range", "a glide without buoyancy or with roll has no range", "give another")
     size, steep = abs(glide.buoyancy_kg), abs(glide.path_angle_rad)
@@ -178,6 +177,11 @@ class GlideState:
     turning_radius_m: Unbounded
     turn_rate_degps: float
     as_printed: bool
+
+    @classmethod
+    def of(cls, glide: SteadyGlide, **more: Any) -> Self:
+        """The glide in degrees, with `more` fields of a subclass."""
+        return cls(**{part.name: _field(glide, part.name) for part in fields(GlideState)}, **more)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -325,77 +329,89 @@ class GlideStudy:
 def study_glider(card: GliderCard, question: GlideQuestion) -> GlideStudy:
     """Run the study; InputError for an angle or step that cannot be flown, or a budget without depth or the reverse."""
     model = build(card)
-    glides = _glides(card, question)
-    printed = _glides(card, question, as_printed=True) if question.as_printed else ()
-    path, printed_path = (
-        fly(card, question.programme, as_printed=as_printed) if question.programme and asked else None
-        for as_printed, asked in ((False, True), (True, question.as_printed))
-    )
-    integrator = Integrator(model) if path or question.views else None
+    steady = _glides(card, question, steady_glide)
+    printed = _glides(card, question, glide_as_printed) if question.as_printed else []
+    integrator = Integrator(model) if question.programme or question.views else None
     best, fastest = best_glide(card), fastest_glide(card)
-    polar = [_state(glide) for glide in glide_polar(card)]
-    errors = None
-    if question.views and integrator:
-        errors = QuasiSteadyErrors(steps=quasi_steady_error(card, integrator), swings=swing_errors(card, integrator))
     return GlideStudy(
         glider=card.ship.name,
         source=card.ship.source,
         buoyancy_kg=card.glider.buoyancy_kg,
-        states=tuple(
-            AngleGlide(
-                **_state_fields(glide),
-                force_residual_N=force_residual(card, glide),
-                turning_radius_with_added_mass_m=(
-                    equilibrium(model, glide).turning_radius_m if glide.turn_rate_radps else math.inf
-                ),
-                ballast_kg=ballast_kg(card, glide.buoyancy_kg),
-            )
-            for glide in glides
-        ),
+        states=tuple(_at_angle(card, model, glide) for glide in steady),
         design=GlideDesign(
             smallest_angle_deg=math.degrees(abs(best.path_angle_rad)),
-            best_glide=_state(best),
-            fastest_glide=_state(fastest),
-            ranges=tuple(_ranges(card, question, (best, fastest, *glides))),
+            best_glide=GlideState.of(best),
+            fastest_glide=GlideState.of(fastest),
+            ranges=_ranges(card, question, (best, fastest, *steady)),
         ),
-        polar={
-            name: np.array([getattr(state, name) for state in polar])
-            for name in ("path_angle_deg", "horizontal_speed_mps", "climb_mps")
-        },
-        as_printed=tuple(
-            BalancedGlide(**_state_fields(glide), force_residual_N=force_residual(card, glide)) for glide in printed
+        polar=_polar(card),
+        as_printed=tuple(BalancedGlide.of(glide, force_residual_N=force_residual(card, glide)) for glide in printed),
+        **_paths(card, question, integrator),
+        quasi_steady_error=(
+            QuasiSteadyErrors(steps=quasi_steady_error(card, integrator), swings=swing_errors(card, integrator))
+            if question.views and integrator
+            else None
         ),
-        steps=tuple(
-            StepGlide(**_state_fields(glide), duration_s=duration)
-            for glide, duration in (zip(path.glides, path.durations_s, strict=True) if path else ())
-        ),
-        path=_places(path),
-        length_m=path.length_m if path else None,
-        path_histories=path.histories() if path else {},
-        path_as_printed=_places(printed_path),
-        path_as_printed_histories=printed_path.histories() if printed_path else {},
-        transient=_transient(compare_with_steady(integrator, path)) if path and integrator else None,
-        quasi_steady_error=errors,
         notices=(*model.notices, *([NO_COMPILER] if integrator and not integrator.compiled else [])),
     )
 
 
-def _state_fields(glide: SteadyGlide) -> dict[str, Any]:
-    """Fields of :class:`GlideState`."""
-    found = {}
-    for part in fields(GlideState):
-        name = part.name.replace("_degps", "_radps").replace("_deg", "_rad")
-        value = getattr(glide, name)
-        found[part.name] = value if name == part.name else math.degrees(value)
-    return found
+def _glides(card: GliderCard, question: GlideQuestion, equations: Callable[..., SteadyGlide]) -> list[SteadyGlide]:
+    size = question.buoyancy_kg
+    return [
+        equations(
+            card, angle, roll_rad=question.roll_rad, buoyancy_kg=None if size is None else math.copysign(size, angle)
+        )
+        for angle in question.angles_rad
+    ]
 
 
-def _state(glide: SteadyGlide) -> GlideState:
-    return GlideState(**_state_fields(glide))
+def _field(glide: SteadyGlide, name: str) -> Any:
+    """A field of :class:`GlideState`."""
+    own = name.replace("_degps", "_radps").replace("_deg", "_rad")
+    value = getattr(glide, own)
+    return value if own == name else math.degrees(value)
+
+
+def _at_angle(card: GliderCard, model: Model, glide: SteadyGlide) -> AngleGlide:
+    turns = glide.turn_rate_radps != 0
+    return AngleGlide.of(
+        glide,
+        force_residual_N=force_residual(card, glide),
+        turning_radius_with_added_mass_m=equilibrium(model, glide).turning_radius_m if turns else math.inf,
+        ballast_kg=ballast_kg(card, glide.buoyancy_kg),
+    )
+
+
+def _polar(card: GliderCard) -> Columns:
+    polar = [GlideState.of(glide) for glide in glide_polar(card)]
+    names = ("path_angle_deg", "horizontal_speed_mps", "climb_mps")
+    return {name: np.array([getattr(state, name) for state in polar]) for name in names}
+
+
+def _paths(card: GliderCard, question: GlideQuestion, integrator: Integrator | None) -> dict[str, Any]:
+    """Fields of :class:`GlideStudy` on the path of a programme."""
+    programme = question.programme
+    path = fly(card, programme) if programme else None
+    printed = fly(card, programme, as_printed=True) if programme and question.as_printed else None
+    flown = zip(path.glides, path.durations_s, strict=True) if path else ()
+    return {
+        "steps": tuple(StepGlide.of(glide, duration_s=duration) for glide, duration in flown),
+        "path": _places(path),
+        "length_m": path.length_m if path else None,
+        "path_histories": _histories(path),
+        "path_as_printed": _places(printed),
+        "path_as_printed_histories": _histories(printed),
+        "transient": _transient(compare_with_steady(integrator, path)) if path and integrator else None,
+    }
 
 
 def _places(path: GlidePath | None) -> tuple[PathPlace, ...]:
     return tuple(PathPlace(*place[:4], math.degrees(place.heading_rad)) for place in (path.places if path else ()))
+
+
+def _histories(path: GlidePath | None) -> Columns:
+    return path.histories() if path else {}
 
 
 def _transient(found: Compared) -> TransientPath:
@@ -410,21 +426,12 @@ def _transient(found: Compared) -> TransientPath:
     )
 
 
-def _glides(card: GliderCard, question: GlideQuestion, *, as_printed: bool = False) -> list[SteadyGlide]:
-    equations, size = glide_as_printed if as_printed else steady_glide, question.buoyancy_kg
-    return [
-        equations(
-            card, angle, roll_rad=question.roll_rad, buoyancy_kg=None if size is None else math.copysign(size, angle)
-        )
-        for angle in question.angles_rad
-    ]
-
-
-def _ranges(card: GliderCard, question: GlideQuestion, glides: tuple[SteadyGlide, ...]) -> list[Range]:
+def _ranges(card: GliderCard, question: GlideQuestion, glides: Sequence[SteadyGlide]) -> tuple[Range, ...]:
     budget, depth = question.budget_kg, question.depth_m
     if budget is None and depth is None:
-        return []
+        return ()
     if budget is None or depth is None:
         missing = "budget_kg" if budget is None else "depth_m"
         raise ArgumentError(missing, "", "is missing", "a range needs the ballast to expel and the depth")
-    return [glide_range(card, glide, budget_kg=budget, depth_m=depth) for glide in glides if not glide.turn_rate_radps]
+    straight = (glide for glide in glides if not glide.turn_rate_radps)
+    return tuple(glide_range(card, glide, budget_kg=budget, depth_m=depth) for glide in straight)

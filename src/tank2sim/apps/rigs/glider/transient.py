@@ -13,26 +13,22 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import casadi as ca
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from tank2sim.analysis.linearisation import OperatingPoint
 from tank2sim.apps.rigs.glider.card import GliderCard
 from tank2sim.apps.rigs.glider.path import GlidePath, path_of
 from tank2sim.apps.rigs.glider.steady import SteadyGlide, glide_at_pitch, smallest_angle, steady_glide
 from tank2sim.arrays import Array, Columns
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
 from tank2sim.records.thinning import drawn_columns
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.running import Running
+from tank2sim.simulation.straight_course import OperatingPoint, steady_motion
 from tank2sim.simulation.trajectory import Trajectory
 
 SWEEP_DURATIONS_S = (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 """Lengths of a step for :func:`quasi_steady_error`; the paper's period is 100 s."""
-
-_ACCURACY = 1e-12  # m/s2, of the accelerations at an equilibrium
 
 
 class GlideEquilibrium(NamedTuple):
@@ -47,35 +43,19 @@ class GlideEquilibrium(NamedTuple):
 
 
 def equilibrium(model: Model, glide: SteadyGlide) -> GlideEquilibrium:
-    """The equilibrium of the transient model under the pitch, roll and buoyancy of a glide, by CasADi's Newton solver.
+    """The equilibrium of the transient model under the pitch, roll and buoyancy of a glide.
 
-    `glide` is the first guess. Its u and w are constant; on a straight path it is the same glide, in a turn it includes
-    the added mass, which the closed form neglects. InputError if there is none near the glide.
+    `glide` is the first guess. On a straight path it is the same glide; in a turn it includes the added mass, which the
+    closed form neglects. InputError if there is none near the glide.
     """
-    p = model.parameter_values()
     orders = {"buoyancy": glide.buoyancy_kg, "pitch": glide.pitch_rad, "roll": glide.roll_rad}
-    u = model.input_values({f"{name}.command": order for name, order in orders.items()})
-    names = model.state_names
     first = {
-        "motion.u": glide.speed_mps * math.cos(glide.incidence_rad),
-        "motion.w": glide.speed_mps * math.sin(glide.incidence_rad),
-        "buoyancy.mass": glide.buoyancy_kg,
-        "pitch.angle": glide.pitch_rad,
-        "roll.angle": glide.roll_rad,
+        "initial.u": glide.speed_mps * math.cos(glide.incidence_rad),
+        "initial.w": glide.speed_mps * math.sin(glide.incidence_rad),
     }
-    x = np.array([first.get(name, 0.0) for name in names])
-    places = [names.index("motion.u"), names.index("motion.w")]
-    residual = ca.substitute(ca.substitute(model.rates[places], model.u, ca.DM(u)), model.p, ca.DM(p))
-    given = [place for place in range(len(names)) if place not in places]
-    residual = ca.substitute(residual, model.x[given], ca.DM(x[given]))
-    problem = {"x": model.x[places], "g": residual}
-    solver = ca.rootfinder("equilibrium", "newton", problem, {"abstol": _ACCURACY, "error_on_fail": False})
-    x[places] = np.array(solver(x[places], [])).ravel()
-    rates = np.abs(np.array(model.rhs(x, u, p)).ravel()[places])
-    if not np.all(rates < 1e3 * _ACCURACY):
-        raise InputError(
-            model.origin, "", "the transient model has no equilibrium near this glide", "give another angle"
-        )
+    p = model.parameter_values(first | {f"initial.{name}": order for name, order in orders.items()})
+    u = model.input_values({f"{name}.command": order for name, order in orders.items()})
+    x = steady_motion(model, np.array(model.initial(p)).ravel(), u, p)
     y = dict(zip(model.outputs, np.array(model.output(x, u, p)).ravel().tolist(), strict=True))
     turn = y["motion.psidot"]
     ground = y["motion.speed"] * math.cos(y["motion.path_angle"])

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from tank2sim.api.verbs import Output, verb
-from tank2sim.arguments import NumberArgument
+from tank2sim.arguments import PositiveArgument, chosen_names
 from tank2sim.files import CARD
 
 if TYPE_CHECKING:
@@ -33,13 +33,13 @@ def tow(
     tows: str | Path | pd.DataFrame,
     *,
     force_N: float | Sequence[float] | None = None,
-    mass_kg: NumberArgument | None = None,
+    mass_kg: PositiveArgument | None = None,
     terms: str | Sequence[str] = "B3,B2,B1",
     start_delay: bool = False,
-    total_mass_kg: NumberArgument | None = None,
-    length_m: NumberArgument | None = None,
-    beam_m: NumberArgument | None = None,
-    volume_m3: NumberArgument | None = None,
+    total_mass_kg: PositiveArgument | None = None,
+    length_m: PositiveArgument | None = None,
+    beam_m: PositiveArgument | None = None,
+    volume_m3: PositiveArgument | None = None,
     method: Literal["paper", "qr", "output_error"] = "output_error",
     name: str | None = None,
 ) -> TowResult:
@@ -86,17 +86,18 @@ def tow(
     """
     from numpy.polynomial import Polynomial
 
-    from tank2sim.apps.rigs.tow.identify import identify_tow, parse_terms
-    from tank2sim.apps.rigs.tow.output_error import TowOptions
+    from tank2sim.apps.rigs.tow.identify import identify_tow
+    from tank2sim.apps.rigs.tow.output_error import TowModel
     from tank2sim.apps.rigs.tow.records import read_tows
     from tank2sim.apps.rigs.tow.result import TowResult
     from tank2sim.apps.rigs.tow.study import study_tows, towed_body
+    from tank2sim.apps.rigs.tow.surge import DRAG_POWERS
     from tank2sim.records.csv_table import table_or_path
 
     read = read_tows(table_or_path(tows, "tows"))
     force = force_N if force_N is None or isinstance(force_N, int | float) else Polynomial(list(force_N))
-    chosen = parse_terms(terms if isinstance(terms, str) else ",".join(terms) or "none")
-    result = identify_tow(read, force, mass_kg, terms=chosen, options=TowOptions(start_delay, total_mass_kg))
+    model = TowModel(chosen_names("terms", terms, DRAG_POWERS), start_delay, total_mass_kg)
+    result = identify_tow(read, force, mass_kg, model)
     size = {"length_m": length_m, "beam_m": beam_m, "volume_m3": volume_m3}
     study = study_tows(result, read, towed_body(read, result.mass_kg, size))
     return TowResult(study, method, name or read.path.stem)

@@ -13,22 +13,10 @@ from scipy import stats
 
 from tank2sim.apps.rigs.tow.output_error import simulated_speeds
 from tank2sim.apps.rigs.tow.records import Tows
-from tank2sim.apps.rigs.tow.surge import DRAG_POWERS, SurgeCoefficients
+from tank2sim.apps.rigs.tow.surge import DELAY, DRAG_POWERS, TOW_PARAMETERS, SurgeCoefficients
 from tank2sim.arrays import Array, Unbounded
 from tank2sim.identification.conditioning import COLLINEAR, scaled_condition
 from tank2sim.notices import Notice, caution
-
-TOW_PARAMETERS = {
-    "M": "total_mass_kg",
-    "B1": "B1_kgs2pm3",
-    "B2": "B2_kgspm2",
-    "B3": "B3_kgpm",
-    "delay": "start_delay_s",
-}
-"""Unknown of (1.5) to its name with unit, as in :class:`SurgeCoefficients`, the card and the JSON."""
-
-DELAY = "delay"
-"""Unknown that (1.5) does not have: time from t = 0 to the start of the body, s."""
 
 ADDED_SHARES = (0.0, 1.0)
 """Added mass in surge over the mass with the water inside. A sphere has 0.5, slender bodies less (Lamb 1932, art. 92
@@ -122,17 +110,12 @@ class TowFit:
     @property
     def coefficients(self) -> SurgeCoefficients:
         """Mass and drag; terms that were not estimated are 0."""
-        return surge_coefficients(dict(zip(self.unknowns, self.values.tolist(), strict=True)))
+        return SurgeCoefficients.of(dict(zip(self.unknowns, self.values.tolist(), strict=True)))
 
     @property
     def added_mass_kg(self) -> float:
         """lambda11 = M - m."""
         return self.estimates["added_mass_kg"]
-
-
-def surge_coefficients(estimates: Mapping[str, float]) -> SurgeCoefficients:
-    """Mass and drag from unknowns and their values, SI; a delay among them is left out."""
-    return SurgeCoefficients(**{TOW_PARAMETERS[name]: value for name, value in estimates.items() if name != DELAY})
 
 
 def tow_findings(
@@ -141,36 +124,44 @@ def tow_findings(
     """Sentences on terms that are not identifiable, impossible values, and misfits beyond the scatter.
 
     `force` is in N over s, `speed` is v*(t) of the equation error, m/s over s; `designs` are the design matrices (rows,
-    free unknowns) by method. The method of the paper is omitted if QR, with the same estimates, is among the fits.
+    free unknowns) by method. The method of the paper is omitted: QR has the same estimates.
     """
-    chosen = [fit for name, fit in fits.items() if name != "paper" or "qr" not in fits]
+    chosen = [fit for name, fit in fits.items() if name != "paper"]
     yield from _collinear(chosen, designs)
     for fit in chosen:
         yield from _uncertain(fit)
     for fit in chosen:
         yield from _impossible(fit, tows.top_speed_mps)
-    if any(fit.method != "output_error" for fit in chosen):
-        yield from _polynomial_findings(tows, speed, chosen[0])
+    yield from _polynomial_findings(tows, speed, fits["qr"])
     if "output_error" in fits:
-        fit = fits["output_error"]
-        speeds = simulated_speeds(fit.coefficients, force, tows.time_s, fit.start_delay_s)
-        row = _worst_misfit(tows, speeds, len(fit.estimated))
-        if row is not None:
-            fast = speeds[row] - tows.mean_speed_mps[row]
-            yield Notice(
-                f"output_error: the equation does not follow the tows within their scatter: at {tows.time_s[row]:g} s "
-                f"it is {abs(fast):.3g} m/s too {'fast' if fast > 0 else 'slow'}; "
-                f"{'' if fit.start_delay_s else 'a late start or '}a force that it lacks is likely."
-            )
+        yield from _misfit(tows, force, fits["output_error"])
     for first, second in combinations(chosen, 2):
-        if first.errors is None or second.errors is None:
-            continue
-        difference = abs(first.values[0] - second.values[0])
-        if difference > _TWO_SIDED_95 * math.hypot(first.errors[0], second.errors[0]):
-            yield Notice(
-                f"{first.method} and {second.method} differ in M by {difference:.3g} kg, more than their standard "
-                "errors explain; this is the accuracy of the mass."
-            )
+        yield from _difference(first, second)
+
+
+def _misfit(tows: Tows, force: Polynomial, fit: TowFit) -> Iterator[Notice]:
+    """A misfit of the integrated speeds beyond the scatter."""
+    speeds = simulated_speeds(fit.coefficients, force, tows.time_s, fit.start_delay_s)
+    row = _worst_misfit(tows, speeds, len(fit.estimated))
+    if row is not None:
+        fast = speeds[row] - tows.mean_speed_mps[row]
+        yield Notice(
+            f"output_error: the equation does not follow the tows within their scatter: at {tows.time_s[row]:g} s "
+            f"it is {abs(fast):.3g} m/s too {'fast' if fast > 0 else 'slow'}; "
+            f"{'' if fit.start_delay_s else 'a late start or '}a force that it lacks is likely."
+        )
+
+
+def _difference(first: TowFit, second: TowFit) -> Iterator[Notice]:
+    """Masses of two methods that differ by more than their errors."""
+    if first.errors is None or second.errors is None:
+        return
+    difference = abs(first.values[0] - second.values[0])
+    if difference > _TWO_SIDED_95 * math.hypot(first.errors[0], second.errors[0]):
+        yield Notice(
+            f"{first.method} and {second.method} differ in M by {difference:.3g} kg, more than their standard "
+            "errors explain; this is the accuracy of the mass."
+        )
 
 
 def identifiable_terms(fits: Sequence[TowFit], designs: Mapping[str, Array]) -> tuple[str, ...]:

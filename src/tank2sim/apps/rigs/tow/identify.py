@@ -13,24 +13,23 @@ known value.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
 from tank2sim.apps.rigs.tow import equation_error, output_error
-from tank2sim.apps.rigs.tow.findings import DELAY, TOW_PARAMETERS, TowFit, surge_coefficients, tow_findings
-from tank2sim.apps.rigs.tow.output_error import AT_ONCE, TowOptions
+from tank2sim.apps.rigs.tow.findings import TowFit, tow_findings
+from tank2sim.apps.rigs.tow.output_error import WHOLE_EQUATION, TowModel
 from tank2sim.apps.rigs.tow.records import Tows, as_force, checked_force, force_words, mean_force
-from tank2sim.apps.rigs.tow.surge import DRAG_POWERS
+from tank2sim.apps.rigs.tow.surge import DELAY, TOW_PARAMETERS, SurgeCoefficients
 from tank2sim.arrays import Array
-from tank2sim.cards.writing import SurgeResult, surge_card_text
-from tank2sim.errors import InputError
+from tank2sim.cards.writing import card_text
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.identification.conditioning import SINGULAR_CONDITION, correlation_matrix, scaled_condition
 from tank2sim.notices import Notice
-
-TOW_METHODS = ("paper", "qr", "output_error")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -84,22 +83,13 @@ class TowIdentification:
         return Polynomial(self.force_polynomial)
 
 
-def parse_terms(text: str) -> tuple[str, ...]:
-    """Drag terms from an option's text, ``"B3,B2,B1"`` or ``"none"``, in the order of (1.5).
-
-    InputError if a term is unknown or repeated.
-    """
-    return () if text.strip().lower() == "none" else _checked_terms(word.strip() for word in text.split(","))
-
-
 def identify_tow(
     tows: Tows,
     force: float | Polynomial | None = None,
     mass_kg: float | None = None,
+    model: TowModel = WHOLE_EQUATION,
     *,
-    terms: Iterable[str] = tuple(DRAG_POWERS),
     speed_degree: int = 2,
-    options: TowOptions = AT_ONCE,
 ) -> TowIdentification:
     """Estimate the surge mass and drag of (1.5) from tows by a known force from rest.
 
@@ -109,77 +99,58 @@ def identify_tow(
         Towing force, N: a constant, or T(t) over s as in (1.13); by default from the file of the tows.
     mass_kg : float, optional
         Mass m with the water in the body; by default from the file of the tows.
-    terms : iterable of str
-        Drag terms to estimate in addition to M, any of B1, B2, B3; other terms are zero.
+    model : TowModel
+        Unknowns; other drag terms are zero. Output error alone estimates a start delay; the other methods use the
+        polynomial without it.
     speed_degree : int
         Degree of the speed polynomial of the first two methods, at least 2; the paper has 2.
-    options : TowOptions
-        A start delay (of output error; the other methods use the polynomial without delay), or a known M.
 
     Raises
     ------
     InputError
-        Force or mass is missing or not positive, a term is unknown or repeated, no unknown remains, or the tows do not
-        determine the unknowns (too few readings, no motion, no acceleration).
+        Force or mass is missing, the force does not pull forward, no unknown remains, or the tows do not determine the
+        unknowns (too few readings, no motion, no acceleration).
     """
-    pull = (
-        checked_force(force, tows.time_s)
-        if isinstance(force, Polynomial)
-        else as_force(_positive(tows, "force_N", force, tows.force_N))
-    )
-    mass = _positive(tows, "mass_kg", mass_kg, tows.mass_kg)
-    terms = _checked_terms(terms)
-    if speed_degree < 2:
-        raise ValueError(f"degree {speed_degree} below 2")
-    if options.total_mass_kg is not None:
-        _positive(tows, "total_mass_kg", options.total_mass_kg, None)
-        if not terms:
-            raise InputError("--total-mass-kg", "", "leaves nothing to estimate", "take drag terms (--terms B3)")
+    pull = checked_force(as_force(_known(tows, "force_N", force)), tows.time_s)
+    mass = _known(tows, "mass_kg", mass_kg)
+    if model.total_mass_kg is not None and not model.terms:
+        raise ArgumentError("total_mass_kg", "", "leaves nothing to estimate", "take drag terms (--terms B3)")
     speed = equation_error.fit_mean_speed(tows, speed_degree)
-    problem = equation_error.discretise(speed.polynomial, tows.time_s, terms, pull, mass_kg=options.total_mass_kg)
+    problem = equation_error.discretise(speed.polynomial, tows.time_s, model.terms, pull, mass_kg=model.total_mass_kg)
     _check_solvable(tows, problem)
-    solutions = dict(_solutions(tows, speed, problem, pull, options))
+    values, notes = equation_error.solve_by_qr(problem), list(_notes(tows, force, mass))
+    solutions = {
+        "paper": _Solution(equation_error.solve_normal_equations(problem), problem.free_design, None),
+        "qr": _Solution(values, problem.free_design, equation_error.covariance(problem, values, speed)),
+    }
+    if fitted := output_error.fit_speeds(tows, pull, model):
+        solutions["output_error"] = _Solution(fitted.estimates, fitted.design, fitted.covariance)
+    else:
+        notes.append("output_error: the fit did not converge and is left out; take fewer terms (--terms B3).")
     fits = {name: _fit(name, solution, (tows, mass, pull), problem) for name, solution in solutions.items()}
-    designs = {name: design for name, (_, design, _) in solutions.items()}
+    designs = {name: solution.design for name, solution in solutions.items()}
     return TowIdentification(
         tows=str(tows.path),
         force_N=mean_force(pull, tows.time_s),
         force_polynomial=tuple(pull.coef.tolist()),
         mass_kg=mass,
-        terms=terms,
-        start_delay=options.start_delay,
-        given_total_mass_kg=options.total_mass_kg,
+        terms=model.terms,
+        start_delay=model.start_delay,
+        given_total_mass_kg=model.total_mass_kg,
         readings=int(np.sum(tows.counts)),
         top_speed_mps=tows.top_speed_mps,
         speed_polynomial=tuple(speed.polynomial.coef.tolist()),
         methods=fits,
-        notices=(
-            *map(Notice, _notes(tows, force, mass, set(TOW_METHODS) - set(fits))),
-            *tow_findings(tows, pull, speed.polynomial, fits, designs),
-        ),
+        notices=(*map(Notice, notes), *tow_findings(tows, pull, speed.polynomial, fits, designs)),
     )
 
 
-_Solution = tuple[Array, Array, Array | None]
-"""M, the coefficients of the drag terms, and the delay if it is estimated, SI; design without the column of a given M;
-covariance of all of them, None where the method gives none."""
+class _Solution(NamedTuple):
+    """Estimates, SI, M first; design without the column of a known M; covariance of all, where the method gives one."""
 
-
-def _solutions(
-    tows: Tows,
-    speed: equation_error.SpeedFit,
-    problem: equation_error.EquationError,
-    force: Polynomial,
-    options: TowOptions,
-) -> Iterator[tuple[str, _Solution]]:
-    design, known = problem.free_design, problem.known
-    values = equation_error.solve_by_qr(problem)
-    yield "paper", (equation_error.solve_normal_equations(problem), design, None)
-    yield "qr", (values, design, equation_error.covariance(problem, values, speed))
-    fit = output_error.fit_speeds(tows, force, problem.terms, options)
-    if fit is not None:
-        spread = np.pad(fit.covariance, (len(known), 0))
-        yield "output_error", (np.concatenate([known, fit.estimates]), fit.design, spread)
+    estimates: Array
+    design: Array
+    covariance: Array | None
 
 
 def _fit(
@@ -194,7 +165,7 @@ def _fit(
     if spread is not None:
         errors = dict(zip(names, np.sqrt(np.maximum(np.diag(spread), 0.0)).tolist(), strict=True))
         errors["added_mass_kg"] = errors["total_mass_kg"]
-    coefficients = surge_coefficients(dict(zip(unknowns, values.tolist(), strict=True)))
+    coefficients = SurgeCoefficients.of(dict(zip(unknowns, values.tolist(), strict=True)))
     delay = estimates.get(TOW_PARAMETERS[DELAY], 0.0)
     speeds = output_error.simulated_speeds(coefficients, force, tows.time_s, delay)
     return TowFit(
@@ -213,37 +184,26 @@ def _fit(
     )
 
 
-def _notes(tows: Tows, force: float | Polynomial | None, mass_kg: float, failed: set[str]) -> Iterator[str]:
-    used = force if isinstance(force, float | int) else tows.force_N
-    for name, used_value, written in (("force_N", used, tows.force_N), ("mass_kg", mass_kg, tows.mass_kg)):
-        if written is not None and written != used_value:
-            yield f"The file of the tows states {name} {written:g}; {used_value:g} was given and used."
-    if isinstance(force, Polynomial) and tows.force_N is not None:
-        yield f"The file of the tows states force_N {tows.force_N:g}; {force_words(force)} was given and used."
+def _notes(tows: Tows, force: float | Polynomial | None, mass_kg: float) -> Iterator[str]:
+    """Differences of what is given from the file, and a motion at the release."""
+    words = force_words(force) if isinstance(force, Polynomial) else f"{tows.force_N if force is None else force:g}"
+    for name, given, stated in (("force_N", words, tows.force_N), ("mass_kg", f"{mass_kg:g}", tows.mass_kg)):
+        if stated is not None and given != f"{stated:g}":
+            yield f"The file of the tows states {name} {stated:g}; {given} was given and used."
     if tows.time_s[0] == 0 and np.nanmax(np.abs(tows.speed_mps[0])) > 0:
         yield "The speed at t_s = 0 is not zero in every tow; a start from rest at that time is assumed."
-    for method in failed:
-        yield f"{method}: the fit did not converge and is left out; take fewer terms (--terms B3)."
 
 
-def _positive(tows: Tows, name: str, given: float | None, written: float | None) -> float:
-    option = "--" + name.replace("_", "-")
-    value = given if given is not None else written
+_K = TypeVar("_K", bound=float | Polynomial)
+
+
+def _known(tows: Tows, name: str, given: _K | None) -> _K | float:
+    """The number that is given, or that the file states; InputError without one."""
+    value = getattr(tows, name) if given is None else given
     if value is None:
-        raise InputError(tows.path, "", f"does not state {name}", f"give {option}, or add a line '# {name}: VALUE'")
-    if not np.isfinite(value) or value <= 0:
-        raise InputError(option, "", f"is {value:g}", "a positive number was expected")
-    return float(value)
-
-
-def _checked_terms(terms: Iterable[str]) -> tuple[str, ...]:
-    terms = tuple(terms)
-    for term in terms:
-        if term not in DRAG_POWERS:
-            raise InputError("--terms", "", f"{term!r} is not a drag term", "take any of B3,B2,B1, or none")
-        if terms.count(term) > 1:
-            raise InputError("--terms", "", f"{term} is repeated", "give each term once")
-    return tuple(term for term in DRAG_POWERS if term in terms)
+        raise InputError(tows.path, "", f"does not state {name}", f"give {name}, or add a line '# {name}: VALUE'")
+    known: _K | float = value
+    return known
 
 
 def _check_solvable(tows: Tows, problem: equation_error.EquationError) -> None:
@@ -267,14 +227,11 @@ def tow_card_text(
     `fit` is one of ``result.methods``; name of the body, source of the numbers, and length if known.
     """
     values = {key: value for key, value in fit.estimates.items() if key not in ("added_mass_kg", "start_delay_s")}
-    return surge_card_text(
-        SurgeResult(
-            name=name,
-            source=source,
-            values={**values, "force_N": result.force_N, "dry_mass_kg": result.mass_kg},
-            standard_errors={key: value for key, value in fit.standard_errors.items() if key in values},
-            top_speed_mps=result.top_speed_mps,
-            length_m=length_m,
-            notes=" ".join(result.notices),
-        )
+    return card_text(
+        {
+            "ship": {"name": name, "length_m": length_m, "source": source, "notes": " ".join(result.notices)},
+            "model": {"kind": "surge", "valid_speed_mps": [0.0, result.top_speed_mps]},
+            "surge": {**values, "force_N": result.force_N, "dry_mass_kg": result.mass_kg},
+            "uncertainty": {key: value for key, value in fit.standard_errors.items() if key in values},
+        }
     )

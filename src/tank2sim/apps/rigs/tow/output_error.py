@@ -12,7 +12,7 @@ from numpy.polynomial import Polynomial
 
 from tank2sim.apps.rigs.search import WithSlopes, least_misfit, pseudo_inverse
 from tank2sim.apps.rigs.tow.records import Tows, as_force, mean_force
-from tank2sim.apps.rigs.tow.surge import DRAG_POWERS, SurgeCoefficients, surge_model
+from tank2sim.apps.rigs.tow.surge import DELAY, DRAG_POWERS, SurgeCoefficients, surge_model
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
@@ -28,25 +28,29 @@ _LATEST_START = 0.5
 
 
 @dataclass(frozen=True)
-class TowOptions:
-    """Assumptions on the tows in addition to (1.5): a start delay after t = 0, the same in all tows, is estimated; and
-    M, if it is known, is not.
-    """
+class TowModel:
+    """Unknowns: M unless it is known, drag terms in order of (1.5), a start delay after t = 0, one for all tows."""
 
+    terms: tuple[str, ...] = tuple(DRAG_POWERS)
     start_delay: bool = False
     total_mass_kg: float | None = None
 
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """Names of M, also of a known one, of the drag terms, and of the delay."""
+        return ("M", *self.terms, *([DELAY] if self.start_delay else []))
 
-AT_ONCE = TowOptions()
-"""A start at t = 0, and M unknown: as in the paper."""
+
+WHOLE_EQUATION = TowModel()
+"""As in the paper."""
 
 
 @dataclass(frozen=True, eq=False)
 class OutputErrorFit:
     """The least-squares fit of the integrated speeds.
 
-    Estimates (unknowns,) are M (unless known), the drag coefficients and the start delay (if estimated), SI; `design`
-    (readings, unknowns) the sensitivities of the speeds; residuals (readings,) the fitted speed less the reading.
+    Estimates (unknowns,) are in the order of the model, SI; `design` (readings, estimated) has the sensitivities of the
+    speeds to all but a known M; residuals (readings,) are the fitted speed less the reading.
     """
 
     estimates: Array
@@ -61,49 +65,49 @@ class OutputErrorFit:
     @property
     def freedom(self) -> int:
         """Readings less estimates."""
-        return len(self.residuals_mps) - len(self.estimates)
+        return len(self.residuals_mps) - int(self.design.shape[1])
 
     @property
     def covariance(self) -> Array:
-        """Covariance of the estimates, for independent readings of equal variance and a true model."""
+        """Covariance of the estimates, for independent readings of equal variance and a true model; 0 of a known M."""
         inverse = pseudo_inverse(self.design)
-        return self.scatter_mps**2 * inverse @ inverse.T
+        known = len(self.estimates) - len(inverse)
+        covariance: Array = np.pad(self.scatter_mps**2 * inverse @ inverse.T, (known, 0))
+        return covariance
 
 
-def speed_predictor(
-    times_s: Array, force: float | Polynomial, terms: tuple[str, ...], options: TowOptions = AT_ONCE
-) -> WithSlopes:
-    """Speeds of (1.5) from rest (times,), and their sensitivities (times, unknowns), as a function of the estimates.
+def speed_predictor(times_s: Array, force: float | Polynomial, model: TowModel) -> WithSlopes:
+    """Speeds of (1.5) from rest (times,), and their sensitivities (times, estimated), as a function of the estimates.
 
     Estimates are (M, B..., delay), SI; without M if it is known, without delay (>= 0) if it is not estimated. The body
     is at rest until t = 0, or until the start delay, and then moves under T(t) of the same clock. The force of each
     integration step is the mean of T over the step, which preserves the impulse.
     """
     pull = as_force(force)
-    model = _unit_model()
-    names = [*(["total_mass"] if options.total_mass_kg is None else []), *terms]
-    chosen = [model.parameter_names.index(f"surge.{name}") for name in names]
-    width = len(chosen) + options.start_delay
+    equation = _unit_model()
+    names = [*(["total_mass"] if model.total_mass_kg is None else []), *model.terms]
+    chosen = [equation.parameter_names.index(f"surge.{name}") for name in names]
+    width = len(chosen) + model.start_delay
     intervals = np.diff(times_s, prepend=0.0)
-    step = max(model.step_s, float(times_s[-1]) / MOST_STEPS)
+    step = max(equation.step_s, float(times_s[-1]) / MOST_STEPS)
     counts = np.ceil(intervals / step - 1e-9).astype(int)
     along = _sensitive_step(tuple(names), width).mapaccum(int(counts.sum()))
-    mass, row = model.parameter_names.index("surge.total_mass"), model.state_names.index("motion.u")
+    mass, row = equation.parameter_names.index("surge.total_mass"), equation.state_names.index("motion.u")
     places = np.cumsum(counts)
 
     def predict(estimates: Array) -> tuple[Array, Array]:
-        parameters = model.parameter_values()
-        if options.total_mass_kg is not None:
-            parameters[mass] = options.total_mass_kg
+        parameters = equation.parameter_values()
+        if model.total_mass_kg is not None:
+            parameters[mass] = model.total_mass_kg
         parameters[chosen] = estimates[: len(chosen)]
-        begin = float(estimates[-1]) if options.start_delay else 0.0
+        begin = float(estimates[-1]) if model.start_delay else 0.0
         # The steps between two readings are shorter if the start is between them, and zero before the start.
         moving = np.diff(np.maximum(times_s, begin), prepend=begin)
         steps = np.repeat(moving / np.maximum(counts, 1), counts)
         at = begin + np.cumsum(steps) - steps
         pulls = (pull(at) + 4 * pull(at + steps / 2) + pull(at + steps)) / 6
-        start = np.zeros((len(model.states), 1 + width))
-        if options.start_delay:
+        start = np.zeros((len(equation.states), 1 + width))
+        if model.start_delay:
             start[row, -1] = -float(pull(begin)) / parameters[mass]
         path = np.asarray(along(start, steps[None, :], pulls[None, :], parameters))[row].reshape(-1, 1 + width)
         at_times = np.vstack([np.zeros(1 + width), path])[places]
@@ -132,14 +136,11 @@ def simulated_speeds(
     coefficients: SurgeCoefficients, force: float | Polynomial, times_s: Array, start_delay_s: float = 0.0
 ) -> Array:
     """Speed (times,) in m/s of (1.5) from rest, at times >= 0 that rise."""
-    values = [coefficients.total_mass_kg, coefficients.B1_kgs2pm3, coefficients.B2_kgspm2, coefficients.B3_kgpm]
-    predict = speed_predictor(times_s, force, tuple(DRAG_POWERS), TowOptions(start_delay=True))
-    return predict(np.array([*values, start_delay_s]))[0]
+    predict = speed_predictor(times_s, force, TowModel(start_delay=True))
+    return predict(np.array([*vars(coefficients).values(), start_delay_s]))[0]
 
 
-def fit_speeds(
-    tows: Tows, force: float | Polynomial, terms: tuple[str, ...], options: TowOptions = AT_ONCE
-) -> OutputErrorFit | None:
+def fit_speeds(tows: Tows, force: float | Polynomial, model: TowModel) -> OutputErrorFit | None:
     """Least squares of the integrated speeds against all readings after the release; None if it does not converge.
 
     InputError if the readings after the release do not outnumber the estimates.
@@ -147,8 +148,8 @@ def fit_speeds(
     read = ~np.isnan(tows.speed_mps) & (tows.time_s > 0)[:, None]
     row_of_reading = np.nonzero(read)[0]
     readings = tows.speed_mps[read]
-    predict = speed_predictor(tows.time_s, force, terms, options)
-    scale, start, highest = _search(tows, mean_force(as_force(force), tows.time_s), terms, options)
+    predict = speed_predictor(tows.time_s, force, model)
+    scale, start, highest = _search(tows, mean_force(as_force(force), tows.time_s), model)
     if len(readings) <= len(scale):
         problem = f"{len(readings)} readings after the release do not test {len(scale)} estimates"
         raise InputError(tows.path, "", problem, "give more readings, or take fewer terms (--terms B3)")
@@ -163,18 +164,17 @@ def fit_speeds(
         return None
     best = np.where(found.active_mask < 0, 0.0, found.x)
     residuals, design = misfit(best)
-    return OutputErrorFit(best * scale, design / scale, residuals)
+    known = [] if model.total_mass_kg is None else [model.total_mass_kg]
+    return OutputErrorFit(np.concatenate([known, best * scale]), design / scale, residuals)
 
 
-def _search(tows: Tows, force_N: float, terms: tuple[str, ...], options: TowOptions) -> tuple[Array, Array, Array]:
+def _search(tows: Tows, force_N: float, model: TowModel) -> tuple[Array, Array, Array]:
     """Scale of each unknown, and start and upper bound in that scale; the lower bound of a bounded unknown is 0."""
     # The mass that gives the last mean speed without drag, and drag terms as large as the force at the top speed.
     mass = force_N * tows.time_s[-1] / max(tows.mean_speed_mps[-1], 1e-3 * tows.top_speed_mps)
-    drags = [force_N / tows.top_speed_mps ** DRAG_POWERS[term] for term in terms]
-    rows = [(drag, 0.0, np.inf) for drag in drags]
-    if options.total_mass_kg is None:
-        rows.insert(0, (mass, 1.0, np.inf))
-    if options.start_delay:
+    rows = [(mass, 1.0, np.inf)] if model.total_mass_kg is None else []
+    rows += [(force_N / tows.top_speed_mps ** DRAG_POWERS[term], 0.0, np.inf) for term in model.terms]
+    if model.start_delay:
         delay = 0.1 * tows.time_s[-1]
         rows.append((delay, 0.1, _LATEST_START * tows.time_s[-1] / delay))
     scale, start, highest = np.array(rows).T

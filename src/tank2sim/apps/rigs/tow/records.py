@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
+from tank2sim.arguments import numbers_in
 from tank2sim.arrays import Array
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.records.csv_table import LONGEST_RUN_S, CsvTable, read_table
@@ -89,52 +91,51 @@ def read_tows(path: Path | str | CsvTable) -> Tows:
     table = read_table(path)
     table.refuse_misspelt_keys(("force_N", "mass_kg", *BODY_KEYS))
     time = table.increasing("t_s")
+    remedy = "count the time from the release, t_s = 0, in s"
     if time[0] < 0:
-        raise InputError(
-            table.path, table.place(0, "t_s"), "is before the release", "count the time from the release, t_s = 0"
-        )
+        raise InputError(table.path, table.place(0, "t_s"), "is before the release", remedy)
     if time[-1] > LONGEST_RUN_S:
         problem = f"is {time[-1]:.10g} s after the release, and at most {LONGEST_RUN_S:g} s can be simulated"
-        raise InputError(
-            table.path, table.place(len(time) - 1, "t_s"), problem, "count the time from the release, in s"
-        )
+        raise InputError(table.path, table.place(len(time) - 1, "t_s"), problem, remedy)
     names = tuple(name for name in table.columns if name != "t_s")
-    for name in names:
-        _check_name(table, name)
     if not names:
         raise InputError(table.path, "header", "there is no speed", "add a column speed_1_mps")
-    speed = np.column_stack([table.columns[name] for name in names])
-    for name, readings in zip(names, speed.T, strict=True):
-        if np.isnan(readings).all():
-            raise InputError(table.path, f"column {name}", "has no reading", "delete the column")
-        if np.nanmax(readings) < _SLOWEST_MPS:
-            remedy = "delete the column, or give the speeds in m/s"
-            raise InputError(table.path, f"column {name}", f"never reaches {_SLOWEST_MPS:g} m/s: no motion", remedy)
-        if np.nanmax(np.abs(readings)) > FASTEST_MPS:
-            row = int(np.nanargmax(np.abs(readings)))
-            problem = f"{readings[row]:.6g} m/s is faster than any body is towed"
-            raise InputError(table.path, table.place(row, name), problem, f"give it in m/s, up to {FASTEST_MPS:g}")
-    moving = speed[time > 0]
-    for number, name in enumerate(names):
-        for before in range(number):
-            if same_readings(moving[:, before], moving[:, number]):
-                problem, remedy = f"has the readings of {names[before]}", "delete it: a copy is not a second tow"
-                raise InputError(table.path, f"column {name}", problem, remedy)
+    speed = np.column_stack([_speeds(table, name) for name in names])
+    _refuse_copies(table, names, speed[time > 0])
     read = ~np.isnan(speed).all(axis=1)
     if np.count_nonzero(read) < FEWEST_TIMES:
         problem = f"has readings at {np.count_nonzero(read)} times only"
         raise InputError(table.path, "", problem, f"give readings at {FEWEST_TIMES} times or more")
     force, mass = table.positive_comment("force_N"), table.positive_comment("mass_kg")
-    body = {key: value for key in BODY_KEYS if (value := table.positive_comment(key)) is not None}
-    return Tows(table.path, names, time[read], speed[read], force, mass, body)
+    return Tows(table.path, names, time[read], speed[read], force, mass, table.positive_comments(BODY_KEYS))
 
 
-def _check_name(table: CsvTable, name: str) -> None:
+def _speeds(table: CsvTable, name: str) -> Array:
+    """The readings of a tow; InputError for a column that is not one."""
+    place, readings = f"column {name}", table.columns[name]
     if not _SPEED.fullmatch(name):
         other = name.startswith("speed") and not name.endswith("_mps")
         problem = "is not a speed in m/s" if other else "is not a speed of a tow"
         remedy = f"{'convert it to m/s and' if other else 'delete it, or'} call it speed_1_mps, speed_2_mps, ..."
-        raise InputError(table.path, f"column {name}", problem, remedy)
+        raise InputError(table.path, place, problem, remedy)
+    if np.isnan(readings).all():
+        raise InputError(table.path, place, "has no reading", "delete the column")
+    if np.nanmax(readings) < _SLOWEST_MPS:
+        remedy = "delete the column, or give the speeds in m/s"
+        raise InputError(table.path, place, f"never reaches {_SLOWEST_MPS:g} m/s: no motion", remedy)
+    row = int(np.nanargmax(np.abs(readings)))
+    if abs(readings[row]) > FASTEST_MPS:
+        problem = f"{readings[row]:.6g} m/s is faster than any body is towed"
+        raise InputError(table.path, table.place(row, name), problem, f"give it in m/s, up to {FASTEST_MPS:g}")
+    return readings
+
+
+def _refuse_copies(table: CsvTable, names: tuple[str, ...], moving: Array) -> None:
+    """Raise InputError for a tow with the readings (times, tows) of another."""
+    for first, second in combinations(range(len(names)), 2):
+        if same_readings(moving[:, first], moving[:, second]):
+            problem, remedy = f"has the readings of {names[first]}", "delete it: a copy is not a second tow"
+            raise InputError(table.path, f"column {names[second]}", problem, remedy)
 
 
 def as_force(force: float | Polynomial) -> Polynomial:
@@ -144,11 +145,8 @@ def as_force(force: float | Polynomial) -> Polynomial:
 
 def parse_force(text: str) -> Polynomial:
     """T(t) from an option's text ``c0,c1,...``: T = c0 + c1 t + ..., N over s; InputError for any other text."""
-    try:
-        coefficients = [float(word) for word in text.split(",")]
-    except ValueError:
-        coefficients = [np.nan]
-    if not np.isfinite(coefficients).all():
+    coefficients = numbers_in(text)
+    if not coefficients:
         raise ArgumentError("force_N", "", f"{text!r} is not a polynomial", "give numbers: 11.6,0.02,-1e-4")
     return Polynomial(coefficients)
 

@@ -16,16 +16,29 @@ from tank2sim.answer.charts.parts import plain, series_look, vector
 from tank2sim.answer.charts.rows import RowPlot, row_layers
 from tank2sim.answer.charts.vega import STACKS, ChartRecord, ChartSpec, PlotAxis, Rule, layered
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, records_table, table
+from tank2sim.answer.parts import (
+    Cell,
+    Column,
+    Illustration,
+    KeyFigure,
+    Section,
+    Table,
+    Verdict,
+    data_frame,
+    records_table,
+    table,
+)
 from tank2sim.answer.result import Result
 from tank2sim.apps.rigs.tow import paper as tow_paper
-from tank2sim.apps.rigs.tow.findings import TOW_PARAMETERS, TowFit
+from tank2sim.apps.rigs.tow.findings import TowFit
 from tank2sim.apps.rigs.tow.identify import tow_card_text
 from tank2sim.apps.rigs.tow.records import force_words
 from tank2sim.apps.rigs.tow.study import Ellipse, FittedModel, TowByTow, TowSpeeds, TowStudy
+from tank2sim.apps.rigs.tow.surge import TOW_PARAMETERS
 from tank2sim.apps.rigs.tow.theory import DragPolynomial, TowedBody, drag_polynomial
 from tank2sim.cards import Card, parse_card
 from tank2sim.identification.conditioning import COLLINEAR
+from tank2sim.units import in_words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -34,7 +47,7 @@ if TYPE_CHECKING:
 _LARGEST_CONDITION = COLLINEAR**2
 """Scaled condition number up to which the unknowns can be distinguished."""
 
-_UNITS = {"M": "kg", "B1": "kg s²/m³", "B2": "kg s/m²", "B3": "kg/m", "delay": "s"}
+_UNITS = {name: in_words(key)[1] for name, key in TOW_PARAMETERS.items()}
 _METHODS = {"paper": "as published", "qr": "least squares", "output_error": "output error"}
 _ESTIMATES = (
     "M dv/dt + B1 v⁴ + B2 v³ + B3 v² = T. The published method and least squares put a polynomial through the mean "
@@ -91,14 +104,12 @@ class TowResult(Result[TowStudy]):
     @property
     def estimates(self) -> pd.DataFrame:
         """Estimates, a row each: method, name with unit (``total_mass_kg``), value, standard error."""
-        import pandas as pd
-
         rows = [
             (method, name, value, fit.standard_errors.get(name))
             for method, fit in self.study.methods.items()
             for name, value in fit.estimates.items()
         ]
-        return pd.DataFrame(rows, columns=["method", "name", "value", "standard_error"])
+        return data_frame(rows, ["method", "name", "value", "standard_error"])
 
     @property
     def total_mass_kg(self) -> float:
@@ -149,10 +160,10 @@ class TowResult(Result[TowStudy]):
         best = self.study.best
         if best is None:
             return ("These tows determine no model with a drag that a hull can have. Take more tows, or longer ones.",)
-        mass, half = best.estimates["M"], best.half_widths_95["M"]
+        water = best.estimates["M"] - self.study.mass_kg
         return (
-            f"The body moves as {mass:.0f} ± {half:.0f} kg (95 %), and {mass - self.study.mass_kg:.0f} kg of it is "
-            f"water. These tows determine {best.label}, and no more.",
+            f"The body moves as {best.mass_words} kg (95 %), and {water:.0f} kg of it is water. These tows determine "
+            f"{best.label}, and no more.",
         )
 
     @property
@@ -240,61 +251,24 @@ class TowResult(Result[TowStudy]):
         )
 
     def _models(self) -> Section:
-        study, name, charts = self.study, "what_these_tows_determine", []
+        study, name = self.study, "what_these_tows_determine"
+        charts = []
         if study.models:
             charts.append(Illustration(model_chart(study.models), caption=_MODELS, name=name))
         if study.confidence_ellipses:
             chart = ellipse_chart(study.confidence_ellipses, study.tow_by_tow)
             charts.append(Illustration(chart, caption=_ELLIPSES, name=name))
-        unknowns = [name for name in _UNITS if any(name in model.estimates for model in study.models)]
         by_tow = [
             f"M by single tows, {label}: {', '.join(f'{row[0]:.0f}' for row in subset.alone)} kg. With one tow left "
             f"out in turn: ± {subset.jackknife_half_widths_95[0]:.0f} kg (95 %)."
             for label, subset in study.tow_by_tow.items()
         ]
-        estimates: list[list[Cell]] = [
-            [
-                model.label,
-                *(cell for name in unknowns for cell in (model.estimates.get(name), model.half_widths_95.get(name))),
-            ]
-            for model in study.models
-        ]
-        heads = [head for name in unknowns for head in (f"{name} ({_UNITS[name]})", f"± ({_UNITS[name]})")]
-        rows: list[list[Cell]] = [
-            [
-                model.label,
-                f"{model.estimates['M']:.0f} ± {model.half_widths_95['M']:.0f}",
-                model.scatter_mps,
-                round(model.aic, 1),
-                float(f"{model.condition_scaled:.2g}"),
-                model.drag_nowhere_negative,
-            ]
-            for model in study.models
-        ]
-        columns = [
-            Column("model"),
-            Column("M ± 95 %", "kg"),
-            Column("scatter", "m/s", digits=3),
-            Column("AIC"),
-            Column("condition", digits=2),
-            Column("drag nowhere negative"),
-        ]
-        return Section(
-            "What these tows determine",
-            text="The same readings by output error with fewer and with more unknowns (delay: time from t = 0 to the "
-            "start of the body).",
-            tables=[
-                table("Output error, models of different size", columns, rows, *by_tow, folded=True),
-                table(
-                    "Estimates of these models with 95 % half-widths",
-                    ("model", *heads),
-                    estimates,
-                    folded=True,
-                    on_screen=False,
-                ),
-            ],
-            charts=charts,
+        text = (
+            "The same readings by output error with fewer and with more unknowns (delay: time from t = 0 to the start "
+            "of the body)."
         )
+        tables = [_model_table(study.models, by_tow), _model_estimates(study.models)]
+        return Section("What these tows determine", text=text, tables=tables, charts=charts)
 
     def _drag(self, body: TowedBody) -> Section:
         study = self.study
@@ -326,8 +300,7 @@ class TowResult(Result[TowStudy]):
     def _theory(self) -> Section:
         estimate = ""
         if best := self.study.best:
-            mass, half = best.estimates["M"], best.half_widths_95["M"]
-            estimate = f" The tows give {mass:.0f} ± {half:.0f} kg by the best usable model."
+            estimate = f" The tows give {best.mass_words} kg by the best usable model."
         fields = {"basis": "body", "k11": "k₁₁", "deep_kg": "(1 + k₁₁) ρ V", "near_surface_kg": "near the surface, M_s"}
         masses = records_table("Mass in surge by theory (2.5)", self.study.mass_by_theory, fields=fields)
         return Section("Mass by theory", text=_THEORY + estimate, tables=[masses])
@@ -353,6 +326,39 @@ def _subset_table(label: str, subset: TowByTow) -> Table:
     ]
     heads = ("tows", *(f"{name} ({_UNITS[name]})" for name in subset.unknowns))
     return table(label[0].upper() + label[1:], heads, rows, on_screen=False)
+
+
+def _model_table(models: Sequence[FittedModel], notes: Sequence[str]) -> Table:
+    rows: list[list[Cell]] = [
+        [
+            model.label,
+            model.mass_words,
+            model.scatter_mps,
+            round(model.aic, 1),
+            float(f"{model.condition_scaled:.2g}"),
+            model.drag_nowhere_negative,
+        ]
+        for model in models
+    ]
+    columns = [
+        *(Column("model"), Column("M ± 95 %", "kg"), Column("scatter", "m/s", digits=3)),
+        *(Column("AIC"), Column("condition", digits=2), Column("drag nowhere negative")),
+    ]
+    return table("Output error, models of different size", columns, rows, *notes, folded=True)
+
+
+def _model_estimates(models: Sequence[FittedModel]) -> Table:
+    unknowns = [name for name in _UNITS if any(name in model.estimates for model in models)]
+    heads = [head for name in unknowns for head in (f"{name} ({_UNITS[name]})", f"± ({_UNITS[name]})")]
+    rows: list[list[Cell]] = [
+        [
+            model.label,
+            *(cell for name in unknowns for cell in (model.estimates.get(name), model.half_widths_95.get(name))),
+        ]
+        for model in models
+    ]
+    caption = "Estimates of these models with 95 % half-widths"
+    return table(caption, ("model", *heads), rows, folded=True, on_screen=False)
 
 
 _SPEEDS = (Signal("speed", "speed", "m/s"), Signal("left", "less the model", "m/s"))
@@ -452,26 +458,17 @@ def model_chart(models: Sequence[FittedModel]) -> ChartSpec:
     lowest = min(model.aic for model in models)
     rows: list[ChartRecord] = []
     for model in models:
-        mass, half = model.estimates["M"], model.half_widths_95["M"]
+        (low, high), mass = model.mass_interval_kg, plain(model.estimates["M"])
         verdict = 0 if model.usable else 1 if model.drag_nowhere_negative else 2
-        rows.append(
-            {"name": model.label, "run": _VERDICTS[verdict], "v": plain(mass), "m": plain(mass)}
-            | {"low": plain(mass - half), "high": plain(mass + half)}
-            | {"least": plain(mass - half), "most": plain(mass + half), "aic": plain(model.aic - lowest)}
-        )
+        span = {"low": plain(low), "high": plain(high), "least": plain(low), "most": plain(high)}
+        shown = {"v": mass, "m": mass, "aic": plain(model.aic - lowest)}
+        rows.append({"name": model.label, "run": _VERDICTS[verdict], **shown, **span})
     verdicts = [verdict for verdict in _VERDICTS if any(row["run"] == verdict for row in rows)]
-    shown = {
-        "name:N": "model",
-        "run:N": "it is",
-        "m:Q": "M (kg)",
-        "least:Q": "from",
-        "most:Q": "to",
-        "aic:Q": "AIC above the lowest",
-    }
     mass_rows = RowPlot(
         rows,
         across=PlotAxis("M with its 95 % interval (kg)"),
-        shown=shown,
+        shown={"name:N": "model", "run:N": "it is", "m:Q": "M (kg)", "least:Q": "from", "most:Q": "to"}
+        | {"aic:Q": "AIC above the lowest"},
         look=series_look(verdicts, as_points=verdicts),
     )
     rank_rows = replace(

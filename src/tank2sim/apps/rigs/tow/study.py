@@ -6,19 +6,17 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial
 from scipy import stats
 
 from tank2sim.apps.rigs.tow.equation_error import discretise, fit_mean_speed, solve_by_qr
-from tank2sim.apps.rigs.tow.findings import DELAY, surge_coefficients
 from tank2sim.apps.rigs.tow.identify import TowIdentification
-from tank2sim.apps.rigs.tow.output_error import OutputErrorFit, TowOptions, fit_speeds, simulated_speeds
+from tank2sim.apps.rigs.tow.output_error import OutputErrorFit, TowModel, fit_speeds, simulated_speeds
 from tank2sim.apps.rigs.tow.paper import are_of_the_paper
 from tank2sim.apps.rigs.tow.records import Tows
-from tank2sim.apps.rigs.tow.surge import SurgeCoefficients
+from tank2sim.apps.rigs.tow.surge import DELAY, SurgeCoefficients
 from tank2sim.apps.rigs.tow.theory import (
     VISCOSITY_M2PS,
     WATER_KGPM3,
@@ -157,7 +155,9 @@ def study_tows(result: TowIdentification, tows: Tows, body: TowedBody | None = N
         body=body,
         drag_coefficients=_drag_coefficients(result, body) if body else {},
     )
-    return replace(study, notices=(*result.notices, *_notes(study), *_continued(study, tows)))
+    return replace(
+        study, notices=(*result.notices, *_notes_on_models(study), *_notes_on_cards(study), *_continued(study, tows))
+    )
 
 
 def _drag_coefficients(result: TowIdentification, body: TowedBody) -> dict[str, DragCoefficients]:
@@ -194,15 +194,7 @@ def towed_body(tows: Tows, mass_kg: float, given: Mapping[str, float | None]) ->
     """The body from the `given` values of :data:`.BODY_KEYS`, else from the tows' file; None if its length is unknown.
 
     The default volume is the mass of the body, with the water inside, over the density of water: it floats.
-
-    Raises
-    ------
-    InputError
-        A given value is not positive.
     """
-    for key, value in given.items():
-        if value is not None and not (np.isfinite(value) and value > 0):
-            raise InputError("--" + key.replace("_", "-"), "", f"is {value:g}", "a positive number was expected")
     known = tows.body | {key: value for key, value in given.items() if value is not None}
     if "length_m" not in known:
         return None
@@ -261,9 +253,9 @@ def _continued(study: TowStudy, tows: Tows) -> Iterator[Notice]:
         )
 
 
-def _notes(study: TowStudy) -> Iterator[Notice]:
-    span = study.mass_range_kg
-    if span is not None:
+def _notes_on_models(study: TowStudy) -> Iterator[Notice]:
+    """What the tows leave open, and which model they prefer."""
+    if span := study.mass_range_kg:
         low, high = span
         yield Notice(
             f"These tows determine M only within {low:.0f} to {high:.0f} kg (added mass {low - study.mass_kg:.0f} to "
@@ -278,13 +270,23 @@ def _notes(study: TowStudy) -> Iterator[Notice]:
     if not study.start_delay and late.get(SIMPLE_LATE.unknowns, 0.0) < late.get(SIMPLE.unknowns, 0.0) - 4:
         yield Notice("A start delay explains these tows much better than none (--start-delay).")
     if any(fit.condition_scaled > COLLINEAR**2 for fit in study.methods.values()):
-        theory = study.mass_by_theory[0].near_surface_kg if study.mass_by_theory else None
-        known = f"{theory:.0f} by (2.5)" if theory is not None else "by theory"
-        if theory is not None and span is not None and not span[0] <= theory <= span[1]:
-            known += ", which these tows contradict"
         yield Notice(
-            f"Take the drag as B3 v^2 alone (--terms B3), or hold M at a known value (--total-mass-kg, {known})."
+            "Take the drag as B3 v^2 alone (--terms B3), or hold M at a known value (--total-mass-kg, "
+            f"{_mass_by_theory(study)})."
         )
+
+
+def _mass_by_theory(study: TowStudy) -> str:
+    """Words for M by (2.5)."""
+    if not study.mass_by_theory:
+        return "by theory"
+    theory, span = study.mass_by_theory[0].near_surface_kg, study.mass_range_kg
+    contradicts = span is not None and not span[0] <= theory <= span[1]
+    return f"{theory:.0f} by (2.5){', which these tows contradict' if contradicts else ''}"
+
+
+def _notes_on_cards(study: TowStudy) -> Iterator[Notice]:
+    """What a card cannot hold."""
     if study.force.degree() > 0:
         yield Notice(
             f"A card holds one force: the mean, {study.force_N:.4g} N; a simulation of these tows must be given the "
@@ -298,18 +300,6 @@ _NO_DELAY_S = 1e-3
 _FAR_BEHIND = 20.0
 """AIC above the best from which a model is excluded: project choice. The usual 10 (Burnham & Anderson 2002) is for
 independent readings, and errors within a tow may be correlated."""
-
-
-class TowModel(NamedTuple):
-    """Drag terms in addition to M, in the order of (1.5), and True for a start delay."""
-
-    terms: tuple[str, ...]
-    start_delay: bool = False
-
-    @property
-    def unknowns(self) -> tuple[str, ...]:
-        """Names of the unknowns."""
-        return ("M", *self.terms, *([DELAY] if self.start_delay else []))
 
 
 MODELS = tuple(
@@ -371,7 +361,12 @@ class FittedModel:
     @property
     def coefficients(self) -> SurgeCoefficients:
         """Mass and drag."""
-        return surge_coefficients(self.estimates)
+        return SurgeCoefficients.of(self.estimates)
+
+    @property
+    def mass_words(self) -> str:
+        """M with the half-width of its 95 % interval, kg: ``2772 ± 226``."""
+        return f"{self.estimates['M']:.0f} ± {self.half_widths_95['M']:.0f}"
 
     @property
     def mass_interval_kg(self) -> tuple[float, float]:
@@ -400,7 +395,7 @@ def _fitted(model: TowModel, fit: OutputErrorFit, top_speed_mps: float) -> Fitte
     half_widths = stats.t.ppf(0.975, fit.freedom) * np.sqrt(np.diag(fit.covariance))
     condition, count = scaled_condition(fit.design) ** 2, len(fit.residuals_mps)
     mean_square = max(float(np.mean(fit.residuals_mps**2)), np.finfo(float).tiny)
-    lowest = float(np.min(surge_coefficients(estimates).drag_N(np.linspace(0.0, top_speed_mps, 401))))
+    lowest = float(np.min(SurgeCoefficients.of(estimates).drag_N(np.linspace(0.0, top_speed_mps, 401))))
     late = not model.start_delay or fit.estimates[-1] > _NO_DELAY_S
     return FittedModel(
         unknowns=model.unknowns,
@@ -510,6 +505,6 @@ def _each(tows: Tows, unknowns: tuple[str, ...], estimate: Callable[[Tows], Arra
 
 def _fit_or_none(tows: Tows, force: Polynomial, model: TowModel) -> OutputErrorFit | None:
     try:
-        return fit_speeds(tows, force, model.terms, TowOptions(start_delay=model.start_delay))
+        return fit_speeds(tows, force, model)
     except InputError:
         return None

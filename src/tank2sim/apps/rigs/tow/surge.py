@@ -8,6 +8,7 @@ well, where the even powers of the print would push the body on.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +18,18 @@ from tank2sim.dynamics.model import Input, Model, Parameter, Quantity, State
 
 DRAG_POWERS: dict[str, int] = {"B1": 4, "B2": 3, "B3": 2}
 """Drag terms of (1.5), in its order, and the power of the speed that each multiplies."""
+
+DELAY = "delay"
+"""Unknown that (1.5) does not have: time from t = 0 to the start of the body, s."""
+
+TOW_PARAMETERS = {
+    "M": "total_mass_kg",
+    "B1": "B1_kgs2pm3",
+    "B2": "B2_kgspm2",
+    "B3": "B3_kgpm",
+    DELAY: "start_delay_s",
+}
+"""Unknown of (1.5) to its name with unit, as in :class:`SurgeCoefficients`, the card and the JSON."""
 
 # The step of the paper's own integration. The time constant M / (dR/dv) of a towed body is 1 s for a 1 m model at
 # 1 m/s and 10 s or more for the vehicle of the paper; a Runge-Kutta step of a tenth of it errs by less than 1e-7 of
@@ -36,6 +49,11 @@ class SurgeCoefficients:
     B1_kgs2pm3: float = 0.0
     B2_kgspm2: float = 0.0
     B3_kgpm: float = 0.0
+
+    @classmethod
+    def of(cls, estimates: Mapping[str, float]) -> SurgeCoefficients:
+        """Coefficients from `estimates`, unknowns (``M``, ``B3``) with their values, SI; a delay is left out."""
+        return cls(**{TOW_PARAMETERS[name]: value for name, value in estimates.items() if name != DELAY})
 
     def drag_N(self, speed_mps: Any) -> Any:
         """Drag in N at speeds in m/s."""
@@ -67,20 +85,16 @@ def surge_model(
     parameters = _parameters(coefficients)
     mass, b1, b2, b3, initial_x, initial_u = (parameter.symbol for parameter in parameters)
     scale = abs(force_N) or 1.0
-    force = Input(name="tow.force", unit="N", start=force_N, nominal=scale, description="Towing force, + forward")
+    force = Input("tow.force", "N", "Towing force, + forward", start=force_N, nominal=scale)
     x, u = _states(initial_x, initial_u, valid_speed_mps[1] if valid_speed_mps else 1.0)
-    speed = Quantity(name="motion.xdot", unit="m/s", description="Rate of the position", value=u.symbol)
+    speed = Quantity("motion.xdot", "m/s", "Rate of the position", value=u.symbol)
     resistance = Quantity(
-        name="force.drag",
-        unit="N",
-        description="Drag, + when it acts aft",
-        nominal=scale,
-        value=drag(u.symbol, b1, b2, b3),
+        "force.drag", "N", "Drag, + when it acts aft", nominal=scale, value=drag(u.symbol, b1, b2, b3)
     )
     acceleration = Quantity(
-        name="motion.udot",
-        unit="m/s2",
-        description="Surge acceleration, + forward",
+        "motion.udot",
+        "m/s2",
+        "Surge acceleration, + forward",
         nominal=scale / coefficients.total_mass_kg,
         value=(force.symbol - resistance.symbol) / mass,
     )
@@ -98,17 +112,11 @@ def surge_model(
 
 
 def _states(initial_x: ca.SX, initial_u: ca.SX, top_speed: float) -> tuple[State, State]:
-    x = State(
-        name="motion.x",
-        unit="m",
-        description="Position along the track, + forward",
-        derivative="motion.xdot",
-        start=initial_x,
-    )
+    x = State("motion.x", "m", "Position along the track, + forward", derivative="motion.xdot", start=initial_x)
     u = State(
-        name="motion.u",
-        unit="m/s",
-        description="Surge speed through the water, + forward",
+        "motion.u",
+        "m/s",
+        "Surge speed through the water, + forward",
         nominal=top_speed,
         derivative="motion.udot",
         start=initial_u,
@@ -121,23 +129,23 @@ def _parameters(coefficients: SurgeCoefficients) -> tuple[Parameter, ...]:
     term = "Drag coefficient of the {} power of the speed"
     return (
         Parameter(
-            name="surge.total_mass",
-            unit="kg",
+            "surge.total_mass",
+            "kg",
+            "Mass of the body with the water in it, plus its added mass in surge",
             start=mass,
             nominal=mass,
             minimum=0.0,
-            description="Mass of the body with the water in it, plus its added mass in surge",
         ),
         *(
-            Parameter(name=f"surge.{key}", unit=unit, start=start, nominal=abs(start) or 1.0, description=description)
+            Parameter(f"surge.{key}", unit, description, start=start, nominal=abs(start) or 1.0)
             for key, unit, start, description in (
                 ("B1", "kg.s2/m3", coefficients.B1_kgs2pm3, term.format("fourth")),
                 ("B2", "kg.s/m2", coefficients.B2_kgspm2, term.format("third")),
                 ("B3", "kg/m", coefficients.B3_kgpm, term.format("second")),
             )
         ),
-        Parameter(name="initial.x", unit="m", start=0.0, tunable=False, description="Position at the beginning"),
-        Parameter(name="initial.u", unit="m/s", start=0.0, tunable=False, description="Surge speed at the beginning"),
+        Parameter("initial.x", "m", "Position at the beginning", start=0.0, tunable=False),
+        Parameter("initial.u", "m/s", "Surge speed at the beginning", start=0.0, tunable=False),
     )
 
 
@@ -148,11 +156,9 @@ def _with_validity(model: Model, speeds_mps: tuple[float, float]) -> Model:
     # range away.
     worth = 1 - 2 * outside / (highest - lowest)
     validity = Quantity(
-        name="validity",
-        unit="1",
-        description=(
-            f"1 from {lowest:g} to {highest:g} m/s, where the coefficients were identified, falling to 0 outside"
-        ),
+        "validity",
+        "1",
+        f"1 from {lowest:g} to {highest:g} m/s, where the coefficients were identified, falling to 0 outside",
         minimum=0.0,
         maximum=1.0,
         value=ca.fmin(1, ca.fmax(0, worth)),

@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from tank2sim.cards.card import Card
-from tank2sim.cards.form import BodyModel, BodySection, CardSection, Environment, Length, TimeConstant
-
-
-class YawRigModel(BodyModel):
-    """``[model]`` of a body that a motor turns in a tank."""
-
-    kind: Literal["yaw_rig"]
+from tank2sim.cards.form import CardSection, Length, TimeConstant, Uncertainty
 
 
 class TankWalls(CardSection):
@@ -116,23 +109,10 @@ class ProgrammeSection(CardSection):
     humps: Annotated[int, Field(ge=1, le=1000)] = 5
 
 
-class YawRigForm(CardSection):
-    """The card of a body on the yaw rig, as in its file."""
-
-    format: Literal["tank2sim-ship/1"]
-    ship: BodySection
-    environment: Environment = Environment()
-    model: YawRigModel
-    yaw_rig: YawRig
-    programme: ProgrammeSection | None = None
-    uncertainty: dict[str, Annotated[float, Field(ge=0)]] = Field(default_factory=dict)
-
-
 @dataclass(frozen=True)
 class YawRigCard(Card):
     """Card of a body on the yaw rig: (3) of paper 3 (Alyshev 2019), SI, and the programme that it runs."""
 
-    model: YawRigModel
     yaw_rig: YawRig
     programme: ProgrammeSection | None = None
-    uncertainty: Mapping[str, float] = field(default_factory=dict)
+    uncertainty: Uncertainty = field(default_factory=dict)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from tank2sim.api.verbs import Output, verb
+from tank2sim.apps.rigs.yaw import YawMethod
 from tank2sim.arguments import NonNegativeArgument, Percent, PositiveArgument, checked
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.files import CARD, write_together
@@ -18,18 +19,10 @@ if TYPE_CHECKING:
 
     from tank2sim.apps.rigs.yaw.records import YawRecord
     from tank2sim.apps.rigs.yaw.result import YawResult
+    from tank2sim.apps.rigs.yaw.simulation import RigRun
     from tank2sim.cards import Card
     from tank2sim.dynamics.vessel import Vessel
-
-YawMethod = Literal[
-    "energy_least_squares",
-    "as_many_equations",
-    "two_intervals",
-    "output_error",
-    "energy_least_squares_reference",
-    "two_intervals_reference",
-]
-"""Methods, the best one first."""
+    from tank2sim.records.csv_table import CsvTable
 
 
 def write_yaw_card(
@@ -144,56 +137,74 @@ def yaw(
     >>> round(found.added_inertia_kgm2, 3)
     0.03
     """
-    from tank2sim.apps.rigs.yaw.identify import YawOptions, identify_yaw, parse_yaw_terms, torque_constant
+    from tank2sim.apps.rigs.yaw.identify import YawOptions, identify_yaw, parse_yaw_terms
     from tank2sim.apps.rigs.yaw.records import read_yaw_record
     from tank2sim.apps.rigs.yaw.result import YawResult
-    from tank2sim.apps.rigs.yaw.simulation import rig_card_of, similarity_words, simulated_file
+    from tank2sim.apps.rigs.yaw.simulation import RigRun, rig_card_of
     from tank2sim.apps.rigs.yaw.theory import parse_body, theory_values
-    from tank2sim.records.csv_table import is_frame, table_or_path
+    from tank2sim.records.csv_table import tables_or_paths
 
-    if (reference is None) != (reference_inertia_kgm2 is None):
-        missing = "reference" if reference is None else "reference_inertia_kgm2"
-        raise ArgumentError(missing, "", "is missing", "give both, the reference and its inertia, or neither")
-    error = 0.0
-    if reference is not None and reference_inertia_kgm2 is not None:
-        in_air = identify_yaw([read_yaw_record(table_or_path(reference, "reference"))])
-        torque_constant_NmpA, error = torque_constant(in_air, reference_inertia_kgm2)
+    constant = _torque_constant(torque_constant_NmpA, reference, reference_inertia_kgm2)
     known = None if rig is None else rig_card_of(rig, "rig")
     options = YawOptions(
         inertia_kgm2=inertia_kgm2,
         inertia_error_kgm2=inertia_error_kgm2,
-        torque_constant_NmpA=torque_constant_NmpA,
-        torque_constant_error=error,
+        torque_constant_NmpA=constant[0],
+        torque_constant_error=constant[1],
         known=known.yaw_rig if known else None,
-        terms=parse_yaw_terms(terms if isinstance(terms, str) else ",".join(terms)) if terms else None,
+        terms=parse_yaw_terms(terms or ()),
         mirror_limit=mirror_percent / 100,
     )
     body = parse_body(theory) if theory else None
-    if isinstance(records, str | Path) or is_frame(records):
-        sources = [table_or_path(records, "records")]
-    else:
-        sources = [table_or_path(source, f"records[{number}]") for number, source in enumerate(records)]
+    sources = tables_or_paths(records, "records")
 
     def result(read: Sequence[YawRecord]) -> YawResult:
         found = identify_yaw(read, options)
-        values = theory_values(body, found.records[0].programme.max_rate_radps) if body else ()
-        return YawResult(found.study(values), method, found, known)
+        used = tuple(record for record in read if record.medium == found.medium)
+        values = theory_values(body, used[0].programme.max_rate_radps) if body else []
+        return YawResult(replace(found, theory=tuple(values)), method, used, known)
 
-    if simulate is None:
-        simulated = {
-            "medium": medium != "water",
-            "controller": controller != "tuned",
-            "similar_to": similar_to,
-            "noise_A": noise_A,
-        }
-        if given := next((name for name, value in simulated.items() if value), ""):
-            raise ArgumentError(given, "", "is of a simulated rig", "give the card to simulate as well")
-        return result([read_yaw_record(source) for source in sources])
+    run = RigRun(medium, controller, similar_to, noise_A)
+    if simulate is not None:
+        return _simulated(simulate, sources, run, result)
+    if run != RigRun():
+        argument = next(name for name, value in vars(RigRun()).items() if getattr(run, name) != value)
+        raise ArgumentError(argument, "", "is of a simulated rig", "give the card to simulate as well")
+    return result([read_yaw_record(source) for source in sources])
+
+
+def _torque_constant(
+    given_NmpA: float | None, reference: str | Path | pd.DataFrame | None, reference_inertia_kgm2: float | None
+) -> tuple[float | None, float]:
+    """k_t (N m/A) and its relative standard error: from a body of known inertia in air, else as given."""
+    from tank2sim.apps.rigs.yaw.identify import identify_yaw, torque_constant
+    from tank2sim.apps.rigs.yaw.records import read_yaw_record
+    from tank2sim.records.csv_table import table_or_path
+
+    if reference is None and reference_inertia_kgm2 is None:
+        return given_NmpA, 0.0
+    if reference is None or reference_inertia_kgm2 is None:
+        missing = "reference" if reference is None else "reference_inertia_kgm2"
+        raise ArgumentError(missing, "", "is missing", "give both, the reference and its inertia, or neither")
+    in_air = identify_yaw([read_yaw_record(table_or_path(reference, "reference"))])
+    return torque_constant(in_air, reference_inertia_kgm2)
+
+
+def _simulated(
+    simulate: Vessel | Card | str | Path,
+    sources: Sequence[Path | CsvTable],
+    run: RigRun,
+    result: Callable[[Sequence[YawRecord]], YawResult],
+) -> YawResult:
+    """The result of a simulated record, which is written to the one file of `sources`."""
+    from tank2sim.apps.rigs.yaw.records import yaw_record_text
+    from tank2sim.apps.rigs.yaw.simulation import rig_card_of, similarity_words, simulated_record
+
     path = sources[0] if sources else None
     if len(sources) != 1 or not isinstance(path, Path):
         raise ArgumentError("simulate", "", f"has {len(sources)} records to write", "give the name of one file")
     card = rig_card_of(simulate, "simulate")
-    record, text = simulated_file(card, path, medium, controller, similar_to, noise_A)
+    record = simulated_record(card, path, run)
     try:
         found = result([record])
     except InputError as fault:
@@ -201,8 +212,8 @@ def yaw(
             raise
         problem = f"the record simulated of it: {fault.problem}"
         raise InputError(card.source, fault.place, problem, fault.remedy) from None
-    write_together({path: text}, inputs=[Path(card.source)])
-    return _with_notice(found, similarity_words(record, similar_to)) if similar_to else found
+    write_together({path: yaw_record_text(record)}, inputs=[Path(card.source)])
+    return _with_notice(found, similarity_words(record, run.similar_to)) if run.similar_to else found
 
 
 @checked
@@ -231,12 +242,13 @@ def simulate_yaw(
     InputError
         The file exists, the card is not one of a yaw rig, or the motor saturates.
     """
-    from tank2sim.apps.rigs.yaw.simulation import rig_card_of, simulated_file
+    from tank2sim.apps.rigs.yaw.records import yaw_record_text
+    from tank2sim.apps.rigs.yaw.simulation import RigRun, rig_card_of, simulated_record
 
-    rig = rig_card_of(card, "card")
-    _, text = simulated_file(rig, Path(path), medium, controller, similar_to, noise_A)
-    write_together({Path(path): text}, inputs=[Path(rig.source)])
-    return Path(path)
+    rig, path = rig_card_of(card, "card"), Path(path)
+    record = simulated_record(rig, path, RigRun(medium, controller, similar_to, noise_A))
+    write_together({path: yaw_record_text(record)}, inputs=[Path(rig.source)])
+    return path
 
 
 def _with_notice(result: YawResult, text: str) -> YawResult:

@@ -7,10 +7,12 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from tank2sim.apps.rigs.yaw.energy import EnergyFit, YawMethodEstimate, term_and_unit
+from tank2sim.apps.rigs.yaw.energy import EnergyFit, YawMethodEstimate
+from tank2sim.apps.rigs.yaw.output_error import AngleFit
 from tank2sim.apps.rigs.yaw.records import YawRecord
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice, caution
+from tank2sim.units import in_words
 
 _NOT_QUITE_MIRRORED = 0.03
 _FULL = 0.995
@@ -34,29 +36,32 @@ _SHARPER = 3.0
 def check_current(records: tuple[YawRecord, ...]) -> Iterator[Notice]:
     """Notes on the files and their currents; InputError for a motor that is saturated or idle."""
     for record in records:
-        name, column = record.path.name, (record.path, "column current_A")
+        name, largest = record.path.name, float(np.abs(record.current_A).max())
         yield from (note.of(name) for note in record.notes)
-        largest = float(np.abs(record.current_A).max())
         if largest < _LEAST_A:
             problem = f"stays below {_LEAST_A:g} A: the motor did not turn the body"
-            raise InputError(*column, problem, "give the current in A")
+            raise InputError(record.path, "column current_A", problem, "give the current in A")
         if largest > _STRONG_A:
             yield Notice(f"the current reaches {largest:.3g} A; if the column is in mA, divide it by 1000.").of(name)
-        limit = record.constants.get("max_current_A", math.inf)
-        full = np.flatnonzero(np.abs(record.current_A) >= _FULL * limit)
-        times = record.time_s[full]
-        for begin, end in (ends for pair in record.programme.pairs() for ends in pair):
-            bad = times[(times >= begin) & (times <= end)]
-            if bad.size:
-                problem = f"reaches the motor's {limit:g} A at {bad[0]:.3f} s, where it is evaluated"
-                remedy = "run a slower programme, or lower gains"
-                if largest > _ANOTHER_UNIT * limit:
-                    remedy = f"its largest is {largest:.3g} A: if the column is in mA, divide it by 1000"
-                raise InputError(*column, problem, remedy)
-        if times.size:
-            yield Notice(
-                f"{name}: the motor is saturated at {times[0]:.3f} s, outside the intervals that are evaluated."
-            )
+        yield from _saturation(record, largest)
+
+
+def _saturation(record: YawRecord, largest: float) -> Iterator[Notice]:
+    """Note on a motor that is saturated; InputError within the intervals that are evaluated."""
+    limit = record.constants.get("max_current_A", math.inf)
+    times = record.time_s[np.abs(record.current_A) >= _FULL * limit]
+    for begin, end in (ends for pair in record.programme.pairs() for ends in pair):
+        bad = times[(times >= begin) & (times <= end)]
+        if bad.size:
+            problem = f"reaches the motor's {limit:g} A at {bad[0]:.3f} s, where it is evaluated"
+            remedy = "run a slower programme, or lower gains"
+            if largest > _ANOTHER_UNIT * limit:
+                remedy = f"its largest is {largest:.3g} A: if the column is in mA, divide it by 1000"
+            raise InputError(record.path, "column current_A", problem, remedy)
+    if times.size:
+        yield Notice(
+            f"{record.path.name}: the motor is saturated at {times[0]:.3f} s, outside the intervals that are evaluated."
+        )
 
 
 def check_turn(record: YawRecord) -> None:
@@ -105,10 +110,12 @@ def check_mirror(records: tuple[YawRecord, ...], mirror: tuple[float, ...], limi
 
 
 def check_added_inertia(
-    record: YawRecord, inertia_kgm2: float, methods: Mapping[str, YawMethodEstimate]
+    record: YawRecord, inertia_kgm2: float | None, methods: Mapping[str, YawMethodEstimate]
 ) -> Iterator[Notice]:
     """Note, marked, on an added inertia (kg m2, of the first method) that is uncertain or that few bodies have;
     InputError where all methods make it negative by more than its error: no body has that."""
+    if inertia_kgm2 is None:
+        return
     added = [(found.inertia[1], 2 * (found.inertia[2] or 0.0)) for found in methods.values()]
     value, doubt = added[0]
     ratio = value / inertia_kgm2
@@ -131,8 +138,9 @@ def check_added_inertia(
         )
 
 
-def check_explained(records: tuple[YawRecord, ...], misfit_rad: float) -> Iterator[Notice]:
+def check_explained(records: tuple[YawRecord, ...], angle: AngleFit | None) -> Iterator[Notice]:
     """Notes if (3) does not explain the record's motion, or a single hump cannot show it."""
+    misfit_rad = float(np.sqrt(np.mean(angle.residual_rad**2))) if angle else 0.0
     if misfit_rad > _PULSE_RAD:
         yield Notice(
             f"(3) leaves {misfit_rad:.2g} rad of the angle (rms), more than an encoder's pulse: gravity, walls or "
@@ -164,10 +172,16 @@ def estimate_notes(methods: Mapping[str, YawMethodEstimate]) -> Iterator[Notice]
             "tuned, a hump differs."
         )
     for name, value in best.friction.items():
-        error, (term, unit) = best.friction_standard_errors[name], term_and_unit(name)
+        error, (term, unit) = best.friction_standard_errors[name], in_words(name)
         if error is not None and abs(value) < 2 * error:
             yield Notice(f"{term} does not differ from zero: {value:.3g} ± {error:.2g} {unit}.")
-    nonlinear, error = methods.get("output_error"), best.total_inertia_standard_error_kgm2
+    yield from _methods_apart(methods)
+
+
+def _methods_apart(methods: Mapping[str, YawMethodEstimate]) -> Iterator[Notice]:
+    """Note if the nonlinear least squares differ from the energy's by more than their errors, or are sharper."""
+    nonlinear, best = methods.get("output_error"), methods["energy_least_squares"]
+    error = best.total_inertia_standard_error_kgm2
     if nonlinear is None or not error or not nonlinear.total_inertia_standard_error_kgm2:
         return
     sharper = nonlinear.total_inertia_standard_error_kgm2

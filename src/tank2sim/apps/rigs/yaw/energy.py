@@ -69,11 +69,11 @@ class Interval:
         """Integral over the interval by the trapezoidal rule."""
         return float(np.trapezoid(values, self.time_s))
 
-    def part(self, place: int, parts: int) -> Interval:
-        """One of `parts` equal parts in time; a braking interval's are counted from its end, as mirror images."""
+    def part(self, place: int) -> Interval:
+        """One of :data:`PARTS` equal parts in time; a braking interval's are counted from its end, as mirror images."""
         if self.braking:
-            place = parts - 1 - place
-        length = (self.time_s[-1] - self.time_s[0]) / parts
+            place = PARTS - 1 - place
+        length = (self.time_s[-1] - self.time_s[0]) / PARTS
         low = self.time_s[0] + place * length
         inside = (self.time_s > low + 1e-9) & (self.time_s < low + length - 1e-9)
         time = np.concatenate([[low], self.time_s[inside], [low + length]])
@@ -103,12 +103,6 @@ ENERGY_TERMS: dict[str, tuple[Work, str]] = {
 """Term to the work (per unit of its coefficient) that the motor does against it over an interval, and its unit:
 inertia is J + lambda661, braking_quadratic f_662d - f_662a; the moment of gravity is -sine sin(psi) - cosine cos(psi).
 """
-
-
-def term_and_unit(name: str) -> tuple[str, str]:
-    """Term of :data:`ENERGY_TERMS` and unit of a name with its unit, as ``coulomb_Nm``."""
-    term, _, unit = name.rpartition("_")
-    return term, unit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -269,18 +263,17 @@ class Balance:
     """The energy balance of every subinterval: work per unit of each term, (n, terms), and of the motor less known
     work, J.
 
-    Row ``((pair * 2 + braking) * parts + part)`` belongs to a part of an interval.
+    Row ``((pair * 2 + braking) * PARTS + part)`` belongs to a part of an interval.
     """
 
     terms: tuple[str, ...]
     rows: Array
     work_J: Array
     pairs: tuple[IntervalPair, ...]
-    parts: int
 
     def whole(self, values: Array) -> Array:
         """Sums over the parts of each interval of a number for each subinterval, (pairs, 2)."""
-        sums: Array = values.reshape(len(self.pairs), 2, self.parts).sum(axis=2)
+        sums: Array = values.reshape(len(self.pairs), 2, PARTS).sum(axis=2)
         return sums
 
 
@@ -298,16 +291,15 @@ def energy_balance(
     terms: tuple[str, ...],
     torque_constant_NmpA: float,
     rig: YawRig | None,
-    parts: int = PARTS,
 ) -> Balance:
     """The balance of every subinterval of mirror pairs; `rig` has the known effects beyond (3)."""
     rows, work = [], []
     for interval in (interval for pair in pairs for interval in pair):
-        for part in (interval.part(place, parts) for place in range(parts)):
+        for part in (interval.part(place) for place in range(PARTS)):
             rows.append([ENERGY_TERMS[term][0](part) for term in terms])
             motor = torque_constant_NmpA * part.integral(part.rate_radps * part.current_A)
             work.append(motor - known_work(part, rig) if rig else motor)
-    return Balance(terms=terms, rows=np.array(rows), work_J=np.array(work), pairs=tuple(pairs), parts=parts)
+    return Balance(terms=terms, rows=np.array(rows), work_J=np.array(work), pairs=tuple(pairs))
 
 
 def fit_energy(balance: Balance, record: YawRecord, programmed: Balance | None = None) -> EnergyFit:
@@ -336,7 +328,7 @@ def fit_energy(balance: Balance, record: YawRecord, programmed: Balance | None =
     # Errors of neighbouring parts are correlated: they share the speed at their common end. Where it is larger, the
     # covariance follows from the scatter of whole intervals, each taken as one draw (Liang & Zeger 1986).
     count = 2 * len(balance.pairs)
-    draws = (inverse * residuals).reshape(len(balance.terms), count, balance.parts).sum(axis=2)
+    draws = (inverse * residuals).reshape(len(balance.terms), count, PARTS).sum(axis=2)
     clustered = count / max(1, count - 1) * draws @ draws.T
     scale = np.maximum(1.0, np.sqrt(np.diag(clustered) / np.diag(covariance)))
     return EnergyFit(coefficients, covariance * np.outer(scale, scale), residuals, balance)
@@ -349,9 +341,8 @@ def estimate_from(terms: tuple[str, ...], values: Array, covariance: Array, idea
     """
     names = [f"{term}_{ENERGY_TERMS[term][1]}" for term in terms]
     errors = np.sqrt(np.diag(covariance)).tolist()
-    whole = ideal.part(0, 1)
     conserved = [term == "inertia" or term.startswith("gravity") for term in terms]
-    against = np.where(conserved, 0.0, [ENERGY_TERMS[term][0](whole) for term in terms])
+    against = np.where(conserved, 0.0, [ENERGY_TERMS[term][0](ideal) for term in terms])
     return YawMethodEstimate(
         total_inertia_kgm2=float(values[0]),
         total_inertia_standard_error_kgm2=errors[0],
@@ -369,10 +360,10 @@ def as_many_equations(fit: EnergyFit, ideal: Interval) -> YawMethodEstimate:
     of friction; each is the mean over the pairs. The standard errors propagate the scatter of the least squares.
     """
     balance = fit.balance
-    unknowns, pairs, parts = len(balance.terms), len(balance.pairs), balance.parts
-    combine = np.zeros((unknowns, pairs, 2, parts))
+    unknowns, pairs = len(balance.terms), len(balance.pairs)
+    combine = np.zeros((unknowns, pairs, 2, PARTS))
     combine[0] = np.array([1.0, -1.0])[:, None] / pairs
-    for equation, chosen in enumerate(np.array_split(np.arange(parts), unknowns - 1), start=1):
+    for equation, chosen in enumerate(np.array_split(np.arange(PARTS), unknowns - 1), start=1):
         combine[equation, :, :, chosen] = 1.0 / pairs
     flat = combine.reshape(unknowns, -1)
     solved = np.linalg.solve(flat @ balance.rows, flat)

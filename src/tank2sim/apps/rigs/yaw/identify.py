@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from pathlib import Path
+from typing import NamedTuple, get_args
 
 import numpy as np
 from scipy.stats import f as f_test
 
+from tank2sim.apps.rigs.yaw import YawMethod
 from tank2sim.apps.rigs.yaw.card import YawRig
 from tank2sim.apps.rigs.yaw.diagnostics import (
     check_added_inertia,
@@ -22,8 +24,11 @@ from tank2sim.apps.rigs.yaw.diagnostics import (
 )
 from tank2sim.apps.rigs.yaw.energy import (
     ENERGY_TERMS,
+    PARTS,
     EnergyFit,
     Interval,
+    IntervalPair,
+    Speeds,
     YawMethodEstimate,
     as_many_equations,
     energy_balance,
@@ -34,22 +39,16 @@ from tank2sim.apps.rigs.yaw.energy import (
     two_intervals,
 )
 from tank2sim.apps.rigs.yaw.model import TORQUE_CONSTANT_NMPA, UNKNOWN_RIG
-from tank2sim.apps.rigs.yaw.output_error import fit_angle
+from tank2sim.apps.rigs.yaw.output_error import AngleFit, fit_angle
 from tank2sim.apps.rigs.yaw.records import YawRecord, refuse_copied_records
 from tank2sim.apps.rigs.yaw.theory import TheoryValue
+from tank2sim.arguments import chosen_names
 from tank2sim.arrays import Array, Columns
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.notices import Notice
 from tank2sim.records.thinning import drawn_columns
 
-YAW_METHODS = (
-    "energy_least_squares",
-    "as_many_equations",
-    "two_intervals",
-    "output_error",
-    "energy_least_squares_reference",
-    "two_intervals_reference",
-)
+YAW_METHODS: tuple[str, ...] = get_args(YawMethod)
 """The first gives the numbers of a card; ``_reference`` uses the programme's speeds instead of the body's."""
 
 AIR_TERMS = ("inertia", "coulomb", "viscous")
@@ -79,37 +78,15 @@ class YawOptions:
 
 
 class _BodyInertia(NamedTuple):
-    """J_zz in kg m2, its standard error (None if unknown), its source, and True if it depends on the records' k_t."""
+    """J_zz in kg m2, its standard error, its source (None if unknown), and True if it depends on the records' k_t."""
 
-    value_kgm2: float
-    error_kgm2: float | None
-    source: str
+    value_kgm2: float | None = None
+    error_kgm2: float | None = None
+    source: str | None = None
     by_torque_constant: bool = False
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class YawIdentification:
-    """Records of one medium and their estimates; `fit` is the energy least squares with actual speeds.
-
-    `air` has the estimates of records in air, if there are records in water as well.
-    """
-
-    records: tuple[YawRecord, ...]
-    estimates: YawEstimates
-    fit: EnergyFit
-    air: YawEstimates | None = None
-
-    @property
-    def methods(self) -> dict[str, YawMethodEstimate]:
-        """Method to its estimates."""
-        return self.estimates.methods
-
-    def study(self, theory: Sequence[TheoryValue] = ()) -> YawStudy:
-        """The study, with the added inertia from the form of the body."""
-        return YawStudy(**vars(self.estimates), air=self.air, theory=tuple(theory))
-
-
-def identify_yaw(records: Sequence[YawRecord], options: YawOptions | None = None) -> YawIdentification:
+def identify_yaw(records: Sequence[YawRecord], options: YawOptions | None = None) -> YawStudy:
     """Estimate the added yaw inertia and the dissipation of one body.
 
     Records in air give J_zz for records in water; alone, they are evaluated themselves.
@@ -124,86 +101,68 @@ def identify_yaw(records: Sequence[YawRecord], options: YawOptions | None = None
     if not records:
         raise ArgumentError("records", "", "is empty", "give one or more CSV files")
     alike = refuse_copied_records(records)
-    wet = tuple(record for record in records if record.medium == "water")
-    dry = tuple(record for record in records if record.medium == "air")
-    if not wet:
-        return _identified(dry, options, None, alike)
-    air = _identified(dry, replace(options, terms=None), None) if dry else None
-    return _identified(wet, options, air, alike)
+    wet, dry = (tuple(record for record in records if record.medium == medium) for medium in ("water", "air"))
+    air = _estimates(dry, replace(options, terms=None), None) if wet and dry else None
+    estimates = _estimates(wet or dry, options, air)
+    return YawStudy(**vars(replace(estimates, notices=(*alike, *estimates.notices))), air=air, theory=())
 
 
-def torque_constant(reference: YawIdentification, known_inertia_kgm2: float) -> tuple[float, float]:
+def torque_constant(reference: YawEstimates, known_inertia_kgm2: float) -> tuple[float, float]:
     """k_t (N m/A) and its relative standard error, from records in air of a body whose inertia is known.
 
     All terms of (3) are proportional to k_t: the records give J/k_t, independent of the k_t of the evaluation.
     InputError for records of water, where the added inertia is unknown, too.
     """
-    if reference.estimates.medium != "air":
-        path = reference.records[0].path
-        raise InputError(path, "", "is of a body in water", "give a record in air ('# medium: air')")
+    if reference.medium != "air":
+        remedy = "give a record in air ('# medium: air')"
+        raise InputError(reference.records[0], "", "is of a body in water", remedy)
     best = reference.methods[YAW_METHODS[0]]
     error = (best.total_inertia_standard_error_kgm2 or 0.0) / best.total_inertia_kgm2
-    return reference.estimates.torque_constant_NmpA * known_inertia_kgm2 / best.total_inertia_kgm2, error
+    return reference.torque_constant_NmpA * known_inertia_kgm2 / best.total_inertia_kgm2, error
 
 
-def parse_yaw_terms(text: str) -> tuple[str, ...]:
-    """Terms from an option's text, ``"coulomb,viscous,quadratic"``; the inertia is always among them.
+def parse_yaw_terms(given: str | Sequence[str]) -> tuple[str, ...] | None:
+    """Terms from names (``"coulomb,viscous,quadratic"``), with the inertia; None without a name.
 
     InputError if a term is unknown or repeated.
     """
-    words = [word.strip() for word in text.split(",") if word.strip() not in ("", "inertia")]
-    for word in words:
-        if word not in ENERGY_TERMS or words.count(word) > 1:
-            problem, known = f"{word!r} is not a term, or is repeated", ", ".join([*ENERGY_TERMS][1:])
-            raise ArgumentError("terms", "", problem, f"take any of {known}, once each")
-    return ("inertia", *(term for term in ENERGY_TERMS if term in words))
+    chosen = chosen_names("terms", given, ENERGY_TERMS)
+    return tuple(term for term in ENERGY_TERMS if term in ("inertia", *chosen)) if given else None
 
 
 Fits = tuple[EnergyFit, EnergyFit]
 
 
-def _identified(
-    records: tuple[YawRecord, ...], options: YawOptions, air: YawIdentification | None, notes: tuple[Notice, ...] = ()
-) -> YawIdentification:
-    """Estimates from records of one medium."""
-    first, rig, before = records[0], options.known, notes
+def _estimates(records: tuple[YawRecord, ...], options: YawOptions, air: YawEstimates | None) -> YawEstimates:
+    """Estimates from records of one medium; `air` has the ones of the body in air, if there are any."""
+    first = records[0]
     constant, unknown = _torque_constant(records, options)
-    notes = (*unknown, *check_current(records))
+    current = tuple(check_current(records))
     for record in records:
         check_turn(record)
-    pairs = [pair for record in records for pair in intervals(record)]
-    mirror = tuple(mirror_difference(pair) for pair in pairs)
-    notes += tuple(check_mirror(records, mirror, options.mirror_limit))
-    programmed = [pair for record in records for pair in intervals(record, "reference")]
-
-    def fitted(terms: tuple[str, ...]) -> Fits:
-        expected = energy_balance(programmed, terms, constant, rig)
-        return fit_energy(energy_balance(pairs, terms, constant, rig), first, expected), fit_energy(expected, first)
-
-    fits = fitted(options.terms or (AIR_TERMS if first.medium == "air" else WATER_TERMS))
-    if options.terms is None:
-        fits, found = _with_gravity(fits, fitted)
-        notes += found
-    fit, ideal = fits[0], programmed[0][0]
+    pairs = _pairs(records, "actual")
+    mirror = tuple(map(mirror_difference, pairs))
+    unlike = tuple(check_mirror(records, mirror, options.mirror_limit))
+    fits, gravity = _energy_fits(records, pairs, constant, options)
+    fit = fits[0]
     check_sign(first, fit)
+    ideal = fits[1].balance.pairs[0][0]
     methods = _energy_estimates(fits, ideal)
-    driven = (rig or UNKNOWN_RIG).model_copy(update={"torque_constant_NmpA": constant})
+    driven = (options.known or UNKNOWN_RIG).model_copy(update={"torque_constant_NmpA": constant})
     angle, omissions = _angle(records, driven, fit, ideal)
-    if angle:
-        methods["output_error"] = angle[0]
-    misfit_rad = float(np.sqrt(np.mean(angle[2] ** 2))) if angle else 0.0
+    methods |= {"output_error": angle.estimate} if angle else {}
     body, remarks = _body(records, options, air)
-    if body:
-        methods = {name: _added(found, body, options.torque_constant_error) for name, found in methods.items()}
-    doubts = check_added_inertia(first, body.value_kgm2, methods) if body else ()
-    methods = {name: methods[name] for name in YAW_METHODS if name in methods}
-    estimates = YawEstimates(
+    methods = {
+        name: _added(methods[name], body, options.torque_constant_error) for name in YAW_METHODS if name in methods
+    }
+    doubts = check_added_inertia(first, body.value_kgm2, methods)
+    return YawEstimates(
         records=tuple(str(record.path) for record in records),
         medium=first.medium,
         torque_constant_NmpA=constant,
-        body_inertia_kgm2=body.value_kgm2 if body else None,
-        body_inertia_standard_error_kgm2=body.error_kgm2 if body else None,
-        body_inertia_source=body.source if body else None,
+        body_inertia_kgm2=body.value_kgm2,
+        body_inertia_standard_error_kgm2=body.error_kgm2,
+        body_inertia_source=body.source,
         added_inertia_kgm2={name: found.added_inertia_kgm2 for name, found in methods.items()},
         dissipation_J={name: found.dissipation_J for name, found in methods.items()},
         methods=methods,
@@ -211,18 +170,33 @@ def _identified(
         histories=record_histories(records, fit),
         energy_balance=energy_balance_means(fit),
         energy_residuals=energy_residuals(fit),
-        angle_residual=angle_residual(angle[1], angle[2]) if angle else None,
+        angle_residual=angle_residual(angle),
         notices=(
-            *before,
-            *doubts,
-            *notes,
-            *omissions,
-            *check_explained(records, misfit_rad),
-            *remarks,
-            *estimate_notes(methods),
+            *(*doubts, *unknown, *current, *unlike, *gravity, *omissions),
+            *(*check_explained(records, angle), *remarks, *estimate_notes(methods)),
         ),
     )
-    return YawIdentification(records=records, estimates=estimates, fit=fit, air=air.estimates if air else None)
+
+
+def _pairs(records: Sequence[YawRecord], speeds: Speeds) -> list[IntervalPair]:
+    """Mirror pairs of all records."""
+    return [pair for record in records for pair in intervals(record, speeds)]
+
+
+def _energy_fits(
+    records: tuple[YawRecord, ...], pairs: Sequence[IntervalPair], constant: float, options: YawOptions
+) -> tuple[Fits, tuple[Notice, ...]]:
+    """Least squares of the energy with measured speeds and with the programme's; a note on a moment of gravity."""
+    first, rig = records[0], options.known
+    programmed = _pairs(records, "reference")
+
+    def fitted(terms: tuple[str, ...]) -> Fits:
+        expected = energy_balance(programmed, terms, constant, rig)
+        return fit_energy(energy_balance(pairs, terms, constant, rig), first, expected), fit_energy(expected, first)
+
+    if options.terms:
+        return fitted(options.terms), ()
+    return _with_gravity(fitted(AIR_TERMS if first.medium == "air" else WATER_TERMS), fitted)
 
 
 def _energy_estimates(fits: Fits, ideal: Interval) -> dict[str, YawMethodEstimate]:
@@ -239,10 +213,12 @@ def _energy_estimates(fits: Fits, ideal: Interval) -> dict[str, YawMethodEstimat
 
 
 def _added(found: YawMethodEstimate, body: _BodyInertia, constant_error: float) -> YawMethodEstimate:
-    """An estimate with lambda661 and its standard error, by the errors of the total, J_zz and k_t together.
+    """An estimate with lambda661, where J_zz is known; its error is by the errors of the total, J_zz and k_t together.
 
     The last is proportional to the total, or to the difference where J_zz was found in air with the same k_t.
     """
+    if body.value_kgm2 is None:
+        return found
     added, error = found.total_inertia_kgm2 - body.value_kgm2, found.total_inertia_standard_error_kgm2
     scaled = added if body.by_torque_constant else found.total_inertia_kgm2
     parts = (error, body.error_kgm2, constant_error * scaled)
@@ -277,7 +253,7 @@ def _with_gravity(fits: Fits, fitted: Callable[[tuple[str, ...]], Fits]) -> tupl
 
 def _angle(
     records: tuple[YawRecord, ...], rig: YawRig, fit: EnergyFit, ideal: Interval
-) -> tuple[tuple[YawMethodEstimate, Array, Array] | None, list[Notice]]:
+) -> tuple[AngleFit | None, list[Notice]]:
     """The nonlinear least squares, or None with the reason."""
     beyond = [term for term in fit.balance.terms if term not in (*WATER_TERMS, *GRAVITY)]
     if beyond:
@@ -302,16 +278,16 @@ def _torque_constant(records: tuple[YawRecord, ...], options: YawOptions) -> tup
 
 
 def _body(
-    records: tuple[YawRecord, ...], options: YawOptions, air: YawIdentification | None
-) -> tuple[_BodyInertia | None, list[Notice]]:
+    records: tuple[YawRecord, ...], options: YawOptions, air: YawEstimates | None
+) -> tuple[_BodyInertia, list[Notice]]:
     """J_zz of a body in water, as given, from air or from a file; and what is missing of it."""
     stated = next((record for record in records if "inertia_kgm2" in record.constants), None)
     if records[0].medium == "air":
-        return None, []
+        return _BodyInertia(), []
     if options.inertia_kgm2 is not None:
         body = _BodyInertia(options.inertia_kgm2, options.inertia_error_kgm2, "as given")
     elif air is not None:
-        best, names = air.methods[YAW_METHODS[0]], ", ".join(record.path.name for record in air.records)
+        best, names = air.methods[YAW_METHODS[0]], ", ".join(Path(record).name for record in air.records)
         error = best.total_inertia_standard_error_kgm2
         return _BodyInertia(best.total_inertia_kgm2, error, f"in air, {names}", by_torque_constant=True), []
     elif stated is not None:
@@ -319,7 +295,7 @@ def _body(
         body = _BodyInertia(stated.constants["inertia_kgm2"], error, f"comment of {stated.path.name}")
     else:
         problem = "J_zz is unknown, so that the added inertia cannot be separated from the total"
-        return None, [Notice(f"{problem}: give a record in air as well, or inertia_kgm2.")]
+        return _BodyInertia(), [Notice(f"{problem}: give a record in air as well, or inertia_kgm2.")]
     problem = "J_zz has no standard error, and the error of the added inertia does not include one"
     remedy = "give inertia_error_kgm2, or a line '# inertia_error_kgm2: 0.0002'."
     return body, [] if body.error_kgm2 is not None else [Notice(f"{problem}: {remedy}")]
@@ -441,7 +417,7 @@ def record_histories(records: Sequence[YawRecord], fit: EnergyFit) -> dict[str, 
 def energy_balance_means(fit: EnergyFit) -> EnergyBalance:
     """Work of the motor and of each term in each part of the intervals, means over all pairs."""
     balance = fit.balance
-    shape = (len(balance.pairs), 2, balance.parts)
+    shape = (len(balance.pairs), 2, PARTS)
     # Braking parts are numbered as mirror images.
     order = (slice(None), slice(None, None, -1))
 
@@ -463,17 +439,19 @@ def energy_residuals(fit: EnergyFit) -> tuple[EnergyResidual, ...]:
         EnergyResidual(
             stage=STAGES[interval.braking],
             hump=interval.number + 1,
-            rate_degps=float(np.degrees(np.mean(interval.part(part, balance.parts).rate_radps))),
+            rate_degps=float(np.degrees(np.mean(interval.part(part).rate_radps))),
             left_J=next(residuals),
         )
         for pair in balance.pairs
         for interval in pair
-        for part in range(balance.parts)
+        for part in range(PARTS)
     )
 
 
-def angle_residual(time_s: Array, residual_rad: Array) -> Columns:
-    """Residual angle of the integrated equation, with a gap (nan) between fitted parts."""
-    breaks = np.flatnonzero(np.abs(np.diff(time_s)) > 1.0) + 1
-    time = np.insert(time_s, breaks, time_s[breaks - 1] + 0.01)
-    return drawn_columns({"t_s": time, "residual_rad": np.insert(residual_rad, breaks, np.nan)}, peaks=True)
+def angle_residual(fit: AngleFit | None) -> Columns | None:
+    """Residual angle of the integrated equation, with a gap (nan) between fitted parts; None without a fit."""
+    if fit is None:
+        return None
+    breaks = np.flatnonzero(np.abs(np.diff(fit.time_s)) > 1.0) + 1
+    time = np.insert(fit.time_s, breaks, fit.time_s[breaks - 1] + 0.01)
+    return drawn_columns({"t_s": time, "residual_rad": np.insert(fit.residual_rad, breaks, np.nan)}, peaks=True)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 
@@ -73,54 +73,66 @@ def yaw_rig_model(name: str, rig: YawRig, *, with_current_loop: bool = True) -> 
     parameters = {parameter.name: parameter for parameter in _parameters(rig)}
     p = {key: parameter.symbol for key, parameter in parameters.items()}
     heading = State(
-        name="motion.psi",
-        unit="rad",
-        description="Yaw angle of the body, + clockwise seen from above",
+        "motion.psi",
+        "rad",
+        "Yaw angle of the body, + clockwise seen from above",
         derivative="motion.psidot",
         start=p["initial.psi"],
     )
     rate = State(
-        name="motion.r",
-        unit="rad/s",
-        description="Yaw rate, + clockwise seen from above",
+        "motion.r",
+        "rad/s",
+        "Yaw rate, + clockwise seen from above",
         nominal=0.1,
         derivative="motion.rdot",
         start=p["initial.r"],
     )
-    recorded = Input(name="motor.current", unit="A", description="Current of the motor, + turns clockwise")
-    motor = _current_loop(p) if with_current_loop else (recorded,)
+    motor = _current_loop(p) if with_current_loop else _recorded_current()
     pulse = 2 * math.pi / p["encoder.pulses"]
-    current = motor[0]
     quantities = [
-        Quantity(name="motion.psidot", unit="rad/s", description="Rate of the yaw angle", value=rate.symbol),
-        *_mechanics(heading.symbol, rate.symbol, current.symbol, p, rig.walls),
+        Quantity("motion.psidot", "rad/s", "Rate of the yaw angle", value=rate.symbol),
+        *_mechanics(heading.symbol, rate.symbol, motor.current, p, rig.walls),
         Quantity(
-            name="encoder.angle",
-            unit="rad",
-            description="Yaw angle as the encoder counts it, whole pulses",
+            "encoder.angle",
+            "rad",
+            "Yaw angle as the encoder counts it, whole pulses",
             value=ca.floor(heading.symbol / pulse) * pulse,
         ),
-        *(variable for variable in motor if isinstance(variable, Quantity)),
+        *motor.quantities,
     ]
     outputs = [heading.name, rate.name, "motion.rdot", "encoder.angle", "moment.motor", "moment.resistance"]
     return Model(
         name=name,
         description="Body turned by a motor about a fixed vertical axis, equation (3) of Alyshev (2019)",
-        states=(heading, rate, *(variable for variable in motor if isinstance(variable, State))),
-        inputs=tuple(variable for variable in motor if isinstance(variable, Input)),
+        states=(heading, rate, *motor.states),
+        inputs=motor.inputs,
         parameters=tuple(parameters.values()),
         quantities=tuple(quantities),
-        outputs=(*outputs, current.name) if with_current_loop else tuple(outputs),
+        outputs=(*outputs, *(state.name for state in motor.states)),
         step_s=_STEP_S,
     )
 
 
-def _current_loop(p: dict[str, ca.SX]) -> tuple[State, Input, Quantity]:
-    command = Input(name="motor.command", unit="A", description="Current asked of the amplifier, + turns clockwise")
+class _Motor(NamedTuple):
+    """The current, and the variables that it follows from."""
+
+    current: ca.SX
+    inputs: tuple[Input, ...]
+    states: tuple[State, ...] = ()
+    quantities: tuple[Quantity, ...] = ()
+
+
+def _recorded_current() -> _Motor:
+    recorded = Input("motor.current", "A", "Current of the motor, + turns clockwise")
+    return _Motor(recorded.symbol, (recorded,))
+
+
+def _current_loop(p: dict[str, ca.SX]) -> _Motor:
+    command = Input("motor.command", "A", "Current asked of the amplifier, + turns clockwise")
     current = State(
-        name="motor.current",
-        unit="A",
-        description="Current of the motor, + turns clockwise",
+        "motor.current",
+        "A",
+        "Current of the motor, + turns clockwise",
         derivative="motor.current_rate",
         start=0.0,
         trim=command.symbol,
@@ -128,12 +140,12 @@ def _current_loop(p: dict[str, ca.SX]) -> tuple[State, Input, Quantity]:
     limit = p["motor.max_current"]
     allowed = ca.fmax(-limit, ca.fmin(limit, command.symbol))
     loop = Quantity(
-        name="motor.current_rate",
-        unit="A/s",
-        description="Rate of the current: the amplifier's loop is a first-order lag",
+        "motor.current_rate",
+        "A/s",
+        "Rate of the current: the amplifier's loop is a first-order lag",
         value=(allowed - current.symbol) / p["motor.lag"],
     )
-    return current, command, loop
+    return _Motor(current.symbol, (command,), (current,), (loop,))
 
 
 def _mechanics(
@@ -162,21 +174,12 @@ def _mechanics(
         accelerates, resistance(p["friction.quadratic"]), resistance(p["friction.quadratic_braking"])
     )
     return (
-        Quantity(name="moment.motor", unit="N.m", description="Moment of the motor, + clockwise", value=motor),
-        Quantity(name="moment.gravity", unit="N.m", description="Moment of gravity, + clockwise", value=gravity),
+        Quantity("moment.motor", "N.m", "Moment of the motor, + clockwise", value=motor),
+        Quantity("moment.gravity", "N.m", "Moment of gravity, + clockwise", value=gravity),
         Quantity(
-            name="moment.resistance",
-            unit="N.m",
-            description="Moment of friction and water, + when it acts counterclockwise",
-            value=resisting,
+            "moment.resistance", "N.m", "Moment of friction and water, + when it acts counterclockwise", value=resisting
         ),
-        Quantity(
-            name="motion.rdot",
-            unit="rad/s2",
-            description="Yaw acceleration, + clockwise",
-            nominal=0.1,
-            value=moment / total,
-        ),
+        Quantity("motion.rdot", "rad/s2", "Yaw acceleration, + clockwise", nominal=0.1, value=moment / total),
     )
 
 
@@ -212,17 +215,17 @@ def _parameters(rig: YawRig) -> tuple[Parameter, ...]:
     return (
         *(
             Parameter(
-                name=name,
-                unit=unit,
+                name,
+                unit,
+                description,
                 start=start,
                 nominal=abs(start) or 1.0,
-                description=description,
                 minimum=_BOUNDS.get(name, (None, None))[0],
                 maximum=_BOUNDS.get(name, (None, None))[1],
             )
             for name, unit, start, description in rows
         ),
-        *(Parameter(name=n, unit=unit, start=0.0, tunable=False, description=text) for n, unit, text in starts),
+        *(Parameter(n, unit, text, start=0.0, tunable=False) for n, unit, text in starts),
     )
 
 

@@ -22,6 +22,7 @@ from tank2sim.apps.rigs.yaw.model import yaw_rig_model
 from tank2sim.apps.rigs.yaw.records import YawRecord
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
+from tank2sim.records.audit.weak import newey_west
 from tank2sim.simulation.scheme import runge_kutta_step
 from tank2sim.simulation.sensitivity import augmented_step
 
@@ -58,10 +59,16 @@ class _Hump(NamedTuple):
     noise_A2: float
 
 
-def fit_angle(
-    records: tuple[YawRecord, ...], rig: YawRig, first: EnergyFit, ideal: Interval
-) -> tuple[YawMethodEstimate, Array, Array] | None:
-    """Fit (3) to the angle of all humps: the estimate, times (s) and residuals (rad); None if it does not converge.
+class AngleFit(NamedTuple):
+    """The estimate, and the residuals of the angle (n,) of all humps with their times."""
+
+    estimate: YawMethodEstimate
+    time_s: Array
+    residual_rad: Array
+
+
+def fit_angle(records: tuple[YawRecord, ...], rig: YawRig, first: EnergyFit, ideal: Interval) -> AngleFit | None:
+    """Fit (3) to the angle of all humps; None if it does not converge.
 
     `rig` has the torque constant and known effects beyond (3), `first` the start values and the terms; the dissipation
     reported belongs to the programme's interval `ideal`.
@@ -96,7 +103,7 @@ def fit_angle(
     gain = rig.torque_constant_NmpA / best["inertia"], decay
     covariance = _covariance(found.fun, misfit(found.x)[1], humps, gain)[:count, :count] * np.outer(scale, scale)
     estimate = estimate_from(terms, values, covariance, ideal)
-    return estimate, np.concatenate([hump.time_s for hump in humps]), found.fun
+    return AngleFit(estimate, np.concatenate([hump.time_s for hump in humps]), found.fun)
 
 
 def _search(misfit: WithSlopes, begin: Array, count: int) -> OptimizeResult | None:
@@ -123,7 +130,7 @@ def _covariance(residuals: Array, design: Array, humps: list[_Hump], gain: tuple
     for part in parts:
         folded[:, : part.shape[1]] += part
     lags = max(1, round(_MEMORY * folded.shape[1]))
-    along = [_newey_west(folded, lags), sum(_newey_west(part, lags) for part in parts)]
+    along = [newey_west(folded.T, lags), sum(newey_west(part.T, lags) for part in parts)]
     noise = _from_current(np.split(inverse, ends, axis=1), humps, gain)
     variances = [np.diag(alone) + noise, *(np.diag(matrix) / (1 - _MEMORY) for matrix in along)]
     if len(humps) > 1:
@@ -145,15 +152,6 @@ def _from_current(parts: list[Array], humps: list[_Hump], gain: tuple[float, flo
         response = gain[0] * np.diff(hump.time_s) * swung
         variances += hump.noise_A2 * np.sum((part @ response) ** 2, axis=1)
     return variances
-
-
-def _newey_west(scores: Array, lags: int) -> Array:
-    """Covariance of the sum of the columns, with Bartlett's weights up to `lags`."""
-    covariance: Array = scores @ scores.T
-    for lag in range(1, lags + 1):
-        cross = scores[:, lag:] @ scores[:, :-lag].T
-        covariance = covariance + (1 - lag / (lags + 1)) * (cross + cross.T)
-    return covariance
 
 
 def _humps(record: YawRecord) -> list[_Hump]:

@@ -166,14 +166,9 @@ def programme_of(card: YawRigCard) -> YawProgramme:
     stated = card.programme
     if stated is None:
         return PAPER_PROGRAMME
+    kind: ProgrammeKind = "reversing" if stated.kind == "reversing" else "unidirectional"
     try:
-        programme = YawProgramme(
-            max_rate_radps=stated.max_rate_radps,
-            rise_s=stated.rise_s,
-            settle_s=stated.settle_s,
-            kind="reversing" if stated.kind == "reversing" else "unidirectional",
-            humps=stated.humps,
-        )
+        programme = YawProgramme(kind=kind, **stated.model_dump(exclude={"kind"}))
     except ValueError as error:
         raise card.fault("programme", str(error), "correct its keys") from None
     return full_turns(programme) if stated.kind == "full_turn" else programme

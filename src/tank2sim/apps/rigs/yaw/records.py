@@ -104,7 +104,6 @@ def read_yaw_record(path: Path | str | CsvTable) -> YawRecord:
     turns = int(np.count_nonzero(np.abs(np.diff(angle)) > math.pi))
     if turns:
         notes.append(f"the angle jumps by a whole turn {turns} times and is put together again.")
-    constants = {key: value for key in _PLAIN if (value := table.positive_comment(key)) is not None}
     return YawRecord(
         path=table.path,
         time_s=time,
@@ -113,7 +112,7 @@ def read_yaw_record(path: Path | str | CsvTable) -> YawRecord:
         medium="air" if medium == "air" else "water",
         programme=programme,
         stated=not missing,
-        constants=constants,
+        constants=table.positive_comments(_PLAIN),
         notes=tuple(map(Notice, notes)),
     )
 

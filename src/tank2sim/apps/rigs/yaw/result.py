@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart
 from tank2sim.answer.charts.motion import History, Signal, history_chart
 from tank2sim.answer.charts.parts import plain, series_look
 from tank2sim.answer.charts.rows import RowPlot, row_chart
@@ -22,15 +23,19 @@ from tank2sim.answer.charts.vega import (
     tooltips,
 )
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, records_frame, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.rigs.yaw.card import YawRigCard
-from tank2sim.apps.rigs.yaw.energy import YawMethodEstimate, term_and_unit
+from tank2sim.apps.rigs.yaw.energy import YawMethodEstimate
 from tank2sim.apps.rigs.yaw.found_card import nrdot_prime, rig_card_text, with_nrdot
-from tank2sim.apps.rigs.yaw.identify import YAW_METHODS, EnergyBalance, EnergyResidual, YawIdentification, YawStudy
+from tank2sim.apps.rigs.yaw.identify import STAGES, YAW_METHODS, EnergyBalance, EnergyResidual, YawStudy
+from tank2sim.apps.rigs.yaw.model import UNKNOWN_RIG
+from tank2sim.apps.rigs.yaw.records import YawRecord
+from tank2sim.apps.rigs.yaw.theory import TheoryValue
 from tank2sim.arrays import Columns
 from tank2sim.cards import Card, parse_card
 from tank2sim.errors import ArgumentError, InputError
+from tank2sim.units import in_words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -62,7 +67,6 @@ _ANGLE = (
     "The equation of motion is integrated under the recorded current, each hump from its own start; the recorded angle "
     "is subtracted."
 )
-_UNITS = {"Nm": "N m", "Nms": "N m s", "Nms2": "N m s²", "kgm2": "kg m²"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -74,8 +78,8 @@ class YawResult(Result[YawStudy]):
     study : YawStudy
     method : str
         Method whose numbers a card gets.
-    identification : YawIdentification, optional
-        None if the result was read from its JSON.
+    records : tuple of YawRecord
+        Records of the study; empty if the result was read from its JSON.
     rig : YawRigCard, optional
         What is known of the rig.
     files : mapping, optional
@@ -84,16 +88,15 @@ class YawResult(Result[YawStudy]):
 
     study: YawStudy
     method: str = YAW_METHODS[0]
-    identification: YawIdentification | None = None
+    records: tuple[YawRecord, ...] = ()
     rig: YawRigCard | None = None
     files: Mapping[Path, str | bytes] = field(default_factory=dict)
     command: ClassVar[str] = "yaw"
 
-    @property
-    def _identified(self) -> YawIdentification:
-        if self.identification is None:
+    def _read_records(self) -> tuple[YawRecord, ...]:
+        if not self.records:
             raise InputError(self.study.records[0], "", "was not read with this result", "evaluate the records again")
-        return self.identification
+        return self.records
 
     def _known_method(self) -> str:
         if self.method not in self.study.methods:
@@ -107,15 +110,12 @@ class YawResult(Result[YawStudy]):
 
         ``added_inertia_kgm2`` is missing where J_zz is not known; ``total_inertia_kgm2`` is J_zz + lambda661.
         """
-        import pandas as pd
-
         columns = [
             f"{name}{error}_{unit}"
             for name, unit in (("added_inertia", "kgm2"), ("total_inertia", "kgm2"), ("dissipation", "J"))
             for error in ("", "_standard_error")
         ]
-        rows = [[getattr(found, column) for column in columns] for found in self.study.methods.values()]
-        return pd.DataFrame(rows, columns=columns, index=pd.Index(self.study.methods, name="method"))
+        return records_frame(self.study.methods, columns, index="method")
 
     @property
     def added_inertia_kgm2(self) -> float | None:
@@ -135,7 +135,7 @@ class YawResult(Result[YawStudy]):
         InputError
             The added inertia or the length is not known, or the added inertia is negative.
         """
-        return nrdot_prime(self._identified, self._known_method(), length_m)
+        return nrdot_prime(self.study, self._read_records(), self._known_method(), length_m)
 
     def with_nrdot(self, card: Any, length_m: float | None = None) -> Any:
         """A ship with N_rdot of the body on the rig on its card, the value before in a comment.
@@ -165,10 +165,9 @@ class YawResult(Result[YawStudy]):
         InputError
             The method gives no friction, or the added inertia is not known or negative.
         """
-        found, method = self._identified, self._known_method()
-        source = f"tank2sim yaw {' '.join(record.path.name for record in found.records)}, method {method}"
-        known = self.rig.yaw_rig if self.rig else None
-        return parse_card(rig_card_text(found, method, name=name, source=source, known=known), "the card found")
+        records, method = self._read_records(), self._known_method()
+        known = self.rig.yaw_rig if self.rig else UNKNOWN_RIG
+        return parse_card(rig_card_text(self.study, records, method, name=name, known=known), "the card found")
 
     @property
     def title(self) -> str:
@@ -234,46 +233,38 @@ class YawResult(Result[YawStudy]):
     def sections(self) -> Sequence[Section]:
         """Estimates, energy balance, records, residuals, theory."""
         study = self.study
+        methods = study.methods
+        estimates = Illustration(
+            _estimates_chart(methods), caption="Dashed: the energy least squares.", name="estimates_by_method"
+        )
+        balance = [
+            Illustration(
+                _balance_chart(study.energy_balance), caption="The mean over all pairs.", name="energy_balance"
+            ),
+            Illustration(_energy_residual_chart(study.energy_residuals), name="energy_balance"),
+        ]
         records = [
-            _chart(_record_chart(name, columns), "", "record_and_programme")
+            Illustration(_record_chart(name, columns), name="record_and_programme")
             for name, columns in study.histories.items()
         ]
         sections = [
-            Section(
-                "Estimates by method",
-                text=_ESTIMATES,
-                tables=[_estimates(study.methods)],
-                charts=[
-                    _chart(_estimates_chart(study.methods), "Dashed: the energy least squares.", "estimates_by_method")
-                ],
-            ),
-            Section(
-                "Energy balance",
-                text=_BALANCE,
-                tables=[_friction(study.methods)],
-                charts=[
-                    _chart(_balance_chart(study.energy_balance), "The mean over all pairs.", "energy_balance"),
-                    _chart(_energy_residual_chart(study.energy_residuals), "", "energy_balance"),
-                ],
-            ),
+            Section("Estimates by method", text=_ESTIMATES, tables=[_estimates(methods)], charts=[estimates]),
+            Section("Energy balance", text=_BALANCE, tables=[_friction(methods)], charts=balance),
             Section("Record and programme", text="The rate is shown where it is evaluated.", charts=records),
         ]
         if study.angle_residual is not None:
-            chart = _chart(_angle_residual_chart(study.angle_residual), "", "nonlinear_least_squares")
+            chart = Illustration(_angle_residual_chart(study.angle_residual), name="nonlinear_least_squares")
             sections.append(Section("Nonlinear least squares", text=_ANGLE, charts=[chart]))
-        if study.theory:
-            rows: list[list[Cell]] = [
-                [value.formula, 1e4 * value.value_kgm2, _scaled(value.printed_kgm2), value.remark]
-                for value in study.theory
-            ]
-            heads = ("formula", "added inertia (10⁻⁴ kg m²)", "published, Table 1 (10⁻⁴ kg m²)", "remark")
-            caption = "Added inertia from the form, by (7), (8) and (9) of Alyshev (2019)"
-            sections.append(Section("Theory", tables=[table(caption, heads, rows, digits=5)]))
-        return sections
+        return [*sections, *([_theory(study.theory)] if study.theory else [])]
 
 
-def _chart(chart: Any, caption: str, name: str) -> Illustration:
-    return Illustration(chart, caption=caption, name=name)
+def _theory(theory: Sequence[TheoryValue]) -> Section:
+    rows: list[list[Cell]] = [
+        [value.formula, 1e4 * value.value_kgm2, _scaled(value.printed_kgm2), value.remark] for value in theory
+    ]
+    heads = ("formula", "added inertia (10⁻⁴ kg m²)", "published, Table 1 (10⁻⁴ kg m²)", "remark")
+    caption = "Added inertia from the form, by (7), (8) and (9) of Alyshev (2019)"
+    return Section("Theory", tables=[table(caption, heads, rows, digits=5)])
 
 
 def _scaled(value: float | None) -> float | None:
@@ -313,13 +304,13 @@ def _friction(methods: Mapping[str, YawMethodEstimate]) -> Table:
     terms = dict.fromkeys(term for found in given.values() for term in found.friction)
     rows: list[list[Cell]] = []
     for term in terms:
-        words, unit = term_and_unit(term)
+        words, unit = in_words(term)
         cells: list[Cell] = []
         for found in given.values():
             value, error = _scaled(found.friction.get(term)), found.friction_standard_errors.get(term)
             shown = None if value is None else format_number(value)
             cells.append(shown if error is None else f"{shown} ± {format_number(1e4 * error, 2)}")
-        rows.append([words.replace("_", " "), _UNITS[unit], *cells])
+        rows.append([words, unit, *cells])
     heads = ("term", "unit", *(name.replace("_", " ") for name in given))
     return table("Friction and water, times 10⁴", heads, rows, folded=True)
 
@@ -340,7 +331,7 @@ def _balance_chart(balance: EnergyBalance) -> ChartSpec:
     terms = {term.replace("_", " "): parts for term, parts in balance.spent_J.items()}
     look = series_look([*terms, "motor"], as_points=["motor"])
     panels = []
-    for name in ("accelerating", "braking"):
+    for name in STAGES:
         bars = [
             {"part": place, "run": term, "v": plain(1e3 * value)}
             for term, parts in terms.items()
@@ -402,24 +393,24 @@ def _estimates_chart(methods: Mapping[str, YawMethodEstimate]) -> ChartSpec:
 
 def _energy_residual_chart(residuals: Sequence[EnergyResidual]) -> ChartSpec:
     """Residual work of each subinterval, against the rate in its middle."""
-    rows: list[ChartRecord] = [
-        {"run": one.stage, "hump": one.hump, "x": plain(one.rate_degps), "v": plain(1e6 * one.left_J)}
-        for one in residuals
+    stages = {stage: [one for one in residuals if one.stage == stage] for stage in STAGES}
+    series = [
+        PlotSeries(
+            stage,
+            x=[one.rate_degps for one in found],
+            y=[1e6 * one.left_J for one in found],
+            points=True,
+            more={"hump": [one.hump for one in found]},
+        )
+        for stage, found in stages.items()
     ]
-    look = series_look(["accelerating", "braking"], as_points=["accelerating", "braking"])
-    up = PlotAxis("work left over (µJ)", zero=True).channel("v")
-    place = {
-        "x": PlotAxis("mean rate of the subinterval (deg/s)").channel("x"),
-        "y": up,
-        "color": look.colour,
-        "shape": look.shape,
-        "tooltip": tooltips({"run:N": "interval", "hump:O": "hump", "v:Q": "left over (µJ)"}),
-    }
-    return layered(
-        [Rule([0.0]).layer(up), layer("point", rows, place)],
-        size=(720, 220),
+    return curve_chart(
+        Plot(series, up=PlotAxis("work left over (µJ)", zero=True), height_px=220, rules=[Rule([0.0])]),
+        PlotAxis("mean rate of the subinterval (deg/s)"),
         title="Residuals of the energy balance",
-        description="Work that the energy least squares do not explain, by subinterval.",
+        window=(),
+        described="Work that the energy least squares do not explain, by subinterval.",
+        shown={"run:N": "interval", "hump:O": "hump", "v:Q": "left over (µJ)"},
     )
 
 

@@ -25,8 +25,8 @@ from tank2sim.apps.rigs.yaw.programme import (
     inertia_from_work,
     programme_of,
 )
-from tank2sim.apps.rigs.yaw.records import Medium, YawRecord, yaw_record_text
-from tank2sim.apps.rigs.yaw.theory import numbers_of
+from tank2sim.apps.rigs.yaw.records import Medium, YawRecord
+from tank2sim.arguments import numbers_in
 from tank2sim.arrays import Array
 from tank2sim.cards import Card
 from tank2sim.dynamics.vessel import Vessel, as_vessel
@@ -48,8 +48,8 @@ class TunedController:
 
     `inertia_kgm2` is a10 = J* + lambda66, from which the first gains are taken, with a20 = 0.1 a10 (N m s) for the
     friction; `divisor` is n1, `integral_gain` K_I, `filter_s` T_o. `tune` takes new gains after every pair of
-    intervals. `as_printed` takes the first gains as they are printed, with a10 and a20 exchanged, and t4, t5 for the
-    limits of braking where t5, t6 are meant.
+    intervals. (The print exchanges a10 and a20 in the first gains, and has t4, t5 as limits of braking where t5, t6
+    are meant.)
     """
 
     inertia_kgm2: float
@@ -57,13 +57,11 @@ class TunedController:
     integral_gain: float = 1.0
     filter_s: float = 0.1
     tune: bool = True
-    as_printed: bool = False
 
     def first_gains(self, lag_s: float, torque_constant_NmpA: float) -> tuple[float, float]:
         """K_P and K_D of the first run: a20 and a10 over n1 T_c k_t."""
         scale = self.divisor * lag_s * torque_constant_NmpA
-        proportional, derivative = 0.1 * self.inertia_kgm2 / scale, self.inertia_kgm2 / scale
-        return (derivative, proportional) if self.as_printed else (proportional, derivative)
+        return 0.1 * self.inertia_kgm2 / scale, self.inertia_kgm2 / scale
 
     def tuned_gains(
         self, programme: YawProgramme, time_s: Array, current: Array, lag_s: float
@@ -76,9 +74,6 @@ class TunedController:
         if not pairs:
             return None
         speeding, braking = pairs[-1]
-        if self.as_printed:  # t4 to t5, where the rate has hardly begun to fall
-            t4 = braking[0] - programme.settle_s - programme.rise_s / 6
-            braking = t4, t4 + programme.rise_s / 6
         works: list[float] = []  # int w I dt, A rad
         for ends in (braking, speeding):
             times = np.linspace(*ends, 401)
@@ -288,33 +283,40 @@ def yaw_record(
     )
 
 
-def simulated_record(
-    card: YawRigCard,
-    path: Path,
-    current_noise_A: float = 0.0,
-    *,
-    medium: Medium = "water",
-    controller: Controller | None = None,
-    programme: YawProgramme | None = None,
-) -> YawRecord:
-    """Simulate the record of a programme on the card's rig, including its encoder, for the file `path`.
+@dataclass(frozen=True)
+class RigRun:
+    """A run to simulate on a card's rig; `controller` is ``tuned`` (4), with the true inertia, or ``adaptive`` (6).
 
-    In ``air`` the rig is given by :func:`rig_in_air`. The controller is by default (4), with the true inertia, the
-    programme the card's; the noise of the recorded current is a standard deviation. InputError if the motor
-    saturates, or the card lacks a programme.
+    `similar_to` (``L,B,R,T``) is a ship's motion that the body follows at its size, in place of the card's programme;
+    `noise_A` the standard deviation of the recorded current.
     """
-    wet, programme = card.yaw_rig, programme or programme_of(card)
-    rig = rig_in_air(wet) if medium == "air" else wet
-    controller = controller or TunedController(inertia_kgm2=rig.inertia_kgm2 + rig.added_inertia_kgm2)
-    run = run_yaw_rig(rig, programme, controller, Measuring(current_noise_A=current_noise_A))
-    constants = {}
-    if medium == "water":
-        constants = {"inertia_kgm2": rig.inertia_kgm2, "water_density_kgpm3": card.environment.water_density_kgpm3}
-        if error := card.uncertainty.get("inertia_kgm2"):
-            constants["inertia_error_kgm2"] = error
-    if card.ship.length_m is not None:
-        constants["length_m"] = card.ship.length_m
-    return yaw_record(run, rig, path, constants, medium=medium)
+
+    medium: Medium = "water"
+    controller: str = "tuned"
+    similar_to: str | None = None
+    noise_A: float = 0.0
+
+
+def simulated_record(card: YawRigCard, path: Path, run: RigRun) -> YawRecord:
+    """Simulate a run on the card's rig, including its encoder, as the record of the file `path`.
+
+    In ``air`` the rig is given by :func:`rig_in_air`. InputError if the file exists or the motor saturates.
+    """
+    if path.exists():
+        raise InputError(path, "", "exists, and may be a measurement", "give the simulated record a new name")
+    air = run.medium == "air"
+    rig = rig_in_air(card.yaw_rig) if air else card.yaw_rig
+    programme = similar_programme(card, run.similar_to) if run.similar_to else programme_of(card)
+    tuned = TunedController(inertia_kgm2=rig.inertia_kgm2 + rig.added_inertia_kgm2)
+    controller = AdaptiveController() if run.controller == "adaptive" else tuned
+    found = run_yaw_rig(rig, programme, controller, Measuring(current_noise_A=run.noise_A))
+    water: dict[str, float | None] = {
+        "inertia_kgm2": rig.inertia_kgm2,
+        "water_density_kgpm3": card.environment.water_density_kgpm3,
+        "inertia_error_kgm2": card.uncertainty.get("inertia_kgm2"),
+    }
+    known = ({} if air else water) | {"length_m": card.ship.length_m}
+    return yaw_record(found, rig, path, {key: value for key, value in known.items() if value}, medium=run.medium)
 
 
 def rig_in_air(rig: YawRig) -> YawRig:
@@ -325,23 +327,6 @@ def rig_in_air(rig: YawRig) -> YawRig:
     """
     water = ("added_inertia_kgm2", "quadratic_Nms2", "inertia_accelerating_kgm2", "inertia_braking_kgm2")
     return rig.model_copy(update={**dict.fromkeys(water, 0.0), "braking_quadratic_Nms2": None, "walls": None})
-
-
-def simulated_file(
-    rig: YawRigCard,
-    path: Path,
-    medium: Medium,
-    controller: str,
-    similar_to: str | None,
-    noise_A: float,
-) -> tuple[YawRecord, str]:
-    """A simulated record, and the text of its file; `controller` and `similar_to` as of :func:`tank2sim.yaw`."""
-    if path.exists():
-        raise InputError(path, "", "exists, and may be a measurement", "give the simulated record a new name")
-    chosen = AdaptiveController() if controller == "adaptive" else None
-    programme = similar_programme(rig, similar_to) if similar_to else None
-    record = simulated_record(rig, path, noise_A, medium=medium, controller=chosen, programme=programme)
-    return record, yaw_record_text(record)
 
 
 def rig_card_of(given: Vessel | Card | str | Path, argument: str) -> YawRigCard:
@@ -367,7 +352,7 @@ def similar_programme(card: YawRigCard, text: str) -> YawProgramme:
 
 def _ship_motion(text: str) -> tuple[float, ...]:
     """Length and beam (m), yaw rate (deg/min) and time (s) of a text ``L,B,R,T``."""
-    numbers = numbers_of(text, (4,))
+    numbers = numbers_in(text, (4,))
     if not numbers or not numbers[2] or min(numbers[0], numbers[1], numbers[3]) <= 0:
         remedy = "write length and beam in m, yaw rate in deg/min and time in s: 38,8,100,120"
         raise ArgumentError("similar_to", "", f"{text!r} is not a motion of a ship", remedy)

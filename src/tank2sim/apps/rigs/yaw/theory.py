@@ -6,11 +6,12 @@ All values are in kg m2, about the vertical axis through midships, of the body f
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from scipy.special import ellipeinc, ellipkinc
 
+from tank2sim.arguments import numbers_in
 from tank2sim.dynamics.ellipsoid import lamb_coefficients
 from tank2sim.dynamics.vessel import as_vessel
 from tank2sim.errors import ArgumentError
@@ -94,9 +95,9 @@ def added_inertia_of_ellipsoid(body: FloatingBody) -> float:
     return depth_factor(body.draught_m / body.depth_m) * ellipsoid_water_inertia(body) * k66
 
 
-def rotational_froude_number(body: FloatingBody, rate_radps: float, gravity_mps2: float = GRAVITY_MPS2) -> float:
+def rotational_froude_number(body: FloatingBody, rate_radps: float) -> float:
     """|Fr| = L |w| / sqrt(g B), of the speed of the ends and the beam."""
-    return body.length_m * abs(rate_radps) / math.sqrt(gravity_mps2 * body.beam_m)
+    return body.length_m * abs(rate_radps) / math.sqrt(GRAVITY_MPS2 * body.beam_m)
 
 
 def added_inertia_by_8(body: FloatingBody, rate_radps: float, stage: Stage, *, bracket: float = 0.088) -> float:
@@ -117,9 +118,9 @@ def added_inertia_by_8(body: FloatingBody, rate_radps: float, stage: Stage, *, b
     return float(size * (still_water + waves))
 
 
-def sensitivity_of_8(body: FloatingBody, rate_radps: float, stage: Stage, change: float = 0.01) -> float:
-    """What `change` in the block coefficient does to (8), kg m2."""
-    fuller = FloatingBody(**{**vars(body), "block_coefficient": body.block + change})
+def sensitivity_of_8(body: FloatingBody, rate_radps: float, stage: Stage) -> float:
+    """Change of (8) with 0.01 in the block coefficient, kg m2."""
+    fuller = replace(body, block_coefficient=body.block + 0.01)
     return added_inertia_by_8(fuller, rate_radps, stage) - added_inertia_by_8(body, rate_radps, stage)
 
 
@@ -181,19 +182,10 @@ def theory_values(body: FloatingBody, rate_radps: float) -> tuple[TheoryValue, .
     return tuple(values)
 
 
-def numbers_of(text: str, counts: tuple[int, ...]) -> list[float]:
-    """Finite numbers of a `text` with commas; none unless there are as many as one of `counts`."""
-    try:
-        numbers = [float(word) for word in text.split(",")]
-    except ValueError:
-        return []
-    return numbers if len(numbers) in counts and all(map(math.isfinite, numbers)) else []
-
-
 def parse_body(text: str) -> FloatingBody:
     """From a text ``L,B,T,H`` or ``L,B,T,H,CB``, or from a card that states these."""
     if "," in text:
-        sizes: list[float | None] = [*numbers_of(text, (4, 5))]
+        sizes: list[float | None] = [*numbers_in(text, (4, 5))]
     else:
         ship = as_vessel(text).card.ship
         sizes = [ship.length_m, ship.beam_m, ship.draught_m, ship.water_depth_m, ship.block_coefficient]
