@@ -31,6 +31,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice, caution
 from tank2sim.simulation.card_range import exceeded_range
+from tank2sim.simulation.thruster_manoeuvres import thruster_sides
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicHermiteSpline
@@ -229,12 +230,15 @@ def calm_inputs(model: Model) -> Array:
 
 
 class TurningEquations:
-    """The equations of steady turning in calm water, in scaled unknowns y = (states of the hull, rudder).
+    """The equations of steady motion in calm water, in scaled unknowns y = (states of the hull, controls).
+
+    The control of a ship is its rudder. A craft that is steered by thrusters has two: mean revolutions of the thrusters
+    that push ahead, and port less starboard, half of which each side has more or less (rad/s).
 
     Parameters
     ----------
     model : Model
-        A ship, or a steering model with the state ``motion.beta``.
+        A ship or craft, or a steering model with the state ``motion.beta``.
     free : bool
         Whether the parameters are arguments of the functions; else they are numbers, and the functions are short.
     """
@@ -242,17 +246,21 @@ class TurningEquations:
     def __init__(self, model: Model, *, free: bool = False):
         self.model = model
         self.names = ("motion.beta", "motion.r") if "motion.beta" in model.state_names else hull_states(model)
+        self.sides = thruster_sides(model)
+        self.controls = ("mean", "difference") if self.sides else ("rudder.angle",)
         nominal = {state.name: state.nominal for state in model.states}
         values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
         speed = float(values["ship.speed"])
         self.ship_time = float(values["ship.length"]) / speed
         sizes = {"motion.u": speed, "motion.v": speed, "motion.r": 1 / self.ship_time}
-        self.scale: Array = np.array([*(sizes.get(name, nominal[name]) for name in self.names), 1.0])
+        self.scale: Array = np.array(
+            [*(sizes.get(name, nominal[name]) for name in self.names), *(1.0,) * len(self.controls)]
+        )
         self.yaw: Array = np.eye(len(self.scale))[self.names.index("motion.r")]
         self.symbol, self.p = ca.SX.sym("y", len(self.scale)), model.p if free else ca.SX(model.parameter_values())
         derivative = {state.name: state.derivative for state in model.states}
         rates = model.expand(ca.vcat([model.symbol(derivative[name]) for name in self.names]))
-        self.rates = self.along(rates) * self.ship_time / self.scale[:-1]
+        self.rates = self.along(rates) * self.ship_time / self.scale[: len(self.names)]
         slopes = ca.densify(ca.jacobian(self.rates, self.symbol))
         arguments = [self.symbol, model.p] if free else [self.symbol]
         self.function = ca.Function("steady", arguments, [self.rates, slopes], {"cse": True})
@@ -261,10 +269,23 @@ class TurningEquations:
         """An expression of states, inputs and parameters in the unknowns, in calm water."""
         model = self.model
         states = ca.substitute(ca.vcat([ca.SX(state.start) for state in model.states]), model.p, self.p)
-        for row, name in enumerate((*self.names, "rudder.angle")):
-            states[model.state_names.index(name)] = self.symbol[row] * self.scale[row]
-        (found,) = ca.substitute([expression], [model.x, model.u, model.p], [states, ca.SX(calm_inputs(model)), self.p])
+        inputs = ca.SX(calm_inputs(model))
+        for name, value in self._values().items():
+            if name in model.state_names:
+                states[model.state_names.index(name)] = value
+            else:
+                inputs[model.input_names.index(name)] = value
+        (found,) = ca.substitute([expression], [model.x, model.u, model.p], [states, inputs, self.p])
         return found
+
+    def _values(self) -> dict[str, ca.SX]:
+        """States and inputs by the unknowns."""
+        scaled = ca.vertsplit(self.symbol * self.scale)
+        given = dict(zip((*self.names, *self.controls), scaled, strict=True))
+        if not self.sides:
+            return given
+        mean, difference = given.pop("mean"), given.pop("difference")
+        return given | {name: mean + side * difference / 2 for name, side in self.sides.items()}
 
     def __call__(self, y: Array) -> tuple[Array, Array]:
         """Residual (n,) and Jacobian (n, n + 1)."""
