@@ -3,26 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import linprog
 
 from tank2sim.analysis.heading.control import DAMPING, INTEGRAL_BAND_RAD, SLOWNESS
-from tank2sim.analysis.heading.disturbances import (
-    angles_in_degrees,
-    in_weather,
-    wave_yaw_acceleration,
-    weather_for,
-)
 from tank2sim.analysis.heading.piloted import Piloted, PilotStudy
-from tank2sim.analysis.heading.runs import CraftKeeping, HeadingLoop, StepFigures, step_figures
-from tank2sim.analysis.heading.study import StudySettings, keep_tracks, not_held, unfinished
+from tank2sim.analysis.heading.runs import CraftKeeping, HeadingLoop, StepFigures, craft_keeping, step_figures
+from tank2sim.analysis.heading.study import Outdoors, StudySettings, not_held
 from tank2sim.analysis.linearisation import OperatingPoint, jacobians
 from tank2sim.arrays import Array, ComplexNumber
 from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.craft_terms import CRAFT_ADDED_MASSES
-from tank2sim.dynamics.autopilot_loop import YAW_DISTURBANCE
 from tank2sim.dynamics.craft_autopilot import CraftGains, craft_autopilot_model, thrust_limits
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import inertia
@@ -121,18 +114,10 @@ def study_craft_autopilot(
         "speed": loop.run({"speed.command": speed, "heading.command": 0.0}, duration, begin=slower),
     }
     course = step_figures(runs["course"].t, runs["course"]["motion.psi"], change)
-    weather = weather_for(card.ship.length_m, **settings.weather)
-    outside, inputs = in_weather(model, card, weather)
-    outdoors, begin = HeadingLoop(outside, autopilot), {"initial.u": speed}
-    waves = wave_yaw_acceleration(
-        weather, outdoors.model.step_s, round(KEEPING_LENGTHS / RUN_LENGTHS * duration / outdoors.model.step_s)
-    )
-    kept = {**inputs, "speed.command": speed}
-    runs["keeping"] = outdoors.run(
-        {**kept, YAW_DISTURBANCE: waves}, len(waves) * outdoors.model.step_s, parameters=begin
-    )
-    tracks = keep_tracks(outdoors, settings.waypoints, kept)
-    keeping = _keeping(runs["keeping"], speed)
+    at_speed = replace(settings, speed_mps=speed)
+    outdoors = Outdoors.of(model, card, autopilot, at_speed, KEEPING_LENGTHS / RUN_LENGTHS * duration)
+    runs["keeping"] = outdoors.run
+    keeping = craft_keeping(outdoors.run, speed)
     in_degrees = {name: math.degrees(getattr(course, name)) for name in ("ordered", "overshoot")}
     reached = speed - float(runs["speed"]["motion.u"][0])
     study = CraftAutopilotStudy(
@@ -155,26 +140,11 @@ def study_craft_autopilot(
         speed_change=step_figures(runs["speed"].t, runs["speed"]["motion.u"], reached),
         course_keeping=keeping,
         at_limit_percent={name: 100 * _at_limit(card, run) for name, run in runs.items()},
-        weather=angles_in_degrees(asdict(weather)),
-        track={name: track.figures for name, track in tracks.items()},
-        waypoints_m=np.zeros((0, 2)) if settings.waypoints is None else settings.waypoints,
         histories={name: histories(run) for name, run in runs.items()},
-        track_histories={name: track.histories() for name, track in tracks.items()},
-        notices=(*outside.notices, *not_held(keeping, weather, speed), *unfinished(tracks)),
+        notices=(*outdoors.notices, *not_held(keeping, outdoors.weather, speed), *outdoors.unfinished),
+        **outdoors.reported,
     )
     return study, Piloted(model, autopilot, runs)
-
-
-def _keeping(run: Trajectory, speed: float) -> CraftKeeping:
-    """Figures of the later half of a run on course 0."""
-    later = slice(len(run.t) // 2, None)
-    error, lack = np.degrees(run["motion.psi"][later]), run["motion.u"][later] - speed
-    return CraftKeeping(
-        duration_s=float(run.t[-1] - run.t[later][0]),
-        heading_error_rms_deg=float(np.sqrt(np.mean(error**2))),
-        heading_error_mean_deg=float(error.mean()),
-        speed_error_rms_mps=float(np.sqrt(np.mean(lack**2))),
-    )
 
 
 def craft_gains(card: SteeredCard, speed_mps: float, faster: float = 1.0) -> CraftGains:

@@ -202,12 +202,28 @@ def course_keeping(run: Trajectory, course_rad: float, from_s: float) -> CourseK
         duration_s=duration,
         heading_error_deg2s=float(np.mean(error**2) * duration),
         rudder_deg2s=float(np.mean(rudder**2) * duration),
-        heading_error_rms_deg=float(np.sqrt(np.mean(error**2))),
+        heading_error_rms_deg=_rms(error),
         heading_error_mean_deg=float(error.mean()),
-        rudder_rms_deg=float(np.sqrt(np.mean(rudder**2))),
+        rudder_rms_deg=_rms(rudder),
         rudder_travel_degps=float(moved / duration),
         rate_limited_percent=float(100 * _rate_limited(run)[part[1:]].mean()),
     )
+
+
+def craft_keeping(run: Trajectory, speed_mps: float) -> CraftKeeping:
+    """Figures of the later half of a run on course 0 at an ordered speed."""
+    later = slice(len(run.t) // 2, None)
+    error = np.degrees(run["motion.psi"][later])
+    return CraftKeeping(
+        duration_s=float(run.t[-1] - run.t[later][0]),
+        heading_error_rms_deg=_rms(error),
+        heading_error_mean_deg=float(error.mean()),
+        speed_error_rms_mps=_rms(run["motion.u"][later] - speed_mps),
+    )
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _reached(time: Array, values: Array, level: float) -> float | None:
