@@ -220,7 +220,7 @@ class OfCriteria:
         """See :class:`tank2sim.simulation.ensemble.Question`."""
         whole = build(self.ship.card())
         model = _reading_off(whole, *(name for names in _READ_OFF.values() for name in names))
-        each_step, parameters = Integrator(model), parameters_of(model)
+        each_step, parameters = Integrator(model), model.defaults
 
         def criteria_of(values: Mapping[str, float]) -> MemberResult:
             figures: Numbers = {}
@@ -303,10 +303,10 @@ def _with_runaways(troubles: Sequence[str], fine: Sequence[bool] | NDArray[np.bo
 
 def each_ship(model: Model, answer: Callable[[Mapping[str, float]], MemberResult]) -> Ask:
     """The members one after the other: the `answer` to values in place of the model's, or the reason without one."""
-    defaults = parameters_of(model)
+    defaults = model.defaults
 
     def ask(values: Mapping[str, float]) -> MemberResult:
-        if fault := mass_fault(model, defaults | dict(values)):
+        if fault := mass_fault(model, {**defaults, **values}):
             return MemberResult({}, trouble=fault)
         try:
             return answer(values)
@@ -314,11 +314,6 @@ def each_ship(model: Model, answer: Callable[[Mapping[str, float]], MemberResult
             return MemberResult({}, trouble=error.problem)
 
     return each_alone(ask)
-
-
-def parameters_of(model: Model) -> dict[str, float]:
-    """Values of a model by name."""
-    return dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
 
 
 def _reading_off(model: Model, *names: str) -> Model:

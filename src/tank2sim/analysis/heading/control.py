@@ -52,9 +52,9 @@ def heading_autopilot(ship: Model) -> Model:
 
     Raises InputError: the model is not a ship, has no straight course, or its rudder turns it the wrong way.
     """
-    limits = [parameter.start for parameter in ship.parameters if parameter.name == "steering.max_angle"]
+    limit = ship.defaults.get("steering.max_angle", LARGEST_RUDDER_RAD)
     try:
-        gains = heading_gains(stability(ship).nomoto.dimensional, min([*limits, LARGEST_RUDDER_RAD]))
+        gains = heading_gains(stability(ship).nomoto.dimensional, min(limit, LARGEST_RUDDER_RAD))
     except ValueError as error:
         raise InputError(ship.origin, "", str(error), "check Yd and Nd of the card, and its rudder_sign") from None
     return autopilot_model(f"Autopilot of {ship.name}", gains, ship.step_s)

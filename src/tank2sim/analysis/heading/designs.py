@@ -161,7 +161,7 @@ def steering_plant(ship: Model, speed_mps: float | None = None) -> SteeringPlant
         raise InputError(
             ship.origin, "", "has no rudder", "an autopilot needs the card of a ship (linear, abkowitz or mmg)"
         )
-    values = dict(zip(ship.parameter_names, ship.parameter_values().tolist(), strict=True))
+    values = ship.defaults
     slowest, fastest = values["ship.slowest"], values["ship.fastest"]
     if speed_mps is not None and not slowest <= speed_mps <= fastest:
         remedy = f"the card holds from {slowest:g} to {fastest:g} m/s"

@@ -139,7 +139,7 @@ class CraftKeeping:
 
 def without_anti_windup(autopilot: Model) -> dict[str, float]:
     """Parameters without anti-windup: the integral continues at the limit and over a course change; none for a PD."""
-    starts = {parameter.name: parameter.start for parameter in autopilot.parameters}
+    starts = autopilot.defaults
     if "autopilot.anti_windup_time" not in starts:
         return {}
     changed = {"autopilot.anti_windup_time": 1e6, "autopilot.integral_band": math.pi}
@@ -238,7 +238,6 @@ def _reached(time: Array, values: Array, level: float) -> float | None:
 
 def _rate_limited(run: Trajectory) -> Array:
     """True for each step (n - 1,) in which the rudder moved at its largest rate."""
-    limit = acting_variable(run.model, "steering.max_rate")
-    largest = next((known.start for known in run.model.parameters if known.name == limit), math.inf)
+    largest = run.model.defaults.get(acting_variable(run.model, "steering.max_rate"), math.inf)
     moved = np.abs(np.diff(run["rudder.angle"])) / run.model.step_s
     return np.asarray(moved > 0.999 * largest)

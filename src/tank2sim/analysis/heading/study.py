@@ -380,7 +380,7 @@ def _margins(
     ship: Model, design: HeadingDesign, speed: float | None, *, design_speed_only: bool
 ) -> tuple[tuple[LoopMargins, ...], list[Notice]]:
     """Margins at the speed of the design and at five across the card's range, and notices of speeds without any."""
-    values = {parameter.name: parameter.start for parameter in ship.parameters}
+    values = ship.defaults
     design_speed = values["ship.speed"] if speed is None else speed
     found, notices = [loop_margins(ship, design.autopilot, design_speed)], []
     if design_speed_only:
@@ -445,7 +445,7 @@ def _of_the_gear(ship: Model, design: HeadingDesign, kept: CourseKeeping, weathe
             f"keeping a course in waves the rudder is at full rate {kept.rate_limited_percent:.0f} % of the time: "
             + ("the waves are more than this gear can follow" if filtered else f"{remedy} lets it rest")
         )
-    limit = {parameter.name: parameter.start for parameter in ship.parameters}.get("steering.max_angle", 0.0)
+    limit = ship.defaults.get("steering.max_angle", 0.0)
     if limit > LARGEST_RUDDER_RAD * (1 + 1e-9):
         notices.append(
             f"the autopilot orders no more than {math.degrees(LARGEST_RUDDER_RAD):.0f} deg of rudder, the angle that "

@@ -175,8 +175,7 @@ def steering_modes(model: Model, point: OperatingPoint) -> tuple[complex, ...]:
 
 
 def _modes(model: Model, point: OperatingPoint, states: Sequence[str]) -> tuple[complex, ...]:
-    derivative = {state.name: state.derivative for state in model.states}
-    return sorted_modes(jacobians(model, point, [derivative[name] for name in states], states, [])[0])
+    return sorted_modes(jacobians(model, point, model.derivatives_of(states), states, [])[0])
 
 
 def sorted_modes(A: Array) -> tuple[complex, ...]:
@@ -191,11 +190,10 @@ def steering_states(model: Model) -> tuple[str, ...]:
 
 def answering_states(model: Model) -> tuple[str, ...]:
     """The steering states of effects that respond to sway, yaw or each other: not the lag of an engine."""
-    derivative = {state.name: state.derivative for state in model.states}
     states = steering_states(model)
 
     def answers(name: str) -> bool:
-        rate = model.expand(model.symbol(derivative[name]))
+        rate = model.expand(model.symbols(model.derivatives_of([name])))
         return any(ca.depends_on(rate, model.symbol(state_name)) for state_name in states if state_name != name)
 
     return tuple(name for name in states[2:] if answers(name))

@@ -104,7 +104,7 @@ def stability_study(model: Model, speed_mps: float | None = None, *, spirals: bo
         turning = steady_turning(model)
         notices += turning.notices
     except InputError as error:
-        notices.append(Notice(f"no steady-turning diagram: {_reason(error)}"))
+        notices.append(Notice(f"no steady-turning diagram: {error.reason}"))
     if turning is not None and spirals:
         spiralled, spiral_notes = _spirals(model, turning)
         notices += spiral_notes
@@ -122,12 +122,8 @@ def stability_study(model: Model, speed_mps: float | None = None, *, spirals: bo
     )
 
 
-def _reason(error: InputError) -> str:
-    return f"{error.place}: {error.problem}" if error.place else error.problem
-
-
 def _about_speed(model: Model, found: Stability, *, by_speed: bool) -> list[Notice]:
-    values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    values = model.defaults
     slowest, fastest, card_speed = values["ship.slowest"], values["ship.fastest"], values["ship.speed"]
     messages, speed = [], found.operating_point.speed_mps
     if not by_speed:
@@ -204,13 +200,13 @@ def _spirals(model: Model, turning: SteadyTurning) -> tuple[Spirals, list[Notice
         else:
             messages.append("no spiral: no steady turn is stable with the rudder held")
     except InputError as error:
-        messages.append(f"no spiral: {_reason(error)}")
+        messages.append(f"no spiral: {error.reason}")
     try:
         reverse = reverse_spiral(model, turning, stability(model).nomoto.dimensional)
         if reverse is None:
             messages.append("no reverse spiral: the rudder turns the ship the wrong way, or not at all")
     except InputError as error:
-        messages.append(f"no reverse spiral: {_reason(error)}")
+        messages.append(f"no reverse spiral: {error.reason}")
     most = math.degrees(np.max(np.abs(turning.yaw_rate_radps)))
     for name, points in (("spiral", direct), ("reverse spiral", reverse)):
         if points is None:

@@ -215,10 +215,9 @@ def hull_states(model: Model, motion: Sequence[str] = _MOTION) -> tuple[str, ...
 
     With fewer names in `motion`, the remaining ones of u, v, r are constant.
     """
-    derivative = {state.name: state.derivative for state in model.states}
     found = list(motion)
     for name in found:  # grows on the way
-        rate = model.expand(model.symbol(derivative[name]))
+        rate = model.expand(model.symbols(model.derivatives_of([name])))
         held = (*_PLACE, *_MOTION, "rudder.angle", *found)
         found += [name for name in model.state_names if name not in held and ca.depends_on(rate, model.symbol(name))]
     return tuple(found)
@@ -249,17 +248,15 @@ class TurningEquations:
         self.sides = thruster_sides(model)
         self.controls = ("mean", "difference") if self.sides else ("rudder.angle",)
         nominal = {state.name: state.nominal for state in model.states}
-        values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
-        speed = float(values["ship.speed"])
-        self.ship_time = float(values["ship.length"]) / speed
+        speed = model.defaults["ship.speed"]
+        self.ship_time = model.defaults["ship.length"] / speed
         sizes = {"motion.u": speed, "motion.v": speed, "motion.r": 1 / self.ship_time}
         self.scale: Array = np.array(
             [*(sizes.get(name, nominal[name]) for name in self.names), *(1.0,) * len(self.controls)]
         )
         self.yaw: Array = np.eye(len(self.scale))[self.names.index("motion.r")]
         self.symbol, self.p = ca.SX.sym("y", len(self.scale)), model.p if free else ca.SX(model.parameter_values())
-        derivative = {state.name: state.derivative for state in model.states}
-        rates = model.expand(ca.vcat([model.symbol(derivative[name]) for name in self.names]))
+        rates = model.expand(model.symbols(model.derivatives_of(self.names)))
         self.rates = self.along(rates) * self.ship_time / self.scale[: len(self.names)]
         slopes = ca.densify(ca.jacobian(self.rates, self.symbol))
         arguments = [self.symbol, model.p] if free else [self.symbol]
@@ -347,8 +344,7 @@ def steady_turning(model: Model) -> SteadyTurning:
 
 def largest_rudder(model: Model) -> float:
     """:data:`_LARGEST_RUDDER`, or the largest angle of the gear, rad."""
-    values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
-    return min(_LARGEST_RUDDER, float(values.get("steering.max_angle", _LARGEST_RUDDER)))
+    return min(_LARGEST_RUDDER, model.defaults.get("steering.max_angle", _LARGEST_RUDDER))
 
 
 def _diagram(equations: TurningEquations, port: Curve, starboard: Curve) -> SteadyTurning:
@@ -440,7 +436,7 @@ def _end_notices(found: SteadyTurning) -> list[Notice]:
 
 
 def _out_of_range(model: Model, found: SteadyTurning) -> list[Notice]:
-    values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    values = model.defaults
     rate = found.yaw_rate_radps * values["ship.length"] / found.speed_mps
     outside = exceeded_range(values, found.speed_mps, rate, found.drift_rad, found.rudder_rad)
     return [caution(f"EXTRAPOLATED beyond the card's measurements: steady turns have {outside}")] if outside else []

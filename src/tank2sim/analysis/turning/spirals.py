@@ -156,5 +156,4 @@ def _distance(turning: SteadyTurning, rudder: float, rate: float, *, only_stable
 
 
 def _ship_time(model: Model) -> float:
-    values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
-    return float(values["ship.length"] / values["ship.speed"])
+    return model.defaults["ship.length"] / model.defaults["ship.speed"]

@@ -9,22 +9,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from tank2sim.analysis.ensemble.draws import draws_with
-from tank2sim.analysis.stability.imo import TRIAL_RUDDER
+from tank2sim.analysis.stability.imo import calm_trial, largest_trial_rudder
 from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredBy, SteeredCard
 from tank2sim.cards.small_craft import cruising_revolutions, pushes_ahead
 from tank2sim.dynamics import build
 from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
-from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
 from tank2sim.notices import Notice
 from tank2sim.simulation.card_range import Numbers, entry_name, single_figures
 from tank2sim.simulation.ensemble import Redrawn
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Manoeuvre, Stop, Turn, Zigzag
-from tank2sim.simulation.run import Run, simulate
+from tank2sim.simulation.run import Run
 from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, Spin, StraightRun, ThrusterManoeuvre
 from tank2sim.units import from_si, to_si
 
@@ -59,8 +57,7 @@ class TrialShip:
     @property
     def largest_rudder(self) -> float:
         """Rudder of the turning circles, rad: 35 deg, or the largest of the gear."""
-        gear = self.card.steering_gear
-        return min(TRIAL_RUDDER, gear.max_angle_rad if gear and gear.max_angle_rad else TRIAL_RUDDER)
+        return largest_trial_rudder(self.model.defaults)
 
     def run(
         self,
@@ -77,17 +74,7 @@ class TrialShip:
         parameters, inputs : mapping, optional
             Values in place of the model's, by name, SI.
         """
-        calm = undisturbed_inputs(self.model)
-        try:
-            return simulate(
-                self.model,
-                manoeuvre,
-                inputs={**calm, **(inputs or {})},
-                parameters=parameters,
-                integrator=self.integrator,
-            )
-        except InputError as error:
-            return f"{error.place}: {error.problem}" if error.place else error.problem
+        return calm_trial(self.model, manoeuvre, self.integrator, parameters, inputs)
 
 
 def ship_of(card: SteeredCard) -> TrialShip:
