@@ -12,6 +12,7 @@ from tank2sim.analysis.ensemble.draws import draws_with
 from tank2sim.analysis.stability.imo import calm_trial, largest_trial_rudder
 from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredBy, SteeredCard
+from tank2sim.cards.form import ThrusterSection
 from tank2sim.cards.small_craft import cruising_revolutions, pushes_ahead
 from tank2sim.dynamics import build
 from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
@@ -76,6 +77,25 @@ class TrialShip:
         """
         return calm_trial(self.model, manoeuvre, self.integrator, parameters, inputs)
 
+    def spread(
+        self,
+        manoeuvre: Manoeuvre,
+        drawn: Sequence[Mapping[str, float]],
+        parameters: Mapping[str, float] | None = None,
+    ) -> Numbers:
+        """Standard deviation of the figures of a trial over ships with drawn parameters, by :func:`member_spread`.
+
+        Parameters
+        ----------
+        drawn : sequence of mapping
+            Values of each ship, by name, SI.
+        parameters : mapping, optional
+            Values that all have in place of the model's.
+        """
+        # Only the numbers of each member are kept: the motions of a thousand would fill gigabytes.
+        runs = (self.run(manoeuvre, {**(parameters or {}), **member}) for member in drawn)
+        return member_spread([{} if isinstance(run, str) else figure_numbers(run.figures) for run in runs])
+
 
 def ship_of(card: SteeredCard) -> TrialShip:
     """A card ready to run."""
@@ -110,22 +130,24 @@ def craft_trials(cards: Sequence[SteeredCard]) -> dict[str, ThrusterManoeuvre]:
     The revolutions are those that all craft reach, in tens of rpm. A craft without thrusters at both sides has the
     straight run alone.
     """
-    ahead = [
-        [thruster for thruster, holds in zip(card.thrusters, pushes_ahead(card), strict=True) if holds]
-        for card in cards
-    ]
-    full = min(thruster.max_radps for thrusters in ahead for thruster in thrusters)
-    astern = min(-thruster.lowest_radps for thrusters in ahead for thruster in thrusters)
-    rooms = [min(full - cruising, cruising + astern) for cruising in map(cruising_revolutions, cards)]
-    difference, spin = CRAFT_SHARE * 2 * min(rooms), CRAFT_SHARE * min(full, astern)
+    each = [_steering_thrusters(card) for card in cards]
+    full = min(thruster.max_radps for thrusters in each for thruster in thrusters)
+    astern = min(-thruster.lowest_radps for thrusters in each for thruster in thrusters)
+    room = min(min(full - cruising, cruising + astern) for cruising in map(cruising_revolutions, cards))
     trials: dict[str, ThrusterManoeuvre] = {"straight": StraightRun(_tens(full))}
-    if all({1.0, -1.0} <= {math.copysign(1, one.y_m) for one in thrusters if one.y_m} for thrusters in ahead):
+    if all({1.0, -1.0} <= {math.copysign(1, one.y_m) for one in thrusters if one.y_m} for thrusters in each):
+        difference, spin = _tens(CRAFT_SHARE * 2 * room), _tens(CRAFT_SHARE * min(full, astern))
         trials |= {
-            "difference to starboard": DifferenceTurn(_tens(difference)),
-            "difference to port": DifferenceTurn(-_tens(difference)),
-            "spin to starboard": Spin(_tens(spin)),
+            "difference to starboard": DifferenceTurn(difference),
+            "difference to port": DifferenceTurn(-difference),
+            "spin to starboard": Spin(spin),
         }
     return {f"{name} ({trial.words})": trial for name, trial in trials.items()}
+
+
+def _steering_thrusters(card: SteeredCard) -> list[ThrusterSection]:
+    """The thrusters that push ahead."""
+    return [thruster for thruster, holds in zip(card.thrusters, pushes_ahead(card), strict=True) if holds]
 
 
 def _tens(revolutions: float) -> float:
