@@ -30,6 +30,7 @@ from tank2sim.identification.trials.study import (
 from tank2sim.notices import Notice
 from tank2sim.records.trials import Trial
 from tank2sim.results import identification as identification_module
+from tank2sim.results import trial_charts
 from tank2sim.results.identification import MOST_TRIALS, IdentificationResult
 from tank2sim.results.trial_charts import AFTER, BEFORE, MEASURED, history_grid, track_grid
 from tests.answer import drawn
@@ -259,8 +260,9 @@ def test_the_estimates_are_a_table_and_a_data_frame(found) -> None:
 
 @pytest.mark.slow
 def test_of_many_trials_those_are_shown_that_are_followed_worst(found, monkeypatch) -> None:
-    monkeypatch.setattr(identification_module, "MOST_TRIALS", 2)
-    monkeypatch.setattr(identification_module, "_PER_SHEET", 1)
+    for module in (identification_module, trial_charts):
+        monkeypatch.setattr(module, "MOST_TRIALS", 2)
+    monkeypatch.setattr(trial_charts, "PER_SHEET", 1)
     errors = {"b": 0.2, "c": 0.1, "a": 0.3}
     windows = {name: {"r_degps": WindowError(rms_error=error, rms_signal=1.0)} for name, error in errors.items()}
     trials = tuple(TrialErrors(trial=name, before=error, found=error) for name, error in windows.items())

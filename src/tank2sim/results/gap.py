@@ -32,15 +32,14 @@ from tank2sim.notices import Notice, foremost
 from tank2sim.records.signals.writing import trial_text
 from tank2sim.results.gap_cause_charts import agreement_chart, expected_chart, lacking_chart, rival_chart, when_chart
 from tank2sim.results.gap_charts import (
-    MOST_TRIALS_DRAWN,
+    HISTORIES,
     SETS,
     changes_simulation,
-    gap_histories,
-    gap_tracks,
     misfit_chart,
     place_chart,
     shown_models,
     signal_of,
+    worst_replays,
     worst_tracks,
 )
 from tank2sim.results.gap_text import (
@@ -61,6 +60,7 @@ from tank2sim.results.gap_text import (
     verdict_context,
     with_error,
 )
+from tank2sim.results.trial_charts import MOST_TRIALS, trial_pictures
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
@@ -492,13 +492,17 @@ def _shown(
 
 def _motions(study: GapStudy) -> list[Illustration]:
     """Tracks and histories of held-out, then of fitting trials."""
-    charts = []
-    for word, held in SETS.items():
-        stem, trials = word.replace(" ", "_"), f"trials {_ON[word]}"
-        sheets = gap_histories(study, held_out=held, title=f"Motions, {trials}")
-        charts += _drawn(f"tracks_{stem}", gap_tracks(study, held_out=held, title=f"Tracks, {trials}"))
-        charts += [each for sheet, chart in enumerate(sheets, 1) for each in _drawn(f"histories_{stem}_{sheet}", chart)]
-    return [replace(chart, caption=_RUN) for chart in charts]
+    return [
+        chart
+        for word, held in SETS.items()
+        for chart in trial_pictures(
+            worst_replays(study, held_out=held),
+            _ON[word],
+            word.replace(" ", "_"),
+            captions=(_RUN, _RUN),
+            signals=HISTORIES,
+        )
+    ]
 
 
 _SIZE_HEADS = ("effect", "parameter", "value", "unit", "meaning")
@@ -674,9 +678,9 @@ def _acting_text(study: GapStudy) -> str:
 def _track_text(study: GapStudy) -> str:
     counts = {word: sum(trial.held_out == held for trial in study.trials) for word, held in SETS.items()}
     many = [
-        f"{word}: the {MOST_TRIALS_DRAWN} of {count} with the largest misfit before"
+        f"{word}: the {MOST_TRIALS} of {count} with the largest misfit before"
         for word, count in counts.items()
-        if count > MOST_TRIALS_DRAWN
+        if count > MOST_TRIALS
     ]
     return f"Trials {'; '.join(many)}." if many else ""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from tank2sim.answer.charts.before_after import before_after_switch, misfit_maps
 from tank2sim.answer.charts.parts import SeriesLook, extent, plain, records, series_look, with_unit
 from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, heading, layer, layered, panel_title, tooltips
-from tank2sim.gap.outcome.study import GapReplay, GapStudy, TrialMisfit
+from tank2sim.gap.outcome.study import GapReplay, GapStudy
 from tank2sim.gap.result import MisfitPlace
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.thinning import thin_points
@@ -20,26 +20,21 @@ from tank2sim.results.trial_charts import (
     BEFORE,
     MEASURED,
     MODEL_SERIES,
-    history_grid,
+    MOST_TRIALS,
     panel_grid,
     place_over_time,
     track_grid,
     whole_range,
+    worst_trials,
 )
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 from tank2sim.units import to_si
-
-MOST_TRIALS_DRAWN = 12
-"""Tracks in one picture: those of the largest misfit before; more are hard to look at (project choice)."""
 
 FEW_TRIALS = 3
 """Tracks below the verdict: one row of pictures. Project choice."""
 
 MOST_PLACES = 6
 """Worst places that are shown over time: two rows of pictures (project choice)."""
-
-_PER_SHEET = 6
-"""Trials in one picture of histories: as many as are readable on a sheet of paper."""
 
 HISTORIES = {
     "psi_deg": "heading",
@@ -81,36 +76,17 @@ def shown_models(study: GapStudy) -> tuple[str, ...]:
     return ("before", "after") if changes_simulation(study) else ("before",)
 
 
-def gap_tracks(study: GapStudy, *, held_out: bool, title: str = "") -> ChartSpec | None:
-    """Tracks as measured, by the card before and by the card found, a panel a trial; None without any.
-
-    Of many trials those with the largest misfit before are shown.
-    """
-    return track_grid(_worst(study, lambda trial: trial.held_out == held_out), title=title)
+def worst_replays(study: GapStudy, *, held_out: bool, most: int = MOST_TRIALS) -> list[GapReplay]:
+    """Replays of held-out or of fitting trials with the largest misfits before, in the order of the trials."""
+    chosen = [place for place, trial in enumerate(study.trials) if trial.held_out == held_out]
+    replays = [replace(study.replays[place], trial=trial_name(study.replays[place].trial)) for place in chosen]
+    return worst_trials(replays, [study.trials[place].misfit.get("before", np.inf) for place in chosen], most)
 
 
 def worst_tracks(study: GapStudy, *, title: str = "") -> ChartSpec | None:
     """Tracks of the few trials with the largest misfit before, held-out ones where there are any; None without."""
     held_out = any(trial.held_out for trial in study.trials)
-    return track_grid(_worst(study, lambda trial: trial.held_out == held_out, FEW_TRIALS), title=title)
-
-
-def gap_histories(study: GapStudy, *, held_out: bool, title: str = "") -> list[ChartSpec]:
-    """Motions over time as measured, by the card before and by the card found, a column a trial, in sheets.
-
-    Of many trials those with the largest misfit before are shown.
-    """
-    columns = _worst(study, lambda trial: trial.held_out == held_out and not HISTORIES.keys().isdisjoint(trial.signals))
-    sheets = [columns[first : first + _PER_SHEET] for first in range(0, len(columns), _PER_SHEET)]
-    return [history_grid(sheet, signals=HISTORIES, title=title) for sheet in sheets]
-
-
-def _worst(study: GapStudy, chosen: Callable[[TrialMisfit], bool], most: int = MOST_TRIALS_DRAWN) -> list[GapReplay]:
-    """Replays of the chosen trials with the largest misfits before, in the order of the trials."""
-    misfits = {place: trial.misfit.get("before", np.inf) for place, trial in enumerate(study.trials) if chosen(trial)}
-    worst = sorted(misfits, key=lambda place: -misfits[place])[:most]
-    replays = [study.replays[place] for place in sorted(worst)]
-    return [replace(replay, trial=trial_name(replay.trial)) for replay in replays]
+    return track_grid(worst_replays(study, held_out=held_out, most=FEW_TRIALS), title=title)
 
 
 def shown_places(study: GapStudy) -> list[MisfitPlace]:

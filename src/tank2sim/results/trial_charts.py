@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -25,10 +26,13 @@ from tank2sim.answer.charts.vega import (
     shared_looks,
     tooltips,
 )
+from tank2sim.answer.parts import Illustration
 from tank2sim.arrays import Array
 from tank2sim.identification.trials.study import PredictedFigure, TrialErrors, TrialMotions
 from tank2sim.records.thinning import Indices, thin_points
 from tank2sim.units import in_words
+
+_T = TypeVar("_T")
 
 MEASURED, BEFORE, AFTER = "measured", "card before", "card found"
 
@@ -38,13 +42,20 @@ MODEL_SERIES = {"before": BEFORE, "after": AFTER}
 PANELS_PER_ROW = 3
 """Trials next to each other in a picture."""
 
+MOST_TRIALS = 12
+"""Trials of which tracks and histories are shown: the worst. More are hard to look at, and make the page slow (project
+choice)."""
+
+PER_SHEET = 6
+"""Trials in one picture of histories: as many as are readable on a sheet of paper."""
+
 MODEL_SAMPLES, MEASURED_SAMPLES = 140, 40
 """Samples of a line, and points of a series, in a small panel (about 200 px wide)."""
 
 SERIES = {MEASURED: "measured", BEFORE: "before", AFTER: "found"}
 """Series to its name in :class:`.TrialMotions` and :class:`.TrialErrors`."""
 
-_SIGNALS = {
+SIGNALS = {
     "delta_deg": "rudder",
     "psi_deg": "heading",
     "r_degps": "yaw rate",
@@ -68,6 +79,36 @@ SYMBOLS = {
 
 _TRACK = ("x_m", "y_m")
 _LOOK = series_look([AFTER, BEFORE, MEASURED], as_points=[MEASURED])
+
+
+def worst_trials(trials: Sequence[_T], sizes: Sequence[float], most: int | None = None) -> list[_T]:
+    """The trials with the largest `sizes`, in their own order; by default :data:`MOST_TRIALS`."""
+    worst = sorted(range(len(trials)), key=lambda place: -sizes[place])[: MOST_TRIALS if most is None else most]
+    return [trials[place] for place in sorted(worst)]
+
+
+def trial_pictures(
+    trials: Sequence[TrialMotions],
+    words: str,
+    stem: str,
+    *,
+    captions: tuple[str, str],
+    signals: Mapping[str, str] = SIGNALS,
+) -> list[Illustration]:
+    """Tracks and time histories of trials, in sheets; empty without any.
+
+    `words`: which trials, for the titles; `stem`: for the names of the charts; `captions`: of tracks and histories;
+    `signals`: column to words.
+    """
+    tracks = track_grid(trials, title=f"Tracks of trials {words}")
+    drawn = [Illustration(tracks, caption=captions[0], name=f"tracks_{stem}")] if tracks else []
+    moving = [
+        trial for trial in trials if not signals.keys().isdisjoint({*trial.measured, *trial.before, *trial.found})
+    ]
+    for first in range(0, len(moving), PER_SHEET):
+        sheet = history_grid(moving[first : first + PER_SHEET], signals=signals, title=f"Motions of trials {words}")
+        drawn.append(Illustration(sheet, caption=captions[1], name=f"histories_{stem}"))
+    return drawn
 
 
 def track_grid(trials: Sequence[TrialMotions], *, title: str = "") -> ChartSpec | None:
@@ -104,9 +145,7 @@ def _track_panel(trial: TrialMotions) -> ChartSpec | None:
     return layered(marks, size=size, data={"values": rows}, title=panel_title(trial.trial))
 
 
-def history_grid(
-    trials: Sequence[TrialMotions], *, signals: Mapping[str, str] = _SIGNALS, title: str = ""
-) -> ChartSpec:
+def history_grid(trials: Sequence[TrialMotions], *, signals: Mapping[str, str] = SIGNALS, title: str = "") -> ChartSpec:
     """Signals over time, a column of panels a trial; `signals`: column to words."""
     text = f"Time histories of {', '.join(trial.trial for trial in trials)}, measured and simulated."
     return panel_grid([_histories(trial, signals) for trial in trials], title, text)
