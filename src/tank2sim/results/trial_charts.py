@@ -55,7 +55,7 @@ MODEL_SAMPLES, MEASURED_SAMPLES = 140, 40
 SERIES = {MEASURED: "measured", BEFORE: "before", AFTER: "found"}
 """Series to its name in :class:`.TrialMotions` and :class:`.TrialErrors`."""
 
-SIGNALS = {
+SHOWN_SIGNALS = {
     "delta_deg": "rudder",
     "psi_deg": "heading",
     "r_degps": "yaw rate",
@@ -93,7 +93,7 @@ def trial_pictures(
     stem: str,
     *,
     captions: tuple[str, str],
-    signals: Mapping[str, str] = SIGNALS,
+    signals: Mapping[str, str] = SHOWN_SIGNALS,
 ) -> list[Illustration]:
     """Tracks and time histories of trials, in sheets; empty without any.
 
@@ -145,7 +145,9 @@ def _track_panel(trial: TrialMotions) -> ChartSpec | None:
     return layered(marks, size=size, data={"values": rows}, title=panel_title(trial.trial))
 
 
-def history_grid(trials: Sequence[TrialMotions], *, signals: Mapping[str, str] = SIGNALS, title: str = "") -> ChartSpec:
+def history_grid(
+    trials: Sequence[TrialMotions], *, signals: Mapping[str, str] = SHOWN_SIGNALS, title: str = ""
+) -> ChartSpec:
     """Signals over time, a column of panels a trial; `signals`: column to words."""
     text = f"Time histories of {', '.join(trial.trial for trial in trials)}, measured and simulated."
     return panel_grid([_histories(trial, signals) for trial in trials], title, text)

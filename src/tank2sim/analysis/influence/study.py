@@ -87,7 +87,7 @@ class Study:
 
     @cached_property
     def _straight(self) -> tuple[EquilibriumFigures, Array]:
-        return straight_courses(self.model, linear_figures(self.model))
+        return straight_courses(self.model, straight_figures(self.model))
 
     @property
     def notices(self) -> tuple[Notice, ...]:
@@ -273,7 +273,7 @@ def turn_figures(u: float, v: float, r: float, side: float, approach: float) -> 
     return figures, np.array([by_radius, 2 * by_radius, by_rate, by_drift, by_speed, -100 / approach * by_speed])
 
 
-def linear_figures(model: Model) -> dict[str, ca.SX]:
+def straight_figures(model: Model) -> dict[str, ca.SX]:
     """Nomoto's coefficients and the criterion of the linearised ship, of x, u and p, by the names of
     :mod:`tank2sim.analysis.influence.figures`."""
     settled = settled_states(model)

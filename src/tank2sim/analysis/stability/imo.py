@@ -121,6 +121,10 @@ def calm_trial(
 
     Parameters
     ----------
+    manoeuvre : Manoeuvre
+        One of :mod:`tank2sim.simulation.manoeuvres`.
+    integrator : Integrator
+        Of the model.
     parameters, inputs : mapping, optional
         Values in place of the model's, and further inputs, by name, SI.
     """

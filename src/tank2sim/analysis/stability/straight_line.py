@@ -179,7 +179,7 @@ def _modes(model: Model, point: OperatingPoint, states: Sequence[str]) -> tuple[
 
 
 def sorted_modes(A: Array) -> tuple[complex, ...]:
-    """Eigenvalues of a matrix (n, n), least damped first."""
+    """Eigenvalues of a matrix `A` (n, n), least damped first."""
     return tuple(complex(value) for value in sorted(np.linalg.eigvals(A), key=lambda value: -value.real))
 
 

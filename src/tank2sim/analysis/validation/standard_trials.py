@@ -87,6 +87,7 @@ class TrialShip:
 
         Parameters
         ----------
+        manoeuvre : Manoeuvre
         drawn : sequence of mapping
             Values of each ship, by name, SI.
         parameters : mapping, optional
