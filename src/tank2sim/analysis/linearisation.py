@@ -118,16 +118,15 @@ def following_states(
         A state is not one of the model, or those left out come to no rest by themselves.
     """
     names = list(model.state_names)
-    for name in states:
-        if name not in names:
-            raise InputError("states", name, "is not a state of the model", f"there are: {', '.join(names)}")
+    if unknown := next((name for name in states if name not in names), ""):
+        raise InputError("states", unknown, "is not a state of the model", f"there are: {', '.join(names)}")
     rates, _ = jacobians(model, point, model.derivatives_of(names), names, [])
-    known = [names.index(name) for name in states]
-    free = [place for place, name in enumerate(names) if name not in states and name not in inputs]
-    found: list[int] = []
-    while added := [place for place in free if place not in found and rates[[*known, *found], place].any()]:
-        found += added
-    if found and np.linalg.eigvals(rates[np.ix_(found, found)]).real.max() >= 0:
+    felt = np.isin(names, states)
+    free = ~felt & ~np.isin(names, inputs)
+    while (added := free & ~felt & rates[felt].any(axis=0)).any():
+        felt |= added
+    found = np.flatnonzero(felt & free)
+    if len(found) and np.linalg.eigvals(rates[np.ix_(found, found)]).real.max() >= 0:
         missing = ", ".join(names[place] for place in found)
         problem = f"leave out {missing}: the others depend on what is left out, and it does not settle by itself"
         raise InputError("states", "", problem, f"add {missing} to the states")

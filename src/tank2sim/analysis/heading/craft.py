@@ -13,6 +13,7 @@ from tank2sim.analysis.heading.piloted import Piloted, PilotStudy
 from tank2sim.analysis.heading.runs import CraftKeeping, HeadingLoop, StepFigures, craft_keeping, step_figures
 from tank2sim.analysis.heading.study import Outdoors, StudySettings, not_held
 from tank2sim.analysis.linearisation import OperatingPoint, jacobians
+from tank2sim.analysis.stability.straight_line import sorted_modes
 from tank2sim.arrays import Array, ComplexNumber
 from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.craft_terms import CRAFT_ADDED_MASSES
@@ -98,17 +99,9 @@ def study_craft_autopilot(
     speed = card.model.speed_mps if settings.speed_mps is None else settings.speed_mps
     change = settings.course_change_rad
     duration = RUN_LENGTHS * card.ship.length_m / speed
-    for faster in FASTER:
-        gains = craft_gains(card, speed, faster)
-        autopilot = craft_autopilot_model(card, gains, model.step_s)
-        loop = HeadingLoop(model, autopilot)
-        steady, slower = (_settled(loop, wanted, duration) for wanted in (speed, SLOWER_SHARE * speed))
-        poles = _poles(loop, steady, speed)
-        if min(-pole.real / abs(pole) for pole in poles) >= LEAST_DAMPING:
-            break
-    else:
-        problem = f"leaves a pole of the closed loop at {poles[0]:.3g} 1/s however fast the autopilot"
-        raise InputError(card.source, "derivatives", problem, "check the damping of the card, or give another speed")
+    gains, autopilot, poles = _damped(card, model, speed, duration)
+    loop = HeadingLoop(model, autopilot)
+    steady, slower = (_settled(loop, wanted, duration) for wanted in (speed, SLOWER_SHARE * speed))
     runs = {
         "course": loop.run({"speed.command": speed, "heading.command": change}, duration, begin=steady),
         "speed": loop.run({"speed.command": speed, "heading.command": 0.0}, duration, begin=slower),
@@ -145,6 +138,21 @@ def study_craft_autopilot(
         **outdoors.reported,
     )
     return study, Piloted(model, autopilot, runs)
+
+
+def _damped(
+    card: SteeredCard, model: Model, speed: float, duration: float
+) -> tuple[CraftGains, Model, tuple[complex, ...]]:
+    """The slowest of the autopilots that are tried whose closed loop is damped, with its gains and poles."""
+    for faster in FASTER:
+        gains = craft_gains(card, speed, faster)
+        autopilot = craft_autopilot_model(card, gains, model.step_s)
+        loop = HeadingLoop(model, autopilot)
+        poles = _poles(loop, _settled(loop, speed, duration), speed)
+        if min(-pole.real / abs(pole) for pole in poles) >= LEAST_DAMPING:
+            return gains, autopilot, poles
+    problem = f"leaves a pole of the closed loop at {poles[0]:.3g} 1/s however fast the autopilot"
+    raise InputError(card.source, "derivatives", problem, "check the damping of the card, or give another speed")
 
 
 def craft_gains(card: SteeredCard, speed_mps: float, faster: float = 1.0) -> CraftGains:
@@ -232,10 +240,9 @@ def _poles(loop: HeadingLoop, state: Array, speed_mps: float) -> tuple[complex, 
     model = loop.model
     inputs = model.input_values()
     inputs[model.input_names.index("speed.command")] = speed_mps
-    names = [state.name for state in model.states if state.name not in ("motion.x", "motion.y")]
-    rates = [state.derivative for state in model.states if state.name in names]
-    A, _ = jacobians(model, OperatingPoint(state, inputs, model.parameter_values()), rates, names, [])
-    return tuple(complex(pole) for pole in sorted(np.linalg.eigvals(A), key=lambda pole: -pole.real))
+    names = [name for name in model.state_names if name not in ("motion.x", "motion.y")]
+    point = OperatingPoint(state, inputs, model.parameter_values())
+    return sorted_modes(jacobians(model, point, model.derivatives_of(names), names, [])[0])
 
 
 def _at_limit(card: SteeredCard, run: Trajectory) -> float:

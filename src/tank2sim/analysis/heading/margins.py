@@ -9,7 +9,7 @@ import control
 import numpy as np
 
 from tank2sim.analysis.linearisation import OperatingPoint, state_space, straight_course
-from tank2sim.analysis.stability.straight_line import settled_states
+from tank2sim.analysis.stability.straight_line import settled_states, sorted_modes
 from tank2sim.arrays import Array, ComplexArray, ComplexNumber, Number, Unbounded
 from tank2sim.dynamics.autopilot_loop import closed_loop_model
 from tank2sim.dynamics.effects import acting_variable
@@ -139,7 +139,7 @@ def loop_margins(ship: Model, autopilot: Model, speed_mps: float | None = None) 
     delays = np.radians(np.mod(phase, 360.0)) / crossover
     heading = np.abs(whole(1j * omega))[0]
     below = np.flatnonzero(heading < math.sqrt(0.5))
-    poles = sorted((complex(pole) for pole in whole.poles()), key=lambda pole: -pole.real)
+    poles = sorted_modes(whole.A)
     largest_gain = float(up.min()) if up.size else math.inf
     return LoopMargins(
         speed_mps=ship.defaults["ship.speed"] if speed_mps is None else speed_mps,
@@ -152,7 +152,7 @@ def loop_margins(ship: Model, autopilot: Model, speed_mps: float | None = None) 
         crossover_radps=float(crossover.max()) if crossover.size else math.nan,
         bandwidth_radps=float(omega[below[0]]) if below.size else math.inf,
         stable=all(pole.real < 0 for pole in poles),
-        poles=tuple(poles),
+        poles=poles,
     )
 
 

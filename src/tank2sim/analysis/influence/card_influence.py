@@ -303,22 +303,20 @@ def _differing(study: Study, sloped: Array) -> Iterable[Notice]:
 
 
 def _not_smooth(found: CardInfluence) -> list[Notice]:
-    notices = []
-    exact = found.exact
-    for row, figure in enumerate(found.figures):
-        gone, bent = [], []
-        for place, parameter in enumerate(found.parameters):
-            slope, step = exact[row, place], found.difference[row, place]
-            if parameter.value == 0 or max(abs(slope), abs(step) if math.isfinite(step) else math.inf) < REPORTED_FROM:
-                continue
-            if not math.isfinite(step):
-                gone.append(parameter.short)
-            elif slope * step <= 0 or not 1 / CURVED < abs(step / slope) < CURVED:
-                bent.append(parameter.short)
-        if gone:
-            notices.append(f"{figure.text}: 10 % more of {', '.join(gone)} and the ship does not show it any more")
-        if bent:
-            notices.append(
-                f"{figure.text} is not smooth or strongly curved in {', '.join(bent)}: slope and 10 % disagree"
-            )
-    return [Notice(text) for text in notices]
+    slopes, steps = found.exact, found.difference
+    given = np.array([parameter.value != 0 for parameter in found.parameters])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        felt = given & ~(np.fmax(np.abs(slopes), np.where(np.isfinite(steps), np.abs(steps), np.inf)) < REPORTED_FROM)
+        ratio = np.abs(steps / slopes)
+    gone = felt & ~np.isfinite(steps)
+    bent = felt & np.isfinite(steps) & ~((slopes * steps > 0) & (ratio > 1 / CURVED) & (ratio < CURVED))
+    texts = []
+    for figure, lost, curved in zip(found.figures, gone, bent, strict=True):
+        lost_names, curved_names = (
+            ", ".join(found.parameters[place].short for place in np.flatnonzero(row)) for row in (lost, curved)
+        )
+        if lost_names:
+            texts.append(f"{figure.text}: 10 % more of {lost_names} and the ship does not show it any more")
+        if curved_names:
+            texts.append(f"{figure.text} is not smooth or strongly curved in {curved_names}: slope and 10 % disagree")
+    return [Notice(text) for text in texts]

@@ -24,6 +24,7 @@ from tank2sim.analysis.stability.straight_line import nomoto, sorted_modes
 from tank2sim.analysis.turning.diagram import TurningEquations
 from tank2sim.arrays import Array, ComplexNumber, Unbounded
 from tank2sim.cards.card import SteeredCard
+from tank2sim.cards.form import ThrusterSection
 from tank2sim.dynamics.build import build
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.notices import Notice
@@ -210,19 +211,7 @@ class CraftMotions:
     """
 
     def __init__(self, card: SteeredCard) -> None:
-        # Twice the bounds, so that the slopes at the largest revolutions follow the thrust curve.
-        free = [
-            thruster.model_copy(
-                update={
-                    "time_constant_s": None,
-                    "dead_band_radps": 0.0,
-                    "max_radps": 2 * thruster.max_radps,
-                    "max_astern_radps": -2 * thruster.lowest_radps,
-                }
-            )
-            for thruster in card.thrusters
-        ]
-        self.model = build(replace(card, thrusters=tuple(free)))
+        self.model = build(replace(card, thrusters=tuple(map(_without_lag, card.thrusters))))
         self._equations = TurningEquations(self.model, free=True)
         sides = self._equations.sides
         if not {1.0, -1.0} <= set(sides.values()):
@@ -326,6 +315,12 @@ class CraftMotions:
             converged=bool(found.success),
             residual=float(np.abs(found.fun).max()),
         )
+
+
+def _without_lag(thruster: ThrusterSection) -> ThrusterSection:
+    """A thruster at once at its order, with twice the bounds: slopes at the largest revolutions follow its curve."""
+    bounds = {"max_radps": 2 * thruster.max_radps, "max_astern_radps": -2 * thruster.lowest_radps}
+    return thruster.model_copy(update={"time_constant_s": None, "dead_band_radps": 0.0, **bounds})
 
 
 @dataclass(frozen=True, eq=False)

@@ -145,19 +145,18 @@ class _Worse(NamedTuple):
 
 def _worst(runs: Mapping[Turn | Zigzag | Stop, Run | str], *names: str) -> list[_Worse]:
     """The larger of each figure over trials, with a remark on its absence or validity."""
-    done = {manoeuvre: run for manoeuvre, run in runs.items() if not isinstance(run, str)}
+    done = [run for run in runs.values() if not isinstance(run, str)]
     troubles = [run if isinstance(run, str) else _wrong_way(manoeuvre, run) for manoeuvre, run in runs.items()]
     trouble = next(filter(None, troubles), "")
-    numbers = [single_figures(run.figures) for run in done.values()]
     found: list[_Worse] = []
     for name in names:
-        shown = [figures[name] for figures in numbers if name in figures]
-        readings = (run.reading for run in done.values() if run.reading.outside(name))
-        outside = next((str(each) for read in readings for each in read.notices), "")
+        shown = [figures[name] for figures in (single_figures(run.figures) for run in done) if name in figures]
+        left = [str(each) for run in done for each in run.reading.notices if run.reading.outside(name)]
+        outside = next(iter(left), "")
         if len(shown) == len(runs):
             found.append(_Worse(max(shown), outside, bool(outside)))
         else:
-            remark = trouble or "; ".join(part for part in ("the run does not show it", outside) if part)
+            remark = trouble or "; ".join(filter(None, ("the run does not show it", outside)))
             found.append(_Worse(None, remark, bool(outside)))
     return found
 

@@ -405,19 +405,25 @@ def _with_folds(
 
 def _judged(model: Model, found: SteadyTurning) -> SteadyTurning:
     """The diagram with its loop and notices."""
-    before = [fold for fold in found.folds if fold.place <= found.straight]
-    after = [fold for fold in found.folds if fold.place > found.straight]
-    loop = None
-    if corner := [fold for fold in before if fold.place == found.straight]:  # it ends the loop in place of a fold
-        before = [fold for fold in before if fold.place < found.straight] or corner
-        after = after or corner
+    return replace(found, loop=_loop(found), notices=(*_end_notices(found), *_out_of_range(model, found)))
+
+
+def _loop(found: SteadyTurning) -> HysteresisLoop | None:
+    """The hysteresis loop between the folds nearest to the straight course; a corner there is either of them."""
+    places = np.array([fold.place for fold in found.folds])
+    corner = found.straight in places
     # rudder to port for more yaw to starboard: unstable in yaw, not in surge alone
-    backwards = bool(corner) or found.slope[found.straight, 0] < 0
-    if not found.stable[found.straight] and backwards and before and after:
-        rates = [rate for rate, stable in found.turns_at(float(found.rudder_rad[found.straight])) if stable]
-        height = math.degrees(max(rates) - min(rates)) if len(rates) > 1 else None
-        loop = HysteresisLoop(math.degrees(abs(before[-1].rudder_rad - after[0].rudder_rad)), height)
-    return replace(found, loop=loop, notices=(*_end_notices(found), *_out_of_range(model, found)))
+    backwards = corner or found.slope[found.straight, 0] < 0
+    if found.stable[found.straight] or not backwards:
+        return None
+    before, after = np.flatnonzero(places < found.straight), np.flatnonzero(places > found.straight)
+    itself = np.flatnonzero(places == found.straight)
+    ends = [*before[-1:], *itself, *after[:1]]
+    if len(ends) < 2 and not corner:
+        return None
+    rates = [rate for rate, stable in found.turns_at(float(found.rudder_rad[found.straight])) if stable]
+    height = math.degrees(max(rates) - min(rates)) if len(rates) > 1 else None
+    return HysteresisLoop(math.degrees(abs(found.folds[ends[0]].rudder_rad - found.folds[ends[-1]].rudder_rad)), height)
 
 
 def _end_notices(found: SteadyTurning) -> list[Notice]:
