@@ -239,20 +239,19 @@ class ComparisonResult(Result[CardComparison]):
 
     def _coefficients(self) -> Section:
         study = self.study
-        alike, alone, tables = 0, [], [self._farthest(place, label) for place, label in self._others()]
-        for caption, rows, factor in (
-            ("Coefficients that differ (values and errors times 1000)", study.coefficients, 1000.0),
-            ("Parameters of effects that differ, SI", study.effects, 1.0),
-        ):
-            shared = [row for row in rows if all(card.value is not None for card in row.cards)]
-            differing = [row for row in shared if any(apart.percent for apart in row.differences)]
-            alike += len(shared) - len(differing)
-            alone += [row.name for row in rows if any(card.value is None for card in row.cards)]
-            if differing:
+        rows = {
+            "Coefficients that differ (values and errors times 1000)": (study.coefficients, 1000.0),
+            "Parameters of effects that differ, SI": (study.effects, 1.0),
+        }
+        tables = [self._farthest(place, label) for place, label in self._others()]
+        for caption, (every, factor) in rows.items():
+            if differing := [row for row in every if _on_all(row) and _differs(row)]:
                 tables.append(self._coefficient_table(caption, differing, factor))
+        alike = sum(_on_all(row) and not _differs(row) for row in study.rows)
+        alone = [row.name for row in study.rows if not _on_all(row)]
         texts = [_COEFFICIENTS, _ASSUMED]
-        texts += [f"{alike} numbers are the same on all cards."] if alike else []
-        texts += [f"Not on all cards: {', '.join(alone)}."] if alone else []
+        texts += [f"{alike} numbers are the same on all cards."] * bool(alike)
+        texts += [f"Not on all cards: {', '.join(alone)}."] * bool(alone)
         charts = []
         if any(summary.compared for summary in study.summary):
             caption = f"Lines at {BEYOND_STANDARD_ERRORS:g} standard errors."
@@ -279,6 +278,14 @@ class ComparisonResult(Result[CardComparison]):
         for label in self.labels[1:]:
             heads += [Column(f"{label}: difference", "%", digits=3), Column("z", digits=3)]
         return table(caption, [*heads, "remark"], [_coefficient_row(row, factor) for row in rows], on_screen=False)
+
+
+def _on_all(row: CoefficientRow) -> bool:
+    return all(card.value is not None for card in row.cards)
+
+
+def _differs(row: CoefficientRow) -> bool:
+    return any(apart.percent for apart in row.differences)
 
 
 def _beyond(summary: CardSummary) -> KeyFigure:

@@ -224,20 +224,16 @@ class ManoeuvreResult(EnsembleResult[ManoeuvreStudy]):
         return [section for section in sections if section.charts or section.tables]
 
     def _tables(self) -> list[Table]:
-        figures = self.study.figures
-        numbers = {
-            name: value
-            for name, value in figures.items()
-            if isinstance(value, float | int) and not name.endswith("_lengths")
-        }
+        ensemble = self.study.ensemble
+        figures = {name: value for name, value in self.study.figures.items() if not name.endswith("_lengths")}
+        numbers = {name: value for name, value in figures.items() if isinstance(value, float | int)}
         lists = {name: value for name, value in figures.items() if isinstance(value, list) and value}
-        missing = [in_words(name)[0] for name, value in figures.items() if value is None]
+        missing = [in_words(name)[0] for name, value in self.study.figures.items() if value is None]
         tables = [self._figure_table(numbers, missing)] if numbers or missing else []
-        if lists:
-            tables.append(self._list_table(lists))
-        if self.study.ensemble:
-            bands = {name: band for name, band in self.study.ensemble.figures.items() if not name.endswith("_lengths")}
-            tables.append(band_table(self.study.ensemble, bands))
+        tables += [self._list_table(lists)] if lists else []
+        if ensemble:
+            bands = {name: band for name, band in ensemble.figures.items() if not name.endswith("_lengths")}
+            tables.append(band_table(ensemble, bands))
         return tables
 
     def _figure_table(self, figures: Mapping[str, float], missing: Sequence[str]) -> Table:
