@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tank2sim.analysis.ensemble.draws import draws_of
-from tank2sim.analysis.influence.card_influence import CardInfluence, influence
+from tank2sim.analysis.influence.card_influence import figure_errors, influence, origin_of_errors
 from tank2sim.analysis.influence.figures import parse_figure
 from tank2sim.analysis.influence.study import Study
 from tank2sim.analysis.validation.standard_trials import SEED, members
@@ -91,16 +91,16 @@ def test_the_standard_error_of_a_figure_is_of_the_whole_covariance(joint: Manoeu
     own = np.array([one.standard_error for one in errors.parameters])
     slopes = np.random.default_rng(1).standard_normal((2, len(own))) / np.maximum(own, 1e-9)
     slopes[:, own == 0] = 0.0
-    found = CardInfluence("ship", (), np.ones(2), errors, slopes, slopes)
+    deviations, shares = figure_errors(slopes, errors.covariance)
     covariance = np.diag(own**2)
     covariance[np.ix_(places, places)] = MATRIX
     truth = np.array([row @ covariance @ row for row in slopes])
-    np.testing.assert_allclose(found.standard_errors, np.sqrt(truth), rtol=1e-12)
+    np.testing.assert_allclose(deviations, np.sqrt(truth), rtol=1e-12)
     # The share is what goes of the variance when a number is known: with one of the three, all of the three.
-    one, other, third = found.shares[:, places].T
+    one, other, third = shares[:, places].T
     np.testing.assert_allclose(one, (slopes[:, places] @ FALLS) ** 2 / truth, rtol=1e-9)
     np.testing.assert_allclose([other, third], [one, one], rtol=1e-9)
-    assert "covariance next to the card (3 numbers, others as if independent)" in found.of_errors
+    assert "covariance next to the card (3 numbers, others as if independent)" in origin_of_errors(errors)
 
 
 @pytest.mark.slow
