@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, ClassVar, Literal, Self, TypeVar
 
 import numpy as np
 
-from tank2sim.analysis.heading.control import INTEGRAL_BAND_RAD
 from tank2sim.analysis.heading.craft import CraftAutopilotStudy
+from tank2sim.analysis.heading.designs import INTEGRAL_BAND_RAD
 from tank2sim.analysis.heading.margins import LoopResponse
 from tank2sim.analysis.heading.piloted import AutopilotExport, Piloted
 from tank2sim.analysis.heading.runs import CourseKeeping, CraftKeeping

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import linprog
 
-from tank2sim.analysis.heading.control import DAMPING, INTEGRAL_BAND_RAD, SLOWNESS
+from tank2sim.analysis.heading.designs import DAMPING, INTEGRAL_BAND_RAD, SLOWNESS
 from tank2sim.analysis.heading.piloted import Piloted, PilotStudy
 from tank2sim.analysis.heading.runs import CraftKeeping, HeadingLoop, StepFigures, craft_keeping, step_figures
 from tank2sim.analysis.heading.study import Outdoors, StudySettings, not_held

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tank2sim.analysis.heading.control import INTEGRAL_BAND_RAD
+from tank2sim.analysis.heading.designs import INTEGRAL_BAND_RAD
 from tank2sim.arrays import Array
 from tank2sim.dynamics.autopilot_loop import closed_loop_model
 from tank2sim.dynamics.effects import acting_variable

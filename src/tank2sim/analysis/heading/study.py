@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tank2sim.analysis.heading.control import LARGEST_RUDDER_RAD
-from tank2sim.analysis.heading.designs import HeadingDesign, LqrWeights, design_heading
+from tank2sim.analysis.heading.designs import LARGEST_RUDDER_RAD, HeadingDesign, LqrWeights, design_heading
 from tank2sim.analysis.heading.disturbances import (
     Weather,
     angles_in_degrees,
