@@ -239,14 +239,11 @@ class ComparisonResult(Result[CardComparison]):
 
     def _coefficients(self) -> Section:
         study = self.study
-        rows = {
-            "Coefficients that differ (values and errors times 1000)": (study.coefficients, 1000.0),
-            "Parameters of effects that differ, SI": (study.effects, 1.0),
-        }
-        tables = [self._farthest(place, label) for place, label in self._others()]
-        for caption, (every, factor) in rows.items():
-            if differing := [row for row in every if _on_all(row) and _differs(row)]:
-                tables.append(self._coefficient_table(caption, differing, factor))
+        tables = [
+            *(self._farthest(place, label) for place, label in self._others()),
+            *self._differing("Coefficients that differ (values and errors times 1000)", study.coefficients, 1000.0),
+            *self._differing("Parameters of effects that differ, SI", study.effects, 1.0),
+        ]
         alike = sum(_on_all(row) and not _differs(row) for row in study.rows)
         alone = [row.name for row in study.rows if not _on_all(row)]
         texts = [_COEFFICIENTS, _ASSUMED]
@@ -271,13 +268,14 @@ class ComparisonResult(Result[CardComparison]):
         heads = ("coefficient", self.labels[0], label, "difference (%)", "standard errors")
         return table(f"Farthest apart: {label}", heads, rows)
 
-    def _coefficient_table(self, caption: str, rows: Sequence[CoefficientRow], factor: float) -> Table:
+    def _differing(self, caption: str, every: Sequence[CoefficientRow], factor: float) -> list[Table]:
         heads: list[str | Column] = ["coefficient"]
         for label in self.labels:
             heads += [Column(label, digits=6), Column("s.e.", digits=3)]
         for label in self.labels[1:]:
             heads += [Column(f"{label}: difference", "%", digits=3), Column("z", digits=3)]
-        return table(caption, [*heads, "remark"], [_coefficient_row(row, factor) for row in rows], on_screen=False)
+        rows = [_coefficient_row(row, factor) for row in every if _on_all(row) and _differs(row)]
+        return [table(caption, [*heads, "remark"], rows, on_screen=False)] if rows else []
 
 
 def _on_all(row: CoefficientRow) -> bool:

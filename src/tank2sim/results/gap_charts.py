@@ -173,14 +173,14 @@ def misfit_chart(study: GapStudy, *, title: str = "") -> ChartSpec:
     measured = {name for trial in study.trials for name in trial.signals}
     ordered = [SignalName(name).file for name in OBSERVED_SIGNALS]
     signals = [name for name in ordered if name in measured] + sorted(measured.difference(ordered))
-    rows: list[ChartRecord] = []
-    for word, held in SETS.items():
-        for trial in study.trials:
-            shown = [name for name in signals if name in trial.signals and trial.held_out == held]
-            rows += [
-                {"group": f"{word} trials", "trial": trial_name(trial.trial), "model": model}
-                | {"signal": name.rpartition("_")[0].replace("_", " "), "misfit": trial.signals[name][model]}
-                for name in shown
-                for model in shown_models(study)
-            ]
-    return misfit_maps(rows, shown_models(study), title=title)
+    models = shown_models(study)
+    words = {held: f"{word} trials" for word, held in SETS.items()}
+    rows = [
+        {"group": words[trial.held_out], "trial": trial_name(trial.trial), "model": model}
+        | {"signal": name.rpartition("_")[0].replace("_", " "), "misfit": trial.signals[name][model]}
+        for trial in sorted(study.trials, key=lambda trial: not trial.held_out)
+        for name in signals
+        if name in trial.signals
+        for model in models
+    ]
+    return misfit_maps(rows, models, title=title)

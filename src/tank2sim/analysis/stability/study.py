@@ -248,27 +248,21 @@ def steady_speeds(model: Model) -> tuple[SteadySpeed, ...]:
 
     inputs, parameters = model.input_values(undisturbed_inputs(model)), model.parameter_values()
     start = np.array(model.initial(parameters)).ravel()
-    u0 = float(parameters[model.parameter_names.index("ship.speed")])
-    place = model.state_names.index("motion.u")
-    start[[row for row, state in enumerate(model.states) if state.steady]] = 0.0
-    for name, order in (pair for effect in EFFECTS.values() for pair in effect.states_behind.items()):
-        if name in model.state_names and order in model.input_names:
-            start[model.state_names.index(name)] = inputs[model.input_names.index(order)]
-    acceleration = ca.Function(
-        "acceleration", [model.x, model.u, model.p], [model.expand(model.symbol("motion.udot"))], {"cse": True}
-    )
+    start[np.array([state.steady for state in model.states])] = 0.0
+    behind = {name: order for effect in EFFECTS.values() for name, order in effect.states_behind.items()}
+    for name in behind.keys() & set(model.state_names):
+        if behind[name] in model.input_names:
+            start[model.state_names.index(name)] = inputs[model.input_names.index(behind[name])]
+    place, rate = model.state_names.index("motion.u"), model.expand(model.symbol("motion.udot"))
+    acceleration = ca.Function("acceleration", [model.x, model.u, model.p], [rate], {"cse": True})
 
     def surge(speed: float) -> float:
         state = start.copy()
         state[place] = speed
         return float(acceleration(state, inputs, parameters))
 
-    speeds = np.linspace(SLOWEST, FASTEST, SPEEDS) * u0
-    signs = np.sign([surge(float(speed)) for speed in speeds])
-    found = []
-    for row in np.flatnonzero(signs[1:] != signs[:-1]):
-        if signs[row] == 0:
-            continue
-        speed = brentq(surge, float(speeds[row]), float(speeds[row + 1]))
-        found.append(SteadySpeed(float(speed), bool(signs[row] > 0)))
-    return tuple(found)
+    speeds = np.linspace(SLOWEST, FASTEST, SPEEDS) * model.defaults["ship.speed"]
+    signs = np.sign([surge(speed) for speed in speeds.tolist()])
+    rows = np.flatnonzero((signs[1:] != signs[:-1]) & (signs[:-1] != 0))
+    held = [float(brentq(surge, *speeds[row : row + 2].tolist())) for row in rows]
+    return tuple(SteadySpeed(speed, bool(signs[row] > 0)) for speed, row in zip(held, rows, strict=True))

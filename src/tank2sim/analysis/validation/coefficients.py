@@ -137,14 +137,8 @@ def _row(reference: ManoeuvringCard, name: str, expansions: Sequence[Expansion])
 def _compare_craft(cards: Sequence[SteeredCard]) -> tuple[CoefficientRow, ...]:
     """Rigid body and hull of craft of one size (the first is the reference), SI."""
     rows = {name: [CardCoefficient(getattr(card.rigid_body, name)) for card in cards] for name in _RIGID_BODY}
-    for name in CRAFT_TERMS:
-        if any(card.derivatives.get(name) for card in cards):
-            rows[name] = [
-                CardCoefficient(card.derivatives[name], card.standard_error(name), name in card.uncertainty)
-                if name in card.derivatives
-                else CardCoefficient(None)
-                for card in cards
-            ]
+    present = [name for name in CRAFT_TERMS if any(card.derivatives.get(name) for card in cards)]
+    rows |= {name: [_own(card, name) for card in cards] for name in present}
     return tuple(
         CoefficientRow(name, tuple(found), tuple(_difference(found[0], other) for other in found[1:]))
         for name, found in rows.items()
@@ -234,30 +228,34 @@ def expanded_as(card: ManoeuvringCard, reference: ManoeuvringCard) -> Expansion:
     slowest, fastest = card.model.speed_range_mps
     outside = not slowest <= ratio * card.model.speed_mps <= fastest
     found = {name: CardCoefficient(getattr(card.rigid_body, name)) for name in _RIGID_BODY}
-    kept = [row for row, name in enumerate(names) if not linear or name in _linear_names()]
-    for row in kept:
-        name, own = names[row], dict(zip(names, matrix[row].tolist(), strict=True))
-        if (converted := _converted(card, own, float(constant[row]))) is None:
+    for name, weights, remainder in zip(names, matrix.tolist(), constant.tolist(), strict=True):
+        own = dict(zip(names, weights, strict=True))
+        converted = None if linear and name not in _linear_names() else _converted(card, own, remainder)
+        if converted is None:
             continue
         found[name] = converted
         if outside and not _kept(card, name, own, converted):
             refused.setdefault(name, "the reference's speed is outside the range in which this card holds")
-    for name in (*ACCELERATION_TERMS, *_OF_MMG_ALONE):
-        if name in card.derivatives:
-            stated = name in card.uncertainty
-            found[name] = CardCoefficient(card.derivatives[name], card.standard_error(name), stated)
+    found |= {name: _own(card, name) for name in (*ACCELERATION_TERMS, *_OF_MMG_ALONE) if name in card.derivatives}
     return Expansion(found, refused, _notes(card, reference, ratio))
+
+
+def _own(card: SteeredCard, name: str) -> CardCoefficient:
+    if name not in card.derivatives:
+        return CardCoefficient(None)
+    return CardCoefficient(card.derivatives[name], card.standard_error(name), name in card.uncertainty)
 
 
 def _converted(card: ManoeuvringCard, weights: Mapping[str, float], remainder: float) -> CardCoefficient | None:
     """A term as the sum of the card's own, each with its weight, and a remainder; None where all are absent."""
-    own = {name: weight for name, weight in weights.items() if name in card.derivatives}
-    known = {name for name, weight in own.items() if abs(weight) > _ABSENT}
-    if not known and abs(remainder) < _ABSENT:
+    own = {name: weight for name, weight in weights.items() if abs(weight) > _ABSENT and name in card.derivatives}
+    if not own and abs(remainder) < _ABSENT:
         return None
     value = sum(weight * card.derivatives[name] for name, weight in own.items()) + remainder
+    if not own:
+        return CardCoefficient(value)
     error = math.hypot(*(weight * card.standard_error(name) for name, weight in own.items()))
-    return CardCoefficient(value, error if known else None, bool(known) and known <= card.uncertainty.keys())
+    return CardCoefficient(value, error, own.keys() <= card.uncertainty.keys())
 
 
 def _speed_ratio(card: ManoeuvringCard, reference: ManoeuvringCard) -> float:

@@ -174,14 +174,16 @@ def compare_cards(cards: Sequence[SteeredCard], count: int = VALIDATION_MEMBERS)
     labels = labels_of(cards)
     ships = [ship_of(card) for card in cards]
     rows, notes = compare_coefficients(cards)
-    drawn = [members(ship.card, ship.model, count) for ship in ships]
-    messages = [message.of(label) for label, (_, notes) in zip(labels, drawn, strict=True) for message in notes]
-    notices, trials = [*_notices(cards, labels), *messages, *notes], []
-    for name, manoeuvre in standard_trials(ships).items():
-        trial, trouble = _trial(name, manoeuvre, ships, labels, [draws for draws, _ in drawn])
-        trials.append(trial)
-        notices += trouble
     effects = compare_effects(cards, [ship.model for ship in ships])
+    drawn = [members(ship.card, ship.model, count) for ship in ships]
+    draws = [each for each, _ in drawn]
+    trials = [_trial(name, one, ships, labels, draws) for name, one in standard_trials(ships).items()]
+    notices = [
+        *_notices(cards, labels),
+        *(message.of(label) for label, (_, messages) in zip(labels, drawn, strict=True) for message in messages),
+        *notes,
+        *(trouble for _, troubles in trials for trouble in troubles),
+    ]
     return CardComparison(
         cards=tuple(
             ComparedCard(label=label, ship=card.ship.name, source=card.ship.source)
@@ -190,7 +192,7 @@ def compare_cards(cards: Sequence[SteeredCard], count: int = VALIDATION_MEMBERS)
         summary=tuple(_summary(label, place, (*rows, *effects)) for place, label in enumerate(labels[1:])),
         coefficients=rows,
         effects=effects,
-        trials=tuple(trials),
+        trials=tuple(trial for trial, _ in trials),
         craft=steered_by is SteeredBy.THRUSTERS,
         members=count,
         notices=tuple(dict.fromkeys(notices)),
