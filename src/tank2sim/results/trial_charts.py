@@ -8,8 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from tank2sim.answer.charts.before_after import before_after_switch, switch
-from tank2sim.answer.charts.matrix import ROW_PX, Matrix
+from tank2sim.answer.charts.before_after import before_after_switch, misfit_maps, switch
 from tank2sim.answer.charts.parts import equal_frame, extent, plain, records, series_look, with_unit
 from tank2sim.answer.charts.rows import RowPlot, row_layers
 from tank2sim.answer.charts.vega import (
@@ -19,7 +18,6 @@ from tank2sim.answer.charts.vega import (
     PlotAxis,
     Rule,
     bare_layer,
-    heading,
     layer,
     layered,
     panel_title,
@@ -190,49 +188,27 @@ def whole_range(rows: Sequence[ChartRecord], field: str, included: Sequence[floa
 
 
 def window_chart(sets: Mapping[str, Sequence[TrialErrors]], *, title: str = "") -> ChartSpec:
-    """Error over windows of each signal in each trial, as a share of the signal, as a heat map.
+    """Error over windows of each signal in each trial, as a share of the signal, to switch between before and after.
 
     `sets`: ``fitted`` and ``held out`` to their trials.
     """
-    every = [errors for trials in sets.values() for trial in trials for errors in (trial.before, trial.found)]
-    signals = [symbol for name, symbol in SYMBOLS.items() if any(name in errors for errors in every)]
-    rows = []
-    for word, trials in sets.items():
-        maps = [
-            _window_map(trials, label, signals, f"{label} · {word}", named=label == BEFORE)
-            for label in MODEL_SERIES.values()
-        ]
-        rows.append({"hconcat": maps, "spacing": 16})
-    return {
-        "vconcat": rows,
-        "spacing": 18,
-        "title": heading(title, "Number and colour: root mean square error as a share of the signal, %."),
-        "description": "Errors over windows by trial and signal, of the card before and the card found.",
-        "usermeta": STACKS,
-    }
-
-
-def _window_map(
-    trials: Sequence[TrialErrors], label: str, signals: Sequence[str], title: str, *, named: bool
-) -> ChartSpec:
-    rows = []
-    for trial in trials:
-        for name, errors in (trial.before if label == BEFORE else trial.found).items():
-            share, error = 100 * errors.relative, errors.rms_error
-            rows.append(
-                {"trial": trial.trial, "signal": SYMBOLS.get(name, name), "share": plain(share)}
-                | {"text": _in_three(share), "error": f"{error:.3g} {in_words(name)[1]}".strip()}
-            )
-    layers = Matrix(
-        colour="share",
-        rows=[trial.trial for trial in trials],
-        columns=signals,
-        side={"labelLimit": 230} if named else {"labels": False, "ticks": False},
-        foot={"title": "signal", "orient": "bottom", "labelAngle": 0},
-        shown={"trial:N": "trial", "signal:N": "signal", "text:N": "share (%)", "error:N": "rms error"},
-    ).layers
-    size = (38 * len(signals), ROW_PX * len(trials))
-    return layered(layers, size=size, data={"values": rows}, title=panel_title(title))
+    rows = [
+        {"group": word, "trial": trial.trial, "signal": symbol, "model": model, "misfit": 100 * errors[name].relative}
+        | {"error": f"{errors[name].rms_error:.3g} {in_words(name)[1]}".strip()}
+        for word, trials in sets.items()
+        for trial in trials
+        for model, errors in zip(MODEL_SERIES, (trial.before, trial.found), strict=True)
+        for name, symbol in SYMBOLS.items()
+        if name in errors
+    ]
+    return misfit_maps(
+        rows,
+        list(MODEL_SERIES),
+        title=title,
+        what="share (%)",
+        subtitle="Number and colour: root mean square error as a share of the signal, %.",
+        shown={"error:N": "rms error"},
+    )
 
 
 def figure_chart(sets: Mapping[str, Sequence[PredictedFigure]], *, title: str = "") -> ChartSpec | None:
@@ -383,9 +359,3 @@ def panel_grid(
         "title": title,
         "description": alternative_text,
     }
-
-
-def _in_three(percent: float) -> str:
-    if not math.isfinite(percent):
-        return "∞"
-    return f"{percent:.0f}" if percent >= 10 else f"{percent:.1f}"
