@@ -228,8 +228,7 @@ def test_places_show_what_is_left_in_the_units_of_the_column(charts) -> None:
     titles = [panel["title"]["text"] for panel in chart["concat"]]
     assert titles == ["turn35 · north", "zigzag · heading"]
     below = chart["concat"][1]["vconcat"][1]
-    drawn = next(layer for layer in below["layer"] if layer["mark"]["type"] == "line")
-    rows = chart["datasets"][drawn["data"]["name"]]
+    rows = chart["datasets"][below["data"]["name"]]
     for run, size in (("card before", 1.2), ("card found", 0.2)):
         assert {round(row["v"], 4) for row in rows if row["run"] == run} == {size}
     (band,) = (row for row in rows_of(charts["places"]) if row.get("high") == pytest.approx(0.4))

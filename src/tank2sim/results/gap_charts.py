@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from tank2sim.answer.charts.before_after import before_after_switch, misfit_maps
-from tank2sim.answer.charts.parts import SeriesLook, extent, plain, records, series_look, with_unit
+from tank2sim.answer.charts.before_after import misfit_maps
+from tank2sim.answer.charts.parts import extent, plain, records, with_unit
 from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, heading, layer, layered, panel_title, tooltips
 from tank2sim.gap.outcome.study import GapReplay, GapStudy
 from tank2sim.gap.result import MisfitPlace
@@ -19,10 +18,10 @@ from tank2sim.results.trial_charts import (
     AFTER,
     BEFORE,
     MEASURED,
-    MODEL_SERIES,
     MOST_TRIALS,
     panel_grid,
     place_over_time,
+    series_marks,
     track_grid,
     whole_range,
     worst_trials,
@@ -123,49 +122,35 @@ def place_chart(study: GapStudy, *, title: str = "") -> ChartSpec | None:
 
 
 def _place_panels(replay: GapReplay, place: MisfitPlace, sigma: float) -> ChartSpec:
-    name, look = signal_of(place.signal), series_look([AFTER, BEFORE, MEASURED], as_points=[MEASURED])
-    time_s, measured = replay.measured["t_s"], replay.measured[name.file]
-    models = {BEFORE: replay.before[name.file], AFTER: replay.found[name.file]}
+    name, time_s = signal_of(place.signal), replay.measured["t_s"]
+    measured, times = replay.measured[name.file], extent(time_s)
     known = np.flatnonzero(np.isfinite(measured))
     points = known[thin_points([measured[known]], SHOWN_POINTS)]
     rows = records(MEASURED, {"t": time_s[points], "v": measured[points]})
     residuals: list[ChartRecord] = []
-    for label, values in models.items():
+    for label, values in {BEFORE: replay.before[name.file], AFTER: replay.found[name.file]}.items():
         kept = thin_points([values], SHOWN_SAMPLES)
         rows += records(label, {"t": time_s[kept], "v": values[kept]})
         kept = known[thin_points([(values - measured)[known]], SHOWN_SAMPLES)]
         residuals += records(label, {"t": time_s[kept], "v": (values - measured)[kept]})
-    band, times = NOISE_BAND * sigma, extent(time_s)
-    up = with_unit(name.words, name.unit)
-    place_above = place_over_time(times, whole_range(rows, "v"), up, "v", labelled=False)
-    left = with_unit("simulated − measured", name.unit)
-    place_below = place_over_time(times, whole_range(residuals, "v", (-band, band)), left, "v", labelled=True)
-    strip = {"y": place_below["y"] | {"field": "low"}, "y2": "high"}
-    noise = layer("rect", [{"low": plain(-band), "high": plain(band)}], strip, style="reference", opacity=0.3)
-    spans = [{"t": plain(place.t_start_s), "to": plain(place.t_end_s)}]
-
-    def behind(axes: ChartSpec) -> list[ChartSpec]:
-        if (place.t_start_s, place.t_end_s) == times:
-            return []
-        return [layer("rect", spans, {"x": axes["x"], "x2": "to"}, style="region", clip=True)]
-
-    above = [*behind(place_above), *_over_time(rows, place_above, up, look)]
-    below = [*behind(place_below), noise, *_over_time(residuals, place_below, left, look)]
-    return {
-        "vconcat": [layered(above, size=(200, 86)), layered(below, size=(200, 66))],
-        "spacing": 16,
-        "title": panel_title(f"{trial_name(place.trial)} · {name.words}"),
-    }
-
-
-def _over_time(rows: Sequence[ChartRecord], place: ChartSpec, up: str, look: SeriesLook) -> list[ChartSpec]:
-    common = place | {"color": look.colour, "tooltip": tooltips({"run:N": "by", "t:Q": "time (s)", "v:Q": up})}
-    points, lines = ([row for row in rows if (row["run"] == MEASURED) == measured] for measured in (True, False))
-    drawn = []
-    if points:
-        drawn.append(layer("point", points, {**common, "shape": look.shape}, clip=True, size=14, strokeWidth=1))
-    line = layer("line", lines, {**common, "strokeDash": look.dash, "order": "i:Q"}, clip=True, strokeWidth=1.5)
-    return [*drawn, line | {"transform": [{"filter": before_after_switch(MODEL_SERIES)}]}]
+    spans = [] if (place.t_start_s, place.t_end_s) == times else [(place.t_start_s, place.t_end_s)]
+    region: list[ChartRecord] = [{"t": plain(begin), "to": plain(end)} for begin, end in spans]
+    low, high = -NOISE_BAND * sigma, NOISE_BAND * sigma
+    panels = []
+    for drawn, words, height, ends in (
+        (rows, name.words, 86, ()),
+        (residuals, "simulated − measured", 66, (low, high)),
+    ):
+        up = with_unit(words, name.unit)
+        axes = place_over_time(times, whole_range(drawn, "v", ends), up, "v", labelled=bool(ends))
+        said = axes | {"tooltip": tooltips({"run:N": "by", "t:Q": "time (s)", "v:Q": up})}
+        behind = [layer("rect", region, {"x": axes["x"], "x2": "to"}, style="region", clip=True)] if region else []
+        if ends:
+            band = {"y": axes["y"] | {"field": "low"}, "y2": "high"}
+            strip: list[ChartRecord] = [{"low": plain(low), "high": plain(high)}]
+            behind.append(layer("rect", strip, band, style="reference", opacity=0.3))
+        panels.append(layered([*behind, *series_marks(said)], size=(200, height), data={"values": drawn}))
+    return {"vconcat": panels, "spacing": 16, "title": panel_title(f"{trial_name(place.trial)} · {name.words}")}
 
 
 def misfit_chart(study: GapStudy, *, title: str = "") -> ChartSpec:

@@ -138,7 +138,7 @@ def _track_panel(trial: TrialMotions) -> ChartSpec | None:
     for label, columns in series.items():
         kept = _thinned(label, [columns["x_m"], columns["y_m"]])
         rows += records(label, {"x": columns["x_m"][kept], "y": columns["y_m"][kept]})
-    marks = _marks(place | {"tooltip": tooltips({"x:Q": "north (m)", "y:Q": "east (m)"})})
+    marks = series_marks(place | {"tooltip": tooltips({"x:Q": "north (m)", "y:Q": "east (m)"})})
     size = frame.width_px, frame.height_px
     return layered(marks, size=size, data={"values": rows}, title=panel_title(trial.trial))
 
@@ -167,7 +167,7 @@ def _histories(trial: TrialMotions, signals: Mapping[str, str]) -> ChartSpec:
         up = with_unit(signals[name], in_words(name)[1])
         place = place_over_time(times, whole_range(rows, fields[name]), up, fields[name], labelled=name == names[-1])
         place["tooltip"] = tooltips({"t:Q": "time (s)", f"{fields[name]}:Q": up})
-        panels.append(layered(_marks(place), size=(200, 66)))
+        panels.append(layered(series_marks(place), size=(200, 66)))
     resolve = shared_looks(x="shared")
     data = {"data": {"values": rows}, "title": panel_title(trial.trial)}
     return data | {"vconcat": panels, "spacing": 12, "resolve": resolve}
@@ -333,8 +333,8 @@ def _thinned(label: str, columns: Sequence[Array]) -> Indices:
     return thin_points(columns, MEASURED_SAMPLES if label == MEASURED else MODEL_SAMPLES)
 
 
-def _marks(place: ChartSpec) -> list[ChartSpec]:
-    """Points and lines of the rows of a trial, which all of its panels share."""
+def series_marks(place: ChartSpec) -> list[ChartSpec]:
+    """Points (measured) and lines (by the cards) at a `place`, of the rows of the chart that they are in."""
     points = place | {"color": _LOOK.colour, "shape": _LOOK.shape}
     lines = place | {"color": _LOOK.colour, "strokeDash": _LOOK.dash, "order": "i:Q"}
     switched = {"filter": before_after_switch(MODEL_SERIES)}
