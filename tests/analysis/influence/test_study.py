@@ -370,6 +370,6 @@ def test_the_agreed_variation_gives_404_m_with_the_right_pairing_and_410_6_with_
 
 
 def test_coefficients_of_an_agreed_variation_move_together_and_the_others_stay() -> None:
-    assert changed_together({"a": 2.0, "b": -4.0, "c": 1.0}, {"a": 1.0, "b": -5.0}, 2.0) == pytest.approx(
+    assert changed_together({"a": 2.0, "b": -4.0, "c": 1.0}, {"a": 2.0, "b": -10.0}) == pytest.approx(
         {"a": 2.04, "b": -3.6, "c": 1.0}
     )

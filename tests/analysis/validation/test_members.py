@@ -49,8 +49,7 @@ def joint(tmp_path_factory: pytest.TempPathFactory, mariner_card: ManoeuvringCar
     path: Path = tmp_path_factory.mktemp("joint") / "ship.toml"
     text = referring(mariner_card.text + CROSS_FLOW, path)
     covariance_file(path).write_text(Covariance(NAMES, MATRIX).as_text())
-    card = parse_card(text, str(path))
-    assert isinstance(card, ManoeuvringCard)
+    card = parse_card(text, str(path)).manoeuvring()
     return card
 
 
@@ -79,8 +78,7 @@ def test_a_card_of_which_all_errors_go_together_is_not_reported_to_have_none(tmp
     path, names = tmp_path / "ship.toml", ("derivatives.Yv", "derivatives.Nv")
     text = referring(f"{mariner_card.text}\n[uncertainty]\nYv = 5e-4\nNv = 1.6e-4\n", path)
     covariance_file(path).write_text(Covariance(names, MATRIX[:2, :2]).as_text())
-    card = parse_card(text, str(path))
-    assert isinstance(card, ManoeuvringCard)
+    card = parse_card(text, str(path)).manoeuvring()
     reported = " ".join(draws_of(card, 0)[1])
     assert "no standard error of any number" not in reported and "no standard error of Xu" in reported
 

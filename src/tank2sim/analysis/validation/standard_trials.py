@@ -165,9 +165,7 @@ def figure_numbers(figures: Figures) -> Numbers:
     return {name: value for name, value in single if (name in figures or name in overshoots) and name not in excluded}
 
 
-def members(
-    card: SteeredCard, model: Model, count: int, seed: int = SEED
-) -> tuple[tuple[dict[str, float], ...], tuple[Notice, ...]]:
+def members(card: SteeredCard, model: Model, count: int) -> tuple[tuple[dict[str, float], ...], tuple[Notice, ...]]:
     """Parameters of `count` ships drawn within the errors of the card, with notices.
 
     Errors of all numbers are normal, correlated by the card's covariance, or independent without one. Each member has
@@ -182,7 +180,7 @@ def members(
     if not count:
         return (), ()
     errors = joint_errors(card, card_parameters(card, study_model(card)))
-    draws, known = draws_with(errors, seed), set(model.parameter_names)
+    draws, known = draws_with(errors, SEED), set(model.parameter_names)
     found = draws.members(0, count)
     words = Redrawn.of(list(found.beyond.values())).in_words(count)
     members = (zip(draws.names, row, strict=True) for row in found.values.tolist())
