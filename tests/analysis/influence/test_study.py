@@ -324,7 +324,7 @@ def test_what_is_no_figure_is_refused_with_what_there_is(text, words) -> None:
 
 
 def test_the_help_names_every_figure() -> None:
-    assert all(name in forms() for name in FIGURE_KINDS)
+    assert all(kind.name in forms() for kind in FIGURE_KINDS.values())
 
 
 def test_both_ways_to_write_a_target_mean_the_same() -> None:
