@@ -169,10 +169,8 @@ def found_in_words(study: GapStudy) -> str:
 
 def _missing_in_words(study: GapStudy) -> str:
     """What the model lacks, and which sensors are at fault."""
-    known = {effect.name: EFFECTS[effect.name] for effect in study.effects if effect.name in EFFECTS}
-    faults = {name for name, effect in known.items() if effect.acts_on == "sensor"}
-    lacking = [effect for effect in study.effects if effect.name not in faults]
-    sensors = [effect for effect in study.effects if effect.name in faults]
+    sensors = [effect for effect in study.effects if _of_sensor(effect.name)]
+    lacking = [effect for effect in study.effects if effect not in sensors]
     sentences = []
     if lacking:
         names = _listed(map(_with_values, lacking))
@@ -181,8 +179,12 @@ def _missing_in_words(study: GapStudy) -> str:
         at_fault = "A sensor is at fault" if len(sensors) == 1 else "Sensors are at fault"
         model = "" if lacking else ", not the model"
         sentences.append(f"{at_fault}{model}: {_listed(map(_with_values, sensors))}.")
-    described = [known[effect.name].description for effect in (*lacking, *sensors) if effect.name in known]
+    described = (EFFECTS[effect.name].description for effect in (*lacking, *sensors) if effect.name in EFFECTS)
     return " ".join([*sentences, *described, *_refitted(study)])
+
+
+def _of_sensor(name: str) -> bool:
+    return name in EFFECTS and EFFECTS[name].acts_on == "sensor"
 
 
 def _ambiguous_in_words(study: GapStudy) -> str:

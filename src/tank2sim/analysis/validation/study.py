@@ -316,17 +316,20 @@ def _validated(
     shown = [name for name in measured if name in coarse]
     beyond = ", ".join(name for name in shown if read.outside(name))
     messages = [notice.of(beyond) for notice in read.notices if beyond]
-    if drawn:
-        few = "too few members of the ensemble reach it to determine u_input"
-        messages += [Notice(f"{name}: {few}") for name in shown if name not in inputs]
-    if what.rudder_rate_radps is None and what.begin_s <= what.trial.time_s[0]:
-        messages.append(
-            Notice(
-                "the record begins with the order already given, and its first row is taken as the execute: if the "
-                "order was earlier, advance and times are too small by that time"
-            )
+    few = [name for name in shown if drawn and name not in inputs]
+    messages += [Notice(f"{name}: too few members of the ensemble reach it to determine u_input") for name in few]
+    return rows, [message.of(what.trial.name) for message in (*messages, *_late_execute(what))]
+
+
+def _late_execute(what: Recorded) -> list[Notice]:
+    if what.rudder_rate_radps is not None or what.begin_s > what.trial.time_s[0]:
+        return []
+    return [
+        Notice(
+            "the record begins with the order already given, and its first row is taken as the execute: if the order "
+            "was earlier, advance and times are too small by that time"
         )
-    return rows, [message.of(what.trial.name) for message in messages]
+    ]
 
 
 def _of_reading(what: Recorded, name: str) -> tuple[float, float]:
