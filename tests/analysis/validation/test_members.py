@@ -109,8 +109,8 @@ def test_influence_and_ensemble_of_a_card_with_a_covariance_say_the_same(joint: 
     result = influence(study)
     draws, _ = draws_of(joint, 2)
     spread = ensemble(OfFigures(ShipText.of(joint), ("criterion_C",)), draws, 150).figures["criterion_C"].std(ddof=1)
-    assert result.standard_errors[0] == pytest.approx(spread, rel=0.2)
-    parts = result.slopes[0] * [one.standard_error for one in result.parameters]
+    assert result.figures["criterion_C"].standard_error == pytest.approx(spread, rel=0.2)
+    parts = study.slopes_at(study.values)[1][0] * [one.standard_error for one in study.parameters]
     assert not 0.7 < np.linalg.norm(parts) / spread < 1.4  # as if independent it would be another
 
 
