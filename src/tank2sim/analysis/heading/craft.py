@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 from tank2sim.analysis.heading.designs import DAMPING, INTEGRAL_BAND_RAD, SLOWNESS
 from tank2sim.analysis.heading.piloted import Piloted, PilotStudy
 from tank2sim.analysis.heading.runs import CraftKeeping, HeadingLoop, StepFigures, craft_keeping, step_figures
-from tank2sim.analysis.heading.study import Outdoors, StudySettings, not_held
+from tank2sim.analysis.heading.study import StudySettings, WeatherRuns, not_held
 from tank2sim.analysis.linearisation import OperatingPoint, jacobians
 from tank2sim.analysis.stability.straight_line import sorted_modes
 from tank2sim.arrays import Array, ComplexNumber
@@ -108,9 +108,9 @@ def study_craft_autopilot(
     }
     course = step_figures(runs["course"].t, runs["course"]["motion.psi"], change)
     at_speed = replace(settings, speed_mps=speed)
-    outdoors = Outdoors.of(model, card, autopilot, at_speed, KEEPING_LENGTHS / RUN_LENGTHS * duration)
-    runs["keeping"] = outdoors.run
-    keeping = craft_keeping(outdoors.run, speed)
+    outside = WeatherRuns.of(model, card, autopilot, at_speed, KEEPING_LENGTHS / RUN_LENGTHS * duration)
+    runs["keeping"] = outside.run
+    keeping = craft_keeping(outside.run, speed)
     in_degrees = {name: math.degrees(getattr(course, name)) for name in ("ordered", "overshoot")}
     reached = speed - float(runs["speed"]["motion.u"][0])
     study = CraftAutopilotStudy(
@@ -134,8 +134,8 @@ def study_craft_autopilot(
         course_keeping=keeping,
         at_limit_percent={name: 100 * _at_limit(card, run) for name, run in runs.items()},
         histories={name: histories(run) for name, run in runs.items()},
-        notices=(*outdoors.notices, *not_held(keeping, outdoors.weather, speed), *outdoors.unfinished),
-        **outdoors.reported,
+        notices=(*outside.notices, *not_held(keeping, outside.weather, speed), *outside.unfinished),
+        **outside.reported,
     )
     return study, Piloted(model, autopilot, runs)
 

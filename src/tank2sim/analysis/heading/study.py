@@ -191,7 +191,7 @@ def _histories(runs: Mapping[str, Trajectory], weather: Weather) -> dict[str, Co
 
 
 @dataclass(frozen=True, eq=False)
-class Outdoors:
+class WeatherRuns:
     """Course keeping on course 0 in current, wind and waves, and tracks in the same current and wind.
 
     `loop`: ship and autopilot with inputs of the weather; `run`: the course keeping; `notices`: of the ship.
@@ -205,7 +205,7 @@ class Outdoors:
     notices: tuple[Notice, ...]
 
     @staticmethod
-    def of(ship: Model, card: SteeredCard, autopilot: Model, settings: StudySettings, duration_s: float) -> Outdoors:
+    def of(ship: Model, card: SteeredCard, autopilot: Model, settings: StudySettings, duration_s: float) -> WeatherRuns:
         """Keep course for `duration_s`, and the track of the settings, if there is one.
 
         Raises
@@ -221,7 +221,7 @@ class Outdoors:
         step = loop.model.step_s
         waves = wave_yaw_acceleration(weather, step, round(duration_s / step))
         order: dict[str, float | Array] = {**inputs, YAW_DISTURBANCE: waves, "heading.command": 0.0}
-        return Outdoors(
+        return WeatherRuns(
             weather=weather,
             loop=loop,
             run=loop.run(order, len(waves) * step, parameters=settings.start),
@@ -267,12 +267,12 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
     if not margins[0].stable:
         raise _not_stable(ship, design, settings.speed_mps)
     unit = math.sqrt(design.found.nomoto.dimensional.T_s / design.found.nomoto.dimensional.K_per_s)
-    outdoors = Outdoors.of(ship, card, design.autopilot, settings, _KEEPING_TIMES * unit)
-    runs, changes = _changes(outdoors.loop, design, settings, _CHANGE_TIMES * unit)
-    runs["keeping"] = outdoors.run
-    kept = course_keeping(outdoors.run, 0.0, outdoors.run.t[-1] / 2)
-    begin = len(outdoors.run.t) // 2
-    later = {name: float(np.mean(outdoors.run[name][begin:])) for name in ("motion.u", "rudder.angle")}
+    outside = WeatherRuns.of(ship, card, design.autopilot, settings, _KEEPING_TIMES * unit)
+    runs, changes = _changes(outside.loop, design, settings, _CHANGE_TIMES * unit)
+    runs["keeping"] = outside.run
+    kept = course_keeping(outside.run, 0.0, outside.run.t[-1] / 2)
+    begin = len(outside.run.t) // 2
+    later = {name: float(np.mean(outside.run[name][begin:])) for name in ("motion.u", "rudder.angle")}
     alone = design.found
     study = AutopilotStudy(
         ship=alone.ship,
@@ -294,17 +294,17 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
             course_changes=changes,
             course_keeping=kept,
         ),
-        histories=_histories(runs, outdoors.weather),
+        histories=_histories(runs, outside.weather),
         notices=(
-            *not_held(kept, outdoors.weather, later["motion.u"], later["rudder.angle"]),
-            *outdoors.notices,
+            *not_held(kept, outside.weather, later["motion.u"], later["rudder.angle"]),
+            *outside.notices,
             *notices,
             *([] if settings.speed_mps is None else [Notice(_BEGUN_AT.format(settings.speed_mps))]),
             *_notices(margins, runs, changes),
-            *outdoors.unfinished,
-            *_of_the_gear(ship, design, kept, outdoors.weather),
+            *outside.unfinished,
+            *_of_the_gear(ship, design, kept, outside.weather),
         ),
-        **outdoors.reported,
+        **outside.reported,
     )
     return study, Piloted(ship, design.autopilot, runs)
 
