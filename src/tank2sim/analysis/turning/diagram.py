@@ -211,14 +211,15 @@ class TurningDiagram:
 
 
 def hull_states(model: Model, motion: Sequence[str] = _MOTION) -> tuple[str, ...]:
-    """States that move with the hull at a held rudder: u, v, r, and states of effects on which their rates depend.
+    """States that move with the hull at held rudder or thrusters: u, v, r, and states of effects that act on them.
 
     With fewer names in `motion`, the remaining ones of u, v, r are constant.
     """
     found = list(motion)
+    steering = [name for name in model.state_names if name == "rudder.angle" or name.startswith("thrusters.")]
     for name in found:  # grows on the way
         rate = model.expand(model.symbols(model.derivatives_of([name])))
-        held = (*_PLACE, *_MOTION, "rudder.angle", *found)
+        held = (*_PLACE, *_MOTION, *steering, *found)
         found += [name for name in model.state_names if name not in held and ca.depends_on(rate, model.symbol(name))]
     return tuple(found)
 
