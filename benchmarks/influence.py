@@ -10,7 +10,7 @@ import os
 import tempfile
 import time
 
-from tank2sim.analysis.influence.card_influence import CardInfluence, influence
+from tank2sim.analysis.influence.card_influence import InfluenceStudy, influence
 from tank2sim.analysis.influence.figures import parse_figure
 from tank2sim.analysis.influence.study import Study
 from tank2sim.analysis.tuning.result import FEWEST, UNCERTAIN, Means
@@ -67,7 +67,7 @@ def ship() -> ManoeuvringCard:
     return card
 
 
-def timed() -> tuple[float, CardInfluence]:
+def timed() -> tuple[float, InfluenceStudy]:
     begin = time.perf_counter()
     result = influence(Study(ship(), [parse_figure(text) for text in FIGURES]))
     return time.perf_counter() - begin, result

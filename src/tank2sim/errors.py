@@ -30,6 +30,11 @@ class InputError(Exception):
         self.source, self.place, self.problem, self.remedy = str(source), place, problem, remedy
         super().__init__(": ".join(part for part in (self.source, place, problem) if part) + f"; {remedy}")
 
+    @property
+    def reason(self) -> str:
+        """Place and problem, where the file is known."""
+        return f"{self.place}: {self.problem}" if self.place else self.problem
+
     def __reduce__(self) -> tuple[type[InputError], tuple[str, str, str, str]]:
         """As it comes back from another process: pickle would call it with its one line alone."""
         return type(self), (self.source, self.place, self.problem, self.remedy)

@@ -27,7 +27,8 @@ from tank2sim.answer.charts.theme import DARK, DARK_TONE
 from tank2sim.answer.page import render_page
 from tank2sim.gap.outcome.export import gap_study
 from tank2sim.results.gap import NO_TRIALS, gap_result
-from tank2sim.results.gap_charts import gap_histories, gap_tracks, misfit_chart, place_chart
+from tank2sim.results.gap_charts import HISTORIES, misfit_chart, place_chart, worst_replays
+from tank2sim.results.trial_charts import history_grid, track_grid
 from tests.answer.drawn import rows, rows_of_layer
 from tests.answer.opened_page import CHROMIUM, opened
 from tests.gap import made_up
@@ -182,8 +183,8 @@ def test_a_switch_is_at_all_together_and_one_model_needs_none() -> None:
     [
         misfit_chart,
         place_chart,
-        lambda found: gap_tracks(found, held_out=False),
-        lambda found: gap_histories(found, held_out=True)[0],
+        lambda found: track_grid(worst_replays(found, held_out=False)),
+        lambda found: history_grid(worst_replays(found, held_out=True), signals=HISTORIES),
     ],
     ids=["misfit", "places", "tracks", "histories"],
 )

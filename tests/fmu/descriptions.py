@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from tank2sim.analysis.heading.control import heading_autopilot
+from tank2sim.analysis.heading.designs import design_heading
 from tank2sim.cards import read_card
 from tank2sim.dynamics import Model, build
 from tank2sim.fmu.export import description_text
@@ -13,7 +13,7 @@ from tank2sim.fmu.export import description_text
 @cache
 def model_of(ship: str) -> Model:
     if ship == "autopilot":
-        return heading_autopilot(build(read_card("mariner")))
+        return design_heading(build(read_card("mariner"))).autopilot
     return build(read_card(ship))
 
 

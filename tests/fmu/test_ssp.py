@@ -19,7 +19,7 @@ from fmpy.ssp.ssd import read_ssd
 from fmpy.validation import validate_fmu
 from scipy.integrate import solve_ivp
 
-from tank2sim.analysis.heading.control import heading_autopilot
+from tank2sim.analysis.heading.designs import design_heading
 from tank2sim.dynamics.model import Model
 from tank2sim.fmu.export import ExportedFmu
 from tank2sim.fmu.ssp import ship_with_autopilot
@@ -44,7 +44,7 @@ class Joined:
     """The ship and its autopilot in one right-hand side."""
 
     def __init__(self, ship: Model):
-        self.ship, self.pilot = ship, heading_autopilot(ship)
+        self.ship, self.pilot = ship, design_heading(ship).autopilot
         self.p, self.pilot_p = ship.parameter_values(), self.pilot.parameter_values()
         self.rudder = ship.input_names.index("rudder.command")
         self.seen = [ship.state_names.index(name) for name in ("motion.psi", "motion.r")]

@@ -15,7 +15,7 @@ from tank2sim.gap.outcome.export import gap_study
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY, Gap, Passed, Rival
 from tank2sim.results.gap import NO_TRIALS, GapResult, gap_result
 from tank2sim.results.gap_cause_charts import agreement_chart, rival_chart
-from tank2sim.results.gap_charts import gap_tracks, misfit_chart, shown_places
+from tank2sim.results.gap_charts import misfit_chart, shown_places, worst_replays
 from tank2sim.results.gap_text import found_in_words, probabilities_in_words, with_error
 from tests.answer.drawn import rows_of
 from tests.gap import made_up
@@ -228,8 +228,7 @@ def test_places_show_what_is_left_in_the_units_of_the_column(charts) -> None:
     titles = [panel["title"]["text"] for panel in chart["concat"]]
     assert titles == ["turn35 · north", "zigzag · heading"]
     below = chart["concat"][1]["vconcat"][1]
-    drawn = next(layer for layer in below["layer"] if layer["mark"]["type"] == "line")
-    rows = chart["datasets"][drawn["data"]["name"]]
+    rows = chart["datasets"][below["data"]["name"]]
     for run, size in (("card before", 1.2), ("card found", 0.2)):
         assert {round(row["v"], 4) for row in rows if row["run"] == run} == {size}
     (band,) = (row for row in rows_of(charts["places"]) if row.get("high") == pytest.approx(0.4))
@@ -244,8 +243,8 @@ def test_without_places_the_largest_misfits_are_shown() -> None:
 
 def test_tracks_are_of_their_own_set() -> None:
     found = gap_study(made_up.missing())
-    tracks = [chart_specification(gap_tracks(found, held_out=held))["concat"] for held in (True, False)]
-    assert [[panel["title"]["text"] for panel in panels] for panels in tracks] == [["turn20"], ["turn35", "zigzag"]]
+    names = [[replay.trial for replay in worst_replays(found, held_out=held)] for held in (True, False)]
+    assert names == [["turn20"], ["turn35", "zigzag"]]
 
 
 def test_the_missing_force_is_drawn_over_one_turn_of_the_compass() -> None:

@@ -30,6 +30,7 @@ from tank2sim.identification.trials.study import (
 from tank2sim.notices import Notice
 from tank2sim.records.trials import Trial
 from tank2sim.results import identification as identification_module
+from tank2sim.results import trial_charts
 from tank2sim.results.identification import MOST_TRIALS, IdentificationResult
 from tank2sim.results.trial_charts import AFTER, BEFORE, MEASURED, history_grid, track_grid
 from tests.answer import drawn
@@ -159,8 +160,8 @@ def test_the_card_before_is_drawn_as_before_and_the_card_found_as_found(found) -
 
 def test_windows_show_the_share_of_each_signal_by_trial(found) -> None:
     result, _, charts = found
-    cells = [row for row in drawn.rows_of(charts["windows"]) if "share" in row]
-    now = {(row["trial"], row["signal"]): row["share"] for row in cells}  # the card found comes last of each trial
+    cells = [row for row in drawn.rows_of(charts["windows"]) if row.get("model") == "after"]
+    now = {(row["trial"], row["signal"]): row["misfit"] for row in cells}
     for one in (*result.fit.following, *result.holdout.following):
         assert now[one.name, "r"] == pytest.approx(100 * one.relative("motion.r"), 1e-4)
         assert now[one.name, "ψ"] == pytest.approx(100 * one.relative("motion.psi"), 1e-4)
@@ -168,9 +169,9 @@ def test_windows_show_the_share_of_each_signal_by_trial(found) -> None:
 
 def test_maps_next_to_each_other_share_one_legend(found) -> None:
     """Vega warns in the console where one of them has a legend and another none."""
-    maps = [one for row in chart_specification(found[2]["windows"])["vconcat"] for one in row["hconcat"]]
-    legends = [one["layer"][0]["encoding"]["color"]["legend"] for one in maps]
-    assert len(legends) == 4 and all(one == legends[0] for one in legends)
+    maps = chart_specification(found[2]["windows"])["vconcat"]
+    legends = [one["spec"]["layer"][0]["encoding"]["color"]["legend"] for one in maps]
+    assert len(legends) == 2 and all(one == legends[0] for one in legends)
 
 
 @pytest.mark.slow
@@ -259,8 +260,9 @@ def test_the_estimates_are_a_table_and_a_data_frame(found) -> None:
 
 @pytest.mark.slow
 def test_of_many_trials_those_are_shown_that_are_followed_worst(found, monkeypatch) -> None:
-    monkeypatch.setattr(identification_module, "MOST_TRIALS", 2)
-    monkeypatch.setattr(identification_module, "_PER_SHEET", 1)
+    for module in (identification_module, trial_charts):
+        monkeypatch.setattr(module, "MOST_TRIALS", 2)
+    monkeypatch.setattr(trial_charts, "PER_SHEET", 1)
     errors = {"b": 0.2, "c": 0.1, "a": 0.3}
     windows = {name: {"r_degps": WindowError(rms_error=error, rms_signal=1.0)} for name, error in errors.items()}
     trials = tuple(TrialErrors(trial=name, before=error, found=error) for name, error in windows.items())

@@ -16,7 +16,15 @@ from tank2sim.simulation.straight_course import OperatingPoint, straight_course
 if TYPE_CHECKING:
     import control
 
-__all__ = ["OperatingPoint", "following_states", "jacobians", "signal_name", "state_space", "straight_course"]
+__all__ = [
+    "OperatingPoint",
+    "following_states",
+    "jacobians",
+    "signal_name",
+    "slow_slopes",
+    "state_space",
+    "straight_course",
+]
 
 
 def jacobians(
@@ -34,18 +42,26 @@ def jacobians(
     not named are constant.
     """
     if settled:
-        derivative = {state.name: state.derivative for state in model.states}
-        rates = [derivative[name] for name in settled]
+        rates = model.derivatives_of(settled)
         whole, inputs_whole = jacobians(model, point, [*values, *rates], [*states, *settled], inputs)
         n, m = len(values), len(states)
         # pinv: a state that nothing drives back (a play) has no place of rest, and moves nothing then
         follow = whole[:n, m:] @ np.linalg.pinv(whole[n:, m:])
         return whole[:n, :m] - follow @ whole[n:, :m], inputs_whole[:n] - follow @ inputs_whole[n:]
-    expressions = model.expand(ca.vcat([model.symbol(name) for name in values]))
-    by_state = ca.jacobian(expressions, ca.vcat([model.symbol(name) for name in states]))
-    by_input = ca.jacobian(expressions, ca.vcat([ca.SX(0, 1), *(model.symbol(name) for name in inputs)]))
+    expressions = model.expand(model.symbols(values))
+    by_state, by_input = (ca.jacobian(expressions, model.symbols(names)) for names in (states, inputs))
     both = ca.Function("jacobians", [model.x, model.u, model.p], [by_state, by_input])(point.x, point.u, point.p)
     return np.array(both[0]), np.array(both[1])
+
+
+def slow_slopes(model: Model, values: Sequence[str], by: Sequence[str], settled: Sequence[str]) -> ca.SX:
+    """Slopes (nv, nb) of named quantities by named states, of x, u and p, where the states `settled` follow at once."""
+    rows = model.expand(model.symbols([*values, *model.derivatives_of(settled)]))
+    whole = ca.densify(ca.jacobian(rows, model.symbols([*by, *settled])))
+    n, m = len(values), len(by)
+    if not settled:
+        return whole
+    return whole[:n, :m] - whole[:n, m:] @ ca.solve(whole[n:, m:], whole[n:, :m])
 
 
 def state_space(
@@ -74,8 +90,7 @@ def state_space(
     states = list(model.state_names if states is None else states)
     inputs = [v.name for v in model.inputs if not v.boolean] if inputs is None else list(inputs)
     outputs = list(model.outputs if outputs is None else outputs)
-    derivative = {state.name: state.derivative for state in model.states}
-    A, B = jacobians(model, point, [derivative[name] for name in states], states, inputs, settled=settled)
+    A, B = jacobians(model, point, model.derivatives_of(states), states, inputs, settled=settled)
     C, D = jacobians(model, point, outputs, states, inputs, settled=settled)
     return control.StateSpace(
         A,
@@ -102,18 +117,16 @@ def following_states(
     InputError
         A state is not one of the model, or those left out come to no rest by themselves.
     """
-    derivative = {state.name: state.derivative for state in model.states}
-    names = list(derivative)
-    for name in states:
-        if name not in names:
-            raise InputError("states", name, "is not a state of the model", f"there are: {', '.join(names)}")
-    rates, _ = jacobians(model, point, list(derivative.values()), names, [])
-    known = [names.index(name) for name in states]
-    free = [place for place, name in enumerate(names) if name not in states and name not in inputs]
-    found: list[int] = []
-    while added := [place for place in free if place not in found and rates[[*known, *found], place].any()]:
-        found += added
-    if found and np.linalg.eigvals(rates[np.ix_(found, found)]).real.max() >= 0:
+    names = list(model.state_names)
+    if unknown := next((name for name in states if name not in names), ""):
+        raise InputError("states", unknown, "is not a state of the model", f"there are: {', '.join(names)}")
+    rates, _ = jacobians(model, point, model.derivatives_of(names), names, [])
+    felt = np.isin(names, states)
+    free = ~felt & ~np.isin(names, inputs)
+    while (added := free & ~felt & rates[felt].any(axis=0)).any():
+        felt |= added
+    found = np.flatnonzero(felt & free)
+    if len(found) and np.linalg.eigvals(rates[np.ix_(found, found)]).real.max() >= 0:
         missing = ", ".join(names[place] for place in found)
         problem = f"leave out {missing}: the others depend on what is left out, and it does not settle by itself"
         raise InputError("states", "", problem, f"add {missing} to the states")

@@ -121,8 +121,8 @@ def _doubt_of_radians(run: Run) -> list[Notice]:
     if "rudder.command" not in model.input_names:
         return []
     largest = math.degrees(float(np.abs(run.trajectory["rudder.command"]).max()))
-    limits = [parameter.start for parameter in model.parameters if parameter.name == "steering.max_angle"]
-    most = math.degrees(limits[0]) if limits else _MOST_DEG
+    limit = model.defaults.get("steering.max_angle")
+    most = _MOST_DEG if limit is None else math.degrees(limit)
     if not _LEAST_DEG <= math.degrees(largest) <= most + 1e-6:
         return []
     rudder = f"the largest rudder angle is {largest:.3g} deg"

@@ -16,7 +16,7 @@ from tank2sim.notices import Notice
 
 if TYPE_CHECKING:
     from tank2sim.analysis.ensemble.results import FigureBands
-    from tank2sim.analysis.influence.card_influence import CardInfluence, InfluenceStudy
+    from tank2sim.analysis.influence.card_influence import InfluenceStudy
     from tank2sim.analysis.influence.figures import InfluenceFigure
     from tank2sim.analysis.influence.study import Study
     from tank2sim.api.ensemble import EnsembleOptions
@@ -158,6 +158,7 @@ def tune_ship(
     from tank2sim.analysis.tuning.tune import tune
     from tank2sim.api.ensemble import EnsembleOptions
     from tank2sim.cards.covariance_reading import derived_card
+    from tank2sim.dynamics.card_parameters import joint_errors
     from tank2sim.results.influence import TuningResult
 
     ensemble = EnsembleOptions(members, seed, executor)
@@ -173,7 +174,7 @@ def tune_ship(
     tuned = tune(study, parsed, means)
     found = influence(study, means.agreed)
     changed, notices = derived_card(card, tuned_text(card, tuned), "the tuned card") if tuned.reached else (None, ())
-    if found.errors.together:
+    if joint_errors(card, study.parameters).together:
         notices = (Notice(_INDEPENDENT), *notices)
     reported = replace(_reported(found, notices), tuned=tuned, ensemble=_bands(ship, study, ensemble))
     return TuningResult(reported, ship, changed)
@@ -269,11 +270,11 @@ def _listed(texts: str | Sequence[str]) -> list[str]:
     return [texts] if isinstance(texts, str) else list(texts)
 
 
-def _reported(found: CardInfluence, notices: Sequence[Notice] = ()) -> InfluenceStudy:
+def _reported(found: InfluenceStudy, notices: Sequence[Notice] = ()) -> InfluenceStudy:
     """The study, with further notices."""
     from tank2sim.simulation.integrator import compiler_notices
 
-    return replace(found.reported(), notices=tuple(dict.fromkeys([*found.notices, *notices, *compiler_notices()])))
+    return replace(found, notices=tuple(dict.fromkeys([*found.notices, *notices, *compiler_notices()])))
 
 
 def _bands(ship: Vessel, study: Study, ensemble: EnsembleOptions) -> FigureBands | None:

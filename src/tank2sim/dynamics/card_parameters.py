@@ -80,7 +80,7 @@ def card_parameters(card: SteeredCard, model: Model) -> tuple[CardParameter, ...
 
 
 def find_parameter(parameters: Sequence[CardParameter], name: str, argument: str) -> CardParameter:
-    """The parameter of a user's name, either its full name or that in the card.
+    """The parameter of a user's name, either its full name or that in the card; `argument` has it, for messages.
 
     Raises InputError: the parameter does not exist on the card, or is exactly zero.
     """

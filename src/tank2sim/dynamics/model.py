@@ -209,6 +209,20 @@ class Model:
         """The symbol of a variable, to write expressions with."""
         return self._by_name[name].symbol
 
+    def symbols(self, names: Iterable[str]) -> ca.SX:
+        """The symbols (n, 1) of variables."""
+        return ca.vcat([self.symbol(name) for name in names])
+
+    def derivatives_of(self, states: Iterable[str]) -> list[str]:
+        """Names of the time derivatives of states."""
+        known = {state.name: state.derivative for state in self.states}
+        return [known[name] for name in states]
+
+    @cached_property
+    def defaults(self) -> Mapping[str, float]:
+        """Start values of the parameters by name."""
+        return dict(zip(self.parameter_names, self.parameter_values().tolist(), strict=True))
+
     @cached_property
     def _by_name(self) -> dict[str, Variable]:
         return {variable.name: variable for variable in self.variables}

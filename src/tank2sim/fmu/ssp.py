@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
+from typing import TYPE_CHECKING
 
-from tank2sim.analysis.heading.control import DAMPING, SLOWNESS, heading_autopilot
-from tank2sim.analysis.stability.straight_line import stability
 from tank2sim.dynamics.model import Model
 from tank2sim.fmu.export import ExportedFmu, make_fmu, zipped
 from tank2sim.fmu.interface import FmuVariable, interface
@@ -16,6 +15,9 @@ from tank2sim.fmu.platforms import Platform
 from tank2sim.fmu.provenance import Documents, ValueOrigin
 from tank2sim.fmu.templates import render
 from tank2sim.units import UNITS
+
+if TYPE_CHECKING:
+    from tank2sim.analysis.heading.designs import HeadingDesign
 
 _STOP_SHIP_TIMES = 40  # L/u0, in which a change of course has long ended
 
@@ -59,14 +61,14 @@ def ship_with_autopilot(
     ------
     InputError
         No autopilot can be designed for the ship, or its FMU cannot be made: see
-        :func:`tank2sim.analysis.heading.control.heading_autopilot` and :func:`tank2sim.fmu.export.make_fmu`.
+        :func:`tank2sim.analysis.heading.designs.design_heading` and :func:`tank2sim.fmu.export.make_fmu`.
     """
-    autopilot = heading_autopilot(ship)
-    steered = make_fmu(
-        autopilot, fmi=made.fmi, documents=_documents(ship, autopilot), platforms=platforms, report=report
-    )
+    from tank2sim.analysis.heading.designs import design_heading  # slow to import
+
+    design = design_heading(ship)
+    autopilot = design.autopilot
+    steered = make_fmu(autopilot, fmi=made.fmi, documents=_documents(design), platforms=platforms, report=report)
     parts, joints = _joined({"ship": ship, "autopilot": autopilot}, every_input)
-    lengths = {parameter.name: parameter.start for parameter in ship.parameters}
     values = {
         "name": f"{ship.name} with heading autopilot",
         "description": "A ship on a heading that its autopilot keeps: heading.command of autopilot, rad",
@@ -74,7 +76,7 @@ def ship_with_autopilot(
         "parts": parts,
         "connections": joints,
         "units": [UNITS[name] for name in sorted({connector.unit for part in parts for connector in part.connectors})],
-        "stop_time": float(round(_STOP_SHIP_TIMES * lengths["ship.length"] / lengths["ship.speed"])),
+        "stop_time": float(round(_STOP_SHIP_TIMES * ship.defaults["ship.length"] / ship.defaults["ship.speed"])),
     }
     contents = {
         "SystemStructure.ssd": render("SystemStructure.ssd.xml", values).encode("utf-8"),
@@ -101,14 +103,9 @@ def _joined(models: Mapping[str, Model], every_input: bool) -> tuple[list[Part],
     return parts, joints
 
 
-def _documents(ship: Model, autopilot: Model) -> Documents:
+def _documents(design: HeadingDesign) -> Documents:
     """Description of the autopilot's FMU."""
-    found = stability(ship)
-    nomoto = found.nomoto.dimensional
-    source = (
-        f"Pole placement (relative damping {DAMPING:g}, integral {SLOWNESS:g} of the natural frequency) on Nomoto's "
-        f"model of {ship.name} at {found.operating_point.speed_mps:.4g} m/s: "
-        f"K = {nomoto.K_per_s:.5g} 1/s, T = {nomoto.T_s:.5g} s"
-    )
-    tuned = (parameter.name for parameter in autopilot.parameters if parameter.name.startswith("autopilot."))
+    nomoto = design.found.nomoto.dimensional
+    source = f"{design.source}: K = {nomoto.K_per_s:.5g} 1/s, T = {nomoto.T_s:.5g} s"
+    tuned = (parameter.name for parameter in design.autopilot.parameters if parameter.name.startswith("autopilot."))
     return Documents(source=source, origins={name: ValueOrigin(source) for name in tuned})

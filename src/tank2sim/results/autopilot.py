@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, ClassVar, Literal, Self, TypeVar
 
 import numpy as np
 
-from tank2sim.analysis.heading.control import INTEGRAL_BAND_RAD
 from tank2sim.analysis.heading.craft import CraftAutopilotStudy
+from tank2sim.analysis.heading.designs import INTEGRAL_BAND_RAD
 from tank2sim.analysis.heading.margins import LoopResponse
 from tank2sim.analysis.heading.piloted import AutopilotExport, Piloted
 from tank2sim.analysis.heading.runs import CourseKeeping, CraftKeeping
@@ -40,7 +40,6 @@ from tank2sim.answer.parts import (
     table,
 )
 from tank2sim.answer.result import Result
-from tank2sim.arrays import Columns
 from tank2sim.errors import InputError
 from tank2sim.files import FMU, refuse_other_ending, write_together
 from tank2sim.simulation.trial_file import trial_columns
@@ -198,6 +197,16 @@ class ResultWithController(Result[_S]):
             f"yaw the ship by {weather['wave_yaw_deg']:.3g} deg (standard deviation); seed {weather['seed']:.0f}."
         )
         return Section("Course keeping", text=text, tables=[quantities(caption, figures)], charts=[chart])
+
+    def _drawn(self, title: str, signals: Sequence[Signal], *names: str, until_s: float = math.inf) -> Illustration:
+        """Signals of runs over time."""
+        drawn = []
+        for name in names:
+            columns = self.study.histories[name]
+            shown = columns["t_s"] <= until_s
+            values = {signal.name: columns[signal.name][shown] for signal in signals}
+            drawn.append(History(name, time_s=columns["t_s"][shown], values=values))
+        return Illustration(history_chart(drawn, signals, title=title))
 
     def _fmu_line(self) -> tuple[str, ...]:
         """The FMU in a line, if there is one."""
@@ -394,8 +403,7 @@ class AutopilotResult(ResultWithController[AutopilotStudy]):
         changes = self.study.closed_loop.course_changes
         settled = [changes[name].settling_time_s if name in changes else None for name in names]
         until = max(math.inf if seconds is None else 2 * seconds for seconds in settled)
-        drawn = [_history(name, self.study.histories[name], _SIGNALS, until) for name in names]
-        return Illustration(history_chart(drawn, _SIGNALS, title=title), caption=caption)
+        return replace(self._drawn(title, _SIGNALS, *names, until_s=until), caption=caption)
 
 
 _CHANGES = {
@@ -457,17 +465,14 @@ class CraftAutopilotResult(ResultWithController[CraftAutopilotStudy]):
     @property
     def key_figures(self) -> Sequence[KeyFigure]:
         """Overshoots, and settling times where the craft settles."""
-        figures = []
-        for words, unit, change in (
-            ("heading", "deg", self.study.course_change),
-            ("speed", "m/s", self.study.speed_change),
-        ):
+        overshoots, settled = [], []
+        changes = (("heading", "deg", self.study.course_change), ("speed", "m/s", self.study.speed_change))
+        for words, unit, change in changes:
             note = f"in a change by {change.ordered:.3g} {unit}"
-            figures.append(KeyFigure(f"Overshoot of {words}", change.overshoot, unit, note=note))
+            overshoots.append(KeyFigure(f"Overshoot of {words}", change.overshoot, unit, note=note))
             if change.settling_time_s is not None:
-                label = f"{words.capitalize()} settled"
-                figures.append(KeyFigure(label, change.settling_time_s, "s", note=note))
-        return sorted(figures, key=lambda figure: not figure.label.startswith("Overshoot"))
+                settled.append(KeyFigure(f"{words.capitalize()} settled", change.settling_time_s, "s", note=note))
+        return [*overshoots, *settled]
 
     @property
     def sections(self) -> Sequence[Section]:
@@ -477,15 +482,12 @@ class CraftAutopilotResult(ResultWithController[CraftAutopilotStudy]):
             *self._tracks(),
             self._keeping(
                 self.study.course_keeping,
-                self._drawn("keeping", [_HEADING, _SPEED, *self._revolutions], "Course keeping"),
+                self._drawn("Course keeping", [_HEADING, _SPEED, *self._revolutions], "keeping"),
                 at_limit_percent=self.study.at_limit_percent["keeping"],
             ),
             self._controller(),
             *self._fmu(),
         ]
-
-    def _drawn(self, name: str, signals: Sequence[Signal], title: str) -> Illustration:
-        return Illustration(history_chart([_history(name, self.study.histories[name], signals)], signals, title=title))
 
     @property
     def _revolutions(self) -> list[Signal]:
@@ -496,26 +498,18 @@ class CraftAutopilotResult(ResultWithController[CraftAutopilotStudy]):
     def _changes(self) -> Section:
         study, turning = self.study, self._revolutions
         charts = [
-            self._drawn("course", [_HEADING, _SPEED, *turning], "Change of course"),
-            self._drawn("speed", [_SPEED, *turning], "Change of speed"),
+            self._drawn("Change of course", [_HEADING, _SPEED, *turning], "course"),
+            self._drawn("Change of speed", [_SPEED, *turning], "speed"),
         ]
         rows: list[list[Cell]] = [
             [
                 f"{words}, {change.ordered:.3g} {unit}",
-                change.rise_time_s,
-                change.overshoot,
-                change.settling_time_s,
-                study.at_limit_percent[words],
+                *(change.rise_time_s, change.overshoot, change.settling_time_s, study.at_limit_percent[words]),
             ]
             for words, unit, change in (("course", "deg", study.course_change), ("speed", "m/s", study.speed_change))
         ]
-        heads = (
-            "change",
-            "rise time (s)",
-            "overshoot (deg or m/s)",
-            "settling time (s)",
-            "a thruster at its limit (%)",
-        )
+        settling = ("rise time (s)", "overshoot (deg or m/s)", "settling time (s)")
+        heads = ("change", *settling, "a thruster at its limit (%)")
         return Section(
             "Changes of course and speed",
             text="On the nonlinear craft in calm water, from a steady course.",
@@ -538,12 +532,6 @@ class CraftAutopilotResult(ResultWithController[CraftAutopilotStudy]):
 
 def _settles(seconds: float) -> str:
     return f"settles in {seconds:.3g} s"
-
-
-def _history(label: str, columns: Columns, signals: Sequence[Signal], until_s: float = math.inf) -> History:
-    shown = columns["t_s"] <= until_s
-    values = {signal.name: columns[signal.name][shown] for signal in signals}
-    return History(label, time_s=columns["t_s"][shown], values=values)
 
 
 def _from_the_near_end(response: LoopResponse) -> FrequencyResponse:

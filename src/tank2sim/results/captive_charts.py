@@ -115,26 +115,25 @@ def _loops(loops: Sequence[ForceLoop], force: str, factor: float) -> list[PlotSe
 
 def harmonic_chart(plot: HarmonicsPlot) -> ChartSpec:
     """Amplitudes of a force's harmonics as bars, one panel a harmonic, the runs side by side; strokes are the fit."""
-    runs, up = plot.runs, plot.up
-    count = max(len(vector(run.amplitude)) for run in runs)
+    up, names = plot.up, [run.run for run in plot.runs]
+    count = max(len(vector(run.amplitude)) for run in plot.runs)
+    fitted = [run for run in plot.runs if run.fitted is not None]
     panels = []
     for order in range(1, count + 1):
-        x = _runs_axis("run:N", [run.run for run in runs], named=order == count, bars=True)
-        rows = [{"run": run.run, "v": _at(run.amplitude, order)} for run in runs]
-        fits = [{"run": run.run, "v": _at(run.fitted, order)} for run in runs if run.fitted is not None]
+        x = _runs_axis("run:N", names, named=order == count, bars=True)
         size = PlotAxis(f"harmonic {order} of {up}", above=True, ticks=4, zero=True)
-        place = {"x": x, "y": size.channel("v")}
-        said: ChartSpec = {"tooltip": tooltips({"run:N": "run", "v:Q": up})}
-        layers = [layer("bar", rows, place | said, opacity=0.7)]
-        if fits:
-            layers.append(layer("tick", fits, place, style="limit", thickness=2))
-        panels.append(layered(layers, size=(720, 110)))
-    subtitle = "Bars: measured. Red strokes: fit." if any(run.fitted is not None for run in runs) else ""
+        place: ChartSpec = {"x": x, "y": size.channel("v")}
+        said = place | {"tooltip": tooltips({"run:N": "run", "v:Q": up})}
+        bars = [{"run": run.run, "v": _at(run.amplitude, order)} for run in plot.runs]
+        fits = [{"run": run.run, "v": _at(run.fitted, order)} for run in fitted]
+        layers = [layer("bar", bars, said, opacity=0.7), layer("tick", fits, place, style="limit", thickness=2)]
+        panels.append(layered(layers if fitted else layers[:1], size=(720, 110)))
+    subtitle = "Bars: measured. Red strokes: fit."
     return stacked(
         panels,
         window=False,
-        title=heading(plot.title, subtitle) if plot.title and subtitle else plot.title,
-        description=f"Amplitudes of the harmonics of {up} in {len(runs)} runs.",
+        title=heading(plot.title, subtitle) if plot.title and fitted else plot.title,
+        description=f"Amplitudes of the harmonics of {up} in {len(names)} runs.",
     )
 
 

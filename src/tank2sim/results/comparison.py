@@ -239,20 +239,16 @@ class ComparisonResult(Result[CardComparison]):
 
     def _coefficients(self) -> Section:
         study = self.study
-        alike, alone, tables = 0, [], [self._farthest(place, label) for place, label in self._others()]
-        for caption, rows, factor in (
-            ("Coefficients that differ (values and errors times 1000)", study.coefficients, 1000.0),
-            ("Parameters of effects that differ, SI", study.effects, 1.0),
-        ):
-            shared = [row for row in rows if all(card.value is not None for card in row.cards)]
-            differing = [row for row in shared if any(apart.percent for apart in row.differences)]
-            alike += len(shared) - len(differing)
-            alone += [row.name for row in rows if any(card.value is None for card in row.cards)]
-            if differing:
-                tables.append(self._coefficient_table(caption, differing, factor))
+        tables = [
+            *(self._farthest(place, label) for place, label in self._others()),
+            *self._differing("Coefficients that differ (values and errors times 1000)", study.coefficients, 1000.0),
+            *self._differing("Parameters of effects that differ, SI", study.effects, 1.0),
+        ]
+        alike = sum(_on_all(row) and not _differs(row) for row in study.rows)
+        alone = [row.name for row in study.rows if not _on_all(row)]
         texts = [_COEFFICIENTS, _ASSUMED]
-        texts += [f"{alike} numbers are the same on all cards."] if alike else []
-        texts += [f"Not on all cards: {', '.join(alone)}."] if alone else []
+        texts += [f"{alike} numbers are the same on all cards."] * bool(alike)
+        texts += [f"Not on all cards: {', '.join(alone)}."] * bool(alone)
         charts = []
         if any(summary.compared for summary in study.summary):
             caption = f"Lines at {BEYOND_STANDARD_ERRORS:g} standard errors."
@@ -272,13 +268,22 @@ class ComparisonResult(Result[CardComparison]):
         heads = ("coefficient", self.labels[0], label, "difference (%)", "standard errors")
         return table(f"Farthest apart: {label}", heads, rows)
 
-    def _coefficient_table(self, caption: str, rows: Sequence[CoefficientRow], factor: float) -> Table:
+    def _differing(self, caption: str, every: Sequence[CoefficientRow], factor: float) -> list[Table]:
         heads: list[str | Column] = ["coefficient"]
         for label in self.labels:
             heads += [Column(label, digits=6), Column("s.e.", digits=3)]
         for label in self.labels[1:]:
             heads += [Column(f"{label}: difference", "%", digits=3), Column("z", digits=3)]
-        return table(caption, [*heads, "remark"], [_coefficient_row(row, factor) for row in rows], on_screen=False)
+        rows = [_coefficient_row(row, factor) for row in every if _on_all(row) and _differs(row)]
+        return [table(caption, [*heads, "remark"], rows, on_screen=False)] if rows else []
+
+
+def _on_all(row: CoefficientRow) -> bool:
+    return all(card.value is not None for card in row.cards)
+
+
+def _differs(row: CoefficientRow) -> bool:
+    return any(apart.percent for apart in row.differences)
 
 
 def _beyond(summary: CardSummary) -> KeyFigure:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from tank2sim.answer.charts.vega import ChartSpec
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, table
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, data_frame, table
 from tank2sim.answer.result import Result
 from tank2sim.cards import Card, parse_card
 from tank2sim.cards.covariance import not_referring
@@ -32,15 +32,14 @@ from tank2sim.notices import Notice, foremost
 from tank2sim.records.signals.writing import trial_text
 from tank2sim.results.gap_cause_charts import agreement_chart, expected_chart, lacking_chart, rival_chart, when_chart
 from tank2sim.results.gap_charts import (
-    MOST_TRIALS_DRAWN,
+    HISTORIES,
     SETS,
     changes_simulation,
-    gap_histories,
-    gap_tracks,
     misfit_chart,
     place_chart,
     shown_models,
     signal_of,
+    worst_replays,
     worst_tracks,
 )
 from tank2sim.results.gap_text import (
@@ -61,6 +60,7 @@ from tank2sim.results.gap_text import (
     verdict_context,
     with_error,
 )
+from tank2sim.results.trial_charts import MOST_TRIALS, trial_pictures
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
@@ -183,15 +183,13 @@ class GapResult(Result[GapStudy]):
 
         Units are in the names of the parameters; angles are in degrees.
         """
-        import pandas as pd
-
         rows = [
             (effect.name, key, value, effect.standard_errors.get(key), effect.confidence)
             for effect in self.study.effects
             for key, value in effect.parameters.items()
         ]
         numbers = ["value", "standard_error", "probability"]
-        return pd.DataFrame(rows, columns=["effect", "parameter", *numbers]).astype(dict.fromkeys(numbers, float))
+        return data_frame(rows, ["effect", "parameter", *numbers]).astype(dict.fromkeys(numbers, float))
 
     @property
     def surroundings(self) -> pd.DataFrame:
@@ -200,11 +198,9 @@ class GapResult(Result[GapStudy]):
         Directions count clockwise from north: from which a wind comes, towards which a current sets. Those of
         held-out trials were fitted to each such trial.
         """
-        import pandas as pd
-
         names = ["trial", "held_out", "speed_mps", "direction_deg", "speed_error_mps", "direction_error_deg"]
         rows = [{"effect": effect.name, **asdict(row)} for effect in self.study.effects for row in effect.by_trial]
-        return pd.DataFrame(rows, columns=["effect", *names])
+        return data_frame(rows, ["effect", *names])
 
     @property
     def coefficients(self) -> pd.DataFrame:
@@ -212,22 +208,18 @@ class GapResult(Result[GapStudy]):
 
         Value and standard error now, and as the given card has them: prime or SI, rudder positive to starboard.
         """
-        import pandas as pd
-
         columns = ["name", "value", "standard_error", "before", "standard_error_before"]
-        return pd.DataFrame(map(asdict, self.study.coefficients), columns=columns).set_index("name")
+        return data_frame(map(asdict, self.study.coefficients), columns, index="name")
 
     @property
     def misfit(self) -> pd.DataFrame:
         """Root mean square of (simulated - measured)/noise by trial, before and after: 1 is noise."""
-        import pandas as pd
-
         rows = [
             (trial_name(trial.trial), trial.held_out, trial.misfit["before"], trial.misfit["after"])
             for trial in self.study.trials
             if trial.misfit
         ]
-        return pd.DataFrame(rows, columns=["trial", "held_out", "before", "after"]).set_index("trial")
+        return data_frame(rows, ["trial", "held_out", "before", "after"], index="trial")
 
     @cached_property
     def improved(self) -> Card:
@@ -343,7 +335,7 @@ class GapResult(Result[GapStudy]):
         ``next_test.csv`` where a test would decide, ``corrected/`` where a sensor is at fault, and ``surroundings/``
         with the winds and currents of single trials as columns, with which the improved card follows them.
         """
-        gap, trials = self._gap, (*self.fitted.trials, *self.held.trials)
+        gap = self._gap
         text = self._improved_text(str(folder / IMPROVED))
         improved, notices = improved_files(gap.base, text, folder / IMPROVED)
         if self.study.card_objections and not self.force:
@@ -351,17 +343,24 @@ class GapResult(Result[GapStudy]):
         files: GapFiles = {**improved, folder / REPORT: self.page()}
         if gap.next_test:
             files[folder / NEXT_TEST_FILE] = gap.next_test.orders
-        if gap.verdict == MISSING and any(EFFECTS[effect.name].acts_on == "sensor" for effect in gap.effects):
-            for trial in trials:
-                corrected = corrected_text(trial.path, trial, self._found, self._gap.card.thrusters)
-                if corrected is not None:
-                    files[folder / CORRECTED / f"{trial.name}.csv"] = corrected
-                new = correct_sensor_faults(trial, self._found).notices[len(trial.notices) :]
-                notices += [notice.of(trial.path.name) for notice in new if notice.leads]
-        files |= {folder / SURROUNDED / f"{name}.csv": text for name, text in self._surrounded().items()}
+        corrected, about = self._corrected()
+        for name, texts in {CORRECTED: corrected, SURROUNDED: self._surrounded()}.items():
+            files |= {folder / name / f"{trial}.csv": text for trial, text in texts.items()}
         names = sorted(path.relative_to(folder).as_posix() for path in (*files, folder / GAP))
         files[folder / GAP] = self.to_json(files=names)
-        return files, notices
+        return files, [*notices, *about]
+
+    def _corrected(self) -> tuple[dict[str, str], list[Notice]]:
+        """Name of each trial to its text without the fault of a sensor, if one is at fault, and messages."""
+        gap, found, notices = self._gap, dict[str, str](), list[Notice]()
+        at_fault = any(EFFECTS[effect.name].acts_on == "sensor" for effect in gap.effects)
+        for trial in (*self.fitted.trials, *self.held.trials) if at_fault and gap.verdict == MISSING else ():
+            corrected = corrected_text(trial.path, trial, self._found, gap.card.thrusters)
+            if corrected is not None:
+                found[trial.name] = corrected
+            new = correct_sensor_faults(trial, self._found).notices[len(trial.notices) :]
+            notices += [notice.of(trial.path.name) for notice in new if notice.leads]
+        return found, notices
 
     def save(self, folder: str | Path) -> tuple[Notice, ...]:
         """Write :meth:`files` into a folder in place of those of an earlier run; return messages.
@@ -492,13 +491,17 @@ def _shown(
 
 def _motions(study: GapStudy) -> list[Illustration]:
     """Tracks and histories of held-out, then of fitting trials."""
-    charts = []
-    for word, held in SETS.items():
-        stem, trials = word.replace(" ", "_"), f"trials {_ON[word]}"
-        sheets = gap_histories(study, held_out=held, title=f"Motions, {trials}")
-        charts += _drawn(f"tracks_{stem}", gap_tracks(study, held_out=held, title=f"Tracks, {trials}"))
-        charts += [each for sheet, chart in enumerate(sheets, 1) for each in _drawn(f"histories_{stem}_{sheet}", chart)]
-    return [replace(chart, caption=_RUN) for chart in charts]
+    return [
+        chart
+        for word, held in SETS.items()
+        for chart in trial_pictures(
+            worst_replays(study, held_out=held),
+            _ON[word],
+            word.replace(" ", "_"),
+            captions=(_RUN, _RUN),
+            signals=HISTORIES,
+        )
+    ]
 
 
 _SIZE_HEADS = ("effect", "parameter", "value", "unit", "meaning")
@@ -566,43 +569,37 @@ def _compared(study: GapStudy) -> tuple[str, ...]:
 
 def _trials(study: GapStudy) -> Table:
     models = _compared(study)
-    rows: list[list[Cell]] = [
-        [trial_name(trial.trial), word, *(_hundredths(trial.misfit.get(model)) for model in models)]
-        for word, held in SETS.items()
-        for trial in study.trials
-        if trial.held_out == held and trial.signals
-    ]
-    words = [row[1] for row in rows]
-    rows += [
-        ["all", word, *(_hundredths(study.set_misfit(model, held_out=held)) for model in models)]
-        for word, held in SETS.items()
-        if words.count(word) > 1
-    ]
+    rows, together = list[list[Cell]](), list[list[Cell]]()
+    for word, held in SETS.items():
+        trials = [trial for trial in study.trials if trial.held_out == held and trial.signals]
+        for trial in trials:
+            rows.append([trial_name(trial.trial), word, *_hundredths(map(trial.misfit.get, models))])
+        if len(trials) > 1:
+            sets = (study.set_misfit(model, held_out=held) for model in models)
+            together.append(["all", word, *_hundredths(sets)])
     heads = ("trial", "set", *(model.replace("_", " ") for model in models))
-    lost = any(cell == math.inf for row in rows for cell in row)
-    notes = ["Infinite: the simulation left all bounds."] if lost else []
+    lost = any(math.inf in row for row in (*rows, *together))
+    notes = ["Infinite: the simulation left all bounds."] * lost
     caption = "Misfit of each trial in units of the noise"
-    return replace(table(caption, heads, rows, *notes, digits=_ALL_DIGITS), wide=True)
+    return replace(table(caption, heads, [*rows, *together], *notes, digits=_ALL_DIGITS), wide=True)
 
 
 def _signals(study: GapStudy) -> Table:
     measured = {name for trial in study.trials for name in trial.signals}
-    words = [word for word, held in SETS.items() if any(trial.held_out == held for trial in study.trials)]
-    columns = [(word, model) for word in words for model in _compared(study)]
-    rows: list[list[Cell]] = [
-        [label] + [_hundredths(study.set_misfit(model, held_out=SETS[word], signal=signal)) for word, model in columns]
-        for label, signal in [
-            *((signal_of(name).words, name) for name in study.misfit.noise if name in measured),
-            ("all", None),
-        ]
-    ]
+    held = {trial.held_out for trial in study.trials}
+    columns = [(word, model) for word, of_held in SETS.items() if of_held in held for model in _compared(study)]
+    named = {signal_of(name).words: name for name in study.misfit.noise if name in measured}
+    rows: list[list[Cell]] = []
+    for label, signal in [*named.items(), ("all", None)]:
+        misfits = (study.set_misfit(model, held_out=SETS[word], signal=signal) for word, model in columns)
+        rows.append([label, *_hundredths(misfits)])
     heads = ("signal", *(f"{word}, {model.replace('_', ' ')}" for word, model in columns))
     caption = "Misfit of each signal in units of the noise"
     return table(caption, heads, rows, digits=_ALL_DIGITS, on_screen=False)
 
 
-def _hundredths(misfit: float | None) -> float | None:
-    return misfit if misfit is None or not math.isfinite(misfit) else round(misfit, 2)
+def _hundredths(misfits: Iterable[float | None]) -> list[float | None]:
+    return [misfit if misfit is None or not math.isfinite(misfit) else round(misfit, 2) for misfit in misfits]
 
 
 def _place_of_the_gap(study: GapStudy) -> Section:
@@ -674,9 +671,9 @@ def _acting_text(study: GapStudy) -> str:
 def _track_text(study: GapStudy) -> str:
     counts = {word: sum(trial.held_out == held for trial in study.trials) for word, held in SETS.items()}
     many = [
-        f"{word}: the {MOST_TRIALS_DRAWN} of {count} with the largest misfit before"
+        f"{word}: the {MOST_TRIALS} of {count} with the largest misfit before"
         for word, count in counts.items()
-        if count > MOST_TRIALS_DRAWN
+        if count > MOST_TRIALS
     ]
     return f"Trials {'; '.join(many)}." if many else ""
 

@@ -161,40 +161,32 @@ def _explained(lacking: Lacking) -> ChartSpec:
         {"name": _STATE_WORDS.get(name, name), "v": plain(100 * share), "text": f"{100 * share:.0f} %"}
         for name, share in sorted(lacking.explained.items(), key=lambda item: -item[1])
     ]
-    return _bars(rows, "share of it that each state explains (%)", width=150, percent=True)
+    across = PlotAxis("share of it that each state explains (%)", domain=(0, 140), nice=False, ticks=[0, 50, 100])
+    return _bars(rows, across, width=150)
 
 
 _LINES = r"split(replace(datum.label, / \+ /g, '|+ '), '|')"
 """Labels of several effects with a line for each: a narrow page has no room for more."""
 
 
-def _bars(
-    rows: Sequence[ChartRecord],
-    across_title: str,
-    *,
-    width: int,
-    symlog: bool = False,
-    percent: bool = False,
-    **more: Any,
-) -> ChartSpec:
+def _bars(rows: Sequence[ChartRecord], across: PlotAxis, *, width: int, **more: Any) -> ChartSpec:
     """Bars with their number at the end."""
-    farthest = max((row["v"] for row in rows if row["v"] is not None), default=0.0) or 1.0
-    # Room on the right for the number at the end of the longest bar.
-    end = 140 if percent else farthest * (12 if symlog else 1.25)
-    powers = [step for step in (0, 10, 100, 1e3, 1e4, 1e5, 1e6) if step <= end]
-    across = PlotAxis(
-        across_title,
-        domain=(0, end),
-        nice=False,
-        scale={"type": "symlog", "constant": 10} if symlog else None,
-        ticks=[0, 50, 100] if percent else powers if symlog else 4,
-    )
     side = {"labelExpr": _LINES, "labelLimit": 150, "ticks": False, "grid": False}
     (bars,) = row_layers(RowPlot(rows, across=across, side=side), mark="bar", height=11, clip=True)
     place = {name: bars["encoding"][name] for name in ("x", "y")}
     texts = layer("text", rows, {**place, "text": "text:N"}, align="left", dx=5, fontSize=10.5, style="reference")
     lines = max((row["name"].count(" + ") + 1 for row in rows), default=1)
     return layered([bars, texts], size=(width, (10 + 12 * lines) * max(1, len(rows))), **more)
+
+
+def _from_zero(rows: Sequence[ChartRecord], title: str, *, symlog: bool = False) -> PlotAxis:
+    """An axis with room on the right for the number at the end of the longest bar."""
+    farthest = max((row["v"] or 0.0 for row in rows), default=0.0) or 1.0
+    if not symlog:
+        return PlotAxis(title, domain=(0, 1.25 * farthest), nice=False, ticks=4)
+    powers = [step for step in (0, 10, 100, 1e3, 1e4, 1e5, 1e6) if step <= 12 * farthest]
+    scale = {"type": "symlog", "constant": 10}
+    return PlotAxis(title, domain=(0, 12 * farthest), nice=False, scale=scale, ticks=powers)
 
 
 def rival_chart(study: GapStudy, *, title: str = "") -> ChartSpec | None:
@@ -211,10 +203,10 @@ def rival_chart(study: GapStudy, *, title: str = "") -> ChartSpec | None:
         }
         for rival in (*shown, *none)
     ]
-    across = "worse than the best by, -2 log likelihood"
     symlog = max(row["v"] or 0.0 for row in rows) > 100
+    across = _from_zero(rows, "worse than the best by, -2 log likelihood", symlog=symlog)
     described = "Explanations by their loss of score."
-    return _bars(rows, across, width=430, symlog=symlog, title=heading(title, _COMPARED), description=described)
+    return _bars(rows, across, width=430, title=heading(title, _COMPARED), description=described)
 
 
 _COMPARED = (
@@ -232,8 +224,8 @@ def expected_chart(test: DecidingTest, *, title: str = "") -> ChartSpec | None:
     rows: list[ChartRecord] = [{"name": name, "v": plain(size), "text": format_number(size, 2)} for name, size in sizes]
     if not rows:
         return None
-    described = "Expected difference in each manoeuvre."
-    return _bars(rows, "expected difference (noise units)", width=430, title=title, description=described)
+    across = _from_zero(rows, "expected difference (noise units)")
+    return _bars(rows, across, width=430, title=title, description="Expected difference in each manoeuvre.")
 
 
 def agreement_chart(study: GapStudy, *, title: str = "") -> ChartSpec | None:
@@ -260,14 +252,14 @@ def agreement_chart(study: GapStudy, *, title: str = "") -> ChartSpec | None:
 def _agreement_panel(study: GapStudy, name: str, trials: Mapping[str, TrialEstimate], *, named: bool) -> ChartSpec:
     effect, _, parameter = name.rpartition(".")
     words, unit = in_words(parameter)
-    whole = next((entry for entry in study.effects if entry.name == effect and parameter in entry.parameters), None)
-    middle = whole.parameters[parameter] if whole else None
     held = {trial.trial: trial.held_out for trial in study.trials}
-    around = middle if parameter == "direction_deg" else None
-    rows = [_row_of_trial(trial, alone, held.get(trial, False), around) for trial, alone in trials.items()]
-    band = NORMAL * whole.standard_errors.get(parameter, 0.0) if whole else 0.0
-    domain = _informative_range(rows, [] if middle is None else [middle - band, middle + band])
-    across = PlotAxis(with_unit(words, unit), domain=domain, nice=False, ticks=5)
+    whole = [one for one in study.effects if one.name == effect and parameter in one.parameters][:1]
+    middles = [one.parameters[parameter] for one in whole]
+    bands = [NORMAL * one.standard_errors.get(parameter, 0.0) for one in whole]
+    edges = [(middle - band, middle + band) for middle, band in zip(middles, bands, strict=True)]
+    around = middles if parameter == "direction_deg" else []
+    rows = [_row_of_trial(trial, alone, held.get(trial, False), *around) for trial, alone in trials.items()]
+    across = PlotAxis(with_unit(words, unit), domain=_informative_range(rows, edges), nice=False, ticks=5)
     names = [trial_name(trial) for trial in held if trial in trials]
     side = {"labelLimit": 220} | ({} if named else {"labels": False, "ticks": False})
     shown = {"name:N": "trial", "v:Q": "estimate", "low:Q": "from", "high:Q": "to"}
@@ -275,16 +267,15 @@ def _agreement_panel(study: GapStudy, name: str, trials: Mapping[str, TrialEstim
     layers = row_layers(
         RowPlot(rows, across=across, look=look, names=names, side=side, shown=shown), size=36, clip=True
     )
-    if middle is not None:
-        strip = [{"low": plain(middle - band), "high": plain(middle + band)}]
-        edges = {"x": across.channel("low"), "x2": "high"}
-        together = Rule([middle], upright=True).layer(across.channel("v"))
-        layers = [layer("rect", strip, edges, style="reference", opacity=0.25), together, *layers]
+    strips: list[ChartRecord] = [{"low": plain(low), "high": plain(high)} for low, high in edges]
+    if strips:
+        strip = layer("rect", strips, {"x": across.channel("low"), "x2": "high"}, style="reference", opacity=0.25)
+        layers = [strip, Rule(middles, upright=True).layer(across.channel("v")), *layers]
     title = panel_title(f"{effect.replace('_', ' ')}: {words}")
     return layered(layers, size=(230, 22 * len(names)), title=title)
 
 
-def _row_of_trial(trial: str, alone: TrialEstimate, held_out: bool, around: float | None) -> ChartRecord:
+def _row_of_trial(trial: str, alone: TrialEstimate, held_out: bool, around: float | None = None) -> ChartRecord:
     """A trial's estimate with its 95 % interval; a direction (deg) within half a turn of that of all trials."""
     estimate, half = alone.value, NORMAL * alone.standard_error
     if around is not None:
@@ -294,13 +285,13 @@ def _row_of_trial(trial: str, alone: TrialEstimate, held_out: bool, around: floa
     return {"name": trial_name(trial), "run": word, "v": plain(estimate)} | ends
 
 
-def _informative_range(rows: Sequence[ChartRecord], also: Sequence[float]) -> tuple[float, float]:
+def _informative_range(rows: Sequence[ChartRecord], also: Sequence[tuple[float, float]]) -> tuple[float, float]:
     """Range that holds other values and the intervals of the trials that determine the parameter, with a margin."""
-    known = [row for row in rows if row["low"] is not None and row["high"] is not None]
-    least = min((row["high"] - row["low"] for row in known), default=0.0)
-    informative = [row for row in known if row["high"] - row["low"] <= UNINFORMATIVE * least] or known
-    ends = [row[key] for row in informative for key in ("low", "high")]
-    low, high = extent(np.array([*ends, *also], dtype=float))
+    every = np.array([[row["low"], row["high"]] for row in rows], dtype=float).reshape(-1, 2)
+    known = every[np.isfinite(every).all(axis=1)]
+    widths = np.ptp(known, axis=1)
+    informative = known[widths <= UNINFORMATIVE * widths.min(initial=math.inf)]
+    low, high = extent(np.array([*informative, *also], dtype=float))
     margin = 0.05 * (high - low) or 1.0
     return low - margin, high + margin
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from tank2sim.answer.charts.before_after import before_after_switch, misfit_maps
-from tank2sim.answer.charts.parts import SeriesLook, extent, plain, records, series_look, with_unit
+from tank2sim.answer.charts.before_after import misfit_maps
+from tank2sim.answer.charts.parts import extent, plain, records, with_unit
 from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, heading, layer, layered, panel_title, tooltips
-from tank2sim.gap.outcome.study import GapReplay, GapStudy, TrialMisfit
+from tank2sim.gap.outcome.study import GapReplay, GapStudy
 from tank2sim.gap.result import MisfitPlace
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.thinning import thin_points
@@ -19,27 +18,22 @@ from tank2sim.results.trial_charts import (
     AFTER,
     BEFORE,
     MEASURED,
-    MODEL_SERIES,
-    history_grid,
+    MOST_TRIALS,
     panel_grid,
     place_over_time,
+    series_marks,
     track_grid,
     whole_range,
+    worst_trials,
 )
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 from tank2sim.units import to_si
-
-MOST_TRIALS_DRAWN = 12
-"""Tracks in one picture: those of the largest misfit before; more are hard to look at (project choice)."""
 
 FEW_TRIALS = 3
 """Tracks below the verdict: one row of pictures. Project choice."""
 
 MOST_PLACES = 6
 """Worst places that are shown over time: two rows of pictures (project choice)."""
-
-_PER_SHEET = 6
-"""Trials in one picture of histories: as many as are readable on a sheet of paper."""
 
 HISTORIES = {
     "psi_deg": "heading",
@@ -81,36 +75,17 @@ def shown_models(study: GapStudy) -> tuple[str, ...]:
     return ("before", "after") if changes_simulation(study) else ("before",)
 
 
-def gap_tracks(study: GapStudy, *, held_out: bool, title: str = "") -> ChartSpec | None:
-    """Tracks as measured, by the card before and by the card found, a panel a trial; None without any.
-
-    Of many trials those with the largest misfit before are shown.
-    """
-    return track_grid(_worst(study, lambda trial: trial.held_out == held_out), title=title)
+def worst_replays(study: GapStudy, *, held_out: bool, most: int = MOST_TRIALS) -> list[GapReplay]:
+    """Replays of held-out or of fitting trials with the largest misfits before, in the order of the trials."""
+    chosen = [place for place, trial in enumerate(study.trials) if trial.held_out == held_out]
+    replays = [replace(study.replays[place], trial=trial_name(study.replays[place].trial)) for place in chosen]
+    return worst_trials(replays, [study.trials[place].misfit.get("before", np.inf) for place in chosen], most)
 
 
 def worst_tracks(study: GapStudy, *, title: str = "") -> ChartSpec | None:
     """Tracks of the few trials with the largest misfit before, held-out ones where there are any; None without."""
     held_out = any(trial.held_out for trial in study.trials)
-    return track_grid(_worst(study, lambda trial: trial.held_out == held_out, FEW_TRIALS), title=title)
-
-
-def gap_histories(study: GapStudy, *, held_out: bool, title: str = "") -> list[ChartSpec]:
-    """Motions over time as measured, by the card before and by the card found, a column a trial, in sheets.
-
-    Of many trials those with the largest misfit before are shown.
-    """
-    columns = _worst(study, lambda trial: trial.held_out == held_out and not HISTORIES.keys().isdisjoint(trial.signals))
-    sheets = [columns[first : first + _PER_SHEET] for first in range(0, len(columns), _PER_SHEET)]
-    return [history_grid(sheet, signals=HISTORIES, title=title) for sheet in sheets]
-
-
-def _worst(study: GapStudy, chosen: Callable[[TrialMisfit], bool], most: int = MOST_TRIALS_DRAWN) -> list[GapReplay]:
-    """Replays of the chosen trials with the largest misfits before, in the order of the trials."""
-    misfits = {place: trial.misfit.get("before", np.inf) for place, trial in enumerate(study.trials) if chosen(trial)}
-    worst = sorted(misfits, key=lambda place: -misfits[place])[:most]
-    replays = [study.replays[place] for place in sorted(worst)]
-    return [replace(replay, trial=trial_name(replay.trial)) for replay in replays]
+    return track_grid(worst_replays(study, held_out=held_out, most=FEW_TRIALS), title=title)
 
 
 def shown_places(study: GapStudy) -> list[MisfitPlace]:
@@ -147,49 +122,35 @@ def place_chart(study: GapStudy, *, title: str = "") -> ChartSpec | None:
 
 
 def _place_panels(replay: GapReplay, place: MisfitPlace, sigma: float) -> ChartSpec:
-    name, look = signal_of(place.signal), series_look([AFTER, BEFORE, MEASURED], as_points=[MEASURED])
-    time_s, measured = replay.measured["t_s"], replay.measured[name.file]
-    models = {BEFORE: replay.before[name.file], AFTER: replay.found[name.file]}
+    name, time_s = signal_of(place.signal), replay.measured["t_s"]
+    measured, times = replay.measured[name.file], extent(time_s)
     known = np.flatnonzero(np.isfinite(measured))
     points = known[thin_points([measured[known]], SHOWN_POINTS)]
     rows = records(MEASURED, {"t": time_s[points], "v": measured[points]})
     residuals: list[ChartRecord] = []
-    for label, values in models.items():
+    for label, values in {BEFORE: replay.before[name.file], AFTER: replay.found[name.file]}.items():
         kept = thin_points([values], SHOWN_SAMPLES)
         rows += records(label, {"t": time_s[kept], "v": values[kept]})
         kept = known[thin_points([(values - measured)[known]], SHOWN_SAMPLES)]
         residuals += records(label, {"t": time_s[kept], "v": (values - measured)[kept]})
-    band, times = NOISE_BAND * sigma, extent(time_s)
-    up = with_unit(name.words, name.unit)
-    place_above = place_over_time(times, whole_range(rows, "v"), up, "v", labelled=False)
-    left = with_unit("simulated − measured", name.unit)
-    place_below = place_over_time(times, whole_range(residuals, "v", (-band, band)), left, "v", labelled=True)
-    strip = {"y": place_below["y"] | {"field": "low"}, "y2": "high"}
-    noise = layer("rect", [{"low": plain(-band), "high": plain(band)}], strip, style="reference", opacity=0.3)
-    spans = [{"t": plain(place.t_start_s), "to": plain(place.t_end_s)}]
-
-    def behind(axes: ChartSpec) -> list[ChartSpec]:
-        if (place.t_start_s, place.t_end_s) == times:
-            return []
-        return [layer("rect", spans, {"x": axes["x"], "x2": "to"}, style="region", clip=True)]
-
-    above = [*behind(place_above), *_over_time(rows, place_above, up, look)]
-    below = [*behind(place_below), noise, *_over_time(residuals, place_below, left, look)]
-    return {
-        "vconcat": [layered(above, size=(200, 86)), layered(below, size=(200, 66))],
-        "spacing": 16,
-        "title": panel_title(f"{trial_name(place.trial)} · {name.words}"),
-    }
-
-
-def _over_time(rows: Sequence[ChartRecord], place: ChartSpec, up: str, look: SeriesLook) -> list[ChartSpec]:
-    common = place | {"color": look.colour, "tooltip": tooltips({"run:N": "by", "t:Q": "time (s)", "v:Q": up})}
-    points, lines = ([row for row in rows if (row["run"] == MEASURED) == measured] for measured in (True, False))
-    drawn = []
-    if points:
-        drawn.append(layer("point", points, {**common, "shape": look.shape}, clip=True, size=14, strokeWidth=1))
-    line = layer("line", lines, {**common, "strokeDash": look.dash, "order": "i:Q"}, clip=True, strokeWidth=1.5)
-    return [*drawn, line | {"transform": [{"filter": before_after_switch(MODEL_SERIES)}]}]
+    spans = [] if (place.t_start_s, place.t_end_s) == times else [(place.t_start_s, place.t_end_s)]
+    region: list[ChartRecord] = [{"t": plain(begin), "to": plain(end)} for begin, end in spans]
+    low, high = -NOISE_BAND * sigma, NOISE_BAND * sigma
+    panels = []
+    for drawn, words, height, ends in (
+        (rows, name.words, 86, ()),
+        (residuals, "simulated − measured", 66, (low, high)),
+    ):
+        up = with_unit(words, name.unit)
+        axes = place_over_time(times, whole_range(drawn, "v", ends), up, "v", labelled=bool(ends))
+        said = axes | {"tooltip": tooltips({"run:N": "by", "t:Q": "time (s)", "v:Q": up})}
+        behind = [layer("rect", region, {"x": axes["x"], "x2": "to"}, style="region", clip=True)] if region else []
+        if ends:
+            band = {"y": axes["y"] | {"field": "low"}, "y2": "high"}
+            strip: list[ChartRecord] = [{"low": plain(low), "high": plain(high)}]
+            behind.append(layer("rect", strip, band, style="reference", opacity=0.3))
+        panels.append(layered([*behind, *series_marks(said)], size=(200, height), data={"values": drawn}))
+    return {"vconcat": panels, "spacing": 16, "title": panel_title(f"{trial_name(place.trial)} · {name.words}")}
 
 
 def misfit_chart(study: GapStudy, *, title: str = "") -> ChartSpec:
@@ -197,14 +158,14 @@ def misfit_chart(study: GapStudy, *, title: str = "") -> ChartSpec:
     measured = {name for trial in study.trials for name in trial.signals}
     ordered = [SignalName(name).file for name in OBSERVED_SIGNALS]
     signals = [name for name in ordered if name in measured] + sorted(measured.difference(ordered))
+    models = shown_models(study)
+    words = {held: f"{word} trials" for word, held in SETS.items()}
     rows = [
-        {"group": f"{word} trials", "trial": trial_name(trial.trial), "model": model}
+        {"group": words[trial.held_out], "trial": trial_name(trial.trial), "model": model}
         | {"signal": name.rpartition("_")[0].replace("_", " "), "misfit": trial.signals[name][model]}
-        for word, held in SETS.items()
-        for trial in study.trials
-        if trial.held_out == held
+        for trial in sorted(study.trials, key=lambda trial: not trial.held_out)
         for name in signals
         if name in trial.signals
-        for model in shown_models(study)
+        for model in models
     ]
-    return misfit_maps(rows, shown_models(study), title=title)
+    return misfit_maps(rows, models, title=title)

@@ -58,21 +58,21 @@ def probabilities_in_words(study: GapStudy) -> list[str]:
         return _nothing_in_percent(study)
     each = "; ".join(f"{effect_in_words(effect.name)} {as_percent(effect.confidence)}" for effect in study.effects)
     what = "the effect is there, alone or with another one" if len(study.effects) == 1 else "each effect is there"
-    sentences = [f"Probability that {what}: {each}."]
     more = _unnamed(study)
-    if more:
-        likely = ", ".join(map(effect_in_words, more))
-        sentences.append(f"As likely as not in addition, though not in the most probable explanation: {likely}.")
+    also = f"As likely as not in addition, though not in the most probable explanation: {', '.join(more)}."
+    return [f"Probability that {what}: {each}.", *([also] if more else _whole_in_percent(study))]
+
+
+def _whole_in_percent(study: GapStudy) -> list[str]:
+    """Probability that the named effects are all that is missing; nothing where the trials are still missed by far."""
     names = [effect.name for effect in study.effects]
     whole = next((rival for rival in study.rivals if set(rival.effects) == set(names)), None)
     after = study.set_misfit("after", held_out=False)
-    if whole is not None and not more and (after is None or after <= MUCH):
-        all_missing = f"{effect_in_words(names[0])} alone is" if len(names) == 1 else f"{_together(names)} are"
-        sentences.append(
-            f"Probability that {all_missing} all that is missing, among the explanations compared: "
-            f"{as_percent(whole.probability)}."
-        )
-    return sentences
+    if whole is None or (after is not None and after > MUCH):
+        return []
+    missing = f"{effect_in_words(names[0])} alone is" if len(names) == 1 else f"{_together(names)} are"
+    probability = as_percent(whole.probability)
+    return [f"Probability that {missing} all that is missing, among the explanations compared: {probability}."]
 
 
 def probability_of_none(study: GapStudy) -> float | None:
@@ -122,11 +122,11 @@ def sizes_of_candidates(study: GapStudy) -> list[EffectFound]:
 
 
 def _unnamed(study: GapStudy) -> list[str]:
-    """Effects that are neither named nor candidates, and that are as probable as not next to different others."""
+    """Effects in words that are neither named nor candidates, and as probable as not next to different others."""
     known = {effect.name for effect in study.effects}
     known |= {name for text in study.alternatives for name in effects_of(text)}
     others = dict.fromkeys(name for rival in study.rivals for name in rival.effects if name not in known)
-    return [name for name in others if _probability(study, name) >= AS_LIKELY_AS_NOT]
+    return [effect_in_words(name) for name in others if _probability(study, name) >= AS_LIKELY_AS_NOT]
 
 
 def _probability(study: GapStudy, name: str) -> float:
@@ -169,9 +169,7 @@ def found_in_words(study: GapStudy) -> str:
 
 def _missing_in_words(study: GapStudy) -> str:
     """What the model lacks, and which sensors are at fault."""
-    sensors = [
-        effect for effect in study.effects if effect.name in EFFECTS and EFFECTS[effect.name].acts_on == "sensor"
-    ]
+    sensors = [effect for effect in study.effects if _of_sensor(effect.name)]
     lacking = [effect for effect in study.effects if effect not in sensors]
     sentences = []
     if lacking:
@@ -181,8 +179,12 @@ def _missing_in_words(study: GapStudy) -> str:
         at_fault = "A sensor is at fault" if len(sensors) == 1 else "Sensors are at fault"
         model = "" if lacking else ", not the model"
         sentences.append(f"{at_fault}{model}: {_listed(map(_with_values, sensors))}.")
-    known = [EFFECTS[effect.name].description for effect in (*lacking, *sensors) if effect.name in EFFECTS]
-    return " ".join([*sentences, *known, *_refitted(study)])
+    described = (EFFECTS[effect.name].description for effect in (*lacking, *sensors) if effect.name in EFFECTS)
+    return " ".join([*sentences, *described, *_refitted(study)])
+
+
+def _of_sensor(name: str) -> bool:
+    return name in EFFECTS and EFFECTS[name].acts_on == "sensor"
 
 
 def _ambiguous_in_words(study: GapStudy) -> str:

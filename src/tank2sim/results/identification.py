@@ -33,7 +33,6 @@ from tank2sim.identification.trials.identify import Identification
 from tank2sim.identification.trials.study import (
     SET_KEYS,
     BootstrapStudy,
-    CardReplay,
     IdentificationStudy,
     ParameterEstimate,
     PosteriorStudy,
@@ -42,7 +41,7 @@ from tank2sim.identification.trials.study import (
     WindowError,
     pooled_error,
 )
-from tank2sim.results.trial_charts import figure_chart, history_grid, track_grid, window_chart
+from tank2sim.results.trial_charts import MOST_TRIALS, figure_chart, trial_pictures, window_chart, worst_trials
 from tank2sim.units import from_si
 
 if TYPE_CHECKING:
@@ -57,13 +56,6 @@ _SAID = ("own", "known", "share_text")
 _T = TypeVar("_T")
 
 FITTED, HELD_OUT = "fitted", "held out"
-
-MOST_TRIALS = 12
-"""Trials of which tracks and histories are shown: the largest errors of yaw rate. More are hard to look at,
-and make the page slow (project choice)."""
-
-_PER_SHEET = 6
-"""Trials in one picture of histories: as many as are readable on a sheet of paper."""
 
 NO_YAW = 3.0
 """A run whose yaw rate stays below this many times its noise is straight."""
@@ -228,12 +220,9 @@ class IdentificationResult(Result[IdentificationStudy]):
     def _trials(self, word: str) -> Section:
         windows = self.study.errors_over_windows[SET_KEYS[word]]
         trials = [trial for trial in self.study.replays if trial.held_out == (word == HELD_OUT)]
-        shown, stem, charts = _worst(trials, windows), word.replace(" ", "_"), []
-        if tracks := track_grid(shown, title=f"Tracks of trials {word}"):
-            charts.append(Illustration(tracks, caption=_TRACKS, name=f"tracks_{stem}"))
-        for first in range(0, len(shown), _PER_SHEET):
-            sheet = history_grid(shown[first : first + _PER_SHEET], title=f"Motions of trials {word}")
-            charts.append(Illustration(sheet, caption=_HISTORIES, name=f"histories_{stem}"))
+        errors = {trial.trial: trial.found["r_degps"].relative for trial in windows if "r_degps" in trial.found}
+        shown = worst_trials(trials, [errors.get(trial.trial, 0.0) for trial in trials])
+        charts = trial_pictures(shown, word, word.replace(" ", "_"), captions=(_TRACKS, _HISTORIES))
         many = f"The {MOST_TRIALS} of {len(windows)} trials with the largest error of yaw rate."
         text = many if len(windows) > MOST_TRIALS else ""
         return Section(f"Trials {word}", text=text, charts=charts)
@@ -349,14 +338,6 @@ class IdentificationResult(Result[IdentificationStudy]):
         """Words for a set of trials to its entries, without a set that has no trial."""
         windows = self.study.errors_over_windows
         return {word: entries[key] for word, key in SET_KEYS.items() if windows[key]}
-
-
-def _worst(trials: Sequence[CardReplay], windows: Sequence[TrialErrors]) -> list[CardReplay]:
-    """The trials with the largest error of yaw rate, in their own order, where there are too many for a picture."""
-    errors = {trial.trial: trial.found["r_degps"].relative for trial in windows if "r_degps" in trial.found}
-    worst = sorted(trials, key=lambda trial: -errors.get(trial.trial, 0.0))[:MOST_TRIALS]
-    kept = {trial.trial for trial in worst}
-    return [trial for trial in trials if trial.trial in kept]
 
 
 def _compared(label: str, word: str, unit: str, before: float, after: float) -> KeyFigure:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -39,6 +39,8 @@ from tank2sim.units import in_words
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_T = TypeVar("_T")
 
 _SIDE_NAMES: Mapping[float, str] = {1: "starboard", -1: "port"}
 
@@ -224,21 +226,14 @@ class ManoeuvreResult(EnsembleResult[ManoeuvreStudy]):
         return [section for section in sections if section.charts or section.tables]
 
     def _tables(self) -> list[Table]:
-        figures = self.study.figures
-        numbers = {
-            name: value
-            for name, value in figures.items()
-            if isinstance(value, float | int) and not name.endswith("_lengths")
-        }
+        figures = _without_lengths(self.study.figures)
+        numbers = {name: value for name, value in figures.items() if isinstance(value, float | int)}
         lists = {name: value for name, value in figures.items() if isinstance(value, list) and value}
-        missing = [in_words(name)[0] for name, value in figures.items() if value is None]
+        missing = [in_words(name)[0] for name, value in self.study.figures.items() if value is None]
         tables = [self._figure_table(numbers, missing)] if numbers or missing else []
-        if lists:
-            tables.append(self._list_table(lists))
-        if self.study.ensemble:
-            bands = {name: band for name, band in self.study.ensemble.figures.items() if not name.endswith("_lengths")}
-            tables.append(band_table(self.study.ensemble, bands))
-        return tables
+        tables += [self._list_table(lists)] if lists else []
+        ensemble = self.study.ensemble
+        return [*tables, band_table(ensemble, _without_lengths(ensemble.figures))] if ensemble else tables
 
     def _figure_table(self, figures: Mapping[str, float], missing: Sequence[str]) -> Table:
         """One row a figure, its size in ship lengths and its limit next to it; empty columns are left out."""
@@ -290,6 +285,11 @@ def _judged(judged: Sequence[KeyFigure]) -> str:
         return "The run leaves the card's valid range: figures outside it are not judged against IMO MSC.137(76)."
     names = ", ".join(figure.label.lower() for figure in judged)
     return f"These figures are within the limits of IMO MSC.137(76): {names}."
+
+
+def _without_lengths(figures: Mapping[str, _T]) -> dict[str, _T]:
+    """Figures that are not in ship lengths."""
+    return {name: value for name, value in figures.items() if not name.endswith("_lengths")}
 
 
 def _in_lengths(name: str) -> str:

@@ -67,12 +67,9 @@ def _branches(turning: TurningDiagram, values: Array) -> list[PlotSeries]:
     folds = {
         int(np.argmin(np.abs(rudder - fold.rudder_deg) + np.abs(rate - fold.yaw_rate_degps))) for fold in turning.folds
     }
-    ends = [0]
-    for place in range(1, len(rudder) - 1):
-        changes = stable[place] != stable[place + 1] and place + 1 not in folds and place not in folds
-        if place in folds or changes:
-            ends.append(place)
-    ends.append(len(rudder) - 1)
+    changes = {int(row) for row in np.flatnonzero(np.diff(np.asarray(stable, dtype=int)))}
+    at_folds = folds | {row - 1 for row in folds}
+    ends = sorted({0, len(rudder) - 1} | {row for row in folds | (changes - at_folds) if 0 < row < len(rudder) - 1})
     parts: dict[str, list[slice]] = {STABLE: [], UNSTABLE: []}
     for first, last in itertools.pairwise(ends):
         parts[STABLE if stable[(first + last + 1) // 2] else UNSTABLE].append(slice(first, last + 1))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from typing import TypeVar
 
 import numpy as np
 
-from tank2sim.answer.charts.before_after import before_after_switch, switch
-from tank2sim.answer.charts.matrix import ROW_PX, Matrix
+from tank2sim.answer.charts.before_after import before_after_switch, misfit_maps, switch
 from tank2sim.answer.charts.parts import equal_frame, extent, plain, records, series_look, with_unit
 from tank2sim.answer.charts.rows import RowPlot, row_layers
 from tank2sim.answer.charts.vega import (
@@ -18,17 +18,19 @@ from tank2sim.answer.charts.vega import (
     PlotAxis,
     Rule,
     bare_layer,
-    heading,
     layer,
     layered,
     panel_title,
     shared_looks,
     tooltips,
 )
+from tank2sim.answer.parts import Illustration
 from tank2sim.arrays import Array
 from tank2sim.identification.trials.study import PredictedFigure, TrialErrors, TrialMotions
 from tank2sim.records.thinning import Indices, thin_points
 from tank2sim.units import in_words
+
+_T = TypeVar("_T")
 
 MEASURED, BEFORE, AFTER = "measured", "card before", "card found"
 
@@ -38,13 +40,20 @@ MODEL_SERIES = {"before": BEFORE, "after": AFTER}
 PANELS_PER_ROW = 3
 """Trials next to each other in a picture."""
 
+MOST_TRIALS = 12
+"""Trials of which tracks and histories are shown: the worst. More are hard to look at, and make the page slow (project
+choice)."""
+
+PER_SHEET = 6
+"""Trials in one picture of histories: as many as are readable on a sheet of paper."""
+
 MODEL_SAMPLES, MEASURED_SAMPLES = 140, 40
 """Samples of a line, and points of a series, in a small panel (about 200 px wide)."""
 
 SERIES = {MEASURED: "measured", BEFORE: "before", AFTER: "found"}
 """Series to its name in :class:`.TrialMotions` and :class:`.TrialErrors`."""
 
-_SIGNALS = {
+SHOWN_SIGNALS = {
     "delta_deg": "rudder",
     "psi_deg": "heading",
     "r_degps": "yaw rate",
@@ -68,6 +77,36 @@ SYMBOLS = {
 
 _TRACK = ("x_m", "y_m")
 _LOOK = series_look([AFTER, BEFORE, MEASURED], as_points=[MEASURED])
+
+
+def worst_trials(trials: Sequence[_T], sizes: Sequence[float], most: int | None = None) -> list[_T]:
+    """The trials with the largest `sizes`, in their own order; by default :data:`MOST_TRIALS`."""
+    worst = sorted(range(len(trials)), key=lambda place: -sizes[place])[: MOST_TRIALS if most is None else most]
+    return [trials[place] for place in sorted(worst)]
+
+
+def trial_pictures(
+    trials: Sequence[TrialMotions],
+    words: str,
+    stem: str,
+    *,
+    captions: tuple[str, str],
+    signals: Mapping[str, str] = SHOWN_SIGNALS,
+) -> list[Illustration]:
+    """Tracks and time histories of trials, in sheets; empty without any.
+
+    `words`: which trials, for the titles; `stem`: for the names of the charts; `captions`: of tracks and histories;
+    `signals`: column to words.
+    """
+    tracks = track_grid(trials, title=f"Tracks of trials {words}")
+    drawn = [Illustration(tracks, caption=captions[0], name=f"tracks_{stem}")] if tracks else []
+    moving = [
+        trial for trial in trials if not signals.keys().isdisjoint({*trial.measured, *trial.before, *trial.found})
+    ]
+    for first in range(0, len(moving), PER_SHEET):
+        sheet = history_grid(moving[first : first + PER_SHEET], signals=signals, title=f"Motions of trials {words}")
+        drawn.append(Illustration(sheet, caption=captions[1], name=f"histories_{stem}"))
+    return drawn
 
 
 def track_grid(trials: Sequence[TrialMotions], *, title: str = "") -> ChartSpec | None:
@@ -99,13 +138,13 @@ def _track_panel(trial: TrialMotions) -> ChartSpec | None:
     for label, columns in series.items():
         kept = _thinned(label, [columns["x_m"], columns["y_m"]])
         rows += records(label, {"x": columns["x_m"][kept], "y": columns["y_m"][kept]})
-    marks = _marks(place | {"tooltip": tooltips({"x:Q": "north (m)", "y:Q": "east (m)"})})
+    marks = series_marks(place | {"tooltip": tooltips({"x:Q": "north (m)", "y:Q": "east (m)"})})
     size = frame.width_px, frame.height_px
     return layered(marks, size=size, data={"values": rows}, title=panel_title(trial.trial))
 
 
 def history_grid(
-    trials: Sequence[TrialMotions], *, signals: Mapping[str, str] = _SIGNALS, title: str = ""
+    trials: Sequence[TrialMotions], *, signals: Mapping[str, str] = SHOWN_SIGNALS, title: str = ""
 ) -> ChartSpec:
     """Signals over time, a column of panels a trial; `signals`: column to words."""
     text = f"Time histories of {', '.join(trial.trial for trial in trials)}, measured and simulated."
@@ -128,7 +167,7 @@ def _histories(trial: TrialMotions, signals: Mapping[str, str]) -> ChartSpec:
         up = with_unit(signals[name], in_words(name)[1])
         place = place_over_time(times, whole_range(rows, fields[name]), up, fields[name], labelled=name == names[-1])
         place["tooltip"] = tooltips({"t:Q": "time (s)", f"{fields[name]}:Q": up})
-        panels.append(layered(_marks(place), size=(200, 66)))
+        panels.append(layered(series_marks(place), size=(200, 66)))
     resolve = shared_looks(x="shared")
     data = {"data": {"values": rows}, "title": panel_title(trial.trial)}
     return data | {"vconcat": panels, "spacing": 12, "resolve": resolve}
@@ -149,49 +188,27 @@ def whole_range(rows: Sequence[ChartRecord], field: str, included: Sequence[floa
 
 
 def window_chart(sets: Mapping[str, Sequence[TrialErrors]], *, title: str = "") -> ChartSpec:
-    """Error over windows of each signal in each trial, as a share of the signal, as a heat map.
+    """Error over windows of each signal in each trial, as a share of the signal, to switch between before and after.
 
     `sets`: ``fitted`` and ``held out`` to their trials.
     """
-    every = [errors for trials in sets.values() for trial in trials for errors in (trial.before, trial.found)]
-    signals = [symbol for name, symbol in SYMBOLS.items() if any(name in errors for errors in every)]
-    rows = []
-    for word, trials in sets.items():
-        maps = [
-            _window_map(trials, label, signals, f"{label} · {word}", named=label == BEFORE)
-            for label in MODEL_SERIES.values()
-        ]
-        rows.append({"hconcat": maps, "spacing": 16})
-    return {
-        "vconcat": rows,
-        "spacing": 18,
-        "title": heading(title, "Number and colour: root mean square error as a share of the signal, %."),
-        "description": "Errors over windows by trial and signal, of the card before and the card found.",
-        "usermeta": STACKS,
-    }
-
-
-def _window_map(
-    trials: Sequence[TrialErrors], label: str, signals: Sequence[str], title: str, *, named: bool
-) -> ChartSpec:
-    rows = []
-    for trial in trials:
-        for name, errors in (trial.before if label == BEFORE else trial.found).items():
-            share, error = 100 * errors.relative, errors.rms_error
-            rows.append(
-                {"trial": trial.trial, "signal": SYMBOLS.get(name, name), "share": plain(share)}
-                | {"text": _in_three(share), "error": f"{error:.3g} {in_words(name)[1]}".strip()}
-            )
-    layers = Matrix(
-        colour="share",
-        rows=[trial.trial for trial in trials],
-        columns=signals,
-        side={"labelLimit": 230} if named else {"labels": False, "ticks": False},
-        foot={"title": "signal", "orient": "bottom", "labelAngle": 0},
-        shown={"trial:N": "trial", "signal:N": "signal", "text:N": "share (%)", "error:N": "rms error"},
-    ).layers
-    size = (38 * len(signals), ROW_PX * len(trials))
-    return layered(layers, size=size, data={"values": rows}, title=panel_title(title))
+    rows = [
+        {"group": word, "trial": trial.trial, "signal": symbol, "model": model, "misfit": 100 * errors[name].relative}
+        | {"error": f"{errors[name].rms_error:.3g} {in_words(name)[1]}".strip()}
+        for word, trials in sets.items()
+        for trial in trials
+        for model, errors in zip(MODEL_SERIES, (trial.before, trial.found), strict=True)
+        for name, symbol in SYMBOLS.items()
+        if name in errors
+    ]
+    return misfit_maps(
+        rows,
+        list(MODEL_SERIES),
+        title=title,
+        what="share (%)",
+        subtitle="Number and colour: root mean square error as a share of the signal, %.",
+        shown={"error:N": "rms error"},
+    )
 
 
 def figure_chart(sets: Mapping[str, Sequence[PredictedFigure]], *, title: str = "") -> ChartSpec | None:
@@ -316,8 +333,8 @@ def _thinned(label: str, columns: Sequence[Array]) -> Indices:
     return thin_points(columns, MEASURED_SAMPLES if label == MEASURED else MODEL_SAMPLES)
 
 
-def _marks(place: ChartSpec) -> list[ChartSpec]:
-    """Points and lines of the rows of a trial, which all of its panels share."""
+def series_marks(place: ChartSpec) -> list[ChartSpec]:
+    """Points (measured) and lines (by the cards) at a `place`, of the rows of the chart that they are in."""
     points = place | {"color": _LOOK.colour, "shape": _LOOK.shape}
     lines = place | {"color": _LOOK.colour, "strokeDash": _LOOK.dash, "order": "i:Q"}
     switched = {"filter": before_after_switch(MODEL_SERIES)}
@@ -342,9 +359,3 @@ def panel_grid(
         "title": title,
         "description": alternative_text,
     }
-
-
-def _in_three(percent: float) -> str:
-    if not math.isfinite(percent):
-        return "∞"
-    return f"{percent:.0f}" if percent >= 10 else f"{percent:.1f}"

@@ -37,8 +37,7 @@ TWENTY = math.radians(20.0)
 def changed(card: ManoeuvringCard, **uncertainty: float) -> ManoeuvringCard:
     """The card with no errors but these."""
     lines = "\n".join(f"{name} = {uncertainty.get(name, 0.0)!r}" for name in {**card.derivatives, **uncertainty})
-    found = parse_card(f"{card.text}\n[uncertainty]\n{lines}\n", card.source)
-    assert isinstance(found, ManoeuvringCard)
+    found = parse_card(f"{card.text}\n[uncertainty]\n{lines}\n", card.source).manoeuvring()
     return found
 
 
@@ -70,8 +69,7 @@ def test_a_figure_linear_in_the_numbers_has_the_spread_of_the_covariance(tmp_pat
     card = changed(mariner_card, **errors)
     matrix = np.array([[4e-8, 1.6e-8], [1.6e-8, 1e-8]])
     covariance_file(ship).write_text(Covariance(("derivatives.Yv", "derivatives.Nv"), matrix).as_text())
-    own = parse_card(referring(card.text, ship), str(ship))
-    assert isinstance(own, ManoeuvringCard)
+    own = parse_card(referring(card.text, ship), str(ship)).manoeuvring()
     for one, gradient in ((own, None), (card, 0.0)):
         cov = matrix if gradient is None else np.diag(np.diag(matrix))
         d = card.derivatives
@@ -100,8 +98,7 @@ def test_a_covariance_goes_into_a_file_of_other_conventions_and_back(tmp_path, m
     matrix = np.array([[4e-8, 1e-8, 0.0], [1e-8, 9e-8, -1e-5], [0.0, -1e-5, 0.01]])
     text = mariner_card.text + CURRENT
     assert 'rudder_sign = "port"' in text
-    card = parse_card(text, str(ship))
-    assert isinstance(card, ManoeuvringCard)
+    card = parse_card(text, str(ship)).manoeuvring()
     written = by_file_name(card, names, matrix)
     assert written.names == ("derivatives.Yv", "derivatives.Nd", "effects.0.parameters.direction_deg")
     # A rudder to port turns the sign of Nd; the direction is in degrees.
@@ -109,8 +106,7 @@ def test_a_covariance_goes_into_a_file_of_other_conventions_and_back(tmp_path, m
     expected = [[4e-8, -1e-8, 0.0], [-1e-8, 9e-8, 1e-5 * deg], [0.0, 1e-5 * deg, 0.01 * deg**2]]
     np.testing.assert_allclose(written.matrix, expected, rtol=1e-12, atol=1e-25)
     covariance_file(ship).write_text(written.as_text())
-    own = parse_card(referring(text, ship), str(ship))
-    assert isinstance(own, ManoeuvringCard)
+    own = parse_card(referring(text, ship), str(ship)).manoeuvring()
     draws, _ = draws_of(own, 0)
     rows = [draws.names.index(name) for name in names]
     np.testing.assert_allclose((draws.root @ draws.root.T)[np.ix_(rows, rows)], matrix, rtol=1e-9, atol=1e-20)
@@ -126,13 +122,11 @@ def test_members_take_their_numbers_together_from_the_samples_of_a_card(tmp_path
     covariance = np.cov(samples.T)
     errors = np.sqrt(np.diag(covariance))
     text = mariner_card.text + f"\n[uncertainty]\nYv = {errors[0]:.8g}\nNd = {errors[1]:.8g}\n"
-    card = parse_card(text, str(ship))
-    assert isinstance(card, ManoeuvringCard)
+    card = parse_card(text, str(ship)).manoeuvring()
     written = by_file_name(card, names, covariance, samples)
     np.testing.assert_array_equal(written.samples, samples * [1, -1])
     covariance_file(ship).write_text(written.as_text())
-    own = parse_card(referring(text, ship), str(ship))
-    assert isinstance(own, ManoeuvringCard)
+    own = parse_card(referring(text, ship), str(ship)).manoeuvring()
     draws, _ = draws_of(own, 0)
     members = [draws.member(number) for number in range(200)]
     found = {(member["derivatives.Yv"], member["derivatives.Nd"]) for member in members}
@@ -193,8 +187,7 @@ def test_criteria_of_a_member_are_those_of_the_ship_with_its_numbers(mariner_car
 
 @pytest.mark.slow
 def test_members_beyond_the_card_are_those_whose_own_trials_left_its_range(mariner_card) -> None:
-    card = revised(mariner_card, {}, {"model.valid_speed_mps": [6.19, 9.3]})
-    assert isinstance(card, ManoeuvringCard)
+    card = revised(mariner_card, {}, {"model.valid_speed_mps": [6.19, 9.3]}).manoeuvring()
     draws, _ = draws_of(card, 4)
     found = ensemble(OfCriteria(ShipText.of(card)), draws, 6)
     model = build(card)

@@ -33,8 +33,7 @@ def grid_of(card: ManoeuvringCard) -> Grid:
 
 @pytest.fixture(scope="module", params=["mariner", pytest.param("kvlcc2-captive", marks=pytest.mark.slow)])
 def found(request: pytest.FixtureRequest):
-    card = read_card(request.param)
-    assert isinstance(card, ManoeuvringCard)
+    card = read_card(request.param).manoeuvring()
     draws, _ = draws_of(card, 3)
     grid = grid_of(card)
     return card, draws, grid, *steering_bands(ShipText.of(card), draws, MEMBERS, (None, grid))

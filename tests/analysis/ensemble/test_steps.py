@@ -49,8 +49,7 @@ def test_the_longest_step_with_the_same_figures_is_taken(mariner_card, monkeypat
 
 @pytest.mark.slow
 def test_a_step_at_the_edge_of_the_stable_ones_is_not_taken(monkeypatch) -> None:
-    card = read_card("kvlcc2")
-    assert isinstance(card, ManoeuvringCard)
+    card = read_card("kvlcc2").manoeuvring()
     draws, _ = draws_of(card, 1)
     monkeypatch.setattr(questions, "STEP_FACTORS", (5,))
     assert fastest_pace(question(card), draws).step_factor == 1
@@ -60,8 +59,7 @@ def test_a_step_at_the_edge_of_the_stable_ones_is_not_taken(monkeypatch) -> None
 
 @pytest.mark.slow
 def test_turns_of_which_most_show_no_steady_part_keep_the_usual_step() -> None:
-    card = read_card("kvlcc2")
-    assert isinstance(card, ManoeuvringCard)
+    card = read_card("kvlcc2").manoeuvring()
     assert fastest_pace(question(card, duration_s=600.0), draws_of(card, 1)[0]) == USUAL_PACE
 
 

@@ -12,13 +12,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import solve_continuous_are
 
-from tank2sim.analysis.heading.control import DAMPING, SLOWNESS, heading_autopilot, heading_gains
 from tank2sim.analysis.heading.designs import (
+    DAMPING,
     POLE_SHIFT,
+    SLOWNESS,
     LqrWeights,
     SteeringPlant,
     _without_integral,
     design_heading,
+    heading_gains,
     robust_design,
     steering_plant,
 )
@@ -221,7 +223,7 @@ def test_the_integral_takes_no_more_than_its_band() -> None:
 
 
 def test_the_autopilot_of_a_ship_is_of_its_nomoto_model_and_gear(mariner: Model) -> None:
-    made = {one.name: one.start for one in heading_autopilot(mariner).parameters}
+    made = {one.name: one.start for one in design_heading(mariner).autopilot.parameters}
     gains = heading_gains(stability(mariner).nomoto.dimensional)
     assert made["autopilot.Kp"] == gains.proportional == pytest.approx(1 + 2 * DAMPING * SLOWNESS)
     assert made["autopilot.Kd"] == gains.derivative
@@ -229,11 +231,9 @@ def test_the_autopilot_of_a_ship_is_of_its_nomoto_model_and_gear(mariner: Model)
 
 
 def test_a_rudder_that_turns_the_wrong_way_is_reported(mariner: Model) -> None:
-    with pytest.raises(ValueError, match="wrong way"):
-        heading_gains(Nomoto(-0.1, 100.0, None, None, 0.0))
     wrong = mariner.substitute("derivatives.Nd", -mariner.symbol("derivatives.Nd"))
     with pytest.raises(InputError, match="wrong way"):
-        heading_autopilot(wrong.substitute("derivatives.Yd", -wrong.symbol("derivatives.Yd")))
+        design_heading(wrong.substitute("derivatives.Yd", -wrong.symbol("derivatives.Yd")))
 
 
 @pytest.mark.parametrize("side", [1, -1])

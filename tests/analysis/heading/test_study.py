@@ -63,7 +63,7 @@ def test_a_linear_card_has_margins_at_its_own_speed_alone() -> None:
     )
     assert piloted.runs["change"]["motion.r"][0] == pytest.approx(0.0, abs=1e-9)
     assert any("35 deg of rudder" in notice and "40 deg" in notice for notice in found.notices)
-    with pytest.raises(InputError, match="--speed"):
+    with pytest.raises(InputError, match="speed_mps"):
         study_autopilot(card, ship, StudySettings(speed_mps=6.0))
 
 

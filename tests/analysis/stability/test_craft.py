@@ -10,6 +10,7 @@ from scipy.stats import norm
 
 import tank2sim as t2s
 from tank2sim.analysis.stability.craft import CraftMotions, craft_stability, keeps_nearly_straight
+from tank2sim.cards import parse_card
 from tank2sim.errors import InputError
 from tank2sim.results.stability import CraftStabilityResult
 from tests.cards.made_craft import craft_card
@@ -65,6 +66,17 @@ def test_a_loop_of_thousands_of_lengths_is_nearly_straight(lengths, nearly_strai
     found = CraftStabilityResult(replace(study, difference_turns=(alone, *study.difference_turns[1:])))
     assert not found.stable
     assert ("by itself" in " ".join(found.headline)) is not nearly_straight
+
+
+def test_thrusters_that_can_turn_are_held_ahead():
+    fixed = t2s.load("otter").card
+    side, turning = "y_m = 0.395", "y_m = 0.395\nmax_azimuth_deg = 30.0\nazimuth_time_constant_s = 0.5"
+    free = parse_card(fixed.text.replace(side, turning), "free.toml").steered()
+    assert free.thrusters != fixed.thrusters
+    found, expected = craft_stability(free), craft_stability(fixed)
+    assert found.straight_run.eigenvalues == pytest.approx(expected.straight_run.eigenvalues, rel=1e-6)
+    assert len(found.straight_run.eigenvalues) == 3
+    assert found.difference_turns[-1].diameter_m == pytest.approx(expected.difference_turns[-1].diameter_m, rel=1e-6)
 
 
 def test_a_speed_beyond_the_thrusters_is_refused(made_up):

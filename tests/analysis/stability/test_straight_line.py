@@ -49,7 +49,7 @@ def test_nomoto_agrees_with_poles_zeros_and_gain_of_python_control(mariner) -> N
         inputs=["rudder.angle"],
         outputs=["motion.r"],
     )
-    found = nomoto(steering)
+    found = nomoto(steering.A, steering.B, steering.C)
     assert found.K_per_s == pytest.approx(float(control.dcgain(steering)))
     np.testing.assert_allclose(sorted(-1 / control.poles(steering).real), sorted([found.T1_s, found.T2_s]))
     np.testing.assert_allclose(-1 / control.zeros(steering).real, [found.T3_s])

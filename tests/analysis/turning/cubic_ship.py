@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from tank2sim.cards import ManoeuvringCard, read_card
+from tank2sim.cards import read_card
 from tank2sim.dynamics import Model, build
 
 N_RRR, N_D = -0.02, 0.0014
@@ -19,8 +19,7 @@ UNSTABLE, STABLE = 2e-4, -2e-3
 
 def cubic_ship(N_r: float) -> Model:
     """The ship with a linear yaw damping (prime): positive is unstable."""
-    mariner = read_card("mariner")
-    assert isinstance(mariner, ManoeuvringCard)
+    mariner = read_card("mariner").manoeuvring()
     kept = ("Xudot", "Yvdot", "Nrdot", "Xu", "Yv")
     nothing = {f"derivatives.{name}": 0.0 for name in mariner.derivatives if name not in kept}
     own = {"derivatives.Nr": N_r, "derivatives.Nrrr": N_RRR, "derivatives.Nd": N_D, "derivatives.Yr": -0.005}

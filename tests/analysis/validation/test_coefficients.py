@@ -156,8 +156,7 @@ def test_a_speed_outside_the_cards_range_is_not_extrapolated_to(mariner_card) ->
 
 
 def test_of_a_linear_card_only_the_linear_terms_are_compared() -> None:
-    card = read_card("kvlcc2-captive")
-    assert isinstance(card, ManoeuvringCard)
+    card = read_card("kvlcc2-captive").manoeuvring()
     linear = replace(card, model=card.model.model_copy(update={"kind": "linear"}))
     rows, _ = rows_of(card, linear)
     assert rows["Nd"].differences[0].why == SAME

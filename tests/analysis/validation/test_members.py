@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tank2sim.analysis.ensemble.draws import draws_of
-from tank2sim.analysis.influence.card_influence import CardInfluence, influence
+from tank2sim.analysis.influence.card_influence import figure_errors, influence, origin_of_errors
 from tank2sim.analysis.influence.figures import parse_figure
 from tank2sim.analysis.influence.study import Study
 from tank2sim.analysis.validation.standard_trials import SEED, members
@@ -49,8 +49,7 @@ def joint(tmp_path_factory: pytest.TempPathFactory, mariner_card: ManoeuvringCar
     path: Path = tmp_path_factory.mktemp("joint") / "ship.toml"
     text = referring(mariner_card.text + CROSS_FLOW, path)
     covariance_file(path).write_text(Covariance(NAMES, MATRIX).as_text())
-    card = parse_card(text, str(path))
-    assert isinstance(card, ManoeuvringCard)
+    card = parse_card(text, str(path)).manoeuvring()
     return card
 
 
@@ -79,8 +78,7 @@ def test_a_card_of_which_all_errors_go_together_is_not_reported_to_have_none(tmp
     path, names = tmp_path / "ship.toml", ("derivatives.Yv", "derivatives.Nv")
     text = referring(f"{mariner_card.text}\n[uncertainty]\nYv = 5e-4\nNv = 1.6e-4\n", path)
     covariance_file(path).write_text(Covariance(names, MATRIX[:2, :2]).as_text())
-    card = parse_card(text, str(path))
-    assert isinstance(card, ManoeuvringCard)
+    card = parse_card(text, str(path)).manoeuvring()
     reported = " ".join(draws_of(card, 0)[1])
     assert "no standard error of any number" not in reported and "no standard error of Xu" in reported
 
@@ -91,16 +89,16 @@ def test_the_standard_error_of_a_figure_is_of_the_whole_covariance(joint: Manoeu
     own = np.array([one.standard_error for one in errors.parameters])
     slopes = np.random.default_rng(1).standard_normal((2, len(own))) / np.maximum(own, 1e-9)
     slopes[:, own == 0] = 0.0
-    found = CardInfluence("ship", (), np.ones(2), errors, slopes, slopes)
+    deviations, shares = figure_errors(slopes, errors.covariance)
     covariance = np.diag(own**2)
     covariance[np.ix_(places, places)] = MATRIX
     truth = np.array([row @ covariance @ row for row in slopes])
-    np.testing.assert_allclose(found.standard_errors, np.sqrt(truth), rtol=1e-12)
+    np.testing.assert_allclose(deviations, np.sqrt(truth), rtol=1e-12)
     # The share is what goes of the variance when a number is known: with one of the three, all of the three.
-    one, other, third = found.shares[:, places].T
+    one, other, third = shares[:, places].T
     np.testing.assert_allclose(one, (slopes[:, places] @ FALLS) ** 2 / truth, rtol=1e-9)
     np.testing.assert_allclose([other, third], [one, one], rtol=1e-9)
-    assert "covariance next to the card (3 numbers, others as if independent)" in found.of_errors
+    assert "covariance next to the card (3 numbers, others as if independent)" in origin_of_errors(errors)
 
 
 @pytest.mark.slow
@@ -111,8 +109,8 @@ def test_influence_and_ensemble_of_a_card_with_a_covariance_say_the_same(joint: 
     result = influence(study)
     draws, _ = draws_of(joint, 2)
     spread = ensemble(OfFigures(ShipText.of(joint), ("criterion_C",)), draws, 150).figures["criterion_C"].std(ddof=1)
-    assert result.standard_errors[0] == pytest.approx(spread, rel=0.2)
-    parts = result.slopes[0] * [one.standard_error for one in result.parameters]
+    assert result.figures["criterion_C"].standard_error == pytest.approx(spread, rel=0.2)
+    parts = study.slopes_at(study.values)[1][0] * [one.standard_error for one in study.parameters]
     assert not 0.7 < np.linalg.norm(parts) / spread < 1.4  # as if independent it would be another
 
 

@@ -158,8 +158,7 @@ def test_trials_that_made_a_card_are_known_by_its_source(mariner_card, trials) -
 
 @pytest.fixture(scope="module")
 def esso() -> ManoeuvringCard:
-    card = read_card("esso-osaka-estimated", {"environment.gravity_mps2": 9.80665})
-    assert isinstance(card, ManoeuvringCard)
+    card = read_card("esso-osaka-estimated", {"environment.gravity_mps2": 9.80665}).manoeuvring()
     return replace(card, effects=())
 
 
@@ -270,8 +269,7 @@ def test_other_ships_and_other_sizes_are_reported(esso, found, mariner_card) -> 
 
 
 def test_a_card_is_called_by_its_folder_also_from_within_it(tmp_path, monkeypatch) -> None:
-    card = read_card("mariner")
-    assert isinstance(card, ManoeuvringCard)
+    card = read_card("mariner").manoeuvring()
     (tmp_path / "trawler").mkdir()
     monkeypatch.chdir(tmp_path / "trawler")
     own = [replace(card, source=source) for source in ("ship.toml", "../other.toml", "./ship.toml")]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import tank2sim as t2s
-from tank2sim.analysis.validation.ship_track import quarter
 from tank2sim.analysis.validation.standard_trials import ship_of
+from tank2sim.apps.bridge.ship_track import quarter
 from tank2sim.apps.bridge.study import SHALLOW, bridge_of, steady_speed
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card, revised
 from tank2sim.dynamics.effects.depth import icorels_squat

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from tank2sim.analysis.turning.points import TurnInDegrees
 from tank2sim.answer.parts import Verdict
 from tank2sim.apps.steering_cards.card import find_steering_card, parse_steering_card, read_steering_card
 from tank2sim.apps.steering_cards.comparison import SteeringComparison, compare_steering_models
 from tank2sim.apps.steering_cards.result import SteeringModelsResult, steering_diagram_chart
+from tank2sim.apps.steering_cards.steady_points import TurnInDegrees
 from tank2sim.apps.steering_cards.tuning_result import TurnTuningResult
 from tank2sim.apps.steering_cards.two_point_tuning import TwoPointStudy
 from tank2sim.bundled import bundled

@@ -7,7 +7,6 @@ from dataclasses import asdict, replace
 import pytest
 
 from tank2sim.analysis.influence.percent import change_percent
-from tank2sim.analysis.turning.points import TurningPoints
 from tank2sim.apps.steering_cards.card import SteeringCard, read_steering_card
 from tank2sim.apps.steering_cards.comparison import (
     agreed_variation,
@@ -20,6 +19,7 @@ from tank2sim.apps.steering_cards.comparison import (
     not_given,
     turns_of,
 )
+from tank2sim.apps.steering_cards.steady_points import TurningPoints
 from tank2sim.errors import InputError
 
 TABLE_1 = {

@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from tank2sim.analysis.turning.points import TurningPoints
 from tank2sim.apps.steering_cards.card import read_steering_card
 from tank2sim.apps.steering_cards.comparison import form_of, model_of
+from tank2sim.apps.steering_cards.steady_points import TurningPoints
 from tank2sim.apps.steering_cards.two_point_tuning import (
     Levers,
     WantedTurn,

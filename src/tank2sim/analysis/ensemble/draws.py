@@ -35,14 +35,14 @@ def draws_with(errors: JointErrors, seed: int) -> Draws:
     """Draws of parameters with these errors; exact parameters are not drawn."""
     uncertain = np.flatnonzero(np.diag(errors.covariance) > 0)
     chosen = [errors.parameters[place] for place in uncertain]
-    bounds = [parameter.bounds for parameter in chosen]
+    bounds = np.array([parameter.bounds for parameter in chosen], dtype=float).reshape(-1, 2)  # None becomes nan
     rows = {place: row for row, place in enumerate(uncertain.tolist())}
     return Draws(
         names=tuple(parameter.name for parameter in chosen),
         mean=np.array([parameter.value for parameter in chosen]),
         root=_root(errors.covariance[np.ix_(uncertain, uncertain)]),
-        lowest=np.array([-np.inf if low is None else low for low, _ in bounds]),
-        highest=np.array([np.inf if high is None else high for _, high in bounds]),
+        lowest=np.nan_to_num(bounds[:, 0], nan=-np.inf, posinf=np.inf, neginf=-np.inf),
+        highest=np.nan_to_num(bounds[:, 1], nan=np.inf, posinf=np.inf, neginf=-np.inf),
         seed=seed,
         samples=errors.samples,
         sampled=np.array([rows[place] for place in errors.sampled], dtype=np.int64),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,9 @@ from tank2sim.simulation.run import simulate
 from tank2sim.simulation.running import RUNAWAY
 from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, StraightRun
 from tank2sim.units import from_si
+
+if TYPE_CHECKING:
+    from tank2sim.analysis.influence.study import Study
 
 ENSEMBLE_SIGNALS: Mapping[str, tuple[str, float]] = {
     "x_m": ("motion.x", 1.0),
@@ -169,18 +173,10 @@ class OfFigures:
 
         card, asked = self.ship.card(), [parse_figure(text) for text in self.figures]
         study = Study(card, asked)
-        lanes = lanes_of(study.model) if any(_lane_figure(figure) for figure in asked) else None
+        lanes = lanes_of(study.model) if any(map(_lane_figure, asked)) else None
         joint = [figure for figure in asked if lanes and _lane_figure(figure)]
         single = [figure for figure in asked if figure not in joint]
-        one_by_one = Study(card, single) if joint and single else study
-        names = [parameter.name for parameter in study.parameters]
-
-        def figures_of(values: Mapping[str, float]) -> MemberResult:
-            given = dict(zip(names, study.values.tolist(), strict=True)) | dict(values)
-            found = one_by_one.figures_at(np.array([given[name] for name in names]))
-            return MemberResult(dict(zip([figure.text for figure in one_by_one.figures], found.tolist(), strict=True)))
-
-        ask_each = each_ship(study.model, figures_of)
+        ask_single = _one_by_one(Study(card, single) if joint else study) if single else None
 
         def ask(count: int, values: Mapping[str, Array], kept: int) -> BatchResult:
             p, troubles = ships_of(study.model, count, values)
@@ -189,16 +185,27 @@ class OfFigures:
                 assert lanes is not None and isinstance(manoeuvre, Turn | Zigzag)
                 runs = lanes.run(manoeuvre, p)
                 troubles = _with_runaways(troubles, runs.fine)
-                for figure in joint:
-                    if figure.manoeuvre == manoeuvre:
-                        found[figure.text] = runs.figures.get(_lane_figure(figure), np.full(count, np.nan))
-            if single or not joint:
-                answer = ask_each(count, values, 0)
+                named = {figure.text: _lane_figure(figure) for figure in joint if figure.manoeuvre == manoeuvre}
+                found |= {text: runs.figures.get(name, np.full(count, np.nan)) for text, name in named.items()}
+            if ask_single:
+                answer = ask_single(count, values, 0)
                 found |= answer.figures
                 troubles = [first or other for first, other in zip(troubles, answer.troubles, strict=True)]
             return _usable({text: found[text] for text in self.figures if text in found}, troubles)
 
         return ask
+
+
+def _one_by_one(study: Study) -> Ask:
+    """Figures of a study by their texts, of one ship after the other."""
+    defaults = {parameter.name: parameter.value for parameter in study.parameters}
+
+    def figures_of(values: Mapping[str, float]) -> MemberResult:
+        given = {**defaults, **values}
+        found = study.figures_at(np.array([given[name] for name in defaults]))
+        return MemberResult(dict(zip([figure.text for figure in study.figures], found.tolist(), strict=True)))
+
+    return each_ship(study.model, figures_of)
 
 
 BEYOND_CARD_MARK = ": beyond the card"
@@ -220,7 +227,7 @@ class OfCriteria:
         """See :class:`tank2sim.simulation.ensemble.Question`."""
         whole = build(self.ship.card())
         model = _reading_off(whole, *(name for names in _READ_OFF.values() for name in names))
-        each_step, parameters = Integrator(model), parameters_of(model)
+        each_step, parameters = Integrator(model), model.defaults
 
         def criteria_of(values: Mapping[str, float]) -> MemberResult:
             figures: Numbers = {}
@@ -303,10 +310,10 @@ def _with_runaways(troubles: Sequence[str], fine: Sequence[bool] | NDArray[np.bo
 
 def each_ship(model: Model, answer: Callable[[Mapping[str, float]], MemberResult]) -> Ask:
     """The members one after the other: the `answer` to values in place of the model's, or the reason without one."""
-    defaults = parameters_of(model)
+    defaults = model.defaults
 
     def ask(values: Mapping[str, float]) -> MemberResult:
-        if fault := mass_fault(model, defaults | dict(values)):
+        if fault := mass_fault(model, {**defaults, **values}):
             return MemberResult({}, trouble=fault)
         try:
             return answer(values)
@@ -314,11 +321,6 @@ def each_ship(model: Model, answer: Callable[[Mapping[str, float]], MemberResult
             return MemberResult({}, trouble=error.problem)
 
     return each_alone(ask)
-
-
-def parameters_of(model: Model) -> dict[str, float]:
-    """Values of a model by name."""
-    return dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
 
 
 def _reading_off(model: Model, *names: str) -> Model:
@@ -375,12 +377,13 @@ def fastest_pace(question: OfManoeuvre, draws: Draws) -> Pace:
         runs = lanes.run(manoeuvre, p, question.duration_s, pace=pace)
         return 2 * int(runs.doubtful.sum()) < len(p) and same_figures(usual, runs, tolerance)
 
-    factors = () if isinstance(manoeuvre, Zigzag) else STEP_FACTORS
-    for pace in (*(Pace(factor, single=True) for factor in (*factors, 1)), *map(Pace, factors)):
+    def holds(pace: Pace) -> bool:
         edge = Pace(pace.step_factor + 1, pace.single)
-        if same(pace, STEP_TOLERANCE) and (pace.step_factor == 1 or same(edge, EDGE_TOLERANCE)):
-            return pace
-    return USUAL_PACE
+        return same(pace, STEP_TOLERANCE) and (pace.step_factor == 1 or same(edge, EDGE_TOLERANCE))
+
+    factors = () if isinstance(manoeuvre, Zigzag) else STEP_FACTORS
+    paces = (*(Pace(factor, single=True) for factor in (*factors, 1)), *map(Pace, factors))
+    return next(filter(holds, paces), USUAL_PACE)
 
 
 def same_figures(usual: LaneFigures, others: LaneFigures, tolerance: float) -> bool:

@@ -243,51 +243,49 @@ def stability_bands(
     """Bands of the straight course at the card's speed, the probabilities of the IMO `criteria`, and on request bands
     of `curves`: at a speed (None: the card's), on a grid."""
     draws, messages = draws_of(card, request.seed)
-    question = OfCriteria(ShipText.of(card))
-    trials = _ensemble(card, question, draws, request.members, executor)
+    ship = ShipText.of(card)
+    trials = _ensemble(card, OfCriteria(ship), draws, request.members, executor)
     messages.append(Notice("an ensemble is judged at the card's speed"))
-    try:
-        straight = _ensemble(card, OfFigures(ShipText.of(card), STRAIGHT), draws, request.members, executor)
-    except InputError as error:
-        straight = Ensemble(request.members, request.seed, {})
-        messages.append(Notice(f"no bands of the straight course: {error.problem}"))
-    chances = tuple(chance(criterion, trials) for criterion in criteria)
-    within = {criterion.name for criterion in criteria if not criterion.beyond_card}
-    judged = [one for one in chances if one.probability_met is not None]
-    limits = {one.name: one.allowed for one in judged if one.name in within}
-    each, of_any, about = tails(question, draws, trials, limits, executor)
+    straight, about = _straight(card, draws, request, executor)
     messages += about
-    chances = tuple(replace(one, tail=each.get(one.name)) for one in chances)
-    messages += _counted(judged, trials.usable)
+    chances = tuple(chance(criterion, trials) for criterion in criteria)
+    judged = [one for one in chances if one.probability_met is not None]
+    beyond = {criterion.name for criterion in criteria if criterion.beyond_card}
+    limits = {one.name: one.allowed for one in judged if one.name not in beyond}
+    each, of_any, about = tails(OfCriteria(ship), draws, trials, limits, executor)
+    messages += [*about, *_counted(judged, trials.usable)]
     if judged and not limits:
         messages.append(
             Notice("no probability of the criteria together: the trials of the card itself leave its range")
         )
     together = all_chances(limits, trials)
-    unseen = answering_states(build(card))
-    if unseen:
-        messages.append(
-            Notice(
-                "no probability of stability: the figures of the members describe slow motions, which "
-                f"{', '.join(unseen)} follow at once"
-            )
-        )
-    stable, between = (None, None) if unseen else _stable(straight)
+    stable, between, about = _stable(card, straight)
     bands, through = bands_without_poles(straight)
-    messages += through
+    messages += [*about, *through]
     drawn = None
     if curves:
-        drawn, about = steering_bands(ShipText.of(card), draws, request.members, curves, executor)
+        drawn, about = steering_bands(ship, draws, request.members, curves, executor)
         messages += about
     return StabilityBands(
         **_members(card, draws, trials, messages, straight.figures),
         figures=bands,
         probability_stable=stable,
         probability_stable_interval_95=between,
-        imo=chances,
+        imo=tuple(replace(one, tail=each.get(one.name)) for one in chances),
         imo_all=together and replace(together, tail=of_any),
         curves=drawn,
     )
+
+
+def _straight(
+    card: SteeredCard, draws: Draws, request: EnsembleRequest, executor: Executor | None
+) -> tuple[Ensemble, list[Notice]]:
+    """Figures of the straight course; none, with the reason, where the card's ship does not show them."""
+    try:
+        return _ensemble(card, OfFigures(ShipText.of(card), STRAIGHT), draws, request.members, executor), []
+    except InputError as error:
+        none = Ensemble(request.members, request.seed, {})
+        return none, [Notice(f"no bands of the straight course: {error.problem}")]
 
 
 def growth_bands(
@@ -332,19 +330,15 @@ def named_bands(
 
 def bands_without_poles(found: Ensemble) -> tuple[dict[str, Band], list[Notice]]:
     """Bands of figures by name, except for those of :data:`POLES` that pass through infinity, with notices on these."""
-    bands = figure_bands(found)
-    poles = [name for name in POLES if name in bands]
-    if not poles:
-        return bands, []
-    judged = found.figures.get("criterion_C")
-    signs = {name: np.sign(found.figures[name] if judged is None else judged) for name in poles}
-    gone = [name for name in poles if (signs[name] > 0).any() and (signs[name] < 0).any()]
+    bands, figures = figure_bands(found), found.figures
+    judges = {name: figures.get("criterion_C", figures[name]) for name in POLES if name in bands}
+    gone = [name for name, values in judges.items() if (values > 0).any() and (values < 0).any()]
     if not gone:
         return bands, []
-    usable, words = found.usable, " and ".join(in_words(name)[0] for name in gone)
-    above = int(np.sum(signs[gone[0]] > 0))
-    text = f"no band of {words}: {above} of {usable} members have C' above zero, the others below, and between these "
-    return {name: band for name, band in bands.items() if name not in gone}, [Notice(f"{text}they go through infinity")]
+    words, above = " and ".join(in_words(name)[0] for name in gone), int(np.sum(judges[gone[0]] > 0))
+    text = f"no band of {words}: {above} of {found.usable} members have C' above zero, the others below"
+    left = {name: band for name, band in bands.items() if name not in gone}
+    return left, [Notice(f"{text}, and between these they go through infinity")]
 
 
 def chance(criterion: ImoCriterion, found: Ensemble) -> Chance:
@@ -400,14 +394,17 @@ def _share(count: int, of: int) -> tuple[float, tuple[float, float]]:
     return count / of, (float(between.low), float(between.high))
 
 
-def _stable(straight: Ensemble) -> tuple[float, tuple[float, float]] | tuple[None, None]:
-    """Share of members whose modes of sway and yaw both decay (C' and T1 + T2 are positive), and its interval."""
+def _stable(card: SteeredCard, straight: Ensemble) -> tuple[float | None, tuple[float, float] | None, list[Notice]]:
+    """Share of members whose modes of sway and yaw both decay (C' and T1 + T2 are positive), its interval, notices."""
+    if unseen := answering_states(build(card)):
+        text = "no probability of stability: the figures of the members describe slow motions, which "
+        return None, None, [Notice(f"{text}{', '.join(unseen)} follow at once")]
     if not straight.figures or not straight.usable:
-        return None, None
+        return None, None, []
     total = straight.figures["T_s"] + straight.figures["T3_s"]
     with np.errstate(invalid="ignore"):
         count = int(np.sum((straight.figures["criterion_C"] > 0) & (total > 0)))
-    return _share(count, straight.usable)
+    return *_share(count, straight.usable), []
 
 
 def _ensemble(card: SteeredCard, question: Question, draws: Draws, members: int, executor: Executor | None) -> Ensemble:

@@ -11,7 +11,7 @@ import numpy as np
 
 from tank2sim.analysis.ensemble.questions import ShipText, each_ship
 from tank2sim.analysis.linearisation import state_space, straight_course
-from tank2sim.analysis.stability.response import SteeringResponse
+from tank2sim.analysis.stability.response import HULL, SteeringResponse, system_response
 from tank2sim.analysis.stability.straight_line import steering_states
 from tank2sim.analysis.turning.diagram import SteadyTurning, largest_rudder, steady_turning
 from tank2sim.arrays import Array
@@ -174,17 +174,14 @@ def branches(turning: SteadyTurning, rudder_rad: Sequence[float] | Array) -> tup
 
 def _responses(model: Model, speed_mps: float | None, grid: Grid) -> list[Array]:
     """Magnitude (dB) and phase (deg) of yaw rate by rudder angle, and the step, 1/s."""
-    import control  # slow to load
-
     point = straight_course(model, speed_mps)
     hull = state_space(model, point, states=steering_states(model), inputs=["rudder.angle"], outputs=["motion.r"])
-    response = np.asarray(hull(1j * grid.omega_radps), dtype=complex).ravel()
+    found = system_response(HULL, hull, grid.omega_radps, grid.time_s)
     with np.errstate(divide="ignore"):
-        magnitude = 20 * np.log10(np.abs(response))
-    phase = np.degrees(np.unwrap(np.angle(response)))
+        magnitude = 20 * np.log10(np.abs(found.response))
+    phase = np.degrees(np.unwrap(np.angle(found.response)))
     phase -= 360.0 * round((phase[-1] - grid.phase_deg) / 360.0)
-    step = np.asarray(control.step_response(hull, T=grid.time_s).outputs, dtype=float).ravel()
-    return [magnitude, phase, step]
+    return [magnitude, phase, found.step_per_s]
 
 
 def _band(found: Ensemble, row: int, own: Array) -> CurveBand:

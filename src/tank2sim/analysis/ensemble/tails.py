@@ -163,31 +163,14 @@ def tails(
     if not names:
         return {}, None, []
     if draws.samples is not None:
-        return (
-            {},
-            None,
-            [Notice("no probability below what the members show: they are rows of samples, without a density")],
-        )
+        return {}, None, [_none("they are rows of samples, without a density")]
     if found.members < LEAST:
-        return (
-            {},
-            None,
-            [Notice(f"no probability below what the members show: {LEAST} members are needed for its search")],
-        )
-    standard = draws.members(0, found.members).standard
-    lines = {}
-    for name in names:
-        line = _linear(standard, found.figures[name], limits[name])
-        if line is not None:
-            lines[name] = replace(line, figure=_figure_at(question, draws, line, name))
+        return {}, None, [_none(f"{LEAST} members are needed for its search")]
+    lines = _lines(question, draws, found, {name: limits[name] for name in names})
     searched = {name: line for name, line in lines.items() if line.searched}
-    one = {name: _too_far(line) for name, line in lines.items() if name not in searched}
-    unknown = [name for name in names if name not in lines]
-    about = (
-        [Notice(f"no probability below what the members show: {', '.join(unknown)} by too few members")]
-        if unknown
-        else []
-    )
+    one = {name: _too_far(line) for name, line in lines.items() if not line.searched}
+    unknown = ", ".join(name for name in names if name not in lines)
+    about = [_none(f"{unknown} by too few members")] if unknown else []
     if not searched:
         return one, None, about
     mixture = _search(question, draws, searched, found.members, executor)
@@ -200,6 +183,17 @@ def tails(
     nearest = min(searched, key=lambda name: searched[name].distance)
     of_any = np.any(list(masks.values()), axis=0)
     return one, _tail(sample, of_any, (searched[nearest], nearest), draws, kept), about
+
+
+def _none(why: str) -> Notice:
+    return Notice(f"no probability below what the members show: {why}")
+
+
+def _lines(question: Question, draws: Draws, found: Ensemble, limits: Mapping[str, float]) -> dict[str, _Linear]:
+    """Figures linear in z by name, where enough members show them."""
+    standard = draws.members(0, found.members).standard
+    lines = {name: _linear(standard, found.figures[name], allowed) for name, allowed in limits.items()}
+    return {name: replace(line, figure=_figure_at(question, draws, line, name)) for name, line in lines.items() if line}
 
 
 def _linear(standard: Array, values: Array, allowed: float) -> _Linear | None:
@@ -300,12 +294,8 @@ def _tail(sample: _Sample, failing: Mask, of: tuple[_Linear, str], draws: Draws,
         shift = {draws.names[place]: float(moved[place]) for place in largest}
     enough = effective >= EFFECTIVE
     remark = (
-        ""
-        if enough
-        else (
-            f"no probability: of {n} members drawn about the failing ships, {int(failing.sum())} fail, as if "
-            f"{effective:.3g} had been drawn from the card's own errors; {EFFECTIVE:g} are needed"
-        )
+        f"no probability: of {n} members drawn about the failing ships, {int(failing.sum())} fail, as if "
+        f"{effective:.3g} had been drawn from the card's own errors; {EFFECTIVE:g} are needed"
     )
     bad = found.bad & ~_out(sample, draws)
     return Tail(
@@ -319,7 +309,7 @@ def _tail(sample: _Sample, failing: Mask, of: tuple[_Linear, str], draws: Draws,
         beyond_card=int(np.sum(failing & beyond)),
         unusable_probability=float(np.sum(sample.weights[bad])) / n,
         failing_ships=shift,
-        remark=remark,
+        remark="" if enough else remark,
         **_of_line(line),
     )
 

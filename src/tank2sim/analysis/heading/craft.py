@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import linprog
 
-from tank2sim.analysis.heading.control import DAMPING, INTEGRAL_BAND_RAD, SLOWNESS
-from tank2sim.analysis.heading.disturbances import (
-    angles_in_degrees,
-    in_weather,
-    wave_yaw_acceleration,
-    weather_for,
-)
+from tank2sim.analysis.heading.designs import DAMPING, INTEGRAL_BAND_RAD, SLOWNESS
 from tank2sim.analysis.heading.piloted import Piloted, PilotStudy
-from tank2sim.analysis.heading.runs import CraftKeeping, HeadingLoop, StepFigures, step_figures
-from tank2sim.analysis.heading.study import StudySettings, keep_tracks, not_held, unfinished
+from tank2sim.analysis.heading.runs import CraftKeeping, HeadingLoop, StepFigures, craft_keeping, step_figures
+from tank2sim.analysis.heading.study import StudySettings, WeatherRuns, not_held
 from tank2sim.analysis.linearisation import OperatingPoint, jacobians
+from tank2sim.analysis.stability.straight_line import sorted_modes
 from tank2sim.arrays import Array, ComplexNumber
 from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.craft_terms import CRAFT_ADDED_MASSES
-from tank2sim.dynamics.autopilot_loop import YAW_DISTURBANCE
 from tank2sim.dynamics.craft_autopilot import CraftGains, craft_autopilot_model, thrust_limits
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import inertia
@@ -105,34 +99,18 @@ def study_craft_autopilot(
     speed = card.model.speed_mps if settings.speed_mps is None else settings.speed_mps
     change = settings.course_change_rad
     duration = RUN_LENGTHS * card.ship.length_m / speed
-    for faster in FASTER:
-        gains = craft_gains(card, speed, faster)
-        autopilot = craft_autopilot_model(card, gains, model.step_s)
-        loop = HeadingLoop(model, autopilot)
-        steady, slower = (_settled(loop, wanted, duration) for wanted in (speed, SLOWER_SHARE * speed))
-        poles = _poles(loop, steady, speed)
-        if min(-pole.real / abs(pole) for pole in poles) >= LEAST_DAMPING:
-            break
-    else:
-        problem = f"leaves a pole of the closed loop at {poles[0]:.3g} 1/s however fast the autopilot"
-        raise InputError(card.source, "derivatives", problem, "check the damping of the card, or give another speed")
+    gains, autopilot, poles = _damped(card, model, speed, duration)
+    loop = HeadingLoop(model, autopilot)
+    steady, slower = (_settled(loop, wanted, duration) for wanted in (speed, SLOWER_SHARE * speed))
     runs = {
         "course": loop.run({"speed.command": speed, "heading.command": change}, duration, begin=steady),
         "speed": loop.run({"speed.command": speed, "heading.command": 0.0}, duration, begin=slower),
     }
     course = step_figures(runs["course"].t, runs["course"]["motion.psi"], change)
-    weather = weather_for(card.ship.length_m, **settings.weather)
-    outside, inputs = in_weather(model, card, weather)
-    outdoors, begin = HeadingLoop(outside, autopilot), {"initial.u": speed}
-    waves = wave_yaw_acceleration(
-        weather, outdoors.model.step_s, round(KEEPING_LENGTHS / RUN_LENGTHS * duration / outdoors.model.step_s)
-    )
-    kept = {**inputs, "speed.command": speed}
-    runs["keeping"] = outdoors.run(
-        {**kept, YAW_DISTURBANCE: waves}, len(waves) * outdoors.model.step_s, parameters=begin
-    )
-    tracks = keep_tracks(outdoors, settings.waypoints, kept)
-    keeping = _keeping(runs["keeping"], speed)
+    at_speed = replace(settings, speed_mps=speed)
+    outside = WeatherRuns.of(model, card, autopilot, at_speed, KEEPING_LENGTHS / RUN_LENGTHS * duration)
+    runs["keeping"] = outside.run
+    keeping = craft_keeping(outside.run, speed)
     in_degrees = {name: math.degrees(getattr(course, name)) for name in ("ordered", "overshoot")}
     reached = speed - float(runs["speed"]["motion.u"][0])
     study = CraftAutopilotStudy(
@@ -155,26 +133,26 @@ def study_craft_autopilot(
         speed_change=step_figures(runs["speed"].t, runs["speed"]["motion.u"], reached),
         course_keeping=keeping,
         at_limit_percent={name: 100 * _at_limit(card, run) for name, run in runs.items()},
-        weather=angles_in_degrees(asdict(weather)),
-        track={name: track.figures for name, track in tracks.items()},
-        waypoints_m=np.zeros((0, 2)) if settings.waypoints is None else settings.waypoints,
         histories={name: histories(run) for name, run in runs.items()},
-        track_histories={name: track.histories() for name, track in tracks.items()},
-        notices=(*outside.notices, *not_held(keeping, weather, speed), *unfinished(tracks)),
+        notices=(*outside.notices, *not_held(keeping, outside.weather, speed), *outside.unfinished),
+        **outside.reported,
     )
     return study, Piloted(model, autopilot, runs)
 
 
-def _keeping(run: Trajectory, speed: float) -> CraftKeeping:
-    """Figures of the later half of a run on course 0."""
-    later = slice(len(run.t) // 2, None)
-    error, lack = np.degrees(run["motion.psi"][later]), run["motion.u"][later] - speed
-    return CraftKeeping(
-        duration_s=float(run.t[-1] - run.t[later][0]),
-        heading_error_rms_deg=float(np.sqrt(np.mean(error**2))),
-        heading_error_mean_deg=float(error.mean()),
-        speed_error_rms_mps=float(np.sqrt(np.mean(lack**2))),
-    )
+def _damped(
+    card: SteeredCard, model: Model, speed: float, duration: float
+) -> tuple[CraftGains, Model, tuple[complex, ...]]:
+    """The slowest of the autopilots that are tried whose closed loop is damped, with its gains and poles."""
+    for faster in FASTER:
+        gains = craft_gains(card, speed, faster)
+        autopilot = craft_autopilot_model(card, gains, model.step_s)
+        loop = HeadingLoop(model, autopilot)
+        poles = _poles(loop, _settled(loop, speed, duration), speed)
+        if min(-pole.real / abs(pole) for pole in poles) >= LEAST_DAMPING:
+            return gains, autopilot, poles
+    problem = f"leaves a pole of the closed loop at {poles[0]:.3g} 1/s however fast the autopilot"
+    raise InputError(card.source, "derivatives", problem, "check the damping of the card, or give another speed")
 
 
 def craft_gains(card: SteeredCard, speed_mps: float, faster: float = 1.0) -> CraftGains:
@@ -262,10 +240,9 @@ def _poles(loop: HeadingLoop, state: Array, speed_mps: float) -> tuple[complex, 
     model = loop.model
     inputs = model.input_values()
     inputs[model.input_names.index("speed.command")] = speed_mps
-    names = [state.name for state in model.states if state.name not in ("motion.x", "motion.y")]
-    rates = [state.derivative for state in model.states if state.name in names]
-    A, _ = jacobians(model, OperatingPoint(state, inputs, model.parameter_values()), rates, names, [])
-    return tuple(complex(pole) for pole in sorted(np.linalg.eigvals(A), key=lambda pole: -pole.real))
+    names = [name for name in model.state_names if name not in ("motion.x", "motion.y")]
+    point = OperatingPoint(state, inputs, model.parameter_values())
+    return sorted_modes(jacobians(model, point, model.derivatives_of(names), names, [])[0])
 
 
 def _at_limit(card: SteeredCard, run: Trajectory) -> float:

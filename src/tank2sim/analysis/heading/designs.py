@@ -11,20 +11,25 @@ from dataclasses import dataclass, replace
 import control
 import numpy as np
 
-from tank2sim.analysis.heading.control import (
-    DAMPING,
-    INTEGRAL_BAND_RAD,
-    LARGEST_RUDDER_RAD,
-    SLOWNESS,
-    heading_gains,
-)
 from tank2sim.analysis.linearisation import state_space, straight_course
-from tank2sim.analysis.stability.straight_line import Stability, stability
+from tank2sim.analysis.stability.straight_line import Nomoto, Stability, stability
 from tank2sim.arrays import Array
 from tank2sim.dynamics.autopilot import HeadingGains, LinearLaw, autopilot_model, linear_autopilot_model
 from tank2sim.dynamics.effects import acting_variable
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import ArgumentError, InputError
+
+DAMPING = 0.9
+"""Relative damping of the heading, between the 0.8 and 1 that Fossen (2011), 12.2, recommends for ships."""
+
+SLOWNESS = 0.1
+"""The pole of the integral over the natural frequency, so that it does not disturb a course change (Fossen, 12.2)."""
+
+INTEGRAL_BAND_RAD = math.radians(2.0)
+"""Heading error that counts as a change of course, not a disturbance: project choice, twice a helmsman's."""
+
+LARGEST_RUDDER_RAD = math.radians(35.0)
+"""Limit without one on the card: the rudder angle that SOLAS II-1, regulation 29 requires of a gear."""
 
 NOTCH_DAMPING = 0.1
 """Share of waves at the frequency of a wave filter that passes: project choice, as narrow as the band of the waves."""
@@ -161,7 +166,7 @@ def steering_plant(ship: Model, speed_mps: float | None = None) -> SteeringPlant
         raise InputError(
             ship.origin, "", "has no rudder", "an autopilot needs the card of a ship (linear, abkowitz or mmg)"
         )
-    values = dict(zip(ship.parameter_names, ship.parameter_values().tolist(), strict=True))
+    values = ship.defaults
     slowest, fastest = values["ship.slowest"], values["ship.fastest"]
     if speed_mps is not None and not slowest <= speed_mps <= fastest:
         remedy = f"the card holds from {slowest:g} to {fastest:g} m/s"
@@ -181,6 +186,29 @@ def steering_plant(ship: Model, speed_mps: float | None = None) -> SteeringPlant
     B = np.array([[0.0], [0.0], [0.0], [1 / lag]])
     largest = min(values.get("steering.max_angle", LARGEST_RUDDER_RAD), LARGEST_RUDDER_RAD)
     return SteeringPlant(found, math.sqrt(K / T), A, B, largest, ship.step_s)
+
+
+def heading_gains(nomoto: Nomoto, largest_rudder_rad: float = LARGEST_RUDDER_RAD) -> HeadingGains:
+    """Gains that put the poles of heading, yaw rate and integral where (s^2 + 2 z w s + w^2)(s + a) = 0.
+
+    With T dr/dt + r = K delta the loop is T s^3 + (1 + K Kd) s^2 + K Kp s + K Ki; w = sqrt(K/T), which makes the rudder
+    that a heading error orders about as large as the error (project choice, amid the 0.5 to 2 of practice), z is
+    :data:`DAMPING` and a is :data:`SLOWNESS` w. It also holds for a ship that is unstable (K and T negative). K/T is
+    positive.
+    """
+    K, T = nomoto.K_per_s, nomoto.T_s
+    w = math.sqrt(K / T)
+    a = SLOWNESS * w
+    proportional = T / K * (w**2 + 2 * DAMPING * w * a)
+    integral = T / K * w**2 * a
+    return HeadingGains(
+        proportional=proportional,
+        derivative=(T * (2 * DAMPING * w + a) - 1) / K,
+        integral=integral,
+        integral_band_rad=INTEGRAL_BAND_RAD,
+        anti_windup_time_s=1 / w,  # as fast as the heading
+        largest_rudder_rad=largest_rudder_rad,
+    )
 
 
 def _placed(plant: SteeringPlant, name: str, *, integral: bool) -> HeadingDesign:

@@ -9,7 +9,7 @@ import control
 import numpy as np
 
 from tank2sim.analysis.linearisation import OperatingPoint, state_space, straight_course
-from tank2sim.analysis.stability.straight_line import settled_states
+from tank2sim.analysis.stability.straight_line import settled_states, sorted_modes
 from tank2sim.arrays import Array, ComplexArray, ComplexNumber, Number, Unbounded
 from tank2sim.dynamics.autopilot_loop import closed_loop_model
 from tank2sim.dynamics.effects import acting_variable
@@ -139,11 +139,10 @@ def loop_margins(ship: Model, autopilot: Model, speed_mps: float | None = None) 
     delays = np.radians(np.mod(phase, 360.0)) / crossover
     heading = np.abs(whole(1j * omega))[0]
     below = np.flatnonzero(heading < math.sqrt(0.5))
-    poles = sorted((complex(pole) for pole in whole.poles()), key=lambda pole: -pole.real)
-    values = dict(zip(ship.parameter_names, ship.parameter_values().tolist(), strict=True))
+    poles = sorted_modes(whole.A)
     largest_gain = float(up.min()) if up.size else math.inf
     return LoopMargins(
-        speed_mps=values["ship.speed"] if speed_mps is None else speed_mps,
+        speed_mps=ship.defaults["ship.speed"] if speed_mps is None else speed_mps,
         gain_margin_up=largest_gain,
         gain_margin_dB=20 * math.log10(largest_gain),
         gain_margin_down=float(down.max()) if down.size else 0.0,
@@ -153,7 +152,7 @@ def loop_margins(ship: Model, autopilot: Model, speed_mps: float | None = None) 
         crossover_radps=float(crossover.max()) if crossover.size else math.nan,
         bandwidth_radps=float(omega[below[0]]) if below.size else math.inf,
         stable=all(pole.real < 0 for pole in poles),
-        poles=tuple(poles),
+        poles=poles,
     )
 
 
@@ -187,9 +186,7 @@ def margin_frequencies(loop: control.StateSpace) -> Array:
 
 def largest_steps(ship: Model, autopilot: Model, speed_mps: float | None = None) -> LargestSteps:
     """Largest change of course whose linear response stays within the limits of the gear."""
-    values = dict(zip(ship.parameter_names, ship.parameter_values().tolist(), strict=True))
-    limits = dict(zip(autopilot.parameter_names, autopilot.parameter_values().tolist(), strict=True))
-    rate = values.get(acting_variable(ship, "steering.max_rate"), math.inf)
+    rate = ship.defaults.get(acting_variable(ship, "steering.max_rate"), math.inf)
     whole = closed_loop_transfer(ship, autopilot, speed_mps)
     sizes = np.abs(whole.poles())
     peaks = np.zeros(3)
@@ -199,5 +196,5 @@ def largest_steps(ship: Model, autopilot: Model, speed_mps: float | None = None)
     order, moved = (float(peak) for peak in peaks[1:])
     return LargestSteps(
         within_rate_deg=math.degrees(rate / moved),
-        within_angle_deg=math.degrees(limits["autopilot.max_rudder"] / order),
+        within_angle_deg=math.degrees(autopilot.defaults["autopilot.max_rudder"] / order),
     )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tank2sim.analysis.heading.control import INTEGRAL_BAND_RAD
+from tank2sim.analysis.heading.designs import INTEGRAL_BAND_RAD
 from tank2sim.arrays import Array
 from tank2sim.dynamics.autopilot_loop import closed_loop_model
 from tank2sim.dynamics.effects import acting_variable
@@ -139,7 +139,7 @@ class CraftKeeping:
 
 def without_anti_windup(autopilot: Model) -> dict[str, float]:
     """Parameters without anti-windup: the integral continues at the limit and over a course change; none for a PD."""
-    starts = {parameter.name: parameter.start for parameter in autopilot.parameters}
+    starts = autopilot.defaults
     if "autopilot.anti_windup_time" not in starts:
         return {}
     changed = {"autopilot.anti_windup_time": 1e6, "autopilot.integral_band": math.pi}
@@ -202,12 +202,28 @@ def course_keeping(run: Trajectory, course_rad: float, from_s: float) -> CourseK
         duration_s=duration,
         heading_error_deg2s=float(np.mean(error**2) * duration),
         rudder_deg2s=float(np.mean(rudder**2) * duration),
-        heading_error_rms_deg=float(np.sqrt(np.mean(error**2))),
+        heading_error_rms_deg=_rms(error),
         heading_error_mean_deg=float(error.mean()),
-        rudder_rms_deg=float(np.sqrt(np.mean(rudder**2))),
+        rudder_rms_deg=_rms(rudder),
         rudder_travel_degps=float(moved / duration),
         rate_limited_percent=float(100 * _rate_limited(run)[part[1:]].mean()),
     )
+
+
+def craft_keeping(run: Trajectory, speed_mps: float) -> CraftKeeping:
+    """Figures of the later half of a run on course 0 at an ordered speed."""
+    later = slice(len(run.t) // 2, None)
+    error = np.degrees(run["motion.psi"][later])
+    return CraftKeeping(
+        duration_s=float(run.t[-1] - run.t[later][0]),
+        heading_error_rms_deg=_rms(error),
+        heading_error_mean_deg=float(error.mean()),
+        speed_error_rms_mps=_rms(run["motion.u"][later] - speed_mps),
+    )
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _reached(time: Array, values: Array, level: float) -> float | None:
@@ -222,7 +238,6 @@ def _reached(time: Array, values: Array, level: float) -> float | None:
 
 def _rate_limited(run: Trajectory) -> Array:
     """True for each step (n - 1,) in which the rudder moved at its largest rate."""
-    limit = acting_variable(run.model, "steering.max_rate")
-    largest = next((known.start for known in run.model.parameters if known.name == limit), math.inf)
+    largest = run.model.defaults.get(acting_variable(run.model, "steering.max_rate"), math.inf)
     moved = np.abs(np.diff(run["rudder.angle"])) / run.model.step_s
     return np.asarray(moved > 0.999 * largest)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import numpy as np
 
-from tank2sim.analysis.heading.control import LARGEST_RUDDER_RAD
-from tank2sim.analysis.heading.designs import HeadingDesign, LqrWeights, design_heading
+from tank2sim.analysis.heading.designs import LARGEST_RUDDER_RAD, HeadingDesign, LqrWeights, design_heading
 from tank2sim.analysis.heading.disturbances import (
     Weather,
     angles_in_degrees,
@@ -38,7 +38,7 @@ from tank2sim.analysis.heading.runs import (
 )
 from tank2sim.analysis.heading.track_keeping import Guidance, TrackRun, keep_track
 from tank2sim.arrays import Array, Columns
-from tank2sim.cards.card import ManoeuvringCard
+from tank2sim.cards.card import ManoeuvringCard, SteeredCard
 from tank2sim.dynamics.autopilot_loop import YAW_DISTURBANCE
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
@@ -107,6 +107,11 @@ class StudySettings:
     large_change_rad: float = math.radians(90.0)
     weather: Mapping[str, float | None] = field(default_factory=dict)
     waypoints: Array | None = None
+
+    @property
+    def start(self) -> dict[str, float]:
+        """Parameters of a start at the speed of the design."""
+        return {} if self.speed_mps is None else {"initial.u": self.speed_mps}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,6 +190,63 @@ def _histories(runs: Mapping[str, Trajectory], weather: Weather) -> dict[str, Co
     return {name: histories(run, last if name == "keeping" else 0.0) for name, run in runs.items()}
 
 
+@dataclass(frozen=True, eq=False)
+class WeatherRuns:
+    """Course keeping on course 0 in current, wind and waves, and tracks in the same current and wind.
+
+    `loop`: ship and autopilot with inputs of the weather; `run`: the course keeping; `notices`: of the ship.
+    """
+
+    weather: Weather
+    loop: HeadingLoop
+    run: Trajectory
+    tracks: Mapping[str, TrackRun]
+    waypoints_m: Array
+    notices: tuple[Notice, ...]
+
+    @staticmethod
+    def of(ship: Model, card: SteeredCard, autopilot: Model, settings: StudySettings, duration_s: float) -> WeatherRuns:
+        """Keep course for `duration_s`, and the track of the settings, if there is one.
+
+        Raises
+        ------
+        InputError
+            As :func:`keep_track` and :meth:`HeadingLoop.run`.
+        """
+        weather = weather_for(card.ship.length_m, **settings.weather)
+        outside, inputs = in_weather(ship, card, weather)
+        loop = HeadingLoop(outside, autopilot)
+        if settings.speed_mps is not None and "speed.command" in loop.model:
+            inputs["speed.command"] = settings.speed_mps
+        step = loop.model.step_s
+        waves = wave_yaw_acceleration(weather, step, round(duration_s / step))
+        order: dict[str, float | Array] = {**inputs, YAW_DISTURBANCE: waves, "heading.command": 0.0}
+        return WeatherRuns(
+            weather=weather,
+            loop=loop,
+            run=loop.run(order, len(waves) * step, parameters=settings.start),
+            tracks=_keep_tracks(loop, settings.waypoints, inputs),
+            waypoints_m=np.zeros((0, 2)) if settings.waypoints is None else settings.waypoints,
+            notices=outside.notices,
+        )
+
+    @property
+    def reported(self) -> dict[str, Any]:
+        """Fields of :class:`.PilotStudy`."""
+        return {
+            "weather": angles_in_degrees(asdict(self.weather)),
+            "track": {name: track.figures for name, track in self.tracks.items()},
+            "waypoints_m": self.waypoints_m,
+            "track_histories": {name: track.histories() for name, track in self.tracks.items()},
+        }
+
+    @property
+    def unfinished(self) -> list[Notice]:
+        """Notices on tracks that were not sailed to their ends."""
+        lost = [name for name, track in self.tracks.items() if not track.figures.finished]
+        return [Notice(f"the track is not finished, {name}") for name in lost]
+
+
 def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings) -> tuple[AutopilotStudy, Piloted]:
     """Design a heading controller and test it.
 
@@ -204,22 +266,13 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
     margins, notices = _margins(ship, design, settings.speed_mps, design_speed_only=only)
     if not margins[0].stable:
         raise _not_stable(ship, design, settings.speed_mps)
-    values = {parameter.name: parameter.start for parameter in ship.parameters}
-    weather = weather_for(values["ship.length"], **settings.weather)
-    outside, inputs = in_weather(ship, card, weather)
-    loop = HeadingLoop(outside, design.autopilot)
-    start = {} if settings.speed_mps is None else {"initial.u": settings.speed_mps}
-    ahead = undisturbed_inputs(outside)
     unit = math.sqrt(design.found.nomoto.dimensional.T_s / design.found.nomoto.dimensional.K_per_s)
-    runs, changes = _changes(loop, design, settings, ahead, start, _CHANGE_TIMES * unit)
-    steps = round(_KEEPING_TIMES * unit / loop.model.step_s)
-    waves = wave_yaw_acceleration(weather, loop.model.step_s, steps)
-    weathered: dict[str, float | Array] = {**inputs, YAW_DISTURBANCE: waves, "heading.command": 0.0}
-    runs["keeping"] = loop.run(weathered, steps * loop.model.step_s, parameters=start)
-    kept = course_keeping(runs["keeping"], 0.0, runs["keeping"].t[-1] / 2)
-    tracks = keep_tracks(loop, settings.waypoints, inputs)
-    begin = len(runs["keeping"].t) // 2
-    later = {name: runs["keeping"][name][begin:] for name in ("motion.u", "rudder.angle")}
+    outside = WeatherRuns.of(ship, card, design.autopilot, settings, _KEEPING_TIMES * unit)
+    runs, changes = _changes(outside.loop, design, settings, _CHANGE_TIMES * unit)
+    runs["keeping"] = outside.run
+    kept = course_keeping(outside.run, 0.0, outside.run.t[-1] / 2)
+    begin = len(outside.run.t) // 2
+    later = {name: float(np.mean(outside.run[name][begin:])) for name in ("motion.u", "rudder.angle")}
     alone = design.found
     study = AutopilotStudy(
         ship=alone.ship,
@@ -241,20 +294,17 @@ def study_autopilot(card: ManoeuvringCard, ship: Model, settings: StudySettings)
             course_changes=changes,
             course_keeping=kept,
         ),
-        weather=angles_in_degrees(asdict(weather)),
-        track={name: track.figures for name, track in tracks.items()},
-        waypoints_m=np.zeros((0, 2)) if settings.waypoints is None else settings.waypoints,
-        histories=_histories(runs, weather),
-        track_histories={name: track.histories() for name, track in tracks.items()},
+        histories=_histories(runs, outside.weather),
         notices=(
-            *not_held(kept, weather, float(np.mean(later["motion.u"])), float(np.mean(later["rudder.angle"]))),
+            *not_held(kept, outside.weather, later["motion.u"], later["rudder.angle"]),
             *outside.notices,
             *notices,
             *([] if settings.speed_mps is None else [Notice(_BEGUN_AT.format(settings.speed_mps))]),
             *_notices(margins, runs, changes),
-            *unfinished(tracks),
-            *_of_the_gear(ship, design, kept, weather),
+            *outside.unfinished,
+            *_of_the_gear(ship, design, kept, outside.weather),
         ),
+        **outside.reported,
     )
     return study, Piloted(ship, design.autopilot, runs)
 
@@ -292,15 +342,8 @@ def not_held(
     return found
 
 
-def keep_tracks(loop: HeadingLoop, waypoints: Array | None, inputs: Mapping[str, float]) -> dict[str, TrackRun]:
-    """Runs along waypoints by guidance without and with an integral; empty without waypoints.
-
-    Parameters
-    ----------
-    waypoints : array (n, 2), optional
-    inputs : mapping
-        Inputs of the model, by name (current, wind).
-    """
+def _keep_tracks(loop: HeadingLoop, waypoints: Array | None, inputs: Mapping[str, float]) -> dict[str, TrackRun]:
+    """Runs along waypoints (n, 2) by guidance without and with an integral; empty without waypoints."""
     if waypoints is None:
         return {}
     shares = {"line of sight": 0.0, "with integral": INTEGRAL_SHARE}
@@ -336,7 +379,7 @@ def _margins(
     ship: Model, design: HeadingDesign, speed: float | None, *, design_speed_only: bool
 ) -> tuple[tuple[LoopMargins, ...], list[Notice]]:
     """Margins at the speed of the design and at five across the card's range, and notices of speeds without any."""
-    values = {parameter.name: parameter.start for parameter in ship.parameters}
+    values = ship.defaults
     design_speed = values["ship.speed"] if speed is None else speed
     found, notices = [loop_margins(ship, design.autopilot, design_speed)], []
     if design_speed_only:
@@ -360,19 +403,16 @@ def _responses(ship: Model, design: HeadingDesign, margins: tuple[LoopMargins, .
 
 
 def _changes(
-    loop: HeadingLoop,
-    design: HeadingDesign,
-    settings: StudySettings,
-    inputs: Mapping[str, float],
-    start: Mapping[str, float],
-    duration: float,
+    loop: HeadingLoop, design: HeadingDesign, settings: StudySettings, duration: float
 ) -> tuple[dict[str, Trajectory], dict[str, CourseChange]]:
-    courses = {"change": (settings.course_change_rad, dict(start)), "large": (settings.large_change_rad, dict(start))}
+    """Changes of course in calm water, without wind."""
+    calm, start = undisturbed_inputs(loop.model), settings.start
+    courses = {"change": (settings.course_change_rad, start), "large": (settings.large_change_rad, start)}
     if bare := without_anti_windup(design.autopilot):
         courses["large without anti-windup"] = (settings.large_change_rad, {**start, **bare})
-    begin = loop.kept_course(inputs, duration, start)
+    begin = loop.kept_course(calm, duration, start)
     runs = {
-        name: loop.run({**inputs, "heading.command": order}, duration, parameters=values, begin=begin)
+        name: loop.run({**calm, "heading.command": order}, duration, parameters=values, begin=begin)
         for name, (order, values) in courses.items()
     }
     return runs, {name: course_change(run, courses[name][0]) for name, run in runs.items()}
@@ -394,19 +434,6 @@ def _notices(
     return notices
 
 
-def unfinished(tracks: Mapping[str, TrackRun]) -> list[Notice]:
-    """Notices on tracks that were not sailed to their ends.
-
-    Parameters
-    ----------
-    tracks : mapping
-        By guidance.
-    """
-    return [
-        Notice(f"the track is not finished, {name}") for name, track in tracks.items() if not track.figures.finished
-    ]
-
-
 def _of_the_gear(ship: Model, design: HeadingDesign, kept: CourseKeeping, weather: Weather) -> list[Notice]:
     """Notices on the load of the gear in waves, and on limits of the autopilot below the gear's."""
     notices = []
@@ -417,7 +444,7 @@ def _of_the_gear(ship: Model, design: HeadingDesign, kept: CourseKeeping, weathe
             f"keeping a course in waves the rudder is at full rate {kept.rate_limited_percent:.0f} % of the time: "
             + ("the waves are more than this gear can follow" if filtered else f"{remedy} lets it rest")
         )
-    limit = {parameter.name: parameter.start for parameter in ship.parameters}.get("steering.max_angle", 0.0)
+    limit = ship.defaults.get("steering.max_angle", 0.0)
     if limit > LARGEST_RUDDER_RAD * (1 + 1e-9):
         notices.append(
             f"the autopilot orders no more than {math.degrees(LARGEST_RUDDER_RAD):.0f} deg of rudder, the angle that "

@@ -204,8 +204,7 @@ def keep_track(
     InputError
         A leg is shorter than the circle of acceptance, or the motion leaves all bounds.
     """
-    values = {parameter.name: parameter.start for parameter in loop.model.parameters}
-    length, speed = values["ship.length"], values["ship.speed"]
+    length, speed = (loop.model.defaults[f"ship.{name}"] for name in ("length", "speed"))
     _refuse_short_legs(waypoints, guidance.acceptance_lengths * length)
     first = waypoints[1] - waypoints[0]
     course = math.atan2(first[1], first[0])

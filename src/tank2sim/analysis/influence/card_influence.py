@@ -8,18 +8,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from tank2sim.analysis.ensemble.results import FigureBands
-from tank2sim.analysis.influence.figures import InfluenceFigure
 from tank2sim.analysis.influence.percent import STEP_PERCENT, change_percent, changed_together, combined_percent
 from tank2sim.analysis.influence.study import Study
 from tank2sim.analysis.tuning.result import TunedStudy
 from tank2sim.arrays import Array, Number
-from tank2sim.dynamics.card_parameters import CardParameter, JointErrors, agreed_by_name, joint_errors
+from tank2sim.dynamics.card_parameters import JointErrors, agreed_by_name, joint_errors
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice
 
@@ -28,112 +27,6 @@ CURVED = 1.5
 
 REPORTED_FROM = 0.5
 """... where either is at least this percentage of the figure. Project choice: less does not change a decision."""
-
-
-@dataclass(frozen=True, eq=False)
-class CardInfluence:
-    """Influence coefficients of a card.
-
-    Parameters
-    ----------
-    values : array (nf,)
-        Values of the figures.
-    errors : JointErrors
-        Errors of the k parameters.
-    slopes : array (nf, k)
-        Exact slopes dF/dc.
-    difference : array (nf, k)
-        K % by the 10 % difference; nan where the changed ship does not show the figure, or the parameter is zero.
-    agreed : AgreedVariation or None
-    """
-
-    ship: str
-    figures: tuple[InfluenceFigure, ...]
-    values: Array
-    errors: JointErrors
-    slopes: Array
-    difference: Array
-    agreed: AgreedVariation | None = None
-    notices: tuple[Notice, ...] = field(default=())
-
-    @property
-    def parameters(self) -> tuple[CardParameter, ...]:
-        """The parameters (k)."""
-        return self.errors.parameters
-
-    @property
-    def exact(self) -> Array:
-        """K % (nf, k) by exact slopes, 10 c/F dF/dc; nan where a figure is zero."""
-        c = np.array([parameter.value for parameter in self.parameters])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            found = STEP_PERCENT * c * self.slopes / self.values[:, None]
-        return np.where(np.isfinite(found), found, np.nan)
-
-    @property
-    def standard_errors(self) -> Array:
-        """Standard error of each figure (nf,), by the delta method: the root of J C J^T."""
-        return np.sqrt(self._variances)
-
-    @property
-    def shares(self) -> Array:
-        """Share (nf, k) of the variance of each figure that an exact parameter would remove; 0 without variance.
-
-        (J C e_k)^2 / (C_kk J C J^T), the squared correlation of figure and parameter: the first-order index of Sobol
-        (1993) of normal errors. For independent parameters it is (J_k s_k)^2 over their sum, and the shares add to one;
-        the share of a correlated parameter includes its common part.
-        """
-        C = self.errors.covariance
-        size = self._variances[:, None] * np.diag(C)
-        return np.divide((self.slopes @ C) ** 2, size, out=np.zeros_like(size), where=size > 0)
-
-    @property
-    def of_errors(self) -> str:
-        """Text on the origin of the figures' standard errors."""
-        if not self.errors.together:
-            return "standard errors of figures follow from the card's numbers, as if these were independent"
-        remainder = "" if len(self.errors.together) == len(self.parameters) else ", others as if independent"
-        count = len(self.errors.together)
-        return f"standard errors of figures are from the covariance next to the card ({count} numbers{remainder})"
-
-    @property
-    def _variances(self) -> Array:
-        found = np.einsum("ij,jk,ik->i", self.slopes, self.errors.covariance, self.slopes)
-        # Numbers that go together may leave less than rounding of what each would make of the figure alone.
-        return np.asarray(np.maximum(found, 0.0))
-
-    def reported(self) -> InfluenceStudy:
-        """Return the study that results report: parameters have their dotted keys and values in the card's file."""
-        exact, errors, shares = self.exact, self.standard_errors, self.shares
-        keys = [parameter.key for parameter in self.parameters]
-        texts = [figure.text for figure in self.figures]
-        return InfluenceStudy(
-            ship=self.ship,
-            standard_errors=self.of_errors,
-            assumed_errors=self.errors.assumed,
-            figures={
-                text: FigureErrors(value, error, dict(zip(keys, share, strict=True)))
-                for text, value, error, share in zip(
-                    texts, self.values.tolist(), errors.tolist(), shares.tolist(), strict=True
-                )
-            },
-            parameters={
-                parameter.key: CardNumber(
-                    value=parameter.value * parameter.factor,
-                    standard_error=parameter.standard_error * abs(parameter.factor),
-                    assumed=parameter.assumed,
-                    name=parameter.short,
-                )
-                for parameter in self.parameters
-            },
-            influence_percent={
-                text: {
-                    key: InfluenceCoefficient(slope, step) for key, slope, step in zip(keys, slopes, steps, strict=True)
-                }
-                for text, slopes, steps in zip(texts, exact.tolist(), self.difference.tolist(), strict=True)
-            },
-            agreed=self.agreed,
-            notices=self.notices,
-        )
 
 
 @dataclass(frozen=True)
@@ -234,8 +127,10 @@ class InfluenceStudy:
         return np.array([[one.share_of_variance[key] for key in self.parameters] for one in self.figures.values()])
 
 
-def influence(study: Study, agreed: Mapping[str, float] | None = None) -> CardInfluence:
+def influence(study: Study, agreed: Mapping[str, float] | None = None) -> InfluenceStudy:
     """Influence coefficients of every parameter of a card on the figures of a study.
+
+    Parameters are reported by their dotted keys and with their values in the card's file.
 
     Parameters
     ----------
@@ -248,14 +143,68 @@ def influence(study: Study, agreed: Mapping[str, float] | None = None) -> CardIn
         `agreed` has a name that is not a parameter of the card.
     """
     values, slopes = study.slopes_at(study.values)
-    difference = _differences(study)
-    errors = joint_errors(study.card, study.parameters)
-    whole = CardInfluence(study.card.ship.name, study.figures, study.base, errors, slopes, difference)
-    together = None
-    if agreed:
-        together = _agreed(study, whole, agreed_by_name(agreed, study.parameters))
-    notices = [*study.notices, *errors.in_words, *_not_smooth(whole), *_differing(study, values)]
-    return replace(whole, agreed=together, notices=tuple(notices))
+    difference, errors = _differences(study), joint_errors(study.card, study.parameters)
+    deviations, shares = figure_errors(slopes, errors.covariance)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        exact = STEP_PERCENT * study.values * slopes / study.base[:, None]
+    exact = np.where(np.isfinite(exact), exact, np.nan)
+    keys = [parameter.key for parameter in study.parameters]
+    each = zip(study.base.tolist(), deviations.tolist(), shares.tolist(), strict=True)
+    figures = [FigureErrors(value, error, dict(zip(keys, share, strict=True))) for value, error, share in each]
+    coefficients = [
+        dict(zip(keys, map(InfluenceCoefficient, *both), strict=True))
+        for both in zip(exact.tolist(), difference.tolist(), strict=True)
+    ]
+    texts = [figure.text for figure in study.figures]
+    notices = [*study.notices, *errors.in_words, *_not_smooth(study, exact, difference), *_differing(study, values)]
+    return InfluenceStudy(
+        ship=study.card.ship.name,
+        standard_errors=origin_of_errors(errors),
+        assumed_errors=errors.assumed,
+        figures=dict(zip(texts, figures, strict=True)),
+        parameters={
+            parameter.key: CardNumber(
+                value=parameter.value * parameter.factor,
+                standard_error=parameter.standard_error * abs(parameter.factor),
+                assumed=parameter.assumed,
+                name=parameter.short,
+            )
+            for parameter in study.parameters
+        },
+        influence_percent=dict(zip(texts, coefficients, strict=True)),
+        agreed=_agreed(study, exact, difference, agreed_by_name(agreed, study.parameters)) if agreed else None,
+        notices=tuple(notices),
+    )
+
+
+def figure_errors(slopes: Array, covariance: Array) -> tuple[Array, Array]:
+    """Standard error of each figure (nf,), by the delta method, and the share (nf, k) of its variance that an exact
+    parameter would remove; 0 without variance.
+
+    The variance is J C J^T. The share (J C e_k)^2 / (C_kk J C J^T) is the squared correlation of figure and parameter:
+    the first-order index of Sobol (1993) of normal errors. For independent parameters it is (J_k s_k)^2 over their sum,
+    and the shares add to one; the share of a correlated parameter includes its common part.
+
+    Parameters
+    ----------
+    slopes : array (nf, k)
+        J: dF/dc.
+    covariance : array (k, k)
+        C, of the parameters.
+    """
+    # Numbers that go together may leave less than rounding of what each would make of the figure alone.
+    variances = np.maximum(np.einsum("ij,jk,ik->i", slopes, covariance, slopes), 0.0)
+    size = variances[:, None] * np.diag(covariance)
+    return np.sqrt(variances), np.divide((slopes @ covariance) ** 2, size, out=np.zeros_like(size), where=size > 0)
+
+
+def origin_of_errors(errors: JointErrors) -> str:
+    """Text on the origin of the figures' standard errors, from the `errors` of the card."""
+    if not errors.together:
+        return "standard errors of figures follow from the card's numbers, as if these were independent"
+    remainder = "" if len(errors.together) == len(errors.parameters) else ", others as if independent"
+    count = len(errors.together)
+    return f"standard errors of figures are from the covariance next to the card ({count} numbers{remainder})"
 
 
 def _differences(study: Study) -> Array:
@@ -278,7 +227,7 @@ def _change(study: Study, values: Array) -> list[float]:
     return [change_percent(float(new), float(old)) for new, old in zip(figures, study.base, strict=True)]
 
 
-def _agreed(study: Study, found: CardInfluence, percent: Mapping[str, float]) -> AgreedVariation:
+def _agreed(study: Study, exact: Array, difference: Array, percent: Mapping[str, float]) -> AgreedVariation:
     names = [parameter.name for parameter in study.parameters]
     values = dict(zip(names, study.values.tolist(), strict=True))
     changed = changed_together(values, percent)
@@ -287,7 +236,7 @@ def _agreed(study: Study, found: CardInfluence, percent: Mapping[str, float]) ->
     def predicted(K: Array) -> list[float]:
         return [combined_percent(dict(zip(names, row.tolist(), strict=True)), percent) for row in K]
 
-    changes = map(AgreedChange, predicted(found.exact), predicted(found.difference), direct)
+    changes = map(AgreedChange, predicted(exact), predicted(difference), direct)
     keys = {parameter.name: parameter.key for parameter in study.parameters}
     return AgreedVariation(
         percent={keys[name]: value for name, value in percent.items()},
@@ -302,23 +251,20 @@ def _differing(study: Study, sloped: Array) -> Iterable[Notice]:
             yield Notice(f"{figure.text}: its slopes are not to be trusted, the manoeuvre has no clean event there")
 
 
-def _not_smooth(found: CardInfluence) -> list[Notice]:
-    notices = []
-    exact = found.exact
-    for row, figure in enumerate(found.figures):
-        gone, bent = [], []
-        for place, parameter in enumerate(found.parameters):
-            slope, step = exact[row, place], found.difference[row, place]
-            if parameter.value == 0 or max(abs(slope), abs(step) if math.isfinite(step) else math.inf) < REPORTED_FROM:
-                continue
-            if not math.isfinite(step):
-                gone.append(parameter.short)
-            elif slope * step <= 0 or not 1 / CURVED < abs(step / slope) < CURVED:
-                bent.append(parameter.short)
-        if gone:
-            notices.append(f"{figure.text}: 10 % more of {', '.join(gone)} and the ship does not show it any more")
-        if bent:
-            notices.append(
-                f"{figure.text} is not smooth or strongly curved in {', '.join(bent)}: slope and 10 % disagree"
-            )
-    return [Notice(text) for text in notices]
+def _not_smooth(study: Study, slopes: Array, steps: Array) -> list[Notice]:
+    given = study.values != 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        felt = given & ~(np.fmax(np.abs(slopes), np.where(np.isfinite(steps), np.abs(steps), np.inf)) < REPORTED_FROM)
+        ratio = np.abs(steps / slopes)
+    gone = felt & ~np.isfinite(steps)
+    bent = felt & np.isfinite(steps) & ~((slopes * steps > 0) & (ratio > 1 / CURVED) & (ratio < CURVED))
+    texts = []
+    for figure, lost, curved in zip(study.figures, gone, bent, strict=True):
+        lost_names, curved_names = (
+            ", ".join(study.parameters[place].short for place in np.flatnonzero(row)) for row in (lost, curved)
+        )
+        if lost_names:
+            texts.append(f"{figure.text}: 10 % more of {lost_names} and the ship does not show it any more")
+        if curved_names:
+            texts.append(f"{figure.text} is not smooth or strongly curved in {curved_names}: slope and 10 % disagree")
+    return [Notice(text) for text in texts]

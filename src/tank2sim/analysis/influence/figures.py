@@ -28,76 +28,86 @@ class FigureKind:
     description: str
 
 
-FIGURE_KINDS: dict[str, FigureKind] = {
-    kind.name: kind
-    for kind in (
-        FigureKind("K_per_s", STRAIGHT, "Nomoto's K"),
-        FigureKind("T_s", STRAIGHT, "Nomoto's T = T1 + T2 - T3"),
-        FigureKind("T1_s", STRAIGHT, "time constant of the slower mode"),
-        FigureKind("T2_s", STRAIGHT, "time constant of the faster mode"),
-        FigureKind("T3_s", STRAIGHT, "time constant of the zero"),
-        FigureKind("K_prime", STRAIGHT, "K L/U"),
-        FigureKind("T_prime", STRAIGHT, "T U/L"),
-        FigureKind("criterion_C", STRAIGHT, "criterion of straight-line stability, prime system"),
-        FigureKind("steady_radius_m", STEADY, "radius of the steady turn, U/|r|"),
-        FigureKind("steady_diameter_m", STEADY, "its diameter"),
-        FigureKind("steady_rate_degps", STEADY, "yaw rate of the steady turn, positive to starboard"),
-        FigureKind(
-            "steady_drift_deg", STEADY, "drift angle of the steady turn, positive when the bow points to starboard"
-        ),
-        FigureKind("steady_speed_mps", STEADY, "speed in the steady turn"),
-        FigureKind("speed_loss_percent", STEADY, "loss of speed in the steady turn"),
-        FigureKind("advance_m", TURN, "advance at 90 deg"),
-        FigureKind("transfer_m", TURN, "transfer at 90 deg"),
-        FigureKind("tactical_diameter_m", TURN, "tactical diameter at 180 deg"),
-        FigureKind("advance_lengths", TURN, "advance over L"),
-        FigureKind("tactical_diameter_lengths", TURN, "tactical diameter over L"),
-        FigureKind("time_90_s", TURN, "time to 90 deg"),
-        FigureKind("time_180_s", TURN, "time to 180 deg"),
-        *(FigureKind(f"overshoot_{n}_deg", ZIGZAG, f"overshoot {n}") for n in (1, 2, 3, 4)),
-        FigureKind("initial_turning_distance_m", ZIGZAG, "distance to the second execute"),
-        FigureKind("initial_turning_lengths", ZIGZAG, "the same over L"),
-        FigureKind("initial_turning_time_s", ZIGZAG, "time to the second execute"),
-    )
+_OF_SHIPS: dict[str, dict[str, str]] = {
+    STRAIGHT: {
+        "K_per_s": "Nomoto's K",
+        "T_s": "Nomoto's T = T1 + T2 - T3",
+        "T1_s": "time constant of the slower mode",
+        "T2_s": "time constant of the faster mode",
+        "T3_s": "time constant of the zero",
+        "K_prime": "K L/U",
+        "T_prime": "T U/L",
+        "criterion_C": "criterion of straight-line stability, prime system",
+    },
+    STEADY: {
+        "steady_radius_m": "radius of the steady turn, U/|r|",
+        "steady_diameter_m": "its diameter",
+        "steady_rate_degps": "yaw rate of the steady turn, positive to starboard",
+        "steady_drift_deg": "drift angle of the steady turn, positive when the bow points to starboard",
+        "steady_speed_mps": "speed in the steady turn",
+        "speed_loss_percent": "loss of speed in the steady turn",
+    },
+    TURN: {
+        "advance_m": "advance at 90 deg",
+        "transfer_m": "transfer at 90 deg",
+        "tactical_diameter_m": "tactical diameter at 180 deg",
+        "advance_lengths": "advance over L",
+        "tactical_diameter_lengths": "tactical diameter over L",
+        "time_90_s": "time to 90 deg",
+        "time_180_s": "time to 180 deg",
+    },
+    ZIGZAG: {
+        **{f"overshoot_{n}_deg": f"overshoot {n}" for n in (1, 2, 3, 4)},
+        "initial_turning_distance_m": "distance to the second execute",
+        "initial_turning_lengths": "the same over L",
+        "initial_turning_time_s": "time to the second execute",
+    },
 }
-"""All kinds of figures by name."""
 
-_CRAFT_TURN = (
-    ("advance_m", "advance at 90 deg"),
-    ("transfer_m", "transfer at 90 deg"),
-    ("tactical_diameter_m", "tactical diameter at 180 deg"),
-    ("time_90_s", "time to 90 deg"),
-    ("time_180_s", "time to 180 deg"),
-    ("steady_diameter_m", "diameter of the steady turn, 2 U/|r|, after 540 deg"),
-    ("steady_rate_degps", "yaw rate of the steady turn, positive to starboard"),
-    ("steady_speed_mps", "speed in the steady turn"),
-)
-
-CRAFT_FIGURE_KINDS: dict[str, dict[str, FigureKind]] = {
-    word: {name: FigureKind(name, family, description) for name, description in described}
-    for word, family, described in (
-        ("straight", STRAIGHT_RUN, (("final_speed_mps", "speed of 30 lengths at the cruising speed from rest"),)),
-        ("difference", DIFFERENCE, _CRAFT_TURN),
-        (
-            "spin",
-            SPIN,
-            (
-                ("time_180_s", "time to 180 deg"),
-                ("time_360_s", "time to 360 deg"),
-                ("final_rate_degps", "yaw rate after 720 deg, positive to starboard"),
-            ),
-        ),
-    )
+_OF_CRAFT: dict[str, dict[str, str]] = {
+    STRAIGHT_RUN: {"final_speed_mps": "speed of 30 lengths at the cruising speed from rest"},
+    DIFFERENCE: {
+        "advance_m": "advance at 90 deg",
+        "transfer_m": "transfer at 90 deg",
+        "tactical_diameter_m": "tactical diameter at 180 deg",
+        "time_90_s": "time to 90 deg",
+        "time_180_s": "time to 180 deg",
+        "steady_diameter_m": "diameter of the steady turn, 2 U/|r|, after 540 deg",
+        "steady_rate_degps": "yaw rate of the steady turn, positive to starboard",
+        "steady_speed_mps": "speed in the steady turn",
+    },
+    SPIN: {
+        "time_180_s": "time to 180 deg",
+        "time_360_s": "time to 360 deg",
+        "final_rate_degps": "yaw rate after 720 deg, positive to starboard",
+    },
 }
-"""Manoeuvre of a craft with thrusters, by its word, to its figures by name."""
 
 ARGUMENTS = {
     STRAIGHT: ("", "no argument"),
     STEADY: ("@20", "the rudder in deg, positive to starboard"),
     TURN: ("@35", "the rudder in deg, positive to starboard"),
     ZIGZAG: ("@20/20", "rudder/heading in deg"),
+    STRAIGHT_RUN: ("@straight:600", "revolutions in rpm"),
+    DIFFERENCE: ("@difference:200", "port less starboard in rpm"),
+    SPIN: ("@spin:400", "revolutions in rpm"),
 }
-"""Family to an example of its argument, and the meaning of the argument."""
+"""Family to an example of its argument, whose numbers may be others, and the meaning of the argument."""
+
+_NUMBER = r"([+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?)"
+
+
+def _word(family: str) -> str:
+    """The beginning of the argument of a family of craft; empty for ships."""
+    return ARGUMENTS[family][0].partition(":")[0] if family in _OF_CRAFT else ""
+
+
+FIGURE_KINDS: dict[str, FigureKind] = {
+    f"{name}{_word(family)}": FigureKind(name, family, description)
+    for family, described in (_OF_SHIPS | _OF_CRAFT).items()
+    for name, description in described.items()
+}
+"""All kinds of figures by name; of a craft with thrusters with its manoeuvre: ``final_speed_mps@straight``."""
 
 
 def forms() -> str:
@@ -106,13 +116,14 @@ def forms() -> str:
     for family, (example, words) in ARGUMENTS.items():
         names = ", ".join(kind.name for kind in FIGURE_KINDS.values() if kind.family == family)
         parts.append(f"{family} ({words}{', as ' + example if example else ''}): {names}")
-    for word, kinds in CRAFT_FIGURE_KINDS.items():
-        parts.append(f"of a craft with thrusters @{word}:RPM: {', '.join(kinds)}")
     return "; ".join(parts)
 
 
 FigureManoeuvre = Turn | Zigzag | StraightRun | DifferenceTurn | Spin
-_BY_THRUSTERS: dict[str, type[StraightRun | DifferenceTurn | Spin]] = {
+_MANOEUVRES: dict[str, type[FigureManoeuvre]] = {
+    STEADY: Turn,
+    TURN: Turn,
+    ZIGZAG: Zigzag,
     STRAIGHT_RUN: StraightRun,
     DIFFERENCE: DifferenceTurn,
     SPIN: Spin,
@@ -130,11 +141,8 @@ class InfluenceFigure:
     @property
     def manoeuvre(self) -> FigureManoeuvre | None:
         """The simulated manoeuvre: for a steady turn the turning circle to it; None on a straight course."""
-        if self.kind.family in _BY_THRUSTERS:
-            return _BY_THRUSTERS[self.kind.family](*self.angles)
-        if self.kind.family == STRAIGHT:
-            return None
-        return Zigzag(*self.angles) if self.kind.family == ZIGZAG else Turn(*self.angles)
+        made = _MANOEUVRES.get(self.kind.family)
+        return made(*self.angles) if made else None
 
 
 def parse_figure(text: str, argument: str = "figures") -> InfluenceFigure:
@@ -148,40 +156,28 @@ def parse_figure(text: str, argument: str = "figures") -> InfluenceFigure:
         The figure does not exist, or its argument is missing, not allowed or out of bounds.
     """
     name, at, value = text.strip().partition("@")
-    if value.partition(":")[0] in CRAFT_FIGURE_KINDS:
-        return _craft_figure(text.strip(), name, value, argument)
-    kind = FIGURE_KINDS.get(name)
-    if kind is None:
-        close = difflib.get_close_matches(name, FIGURE_KINDS, n=1)
+    word, by_thrusters, _ = value.partition(":")
+    key = f"{name}@{word}" if by_thrusters else name
+    if (kind := FIGURE_KINDS.get(key)) is None:
+        close = difflib.get_close_matches(key, FIGURE_KINDS, n=1)
         remedy = f"did you mean {close[0]}?" if close else f"there are: {forms()}"
         raise ArgumentError(argument, text, "is not a figure", remedy)
     example, words = ARGUMENTS[kind.family]
-    number = r"([+-]?\d+(?:\.\d+)?)"
-    pattern = {STRAIGHT: "", ZIGZAG: f"{number}/{number}"}.get(kind.family, number)
-    found = re.fullmatch(pattern, value)
-    if found is None or bool(at) != bool(example):
+    numbers = _numbers(example, f"{at}{value}")
+    if numbers is None or (by_thrusters and not 0 < abs(numbers[0]) < math.inf):
         raise ArgumentError(argument, text, "cannot be read", f"give {name}{example} ({words})")
-    angles = tuple(float(group) for group in found.groups())
-    if any(not 0 < abs(angle) < 90 for angle in angles) or (len(angles) == 2 and angles[1] < 0):
+    if by_thrusters:
+        return InfluenceFigure(text.strip(), kind, (to_si("n_rpm", numbers[0])[1],))
+    if any(not 0 < abs(angle) < 90 for angle in numbers) or min(numbers[1:], default=0.0) < 0:
         remedy = "the rudder lies between 0 and 90 deg to either side, the heading of a zigzag between 0 and 90 deg"
         raise ArgumentError(argument, text, "has an angle out of bounds", remedy)
-    return InfluenceFigure(text.strip(), kind, tuple(math.radians(angle) for angle in angles))
+    return InfluenceFigure(text.strip(), kind, tuple(map(math.radians, numbers)))
 
 
-def _craft_figure(text: str, name: str, value: str, argument: str) -> InfluenceFigure:
-    word, _, number = value.partition(":")
-    kinds = CRAFT_FIGURE_KINDS[word]
-    if name not in kinds:
-        close = difflib.get_close_matches(name, kinds, n=1)
-        remedy = f"did you mean {close[0]}?" if close else f"there are: {', '.join(kinds)}"
-        raise ArgumentError(argument, text, f"is not a figure of {word}", remedy)
-    try:
-        rpm = float(number)
-    except ValueError:
-        rpm = 0.0
-    if not rpm or not math.isfinite(rpm):
-        raise ArgumentError(argument, text, "cannot be read", f"give revolutions in rpm, as {name}@{word}:400")
-    return InfluenceFigure(text, kinds[name], (to_si("n_rpm", rpm)[1],))
+def _numbers(example: str, argument: str) -> list[float] | None:
+    """The numbers of an argument that is as the example; None of another."""
+    found = re.fullmatch(re.sub(r"\d+", lambda _: _NUMBER, example), argument)
+    return None if found is None else [float(group) for group in found.groups()]
 
 
 _ORDINALS = ("first", "second", "third", "fourth")

@@ -61,6 +61,6 @@ def combined_percent(influence: Mapping[str, float], agreed: Mapping[str, float]
     return sum(percent * influence[name] for name, percent in agreed.items()) / STEP_PERCENT
 
 
-def changed_together(values: Mapping[str, float], agreed: Mapping[str, float], times: float = 1.0) -> dict[str, float]:
-    """Coefficients after `times` an agreed variation (Kc %, by name): c (1 + times Kc/100)."""
-    return {name: value * (1 + times * agreed.get(name, 0.0) / 100) for name, value in values.items()}
+def changed_together(values: Mapping[str, float], agreed: Mapping[str, float]) -> dict[str, float]:
+    """Coefficients after an agreed variation (Kc %, by names): c (1 + Kc/100)."""
+    return {name: value * (1 + agreed.get(name, 0.0) / 100) for name, value in values.items()}

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from functools import cached_property
 
 import casadi as ca
 import numpy as np
 
+from tank2sim.analysis.equilibrium import EquilibriumFigures, straight_courses
 from tank2sim.analysis.influence.figures import STEADY, STRAIGHT, FigureManoeuvre, InfluenceFigure
 from tank2sim.analysis.influence.motion import HALF_TURN, MotionSlopes, overshoots_in
-from tank2sim.analysis.linearisation import straight_course
+from tank2sim.analysis.linearisation import slow_slopes
 from tank2sim.analysis.stability.straight_line import settled_states, steering_constants
 from tank2sim.analysis.turning.diagram import hull_states
 from tank2sim.arrays import Array
@@ -61,8 +62,7 @@ class Study:
         self.parameters: tuple[CardParameter, ...] = card_parameters(card, self.model)
         self.values: Array = np.array([parameter.value for parameter in self.parameters])
         self._integrator = Integrator(self.model)
-        card_values = dict(zip(self.model.parameter_names, self.model.parameter_values().tolist(), strict=True))
-        self._length, self._speed = card_values["ship.length"], card_values["ship.speed"]
+        self._length, self._speed = (self.model.defaults[f"ship.{name}"] for name in ("length", "speed"))
         self._places = [self.model.parameter_names.index(parameter.name) for parameter in self.parameters]
         self._equilibria: dict[float, Array] = {}
         self._long_enough: dict[FigureManoeuvre, float] = {}
@@ -87,7 +87,7 @@ class Study:
 
     @cached_property
     def _straight(self) -> tuple[EquilibriumFigures, Array]:
-        return straight_courses(self.model)
+        return straight_courses(self.model, straight_figures(self.model))
 
     @property
     def notices(self) -> tuple[Notice, ...]:
@@ -219,50 +219,6 @@ def last_event(given: Figures, names: Collection[str]) -> float:
     return float(executes[count - 1] + peaks[count - 1] if count else executes[0])
 
 
-_ACCURACY = 1e-9
-"""Residuals, scaled to about one, of an accepted equilibrium; Newton's last step is far below it."""
-
-
-class EquilibriumFigures:
-    """An equilibrium of a model, f(z, p) = 0, and its values g(z, p) with their exact slopes by the parameters.
-
-    By the implicit function theorem dg/dp = g_p - g_z f_z^-1 f_p, which CasADi derives through its ``rootfinder``.
-
-    Parameters
-    ----------
-    unknown, residual : SX (nz, 1)
-        f(z, p) = 0 in scaled unknowns z, of these, the inputs and the parameters of the model.
-    shown : mapping
-        Name of each value to its expression.
-    """
-
-    def __init__(self, model: Model, unknown: ca.SX, residual: ca.SX, shown: Mapping[str, ca.SX]):
-        self.names, self._model = tuple(shown), model
-        given = ca.vertcat(model.u, model.p)
-        equations = {"x": unknown, "p": given, "g": residual}
-        options = {"abstol": 1e-13, "error_on_fail": False, "max_iter": 30}
-        root = ca.rootfinder("rest", "newton", equations, options)
-        arguments = [unknown, model.u, model.p]
-        self._residual = ca.Function("residual", arguments, [residual])
-        show = ca.Function("shown", arguments, [ca.vcat(list(shown.values()))], {"cse": True})
-        z, u, p = (ca.MX.sym(name, len_) for name, len_ in zip("zup", (s.numel() for s in arguments), strict=True))
-        found = root(z, ca.vertcat(u, p))
-        values = show(found, u, p)
-        self._values = ca.Function("values", [z, u, p], [found, values])
-        self._slopes = ca.Function("slopes", [z, u, p], [ca.jacobian(values, p)])
-
-    def at(self, near: Array, inputs: Mapping[str, float], p: Array) -> tuple[Array, Array] | None:
-        """Unknowns (nz,) and values (n,) at the equilibrium near `near`; None if there is none."""
-        u = self._model.input_values(inputs)
-        z, values = (np.array(value).ravel() for value in self._values(near, u, p))
-        residual = np.array(self._residual(z, u, p))
-        return (z, values) if np.all(np.abs(residual) < _ACCURACY) and np.isfinite(values).all() else None
-
-    def slopes(self, z: Array, inputs: Mapping[str, float], p: Array) -> Array:
-        """Slopes (n, np) of the values by all parameters, at an equilibrium."""
-        return np.array(self._slopes(z, self._model.input_values(inputs), p))
-
-
 def turning_states(model: Model) -> tuple[str, ...]:
     """States that are constant in a steady turn: hull and steering gear."""
     return tuple(dict.fromkeys((*hull_states(model), *(state.name for state in model.states if state.steady))))
@@ -284,11 +240,10 @@ def steady_turns(model: Model) -> EquilibriumFigures:
     x = ca.vcat([fixed[name] for name in model.state_names])
     while ca.depends_on(x, model.x):  # a rudder follows a telemotor, which follows the order
         x = ca.substitute(x, model.x, x)
-    derivative = {state.name: state.derivative for state in model.states}
-    rates = model.expand(ca.vcat([model.symbol(derivative[name]) for name in names]))
+    rates = model.expand(model.symbols(model.derivatives_of(names)))
     time = model.symbol("ship.length") / model.symbol("ship.speed")
     scaled = rates * time / scale
-    place = ca.vcat([model.symbol(name) for name in ("motion.psi", "motion.x", "motion.y")])
+    place = model.symbols(("motion.psi", "motion.x", "motion.y"))
     felt = ca.sumsqr(ca.jacobian(scaled, place))
     residual, felt = ca.substitute([scaled, felt], [model.x], [x])
     u, v, r = (fixed[name] for name in ("motion.u", "motion.v", "motion.r"))
@@ -318,38 +273,18 @@ def turn_figures(u: float, v: float, r: float, side: float, approach: float) -> 
     return figures, np.array([by_radius, 2 * by_radius, by_rate, by_drift, by_speed, -100 / approach * by_speed])
 
 
-def straight_courses(model: Model) -> tuple[EquilibriumFigures, Array]:
-    """The straight course at the speed of expansion with Nomoto's coefficients, the criterion and its state.
-
-    Unknowns are v/u0 and the rudder angle. The values have the names of
-    :mod:`tank2sim.analysis.stability.straight_line`.
-    """
-    unknown = ca.SX.sym("z", 2)
-    speed0 = model.symbol("ship.speed")
-    nominal = {"motion.v": unknown[0] * speed0, "rudder.angle": unknown[1]}
-    x = ca.vcat([nominal.get(state.name, ca.SX(state.start)) for state in model.states])
-    time = model.symbol("ship.length") / speed0
-    motion = model.expand(ca.vcat([model.symbol("motion.vdot") * time / speed0, model.symbol("motion.rdot") * time**2]))
-    shown = _linear_figures(model)
-    residual, values = ca.substitute([motion, ca.vcat(list(shown.values()))], [model.x], [x])
-    point = straight_course(model)
-    at = dict(zip(model.state_names, point.x.tolist(), strict=True))
-    speed = model.parameter_values()[model.parameter_names.index("ship.speed")]
-    near = np.array([at["motion.v"] / speed, at["rudder.angle"]])
-    return EquilibriumFigures(model, unknown, residual, dict(zip(shown, ca.vertsplit(values), strict=True))), near
-
-
-def _linear_figures(model: Model) -> dict[str, ca.SX]:
-    """Figures of the linearised ship, of x, u and p."""
-    A, B = _reduced(model, ["motion.vdot", "motion.rdot"])
-    K, total, product, T3 = steering_constants(A, B, ca.DM([[0, 1]]))
+def straight_figures(model: Model) -> dict[str, ca.SX]:
+    """Nomoto's coefficients and the criterion of the linearised ship, of x, u and p, by the names of
+    :mod:`tank2sim.analysis.influence.figures`."""
+    settled = settled_states(model)
+    slopes = slow_slopes(model, ["motion.vdot", "motion.rdot"], ["motion.v", "motion.r", "rudder.angle"], settled)
+    K, total, product, T3 = steering_constants(slopes[:, :2], slopes[:, 2], ca.DM([[0, 1]]))
     discriminant = total**2 - 4 * product
     T1 = 0.5 * (total + ca.sign(total) * ca.sqrt(discriminant))  # nan where the modes oscillate
-    slopes, _ = _reduced(model, ["force.Y", "force.N"])
     length, density = model.symbol("ship.length"), model.symbol("ship.water_density")
     speed2 = model.symbol("motion.u") ** 2 + model.symbol("motion.v") ** 2
     time = length / ca.sqrt(speed2)
-    determinant = slopes[0, 0] * slopes[1, 1] - slopes[0, 1] * slopes[1, 0]
+    determinant = ca.det(slow_slopes(model, ["force.Y", "force.N"], ["motion.v", "motion.r"], settled))
     return {
         "K_per_s": K,
         "T_s": total - T3,
@@ -360,21 +295,3 @@ def _linear_figures(model: Model) -> dict[str, ca.SX]:
         "T_prime": (total - T3) / time,
         "criterion_C": determinant / (0.25 * density**2 * length**6 * speed2),
     }
-
-
-def _reduced(model: Model, values: Sequence[str]) -> tuple[ca.SX, ca.SX]:
-    """Slopes (n, 2) by v and r and (n, 1) by the rudder, with :func:`settled_states` eliminated."""
-    settled = settled_states(model)
-    derivative = {state.name: state.derivative for state in model.states}
-    rows = model.expand(
-        ca.vcat([model.symbol(name) for name in (*values, *(derivative[settled_state] for settled_state in settled))])
-    )
-    columns = ca.vcat([model.symbol(name) for name in ("motion.v", "motion.r", *settled, "rudder.angle")])
-    whole = ca.jacobian(rows, columns)
-    n = len(values)
-    kept = [0, 1, columns.numel() - 1]
-    reduced = whole[:n, kept]
-    if settled:
-        inner = list(range(2, columns.numel() - 1))
-        reduced = reduced - whole[:n, inner] @ ca.solve(whole[n:, inner], whole[n:, kept])
-    return reduced[:, :2], reduced[:, 2]

@@ -11,28 +11,24 @@ so that a K above 0 turns to starboard where the thrusters at port run faster.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import Any
 
-import casadi as ca
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import root
 
 from tank2sim.analysis.ensemble.questions import ShipText, each_ship
 from tank2sim.analysis.ensemble.results import StabilityBands
-from tank2sim.analysis.linearisation import OperatingPoint
-from tank2sim.analysis.stability.straight_line import steering_constants
+from tank2sim.analysis.stability.straight_line import nomoto, sorted_modes
+from tank2sim.analysis.turning.diagram import TurningEquations
 from tank2sim.arrays import Array, ComplexNumber, Unbounded
 from tank2sim.cards.card import SteeredCard
+from tank2sim.cards.form import ThrusterSection
 from tank2sim.dynamics.build import build
-from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.notices import Notice
 from tank2sim.simulation.ensemble import Ask, MemberResult
-from tank2sim.simulation.thruster_manoeuvres import thruster_sides
 from tank2sim.units import from_si, to_si
 
 SPEED_SHARES = (0.25, 0.5, 0.75, 0.95)
@@ -51,8 +47,6 @@ degree for each length, which wind, waves and errors of a few per cent in its co
 
 NO_RUDDER = "the criteria of IMO MSC.137(76) and the spirals are of a rudder, and are not judged"
 
-_MOTION = ("motion.u", "motion.v", "motion.r")
-_RATES = ("motion.udot", "motion.vdot", "motion.rdot")
 _SMALL = 1e-6
 """Largest rate of a steady motion over the rate's scale: rounding of the search."""
 
@@ -178,8 +172,7 @@ class OfCraft:
         def figures(values: Mapping[str, float]) -> MemberResult:
             member = craft.drawn(values)
             run, highest = member.straight(self.speed_mps), member.highest_speed(card.model.speed_mps)
-            mean = to_si("n_rpm", run.revolutions_rpm)[1]
-            turn = member.turn(run, 2 * min(member.high - mean, mean - member.low))
+            turn = member.turn(run, 1.0)
             return MemberResult(
                 {
                     "growth_per_s": max(mode.real for mode in (*run.eigenvalues, *run.steering_modes)),
@@ -209,7 +202,7 @@ def keeps_nearly_straight(run: CraftAtSpeed, turns: Sequence[SteadyCraftTurn], l
 
 
 class CraftMotions:
-    """Steady motions of a craft, by the revolutions of its sides.
+    """Steady motions of a craft, by the revolutions of its sides, with :class:`.TurningEquations`.
 
     Raises
     ------
@@ -218,114 +211,49 @@ class CraftMotions:
     """
 
     def __init__(self, card: SteeredCard) -> None:
-        # Twice the bounds, so that the slopes at the largest revolutions follow the thrust curve.
-        free = [
-            thruster.model_copy(
-                update={
-                    "time_constant_s": None,
-                    "dead_band_radps": 0.0,
-                    "max_radps": 2 * thruster.max_radps,
-                    "max_astern_radps": -2 * thruster.lowest_radps,
-                }
-            )
-            for thruster in card.thrusters
-        ]
-        self.model = model = build(replace(card, thrusters=tuple(free)))
-        self.sides = thruster_sides(model)
-        if not {1.0, -1.0} <= set(self.sides.values()):
+        self.model = build(replace(card, thrusters=tuple(map(_without_lag, card.thrusters))))
+        self._equations = TurningEquations(self.model, free=True)
+        sides = self._equations.sides
+        if not {1.0, -1.0} <= set(sides.values()):
             problem = "is not steered by thrusters at both sides, and has no rudder"
             raise InputError(card.source, "thrusters", problem, "give one at port and one at starboard")
-        steering = [one for one in card.thrusters if f"thrusters.{one.name}.command" in self.sides]
+        steering = [one for one in card.thrusters if f"thrusters.{one.name}.command" in sides]
         self.low, self.high = max(one.lowest_radps for one in steering), min(one.max_radps for one in steering)
-        self.p = model.parameter_values()
-        self._begin = np.array(model.initial(self.p)).ravel()
-        self._calm = model.input_values(undisturbed_inputs(model))
-        self._moved = [model.state_names.index(name) for name in _MOTION]
-        self._ordered = [model.input_names.index(name) for name in self.sides]
-        rates = model.expand(ca.vcat([model.symbol(name) for name in _RATES]))
-        self._rates = ca.Function("rates", [model.x, model.u, model.p], [rates])
-        by = [ca.vcat([model.symbol(name) for name in names]) for names in (_MOTION, self.sides)]
-        slopes = [ca.jacobian(rates, symbols) for symbols in by]
-        self._jacobians = ca.Function("slopes", [model.x, model.u, model.p], slopes)
+        self.p = self.model.parameter_values()
 
     def drawn(self, values: Mapping[str, float]) -> CraftMotions:
         """The craft with other parameters, by name; names that the model lacks (lags) do not matter here."""
-        other = copy(self)
-        known = set(self.model.parameter_names)
+        other, known = copy(self), set(self.model.parameter_names)
         other.p = self.model.parameter_values({name: value for name, value in values.items() if name in known})
-        other._begin = np.array(self.model.initial(other.p)).ravel()
         return other
 
-    def point(self, motion: Array, mean: float, difference: float) -> OperatingPoint:
-        """The craft in a motion with revolutions.
-
-        Parameters
-        ----------
-        motion : array (3,)
-            u, v (m/s) and r (rad/s).
-        mean, difference : float
-            Mean revolutions, and port less starboard, rad/s.
-        """
-        x, inputs = self._begin.copy(), self._calm.copy()
-        x[self._moved] = motion
-        inputs[self._ordered] = [mean + side * difference / 2 for side in self.sides.values()]
-        return OperatingPoint(x, inputs, self.p)
-
-    def rates(self, motion: Array, mean: float, difference: float) -> Array:
-        """du/dt, dv/dt, dr/dt (3,).
-
-        Parameters
-        ----------
-        motion, mean, difference
-            As of :meth:`point`.
-        """
-        point = self.point(motion, mean, difference)
-        return np.array(self._rates(point.x, point.u, point.p)).ravel()
-
-    def _slopes(self, point: OperatingPoint) -> tuple[Array, Array]:
-        """Accelerations by the motion (3, 3) and by the revolutions of the sides (3, m)."""
-        by_motion, by_revolutions = self._jacobians(point.x, point.u, point.p)
-        return np.array(by_motion), np.array(by_revolutions)
-
     def highest_speed(self, about: float) -> float:
-        """Speed (m/s) that the largest revolutions hold on a straight course.
+        """Speed (m/s) that the largest revolutions hold on a straight course, with the effects of the card.
 
         Parameters
         ----------
         about : float
             A speed from which it is sought, m/s.
         """
-        ahead = self._solved(
-            lambda z: self.rates(np.array([z[0], z[1], 0.0]), self.high, z[2]), np.array([about, 0.0, 0.0])
-        )
-        return float(ahead[0])
+        return self._held({"motion.r": 0.0, "mean": self.high}, {"motion.u": about}).values["motion.u"]
 
     def straight(self, speed: float) -> CraftAtSpeed:
         """The straight run at a speed, m/s."""
-        mean, difference, sway = self._solved(
-            lambda z: self.rates(np.array([speed, z[2], 0.0]), z[0], z[1]), np.array([0.5 * self.high, 0.0, 0.0])
-        )
-        point = self.point(np.array([speed, sway, 0.0]), mean, difference)
-        A, B = self._slopes(point)
-        by_difference = B @ np.array([side / 2 for side in self.sides.values()])
-        modes = _sorted(np.linalg.eigvals(A[1:, 1:]))
-        K, total, product, T3 = map(
-            float, steering_constants(A[1:, 1:], by_difference[1:, None], np.array([[0.0, 1.0]]))
-        )
-        real = total**2 >= 4 * product
-        T1 = 0.5 * (total + math.copysign(math.sqrt(total**2 - 4 * product), total)) if real else None
-        eigenvalues = _sorted(np.linalg.eigvals(A))
+        run = self._held({"motion.u": speed, "motion.r": 0.0}, {"mean": 0.5 * self.high})
+        A, b = run.slopes[:, : len(run.slopes)], run.slopes[:, -1:]
+        modes, eigenvalues = sorted_modes(A[1:, 1:]), sorted_modes(A)
+        found = nomoto(A[1:3, 1:3], b[1:3], np.array([[0.0, 1.0]]))
         return CraftAtSpeed(
             speed_mps=speed,
-            revolutions_rpm=from_si("n_rpm", float(mean)),
+            revolutions_rpm=from_si("n_rpm", run.values["mean"]),
             eigenvalues=eigenvalues,
             steering_modes=modes,
             surge_time_constant_s=float(-1 / A[0, 0]) if A[0, 0] < 0 else None,
-            K=K,
-            T_s=total - T3,
-            T1_s=T1,
-            T2_s=product / T1 if T1 else None,
-            T3_s=T3,
+            K=found.K_per_s,
+            T_s=found.T_s,
+            T1_s=found.T1_s,
+            T2_s=found.T2_s,
+            T3_s=found.T3_s,
             stable=all(mode.real < 0 for mode in (*eigenvalues, *modes)),
         )
 
@@ -334,24 +262,20 @@ class CraftMotions:
 
         A craft that is unstable on a straight course turns without a difference, too: that turn is the first.
         """
-        mean = to_si("n_rpm", run.revolutions_rpm)[1]
-        most = 2 * min(self.high - mean, mean - self.low)
         shares = DIFFERENCE_SHARES if run.stable else (0.0, *DIFFERENCE_SHARES)
-        found = [self.turn(run, share * most) for share in shares]
+        found = [self.turn(run, share) for share in shares]
         return [turn for turn in found if turn is not None]
 
-    def turn(self, run: CraftAtSpeed, difference: float) -> SteadyCraftTurn | None:
-        """The steady turn to starboard by a `difference` (rad/s) about the revolutions of a straight run."""
+    def turn(self, run: CraftAtSpeed, share: float) -> SteadyCraftTurn | None:
+        """The steady turn to starboard by a share of the largest difference about the revolutions of a straight run."""
         mean = to_si("n_rpm", run.revolutions_rpm)[1]
+        difference = share * 2 * min(self.high - mean, mean - self.low)
         for curvature in _CURVATURES:
             rate = curvature * run.speed_mps / self.p[self.model.parameter_names.index("ship.length")]
-            start = np.array([run.speed_mps, -_DRIFT * run.speed_mps, rate])
-            solved = root(lambda z: self.rates(z, mean, difference), start)
-            u, v, r = map(float, solved.x)
-            if not solved.success or u <= 0 or r <= _SMALL * rate:
-                continue
-            A, _ = self._slopes(self.point(solved.x, mean, difference))
-            if np.linalg.eigvals(A).real.max() < 0:
+            near = {"motion.u": run.speed_mps, "motion.v": -_DRIFT * run.speed_mps, "motion.r": rate}
+            turn = self._steady({"mean": mean, "difference": difference}, near)
+            u, v, r = (turn.values[name] for name in ("motion.u", "motion.v", "motion.r"))
+            if turn.converged and u > 0 and r > _SMALL * rate and turn.growth_per_s < 0:
                 speed = math.hypot(u, v)
                 return SteadyCraftTurn(
                     difference_rpm=from_si("n_rpm", difference),
@@ -362,14 +286,53 @@ class CraftMotions:
                 )
         return None
 
-    def _solved(self, rates: Callable[[Array], Array], start: Array) -> Array:
-        """Where the accelerations vanish; refused if nowhere near the start."""
-        found = root(rates, start)
-        if not found.success and np.abs(found.fun).max() > _SMALL:
+    def _held(self, given: Mapping[str, float], near: Mapping[str, float]) -> _SteadyMotion:
+        """As :meth:`_steady`; refused if there is none near the start."""
+        found = self._steady(given, near)
+        if not found.converged and found.residual > _SMALL:
             problem = "has no steady motion with these thrusters"
             raise InputError(self.model.origin, "", problem, "check thrust and damping, or give another speed")
-        return np.asarray(found.x, dtype=float)
+        return found
+
+    def _steady(self, given: Mapping[str, float], near: Mapping[str, float]) -> _SteadyMotion:
+        """The steady motion with the values `given` by name, from others that are `near` (else zero)."""
+        equations = self._equations
+        names = (*equations.names, *equations.controls)
+        start = np.array([{**near, **given}.get(name, 0.0) for name in names]) / equations.scale
+        unknown = [place for place, name in enumerate(names) if name not in given]
+
+        def at(values: Array) -> Array:
+            y = start.copy()
+            y[unknown] = values
+            return y
+
+        found = root(lambda values: np.array(equations.function(at(values), self.p)[0]).ravel(), start[unknown])
+        y = at(found.x)
+        slopes = np.array(equations.function(y, self.p)[1]) / equations.ship_time / equations.scale
+        return _SteadyMotion(
+            values=dict(zip(names, (y * equations.scale).tolist(), strict=True)),
+            slopes=slopes * equations.scale[: len(slopes), None],
+            converged=bool(found.success),
+            residual=float(np.abs(found.fun).max()),
+        )
 
 
-def _sorted(values: npt.NDArray[Any]) -> tuple[complex, ...]:
-    return tuple(complex(value) for value in sorted(values, key=lambda value: -value.real))
+def _without_lag(thruster: ThrusterSection) -> ThrusterSection:
+    """A thruster at once at its order, with twice the bounds: slopes at the largest revolutions follow its curve."""
+    bounds = {"max_radps": 2 * thruster.max_radps, "max_astern_radps": -2 * thruster.lowest_radps}
+    return thruster.model_copy(update={"time_constant_s": None, "dead_band_radps": 0.0, **bounds})
+
+
+@dataclass(frozen=True, eq=False)
+class _SteadyMotion:
+    """Where a search ended: values by name, slopes (n, n + 2) of the rates by states and controls, scaled residual."""
+
+    values: dict[str, float]
+    slopes: Array
+    converged: bool
+    residual: float
+
+    @property
+    def growth_per_s(self) -> float:
+        """Real part of the least damped mode with revolutions held."""
+        return float(np.linalg.eigvals(self.slopes[:, : len(self.slopes)]).real.max())

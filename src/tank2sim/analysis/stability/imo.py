@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
-from tank2sim.simulation.card_range import NOTHING_READ, CardRangeReading, Numbers, entry_name, single_figures
+from tank2sim.simulation.card_range import entry_name, single_figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import FULL_ASTERN, Manoeuvre, Stop, Turn, Zigzag
-from tank2sim.simulation.run import simulate
-from tank2sim.simulation.trajectory import Trajectory
+from tank2sim.simulation.run import Run, simulate
 
 TRIAL_RUDDER = math.radians(35.0)
 """Rudder of the turning circle trials: 35 deg, or the largest of the gear."""
@@ -109,38 +108,31 @@ class ImoCriterion:
         return cls(name, found, allowed, unit, remark, beyond_card, passed, margin, percent)
 
 
-@dataclass(frozen=True)
-class _Trials:
-    """Trials of a ship in calm water."""
+def calm_trial(
+    model: Model,
+    manoeuvre: Manoeuvre,
+    integrator: Integrator,
+    parameters: Mapping[str, float] | None = None,
+    inputs: Mapping[str, float] | None = None,
+) -> Run | str:
+    """A trial in calm water, or the reason that it cannot be run.
 
-    model: Model
-    integrator: Integrator
-    parameters: Mapping[str, float]
+    MSC.137(76) requires calm water: a current on the card belongs to a location, not to the ship.
 
-    def run(self, manoeuvre: Manoeuvre) -> tuple[Numbers, str, CardRangeReading]:
-        """Figures of a trial, the reason without any, and where it left the card's range."""
-        # MSC.137(76) requires calm water: a current on the card belongs to a location, not to the ship.
-        calm = undisturbed_inputs(self.model)
-        defaults, integrator = self.parameters, self.integrator
-        try:
-            run = simulate(self.model, manoeuvre, inputs=calm, parameters=defaults, integrator=integrator)
-        except InputError as error:
-            return {}, f"{error.place}: {error.problem}" if error.place else error.problem, NOTHING_READ
-        return single_figures(run.figures), _wrong_way(manoeuvre, run.trajectory), run.reading
-
-    def worst(self, manoeuvres: Sequence[Manoeuvre], *names: str) -> list[_Worse]:
-        """The larger of each figure over the trials, with a remark on its absence or validity."""
-        runs = [self.run(manoeuvre) for manoeuvre in manoeuvres]
-        trouble = next((trouble for _, trouble, _ in runs if trouble), "")
-        found: list[_Worse] = []
-        for name in names:
-            shown = [figures[name] for figures, _, _ in runs if name in figures]
-            outside = next((str(each) for *_, read in runs if read.outside(name) for each in read.notices), "")
-            remark = outside
-            if len(shown) < len(runs):
-                remark = trouble or "; ".join(part for part in ("the run does not show it", outside) if part)
-            found.append(_Worse(max(shown) if len(shown) == len(runs) else None, remark, bool(outside)))
-        return found
+    Parameters
+    ----------
+    manoeuvre : Manoeuvre
+        One of :mod:`tank2sim.simulation.manoeuvres`.
+    integrator : Integrator
+        Of the model.
+    parameters, inputs : mapping, optional
+        Values in place of the model's, and further inputs, by name, SI.
+    """
+    calm = {**undisturbed_inputs(model), **(inputs or {})}
+    try:
+        return simulate(model, manoeuvre, inputs=calm, parameters=parameters, integrator=integrator)
+    except InputError as error:
+        return error.reason
 
 
 class _Worse(NamedTuple):
@@ -151,11 +143,29 @@ class _Worse(NamedTuple):
     beyond: bool
 
 
-def _wrong_way(manoeuvre: Manoeuvre, run: Trajectory) -> str:
+def _worst(runs: Mapping[Turn | Zigzag | Stop, Run | str], *names: str) -> list[_Worse]:
+    """The larger of each figure over trials, with a remark on its absence or validity."""
+    done = [run for run in runs.values() if not isinstance(run, str)]
+    troubles = [run if isinstance(run, str) else _wrong_way(manoeuvre, run) for manoeuvre, run in runs.items()]
+    trouble = next(filter(None, troubles), "")
+    found: list[_Worse] = []
+    for name in names:
+        shown = [figures[name] for figures in (single_figures(run.figures) for run in done) if name in figures]
+        left = [str(each) for run in done for each in run.reading.notices if run.reading.outside(name)]
+        outside = next(iter(left), "")
+        if len(shown) == len(runs):
+            found.append(_Worse(max(shown), outside, bool(outside)))
+        else:
+            remark = trouble or "; ".join(filter(None, ("the run does not show it", outside)))
+            found.append(_Worse(None, remark, bool(outside)))
+    return found
+
+
+def _wrong_way(manoeuvre: Manoeuvre, run: Run) -> str:
     """Cause of missing figures: a ship that turns against its rudder."""
     if not isinstance(manoeuvre, Turn | Zigzag):
         return ""
-    turned = float(run["motion.psi"][-1] - run["motion.psi"][0])
+    turned = float(run.trajectory["motion.psi"][-1] - run.trajectory["motion.psi"][0])
     # A complete zigzag reaches both sides, but only small headings.
     against = turned * manoeuvre.rudder < 0 and abs(turned) > _TURNED
     return "the ship turns against its rudder: see the signs of Yd and Nd and the card's rudder_sign" if against else ""
@@ -177,15 +187,15 @@ def imo_criteria(
     integrator : Integrator, optional
         An existing integrator of this model, to save its preparation.
     """
-    trials = _Trials(model, integrator or Integrator(model), changed or {})
-    parameters = dict(zip(model.parameter_names, model.parameter_values(changed).tolist(), strict=True))
+    engine = integrator or Integrator(model)
+    parameters = {**model.defaults, **(changed or {})}
     time = parameters["ship.length"] / parameters["ship.speed"]
     scale = _SCALE if parameters["ship.length"] < SHORTEST_SHIP_M else ""
     worst: dict[str, _Worse] = {}
     can_stop = "propeller.speed" in model.input_names
     for trial in manoeuvring_trials(largest_trial_rudder(parameters))[: None if can_stop else -1]:
-        found = trials.worst(trial.manoeuvres, *trial.criteria.values())
-        worst |= dict(zip(trial.criteria, found, strict=True))
+        runs = {manoeuvre: calm_trial(model, manoeuvre, engine, changed) for manoeuvre in trial.manoeuvres}
+        worst |= dict(zip(trial.criteria, _worst(runs, *trial.criteria.values()), strict=True))
 
     limits = largest_allowed(time)
 
@@ -235,7 +245,7 @@ def limits_of(manoeuvre: Manoeuvre, model: Model) -> dict[str, float]:
     model : Model
         The ship, at the speed of its card.
     """
-    values = dict(zip(model.parameter_names, model.parameter_values(None).tolist(), strict=True))
+    values = model.defaults
     allowed = largest_allowed(values["ship.length"] / values["ship.speed"])
     trials = manoeuvring_trials(largest_trial_rudder(values))
     criteria = next((trial.criteria for trial in trials if manoeuvre in trial.manoeuvres), {})

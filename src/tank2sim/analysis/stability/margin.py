@@ -15,11 +15,12 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from tank2sim.analysis.linearisation import OperatingPoint, straight_course
+from tank2sim.analysis.equilibrium import EquilibriumFigures, straight_courses
+from tank2sim.analysis.linearisation import slow_slopes, straight_course
 from tank2sim.analysis.stability.straight_line import speed_acts
 from tank2sim.analysis.turning.diagram import hull_states
 from tank2sim.arrays import Array, Number
-from tank2sim.dynamics.model import Model, Parameter
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 
 SPEEDS = 25
@@ -115,69 +116,47 @@ class Margin:
     speed: CriterionBySpeed | None
 
 
-class StabilityCriterion:
-    """C' of a model as a function of speed and parameters, with its exact total derivatives."""
-
-    def __init__(self, model: Model):
-        self.model = model
-        self._places = [model.state_names.index(name) for name in ("motion.v", "rudder.angle")]
-        self._speed = model.state_names.index("motion.u")
-        unknown, x, p = model.x[self._places], model.x, model.p
-        self.by_speed = speed_acts(model, straight_course(model))
-        slopes = _prime_slopes(model, self.by_speed)
-        value = ca.det(slopes)
-        residual = model.expand(ca.vcat([model.symbol(name) for name in ("motion.vdot", "motion.rdot")]))
-        by = ca.vertcat(p, x[self._speed])
-        # implicit function: on the straight course residual(unknown, by) = 0
-        follow = -ca.solve(ca.densify(ca.jacobian(residual, unknown)), ca.densify(ca.jacobian(residual, by)))
-        total = ca.jacobian(value, by) + ca.jacobian(value, unknown) @ follow
-        arguments = [x, model.u, p]
-        self._value = ca.Function("criterion", arguments, [value, ca.densify(total), ca.densify(slopes)], {"cse": True})
-        newton = [residual, ca.densify(ca.jacobian(residual, unknown))]
-        self._course = ca.Function("course", arguments, newton, {"cse": True})
-
-    def at(self, point: OperatingPoint) -> tuple[float, Array, Array]:
-        """C', its total derivative by the parameters and at last by the speed (np + 1,), and the slopes (2, 2)."""
-        value, total, slopes = self._value(point.x, point.u, point.p)
-        return float(value), np.array(total).ravel(), np.array(slopes)
-
-    def moved(
-        self, point: OperatingPoint, *, speed: float | None = None, p: Array | None = None
-    ) -> OperatingPoint | None:
-        """The straight course near a given one, at a new speed or with new parameters; None if there is none."""
-        x, p = point.x.copy(), point.p if p is None else p
-        if speed is not None:
-            x[self._speed] = speed
-        for _ in range(20):
-            residual, jacobian = (np.array(value) for value in self._course(x, point.u, p))
-            if not np.isfinite(jacobian).all() or np.linalg.matrix_rank(jacobian) < 2:
-                return None
-            change = np.linalg.solve(jacobian, -residual.ravel())
-            x[self._places] += change
-            if np.max(np.abs(change)) < 1e-12 * max(1.0, abs(x[self._speed])):
-                return OperatingPoint(x, point.u, p) if abs(x[self._places[1]]) < np.pi / 4 else None
-        return None
-
-
 def _prime_slopes(model: Model, by_speed: bool) -> ca.SX:
     """Slopes (2, 2) of Y' and N' by v' and r' with V = U, or u0 of a linear card; states of effects follow at once."""
-    forces = model.expand(ca.vcat([model.symbol("force.Y"), model.symbol("force.N")]))
-    motion = ca.vcat([model.symbol("motion.v"), model.symbol("motion.r")])
-    slopes = ca.jacobian(forces, motion)
-    derivative = {state.name: state.derivative for state in model.states}
-    settled = [name for name in hull_states(model) if name not in ("motion.u", "motion.v", "motion.r")]
-    if settled:
-        effect_states = ca.vcat([model.symbol(name) for name in settled])
-        rates = model.expand(ca.vcat([model.symbol(derivative[name]) for name in settled]))
-        follow = ca.solve(ca.densify(ca.jacobian(rates, effect_states)), ca.densify(ca.jacobian(rates, motion)))
-        slopes -= ca.jacobian(forces, effect_states) @ follow
+    motion = ("motion.v", "motion.r")
+    settled = [name for name in hull_states(model) if name not in ("motion.u", *motion)]
+    slopes = slow_slopes(model, ["force.Y", "force.N"], motion, settled)
     length, density = model.symbol("ship.length"), model.symbol("ship.water_density")
     speed = model.symbol("ship.speed")
     if by_speed:
         speed = ca.sqrt(model.symbol("motion.u") ** 2 + model.symbol("motion.v") ** 2)
     unit = 0.5 * density * length**2 * speed
-    scale = ca.vertcat(ca.horzcat(unit, unit * length), ca.horzcat(unit * length, unit * length**2))
-    return ca.densify(slopes) / scale
+    return slopes / ca.vertcat(ca.horzcat(unit, unit * length), ca.horzcat(unit * length, unit * length**2))
+
+
+@dataclass(frozen=True, eq=False)
+class _Course:
+    """C' and the slopes (2, 2) on a straight course with unknowns z (2,) and parameters p (np,)."""
+
+    courses: EquilibriumFigures
+    z: Array
+    p: Array
+    C_prime: float
+    slopes: Array
+
+    @staticmethod
+    def near(courses: EquilibriumFigures, z: Array, p: Array) -> _Course | None:
+        """The course near z; None if there is none with less than 45 deg of rudder."""
+        found = courses.at(z, {}, p)
+        if found is None or not abs(found[0][1]) < np.pi / 4:
+            return None
+        C, *slopes = found[1]
+        return _Course(courses, found[0], p, float(C), np.reshape(slopes, (2, 2)))
+
+    def by_parameters(self) -> Array:
+        """Total derivatives (np,) of C'; that by ``initial.u`` is by the speed."""
+        return np.asarray(self.courses.slopes(self.z, {}, self.p)[0])
+
+    def moved(self, place: int, value: float) -> _Course | None:
+        """The course with another value of the parameter at a place; None if there is none."""
+        p = self.p.copy()
+        p[place] = value
+        return _Course.near(self.courses, self.z, p)
 
 
 def stability_margin(model: Model, speed_mps: float | None = None) -> Margin:
@@ -188,30 +167,34 @@ def stability_margin(model: Model, speed_mps: float | None = None) -> Margin:
     InputError
         The model is not a ship, or has no straight course.
     """
-    point = straight_course(model, speed_mps)
-    criterion = StabilityCriterion(model)
-    value, total, slopes = criterion.at(point)
-    if not np.isfinite(value):
+    by_speed = speed_acts(model, straight_course(model))
+    slopes = _prime_slopes(model, by_speed)
+    shown = dict(
+        zip(("C", "Yv", "Yr", "Nv", "Nr"), ca.vertsplit(ca.vertcat(ca.det(slopes), ca.vec(slopes.T))), strict=True)
+    )
+    courses, z = straight_courses(model, shown, speed_mps)
+    course = _Course.near(courses, z, model.parameter_values({} if speed_mps is None else {"initial.u": speed_mps}))
+    if course is None:
         raise InputError(
             model.origin, "", "the slopes of its forces are not finite numbers", "check the derivatives of the card"
         )
-    names = model.parameter_names
+    names, total, slope = model.parameter_names, course.by_parameters(), course.slopes
     influences = [
-        _influence(criterion, point, name, float(total[names.index(name)]))
-        for name in names
-        if (name.startswith("derivatives.") or name in _BODY) and point.p[names.index(name)] != 0
+        _influence(course, name, place, float(total[place]))
+        for place, name in enumerate(names)
+        if (name.startswith("derivatives.") or name in _BODY) and course.p[place] != 0
     ]
     moving = [influence for influence in influences if abs(influence.percent) > _NOTHING]
-    damping, sway = _ratio(slopes[1, 1], slopes[0, 1]), _ratio(slopes[1, 0], slopes[0, 0])
+    damping, sway = _ratio(slope[1, 1], slope[0, 1]), _ratio(slope[1, 0], slope[0, 0])
     return Margin(
-        C_prime=value,
+        C_prime=course.C_prime,
         damping_lever_lengths=damping,
         sway_lever_lengths=sway,
         lever_margin_lengths=damping - sway,
-        margin_percent=100 * _ratio(value, abs(slopes[0, 0] * slopes[1, 1])),
-        slopes_prime=slopes,
+        margin_percent=100 * _ratio(course.C_prime, abs(slope[0, 0] * slope[1, 1])),
+        slopes_prime=slope,
         derivatives=tuple(sorted(moving, key=lambda item: -abs(item.percent))),
-        speed=_over_speed(criterion, point),
+        speed=_over_speed(model, course) if by_speed else None,
     )
 
 
@@ -219,52 +202,38 @@ def _ratio(upper: float, lower: float) -> float:
     return float(upper / lower) if lower else float("nan")
 
 
-def _influence(criterion: StabilityCriterion, point: OperatingPoint, name: str, slope: float) -> MarginInfluence:
-    place = criterion.model.parameter_names.index(name)
-    value, present = float(point.p[place]), criterion.at(point)[0]
+def _influence(course: _Course, name: str, place: int, slope: float) -> MarginInfluence:
+    value, present = float(course.p[place]), course.C_prime
     percent = 100 * CHANGE * slope * value / abs(present) if present else float("nan")
-    neutral = _neutral(criterion, point, place) if abs(percent) > _NOTHING else None
+    neutral = _neutral(course, place) if abs(percent) > _NOTHING else None
     return MarginInfluence(name, value, slope, percent, neutral, neutral and 100 * (neutral / value - 1))
 
 
-def _neutral(criterion: StabilityCriterion, point: OperatingPoint, place: int) -> float | None:
+def _neutral(course: _Course, place: int) -> float | None:
     """The value of a parameter at which C' = 0, by Newton's method along the straight course."""
-    value = float(point.p[place])
-    size, current = abs(value), point
+    value = float(course.p[place])
     for _ in range(30):
-        found, total, _ = criterion.at(current)
-        if not total[place]:
+        slope = float(course.by_parameters()[place])
+        if not slope:
             return None
-        change = -found / total[place]
-        p = current.p.copy()
-        p[place] += change
-        if not abs(p[place] - value) < 10 * size:
-            return None
-        following = criterion.moved(current, p=p)
+        change = -course.C_prime / slope
+        changed = float(course.p[place]) + change
+        following = course.moved(place, changed) if abs(changed - value) < 10 * abs(value) else None
         if following is None:
             return None
-        current = following
-        if abs(change) < 1e-12 * size:
-            return float(p[place])
+        course = following
+        if abs(change) < 1e-12 * abs(value):
+            return changed
     return None
 
 
-def _over_speed(criterion: StabilityCriterion, point: OperatingPoint) -> CriterionBySpeed | None:
-    model = criterion.model
-    if not criterion.by_speed:
-        return None
-    start = {parameter.name: parameter.start for parameter in model.parameters if isinstance(parameter, Parameter)}
-    speeds = np.linspace(start["ship.slowest"], start["ship.fastest"], SPEEDS)
-    rows = []
-    for speed in speeds:
-        shifted = criterion.moved(point, speed=float(speed))
-        if shifted is None:
-            rows.append((np.nan, np.nan))
-            continue
-        value, total, _ = criterion.at(shifted)
-        rows.append((value, float(total[-1])))
-    criteria, slopes = np.array(rows).T
-    return CriterionBySpeed(speeds, criteria, slopes)
+def _over_speed(model: Model, course: _Course) -> CriterionBySpeed:
+    speeds = np.linspace(model.defaults["ship.slowest"], model.defaults["ship.fastest"], SPEEDS)
+    place = model.parameter_names.index("initial.u")
+    found = [course.moved(place, float(speed)) for speed in speeds]
+    C_prime = np.array([np.nan if one is None else one.C_prime for one in found])
+    slopes = np.array([np.nan if one is None else one.by_parameters()[place] for one in found])
+    return CriterionBySpeed(speeds, C_prime, slopes)
 
 
 @dataclass(frozen=True)
@@ -322,7 +291,7 @@ def trim_effect(model: Model, margin: Margin) -> TrimEffect:
 
     The mass, its centre and the rudder do not change.
     """
-    values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    values = model.defaults
     length = values["ship.length"]
     mass = values["ship.mass"] / (0.5 * values["ship.water_density"] * length**3)
     inertia = {"Yr": mass, "Nr": mass * values["ship.x_G"] / length}

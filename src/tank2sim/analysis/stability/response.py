@@ -70,7 +70,7 @@ def steering_responses(model: Model, point: OperatingPoint, nomoto: Nomoto) -> t
     slowest, fastest = float(rates.min()), float(rates.max())
     omega = np.geomspace(slowest / 20, fastest * 20, _FREQUENCIES)
     time = _times(hull.poles(), slowest)
-    found = [_response(label, system, omega, time) for label, system in systems.items()]
+    found = [system_response(label, system, omega, time) for label, system in systems.items()]
     return tuple(candidate for candidate in found if np.all(np.abs(candidate.response) > 0))
 
 
@@ -84,9 +84,8 @@ def _times(poles: NDArray[np.complex128], slowest: float) -> NDArray[np.float64]
     return np.linspace(0.0, length, int(min(max(_FEWEST, math.ceil(_IN_A_PERIOD * cycles) + 1), _MOST)))
 
 
-def _response(
-    label: str, system: control.StateSpace, omega: NDArray[np.float64], time: NDArray[np.float64]
-) -> SteeringResponse:
+def system_response(label: str, system: control.StateSpace, omega: Array, time: Array) -> SteeringResponse:
+    """The response of a linear `system` of a `label`, at the frequencies `omega` (n,), rad/s, and `time` (m,), s."""
     import control
 
     response = np.asarray(system(1j * omega), dtype=complex).ravel()

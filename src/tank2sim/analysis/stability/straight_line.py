@@ -5,18 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from tank2sim.analysis.linearisation import OperatingPoint, jacobians, state_space, straight_course
 from tank2sim.analysis.turning.diagram import hull_states
-from tank2sim.arrays import ComplexNumber, Unbounded
+from tank2sim.arrays import Array, ComplexNumber, Unbounded
 from tank2sim.dynamics.model import Model
-
-if TYPE_CHECKING:
-    import control
 
 _ROUNDING = 1e-9
 """Relative size, by rounding, of a neutral mode or of the difference of equal slopes."""
@@ -132,14 +129,14 @@ def stability(model: Model, speed_mps: float | None = None) -> Stability:
 
     settled = settled_states(model)
     modes = steering_modes(model, point)
-    eigenvalues = sorted(_modes(model, point, hull_states(model)), key=lambda value: -value.real)
+    eigenvalues = _modes(model, point, hull_states(model))
     slopes, _ = jacobians(model, point, ["force.Y", "force.N"], ["motion.v", "motion.r"], [], settled=settled)
     # Y_v N_r and N_v Y_r are both in (1/2 rho)^2 L^6 V^2.
     criterion = float(np.linalg.det(slopes)) / (0.25 * density**2 * length**6 * scaling**2)
     steering = state_space(
         model, point, states=["motion.v", "motion.r"], inputs=["rudder.angle"], outputs=["motion.r"], settled=settled
     )
-    models = nomoto(steering)
+    models = nomoto(steering.A, steering.B, steering.C)
     time = length / scaling
     growth = max(mode.real for mode in (*eigenvalues, *modes))
     nothing = _ROUNDING * max(abs(mode) for mode in eigenvalues)
@@ -151,7 +148,7 @@ def stability(model: Model, speed_mps: float | None = None) -> Stability:
             drift_deg=float(np.degrees(-np.arcsin(at["motion.v"] / speed))),
             rudder_deg=float(np.degrees(at["rudder.angle"])),
         ),
-        eigenvalues=tuple(eigenvalues),
+        eigenvalues=eigenvalues,
         stability_criterion=CourseCriterion(
             C_prime=criterion,
             stable=stable,
@@ -178,7 +175,12 @@ def steering_modes(model: Model, point: OperatingPoint) -> tuple[complex, ...]:
 
 
 def _modes(model: Model, point: OperatingPoint, states: Sequence[str]) -> tuple[complex, ...]:
-    return tuple(complex(value) for value in state_space(model, point, states=states, inputs=[], outputs=[]).poles())
+    return sorted_modes(jacobians(model, point, model.derivatives_of(states), states, [])[0])
+
+
+def sorted_modes(A: Array) -> tuple[complex, ...]:
+    """Eigenvalues of a matrix `A` (n, n), least damped first."""
+    return tuple(complex(value) for value in sorted(np.linalg.eigvals(A), key=lambda value: -value.real))
 
 
 def steering_states(model: Model) -> tuple[str, ...]:
@@ -188,11 +190,10 @@ def steering_states(model: Model) -> tuple[str, ...]:
 
 def answering_states(model: Model) -> tuple[str, ...]:
     """The steering states of effects that respond to sway, yaw or each other: not the lag of an engine."""
-    derivative = {state.name: state.derivative for state in model.states}
     states = steering_states(model)
 
     def answers(name: str) -> bool:
-        rate = model.expand(model.symbol(derivative[name]))
+        rate = model.expand(model.symbols(model.derivatives_of([name])))
         return any(ca.depends_on(rate, model.symbol(state_name)) for state_name in states if state_name != name)
 
     return tuple(name for name in states[2:] if answers(name))
@@ -222,13 +223,13 @@ def settled_states(model: Model) -> list[str]:
     return [name for name in model.state_names if name not in rigid_body and not name.startswith("rudder.")]
 
 
-def nomoto(steering: control.StateSpace) -> Nomoto:
-    """Nomoto's coefficients of a sway-yaw system from rudder angle (rad) to yaw rate (rad/s).
+def nomoto(A: Array, B: Array, C: Array) -> Nomoto:
+    """Nomoto's coefficients of a sway-yaw system from what steers (the rudder, rad) to yaw rate (rad/s).
 
     From A (2, 2), B (2, 1), C (1, 2): 1/(T1 T2) = det A, T1 + T2 = -tr A / det A, T3 from the zero.
     """
     with np.errstate(divide="ignore", invalid="ignore"):  # a ship that is neutral has K and T without end
-        K, total, product, T3 = (float(constant) for constant in steering_constants(steering.A, steering.B, steering.C))
+        K, total, product, T3 = (float(constant) for constant in steering_constants(A, B, C))
     # T1 and T2 are the roots of T^2 - (T1 + T2) T + T1 T2; an oscillating pair's are not real.
     discriminant = total**2 - 4 * product
     T1 = 0.5 * (total + math.copysign(math.sqrt(discriminant), total)) if discriminant >= 0 else None

@@ -104,7 +104,7 @@ def stability_study(model: Model, speed_mps: float | None = None, *, spirals: bo
         turning = steady_turning(model)
         notices += turning.notices
     except InputError as error:
-        notices.append(Notice(f"no steady-turning diagram: {_reason(error)}"))
+        notices.append(Notice(f"no steady-turning diagram: {error.reason}"))
     if turning is not None and spirals:
         spiralled, spiral_notes = _spirals(model, turning)
         notices += spiral_notes
@@ -122,12 +122,8 @@ def stability_study(model: Model, speed_mps: float | None = None, *, spirals: bo
     )
 
 
-def _reason(error: InputError) -> str:
-    return f"{error.place}: {error.problem}" if error.place else error.problem
-
-
 def _about_speed(model: Model, found: Stability, *, by_speed: bool) -> list[Notice]:
-    values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    values = model.defaults
     slowest, fastest, card_speed = values["ship.slowest"], values["ship.fastest"], values["ship.speed"]
     messages, speed = [], found.operating_point.speed_mps
     if not by_speed:
@@ -204,13 +200,13 @@ def _spirals(model: Model, turning: SteadyTurning) -> tuple[Spirals, list[Notice
         else:
             messages.append("no spiral: no steady turn is stable with the rudder held")
     except InputError as error:
-        messages.append(f"no spiral: {_reason(error)}")
+        messages.append(f"no spiral: {error.reason}")
     try:
         reverse = reverse_spiral(model, turning, stability(model).nomoto.dimensional)
         if reverse is None:
             messages.append("no reverse spiral: the rudder turns the ship the wrong way, or not at all")
     except InputError as error:
-        messages.append(f"no reverse spiral: {_reason(error)}")
+        messages.append(f"no reverse spiral: {error.reason}")
     most = math.degrees(np.max(np.abs(turning.yaw_rate_radps)))
     for name, points in (("spiral", direct), ("reverse spiral", reverse)):
         if points is None:
@@ -252,27 +248,21 @@ def steady_speeds(model: Model) -> tuple[SteadySpeed, ...]:
 
     inputs, parameters = model.input_values(undisturbed_inputs(model)), model.parameter_values()
     start = np.array(model.initial(parameters)).ravel()
-    u0 = float(parameters[model.parameter_names.index("ship.speed")])
-    place = model.state_names.index("motion.u")
-    start[[row for row, state in enumerate(model.states) if state.steady]] = 0.0
-    for name, order in (pair for effect in EFFECTS.values() for pair in effect.states_behind.items()):
-        if name in model.state_names and order in model.input_names:
-            start[model.state_names.index(name)] = inputs[model.input_names.index(order)]
-    acceleration = ca.Function(
-        "acceleration", [model.x, model.u, model.p], [model.expand(model.symbol("motion.udot"))], {"cse": True}
-    )
+    start[np.array([state.steady for state in model.states])] = 0.0
+    behind = {name: order for effect in EFFECTS.values() for name, order in effect.states_behind.items()}
+    for name in behind.keys() & set(model.state_names):
+        if behind[name] in model.input_names:
+            start[model.state_names.index(name)] = inputs[model.input_names.index(behind[name])]
+    place, rate = model.state_names.index("motion.u"), model.expand(model.symbol("motion.udot"))
+    acceleration = ca.Function("acceleration", [model.x, model.u, model.p], [rate], {"cse": True})
 
     def surge(speed: float) -> float:
         state = start.copy()
         state[place] = speed
         return float(acceleration(state, inputs, parameters))
 
-    speeds = np.linspace(SLOWEST, FASTEST, SPEEDS) * u0
-    signs = np.sign([surge(float(speed)) for speed in speeds])
-    found = []
-    for row in np.flatnonzero(signs[1:] != signs[:-1]):
-        if signs[row] == 0:
-            continue
-        speed = brentq(surge, float(speeds[row]), float(speeds[row + 1]))
-        found.append(SteadySpeed(float(speed), bool(signs[row] > 0)))
-    return tuple(found)
+    speeds = np.linspace(SLOWEST, FASTEST, SPEEDS) * model.defaults["ship.speed"]
+    signs = np.sign([surge(speed) for speed in speeds.tolist()])
+    rows = np.flatnonzero((signs[1:] != signs[:-1]) & (signs[:-1] != 0))
+    held = [float(brentq(surge, *speeds[row : row + 2].tolist())) for row in rows]
+    return tuple(SteadySpeed(speed, bool(signs[row] > 0)) for speed, row in zip(held, rows, strict=True))

@@ -87,30 +87,20 @@ class _Problem:
     def _unknowns(self) -> tuple[Array, Array, Array]:
         """Change of the parameters by the unknowns (k, m), and the bounds of these (m,)."""
         parameters, means = self.study.parameters, self.means
-        held = {find_parameter(parameters, name, "hold").name for name in means.hold}
+        held = {find_parameter(parameters, name, "hold").name for name in means.hold} | self._agreed.keys()
         stated = {find_parameter(parameters, name, "bounds").name: pair for name, pair in means.bounds.items()}
-        for change in (
-            parameter for parameter in parameters if parameter.name in stated and parameter.name in self._agreed
-        ):
+        if both := [parameter for parameter in parameters if parameter.name in stated.keys() & self._agreed.keys()]:
             remedy = "leave out the bound, or take the parameter out of joint_variation"
-            raise ArgumentError("bounds", change.short, "moves with the agreed variation alone", remedy)
+            raise ArgumentError("bounds", both[0].short, "moves with the agreed variation alone", remedy)
         columns, ends = [], []
         for place, parameter in enumerate(parameters):
-            size = parameter.standard_error
-            if parameter.name in stated and not size:  # what is taken as exact moves only where it is allowed to
-                size = (
-                    abs(stated[parameter.name][1] - stated[parameter.name][0])
-                    / abs(parameter.factor)
-                    / (2 * means.within)
-                )
-            if parameter.name in held or parameter.name in self._agreed or not size:
-                continue
-            columns.append(size * np.eye(len(parameters))[place])
-            ends.append(_ends(parameter, size, means.within, stated.get(parameter.name)))
+            size = _size(parameter, means.within, stated.get(parameter.name))
+            if parameter.name not in held and size:
+                columns.append(size * np.eye(len(parameters))[place])
+                ends.append(_ends(parameter, size, means.within, stated.get(parameter.name)))
         if self._agreed:
-            columns.append(
-                np.array([parameter.value * self._agreed.get(parameter.name, 0.0) / 100 for parameter in parameters])
-            )
+            shares = np.array([self._agreed.get(parameter.name, 0.0) / 100 for parameter in parameters])
+            columns.append(self.study.values * shares)
             ends.append((-means.within, means.within))
         if not columns:
             raise ArgumentError("targets", "", "nothing is left to change", "hold fewer parameters, or state bounds")
@@ -230,14 +220,12 @@ class _Problem:
         figures, missed = self.figures(z), np.abs(self.missing(z)) > _REACHED
         if not np.all(np.isfinite(figures)):
             return z
-        loose = [row for row, target in enumerate(self.targets) if target.relation != EQUAL and not missed[row]]
-        tight = [row for row in range(len(self.targets)) if row not in loose]
+        tight = [row for row, target in enumerate(self.targets) if target.relation == EQUAL or missed[row]]
         kept = [tight[index] for index in _independent(self._slopes(z)[tight][:, free])] if tight else []
-        held = [
-            Target(self.targets[row].figure, EQUAL, float(figures[row] if missed[row] else self._wanted[row]))
-            for row in kept
-        ]
-        return _Problem(self.study, [*held, *(self.targets[row] for row in loose)], self.means).least(z, free)
+        values = np.where(missed, figures, self._wanted)
+        targets = [Target(self.targets[row].figure, EQUAL, float(values[row])) for row in kept]
+        targets += [target for row, target in enumerate(self.targets) if row not in tight]
+        return _Problem(self.study, targets, self.means).least(z, free)
 
     def _refined(self, found: Array, fallback: Array, free: Slice) -> Array:
         refined = self.nearest(found, free)
@@ -353,6 +341,14 @@ def _with(z: Array, free: Slice, part: Array) -> Array:
     whole = z.copy()
     whole[free] = part
     return whole
+
+
+def _size(parameter: CardParameter, within: float, stated: tuple[float, float] | None) -> float:
+    """Unit of the moves of a parameter: its standard error, or what makes its stated bounds; an exact number moves only
+    where it is allowed to."""
+    if stated is None or parameter.standard_error:
+        return parameter.standard_error
+    return abs(stated[1] - stated[0]) / abs(parameter.factor) / (2 * within)
 
 
 def _ends(

@@ -31,6 +31,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice, caution
 from tank2sim.simulation.card_range import exceeded_range
+from tank2sim.simulation.thruster_manoeuvres import thruster_sides
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicHermiteSpline
@@ -210,15 +211,15 @@ class TurningDiagram:
 
 
 def hull_states(model: Model, motion: Sequence[str] = _MOTION) -> tuple[str, ...]:
-    """States that move with the hull at a held rudder: u, v, r, and states of effects on which their rates depend.
+    """States that move with the hull at held rudder or thrusters: u, v, r, and states of effects that act on them.
 
     With fewer names in `motion`, the remaining ones of u, v, r are constant.
     """
-    derivative = {state.name: state.derivative for state in model.states}
     found = list(motion)
+    steering = [name for name in model.state_names if name == "rudder.angle" or name.startswith("thrusters.")]
     for name in found:  # grows on the way
-        rate = model.expand(model.symbol(derivative[name]))
-        held = (*_PLACE, *_MOTION, "rudder.angle", *found)
+        rate = model.expand(model.symbols(model.derivatives_of([name])))
+        held = (*_PLACE, *_MOTION, *steering, *found)
         found += [name for name in model.state_names if name not in held and ca.depends_on(rate, model.symbol(name))]
     return tuple(found)
 
@@ -229,12 +230,15 @@ def calm_inputs(model: Model) -> Array:
 
 
 class TurningEquations:
-    """The equations of steady turning in calm water, in scaled unknowns y = (states of the hull, rudder).
+    """The equations of steady motion in calm water, in scaled unknowns y = (states of the hull, controls).
+
+    The control of a ship is its rudder. A craft that is steered by thrusters has two: mean revolutions of the thrusters
+    that push ahead, and port less starboard, half of which each side has more or less (rad/s).
 
     Parameters
     ----------
     model : Model
-        A ship, or a steering model with the state ``motion.beta``.
+        A ship or craft, or a steering model with the state ``motion.beta``.
     free : bool
         Whether the parameters are arguments of the functions; else they are numbers, and the functions are short.
     """
@@ -242,17 +246,19 @@ class TurningEquations:
     def __init__(self, model: Model, *, free: bool = False):
         self.model = model
         self.names = ("motion.beta", "motion.r") if "motion.beta" in model.state_names else hull_states(model)
+        self.sides = thruster_sides(model)
+        self.controls = ("mean", "difference") if self.sides else ("rudder.angle",)
         nominal = {state.name: state.nominal for state in model.states}
-        values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
-        speed = float(values["ship.speed"])
-        self.ship_time = float(values["ship.length"]) / speed
+        speed = model.defaults["ship.speed"]
+        self.ship_time = model.defaults["ship.length"] / speed
         sizes = {"motion.u": speed, "motion.v": speed, "motion.r": 1 / self.ship_time}
-        self.scale: Array = np.array([*(sizes.get(name, nominal[name]) for name in self.names), 1.0])
+        self.scale: Array = np.array(
+            [*(sizes.get(name, nominal[name]) for name in self.names), *(1.0,) * len(self.controls)]
+        )
         self.yaw: Array = np.eye(len(self.scale))[self.names.index("motion.r")]
         self.symbol, self.p = ca.SX.sym("y", len(self.scale)), model.p if free else ca.SX(model.parameter_values())
-        derivative = {state.name: state.derivative for state in model.states}
-        rates = model.expand(ca.vcat([model.symbol(derivative[name]) for name in self.names]))
-        self.rates = self.along(rates) * self.ship_time / self.scale[:-1]
+        rates = model.expand(model.symbols(model.derivatives_of(self.names)))
+        self.rates = self.along(rates) * self.ship_time / self.scale[: len(self.names)]
         slopes = ca.densify(ca.jacobian(self.rates, self.symbol))
         arguments = [self.symbol, model.p] if free else [self.symbol]
         self.function = ca.Function("steady", arguments, [self.rates, slopes], {"cse": True})
@@ -261,10 +267,23 @@ class TurningEquations:
         """An expression of states, inputs and parameters in the unknowns, in calm water."""
         model = self.model
         states = ca.substitute(ca.vcat([ca.SX(state.start) for state in model.states]), model.p, self.p)
-        for row, name in enumerate((*self.names, "rudder.angle")):
-            states[model.state_names.index(name)] = self.symbol[row] * self.scale[row]
-        (found,) = ca.substitute([expression], [model.x, model.u, model.p], [states, ca.SX(calm_inputs(model)), self.p])
+        inputs = ca.SX(calm_inputs(model))
+        for name, value in self._values().items():
+            if name in model.state_names:
+                states[model.state_names.index(name)] = value
+            else:
+                inputs[model.input_names.index(name)] = value
+        (found,) = ca.substitute([expression], [model.x, model.u, model.p], [states, inputs, self.p])
         return found
+
+    def _values(self) -> dict[str, ca.SX]:
+        """States and inputs by the unknowns."""
+        scaled = ca.vertsplit(self.symbol * self.scale)
+        given = dict(zip((*self.names, *self.controls), scaled, strict=True))
+        if not self.sides:
+            return given
+        mean, difference = given.pop("mean"), given.pop("difference")
+        return given | {name: mean + side * difference / 2 for name, side in self.sides.items()}
 
     def __call__(self, y: Array) -> tuple[Array, Array]:
         """Residual (n,) and Jacobian (n, n + 1)."""
@@ -326,8 +345,7 @@ def steady_turning(model: Model) -> SteadyTurning:
 
 def largest_rudder(model: Model) -> float:
     """:data:`_LARGEST_RUDDER`, or the largest angle of the gear, rad."""
-    values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
-    return min(_LARGEST_RUDDER, float(values.get("steering.max_angle", _LARGEST_RUDDER)))
+    return min(_LARGEST_RUDDER, model.defaults.get("steering.max_angle", _LARGEST_RUDDER))
 
 
 def _diagram(equations: TurningEquations, port: Curve, starboard: Curve) -> SteadyTurning:
@@ -388,19 +406,25 @@ def _with_folds(
 
 def _judged(model: Model, found: SteadyTurning) -> SteadyTurning:
     """The diagram with its loop and notices."""
-    before = [fold for fold in found.folds if fold.place <= found.straight]
-    after = [fold for fold in found.folds if fold.place > found.straight]
-    loop = None
-    if corner := [fold for fold in before if fold.place == found.straight]:  # it ends the loop in place of a fold
-        before = [fold for fold in before if fold.place < found.straight] or corner
-        after = after or corner
+    return replace(found, loop=_loop(found), notices=(*_end_notices(found), *_out_of_range(model, found)))
+
+
+def _loop(found: SteadyTurning) -> HysteresisLoop | None:
+    """The hysteresis loop between the folds nearest to the straight course; a corner there is either of them."""
+    places = np.array([fold.place for fold in found.folds])
+    corner = found.straight in places
     # rudder to port for more yaw to starboard: unstable in yaw, not in surge alone
-    backwards = bool(corner) or found.slope[found.straight, 0] < 0
-    if not found.stable[found.straight] and backwards and before and after:
-        rates = [rate for rate, stable in found.turns_at(float(found.rudder_rad[found.straight])) if stable]
-        height = math.degrees(max(rates) - min(rates)) if len(rates) > 1 else None
-        loop = HysteresisLoop(math.degrees(abs(before[-1].rudder_rad - after[0].rudder_rad)), height)
-    return replace(found, loop=loop, notices=(*_end_notices(found), *_out_of_range(model, found)))
+    backwards = corner or found.slope[found.straight, 0] < 0
+    if found.stable[found.straight] or not backwards:
+        return None
+    before, after = np.flatnonzero(places < found.straight), np.flatnonzero(places > found.straight)
+    itself = np.flatnonzero(places == found.straight)
+    ends = [*before[-1:], *itself, *after[:1]]
+    if len(ends) < 2 and not corner:
+        return None
+    rates = [rate for rate, stable in found.turns_at(float(found.rudder_rad[found.straight])) if stable]
+    height = math.degrees(max(rates) - min(rates)) if len(rates) > 1 else None
+    return HysteresisLoop(math.degrees(abs(found.folds[ends[0]].rudder_rad - found.folds[ends[-1]].rudder_rad)), height)
 
 
 def _end_notices(found: SteadyTurning) -> list[Notice]:
@@ -419,7 +443,7 @@ def _end_notices(found: SteadyTurning) -> list[Notice]:
 
 
 def _out_of_range(model: Model, found: SteadyTurning) -> list[Notice]:
-    values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    values = model.defaults
     rate = found.yaw_rate_radps * values["ship.length"] / found.speed_mps
     outside = exceeded_range(values, found.speed_mps, rate, found.drift_rad, found.rudder_rad)
     return [caution(f"EXTRAPOLATED beyond the card's measurements: steady turns have {outside}")] if outside else []

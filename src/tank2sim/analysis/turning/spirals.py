@@ -59,7 +59,7 @@ class SpiralPoints:
     distance_to_diagram_degps: Array
 
 
-def direct_spiral(model: Model, turning: SteadyTurning, integrator: Integrator | None = None) -> SpiralPoints:
+def direct_spiral(model: Model, turning: SteadyTurning) -> SpiralPoints:
     """The direct spiral of a ship, within the rudder angles of the diagram.
 
     Raises InputError: the motion leaves all bounds.
@@ -68,7 +68,7 @@ def direct_spiral(model: Model, turning: SteadyTurning, integrator: Integrator |
     orders = [math.radians(angle) for angle in SPIRAL_RUDDERS_DEG if abs(math.radians(angle)) <= largest * (1 + 1e-9)]
     rudders = (*orders, *orders[-2::-1])
     calm = undisturbed_inputs(model)
-    trajectory = simulate(model, SpiralManoeuvre(rudders), inputs=calm, integrator=integrator).trajectory
+    trajectory = simulate(model, SpiralManoeuvre(rudders), inputs=calm).trajectory
     changes = np.flatnonzero(np.diff(trajectory["rudder.command"]) != 0)
     ends = np.append(changes[len(changes) - len(rudders) + 1 :] + 1, len(trajectory.t) - 1)
     rates = trajectory["motion.r"][ends]
@@ -156,5 +156,4 @@ def _distance(turning: SteadyTurning, rudder: float, rate: float, *, only_stable
 
 
 def _ship_time(model: Model) -> float:
-    values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
-    return float(values["ship.length"] / values["ship.speed"])
+    return model.defaults["ship.length"] / model.defaults["ship.speed"]

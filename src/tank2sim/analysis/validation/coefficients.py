@@ -106,25 +106,14 @@ def compare_coefficients(cards: Sequence[SteeredCard]) -> tuple[tuple[Coefficien
 
 def _compare_ships(cards: Sequence[ManoeuvringCard]) -> tuple[tuple[CoefficientRow, ...], tuple[Notice, ...]]:
     mixed = len({card.model.kind == "mmg" for card in cards}) > 1
-    of_mmg = [mixed and isinstance(card, MmgCard) for card in cards]
-    cards = [linear_form(card, build(card)) if mixed and isinstance(card, MmgCard) else card for card in cards]
-    reference = cards[0]
-    expansions = [
-        _without_errors(found) if straight else found
-        for found, straight in zip((expanded_as(card, reference) for card in cards), of_mmg, strict=True)
-    ]
-    rows = []
-    for name in (*_RIGID_BODY, *ALL_TERMS, *_OF_MMG_ALONE):
-        if not any(name in expansion.coefficients for expansion in expansions):
-            continue
-        found = tuple(_in_sign_of(reference, name, expansion.coefficients.get(name)) for expansion in expansions)
-        differences = tuple(
-            Difference(why=expansion.refused[name])
-            if name in expansion.refused
-            else _difference(found[0], expansion_row)
-            for expansion, expansion_row in zip(expansions[1:], found[1:], strict=True)
-        )
-        rows.append(CoefficientRow(name, found, differences))
+    linear = [linear_form(card, build(card)) if mixed and isinstance(card, MmgCard) else card for card in cards]
+    reference = linear[0]
+    expansions = [expanded_as(card, reference) for card in linear]
+    for place, (one, card) in enumerate(zip(linear, cards, strict=True)):
+        if one is not card:  # the errors of an MMG card's linear terms are not known
+            expansions[place] = _without_errors(expansions[place])
+    present = set().union(*(expansion.coefficients for expansion in expansions))
+    names = [name for name in (*_RIGID_BODY, *ALL_TERMS, *_OF_MMG_ALONE) if name in present]
     notes = [note for expansion in expansions[1:] for note in expansion.notes]
     if mixed:
         notes.append(
@@ -133,20 +122,23 @@ def _compare_ships(cards: Sequence[ManoeuvringCard]) -> tuple[tuple[CoefficientR
                 "mean of both sides of gamma_R; their standard errors are not known"
             )
         )
-    return tuple(rows), tuple(notes)
+    return tuple(_row(reference, name, expansions) for name in names), tuple(notes)
+
+
+def _row(reference: ManoeuvringCard, name: str, expansions: Sequence[Expansion]) -> CoefficientRow:
+    first, *others = (_in_sign_of(reference, name, expansion.coefficients.get(name)) for expansion in expansions)
+    refusals = [expansion.refused.get(name) for expansion in expansions[1:]]
+    differences = [
+        Difference(why=why) if why else _difference(first, other) for why, other in zip(refusals, others, strict=True)
+    ]
+    return CoefficientRow(name, (first, *others), tuple(differences))
 
 
 def _compare_craft(cards: Sequence[SteeredCard]) -> tuple[CoefficientRow, ...]:
     """Rigid body and hull of craft of one size (the first is the reference), SI."""
     rows = {name: [CardCoefficient(getattr(card.rigid_body, name)) for card in cards] for name in _RIGID_BODY}
-    for name in CRAFT_TERMS:
-        if any(card.derivatives.get(name) for card in cards):
-            rows[name] = [
-                CardCoefficient(card.derivatives[name], card.standard_error(name), name in card.uncertainty)
-                if name in card.derivatives
-                else CardCoefficient(None)
-                for card in cards
-            ]
+    present = [name for name in CRAFT_TERMS if any(card.derivatives.get(name) for card in cards)]
+    rows |= {name: [_own(card, name) for card in cards] for name in present}
     return tuple(
         CoefficientRow(name, tuple(found), tuple(_difference(found[0], other) for other in found[1:]))
         for name, found in rows.items()
@@ -175,17 +167,16 @@ def _in_sign_of(reference: ManoeuvringCard, name: str, found: CardCoefficient | 
 def _difference(first: CardCoefficient, second: CardCoefficient) -> Difference:
     if first.value is None or second.value is None:
         return Difference(why="not in the reference's model" if first.value is None else "not in this model")
-    apart = second.value - first.value
+    apart, errors = second.value - first.value, (first.standard_error, second.standard_error)
     percent = 100 * apart / abs(first.value) if first.value else None
     same = math.isclose(first.value, second.value, rel_tol=1e-9, abs_tol=1e-15)  # apart from rounding
-    if first.standard_error and second.standard_error and same:
+    if errors[0] is None or errors[1] is None:
+        return Difference(None, percent, "no standard error" if apart else "")
+    if same and all(errors):
         return Difference(None, percent, SAME)
-    if first.standard_error is None or second.standard_error is None:
-        return Difference(None, percent, "" if apart == 0 else "no standard error")
-    both = math.hypot(first.standard_error, second.standard_error)
-    if both == 0:
-        return Difference(0.0 if apart == 0 else None, percent, "" if apart == 0 else "both are stated as certain")
-    return Difference(apart / both, percent)
+    if both := math.hypot(errors[0], errors[1]):
+        return Difference(apart / both, percent)
+    return Difference(None, percent, "both are stated as certain") if apart else Difference(0.0, percent)
 
 
 def compare_effects(cards: Sequence[SteeredCard], models: Sequence[Model]) -> tuple[CoefficientRow, ...]:
@@ -194,19 +185,23 @@ def compare_effects(cards: Sequence[SteeredCard], models: Sequence[Model]) -> tu
     Values with a unit (a wind speed, a time) are compared only between ships of the same size.
     """
     found = [_of_effects(card, model) for card, model in zip(cards, models, strict=True)]
-    rows = []
-    for name in dict.fromkeys(name for effects in found for name in effects):
-        row = tuple(effects.get(name, CardCoefficient(None)) for effects in found)
-        differences = []
-        for card, model, coefficient in zip(cards[1:], models[1:], row[1:], strict=True):
-            of_size = name in model and model[name].unit not in ("1", "rad")
-            sizes_differ = not math.isclose(card.ship.length_m, cards[0].ship.length_m, rel_tol=1e-6)
-            refused = of_size and sizes_differ
-            differences.append(
-                Difference(why="of a ship of another size") if refused else _difference(row[0], coefficient)
-            )
-        rows.append(CoefficientRow(name, row, tuple(differences)))
-    return tuple(rows)
+    one_size = [math.isclose(card.ship.length_m, cards[0].ship.length_m, rel_tol=1e-6) for card in cards]
+
+    def difference(name: str, place: int) -> Difference:
+        of_size = name in models[place] and models[place][name].unit not in ("1", "rad")
+        if of_size and not one_size[place]:
+            return Difference(why="of a ship of another size")
+        first, other = (found[number].get(name, CardCoefficient(None)) for number in (0, place))
+        return _difference(first, other)
+
+    return tuple(
+        CoefficientRow(
+            name,
+            tuple(effects.get(name, CardCoefficient(None)) for effects in found),
+            tuple(difference(name, place) for place in range(1, len(cards))),
+        )
+        for name in dict.fromkeys(name for effects in found for name in effects)
+    )
 
 
 def _of_effects(card: SteeredCard, model: Model) -> dict[str, CardCoefficient]:
@@ -226,38 +221,54 @@ def _error_of(parameter: CardParameter) -> float | None:
 
 def expanded_as(card: ManoeuvringCard, reference: ManoeuvringCard) -> Expansion:
     """The coefficients of a card in the speed, scaling and inertial convention of another."""
-    ratio = _froude(reference) / _froude(card)
     linear = "linear" in (card.model.kind, reference.model.kind)
-    mmg = card.model.kind == "mmg"  # whose hull has no terms in the speed
-    if abs(ratio - 1) < _SAME_SPEED or linear or mmg:
-        ratio = 1.0
+    ratio = 1.0 if linear else _speed_ratio(card, reference)
     names, matrix, constant = _conversion(card, reference, ratio)
-    sources = [name for name in card.derivatives if name in names]
-    columns = [names.index(name) for name in sources]
-    values = np.array([card.derivatives[name] for name in sources])
-    errors = np.array([card.standard_error(name) for name in sources])
-    stated = {name for name in sources if name in card.uncertainty}
-    found: dict[str, CardCoefficient] = {name: CardCoefficient(getattr(card.rigid_body, name)) for name in _RIGID_BODY}
     refused = _refused(card, reference, ratio, linear)
     slowest, fastest = card.model.speed_range_mps
     outside = not slowest <= ratio * card.model.speed_mps <= fastest
-    for row, name in enumerate(names):
-        weights = matrix[row, columns]
-        if linear and name not in _linear_names():
+    found = {name: CardCoefficient(getattr(card.rigid_body, name)) for name in _RIGID_BODY}
+    for name, weights, remainder in zip(names, matrix.tolist(), constant.tolist(), strict=True):
+        own = dict(zip(names, weights, strict=True))
+        converted = None if linear and name not in _linear_names() else _converted(card, own, remainder)
+        if converted is None:
             continue
-        if np.all(np.abs(weights) < _ABSENT) and abs(constant[row]) < _ABSENT:
-            continue
-        known = {source for source, weight in zip(sources, weights, strict=True) if abs(weight) > _ABSENT}
-        error = float(np.linalg.norm(weights * errors))
-        value = float(weights @ values + constant[row])
-        if outside and (known != {name} or abs(value - card.derivatives[name]) > _ABSENT):
+        found[name] = converted
+        if outside and not _kept(card, name, own, converted):
             refused.setdefault(name, "the reference's speed is outside the range in which this card holds")
-        found[name] = CardCoefficient(value, error if known else None, bool(known) and known <= stated)
-    for name in (*ACCELERATION_TERMS, *_OF_MMG_ALONE):
-        if name in card.derivatives:
-            stated_error = name in card.uncertainty
-            found[name] = CardCoefficient(card.derivatives[name], card.standard_error(name), stated_error)
+    found |= {name: _own(card, name) for name in (*ACCELERATION_TERMS, *_OF_MMG_ALONE) if name in card.derivatives}
     return Expansion(found, refused, _notes(card, reference, ratio))
+
+
+def _own(card: SteeredCard, name: str) -> CardCoefficient:
+    if name not in card.derivatives:
+        return CardCoefficient(None)
+    return CardCoefficient(card.derivatives[name], card.standard_error(name), name in card.uncertainty)
+
+
+def _converted(card: ManoeuvringCard, weights: Mapping[str, float], remainder: float) -> CardCoefficient | None:
+    """A term as the sum of the card's own, each with its weight, and a remainder; None where all are absent."""
+    own = {name: weight for name, weight in weights.items() if abs(weight) > _ABSENT and name in card.derivatives}
+    if not own and abs(remainder) < _ABSENT:
+        return None
+    value = sum(weight * card.derivatives[name] for name, weight in own.items()) + remainder
+    if not own:
+        return CardCoefficient(value)
+    error = math.hypot(*(weight * card.standard_error(name) for name, weight in own.items()))
+    return CardCoefficient(value, error, own.keys() <= card.uncertainty.keys())
+
+
+def _speed_ratio(card: ManoeuvringCard, reference: ManoeuvringCard) -> float:
+    """Froude number of the reference over the card's; 1 where they are the same, and for an MMG card, whose hull has no
+    terms in the speed."""
+    ratio = _froude(reference) / _froude(card)
+    return 1.0 if card.model.kind == "mmg" or abs(ratio - 1) < _SAME_SPEED else ratio
+
+
+def _kept(card: ManoeuvringCard, name: str, weights: Mapping[str, float], converted: CardCoefficient) -> bool:
+    """Whether a converted term is the card's own, unchanged."""
+    known = {source for source, weight in weights.items() if source in card.derivatives and abs(weight) > _ABSENT}
+    return known == {name} and abs((converted.value or 0.0) - card.derivatives[name]) <= _ABSENT
 
 
 def _froude(card: ManoeuvringCard) -> float:
@@ -269,14 +280,11 @@ def _linear_names() -> tuple[str, ...]:
 
 
 def _refused(card: ManoeuvringCard, reference: ManoeuvringCard, ratio: float, linear: bool) -> dict[str, str]:
-    found = {}
-    if linear:
-        found = {name: "not in the linear model" for name in ALL_TERMS if name not in _linear_names()}
-    if ratio != 1 and not (card.propulsion and reference.propulsion):
-        why = "another speed, and the revolutions are not known"
-        terms = map(known_term, ABKOWITZ_TERMS["X"])
-        found |= {term.name: why for term in terms if not (term.v or term.r or term.d)}
-    return found
+    found = {name: "not in the linear model" for name in ALL_TERMS if linear and name not in _linear_names()}
+    if ratio == 1 or (card.propulsion and reference.propulsion):
+        return found
+    straight = [term.name for term in map(known_term, ABKOWITZ_TERMS["X"]) if not any((term.v, term.r, term.d))]
+    return found | dict.fromkeys(straight, "another speed, and the revolutions are not known")
 
 
 def _notes(card: ManoeuvringCard, reference: ManoeuvringCard, ratio: float) -> tuple[Notice, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +19,6 @@ from tank2sim.analysis.validation.coefficients import (
 from tank2sim.analysis.validation.standard_trials import (
     TrialShip,
     figure_numbers,
-    member_spread,
     members,
     ship_of,
     standard_trials,
@@ -32,7 +31,6 @@ from tank2sim.errors import InputError
 from tank2sim.notices import Notice, caution
 from tank2sim.simulation.card_range import Numbers
 from tank2sim.simulation.manoeuvres import Manoeuvre
-from tank2sim.simulation.run import Run
 from tank2sim.simulation.trajectory import Trajectory
 
 SAME_SIZE = 0.03
@@ -176,14 +174,16 @@ def compare_cards(cards: Sequence[SteeredCard], count: int = VALIDATION_MEMBERS)
     labels = labels_of(cards)
     ships = [ship_of(card) for card in cards]
     rows, notes = compare_coefficients(cards)
-    drawn = [members(ship.card, ship.model, count) for ship in ships]
-    messages = [message.of(label) for label, (_, notes) in zip(labels, drawn, strict=True) for message in notes]
-    notices, trials = [*_notices(cards, labels), *messages, *notes], []
-    for name, manoeuvre in standard_trials(ships).items():
-        trial, trouble = _trial(name, manoeuvre, ships, labels, [draws for draws, _ in drawn])
-        trials.append(trial)
-        notices += trouble
     effects = compare_effects(cards, [ship.model for ship in ships])
+    drawn = [members(ship.card, ship.model, count) for ship in ships]
+    draws = [each for each, _ in drawn]
+    trials = [_trial(name, one, ships, labels, draws) for name, one in standard_trials(ships).items()]
+    notices = [
+        *_notices(cards, labels),
+        *(message.of(label) for label, (_, messages) in zip(labels, drawn, strict=True) for message in messages),
+        *notes,
+        *(trouble for _, troubles in trials for trouble in troubles),
+    ]
     return CardComparison(
         cards=tuple(
             ComparedCard(label=label, ship=card.ship.name, source=card.ship.source)
@@ -192,7 +192,7 @@ def compare_cards(cards: Sequence[SteeredCard], count: int = VALIDATION_MEMBERS)
         summary=tuple(_summary(label, place, (*rows, *effects)) for place, label in enumerate(labels[1:])),
         coefficients=rows,
         effects=effects,
-        trials=tuple(trials),
+        trials=tuple(trial for trial, _ in trials),
         craft=steered_by is SteeredBy.THRUSTERS,
         members=count,
         notices=tuple(dict.fromkeys(notices)),
@@ -261,6 +261,17 @@ def scaled_number(name: str, value: float, length_ratio: float) -> float:
     return value * {"m": length_ratio, "s": root, "mps": root, "degps": 1 / root}.get(name.rpartition("_")[2], 1.0)
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _Sailed:
+    """A trial by one card at the reference's size: figures, their deviations, those outside the card's range, track."""
+
+    figures: Numbers = field(default_factory=dict)
+    deviations: Numbers = field(default_factory=dict)
+    outside: tuple[str, ...] = ()
+    track: CardTrack | None = None
+    messages: Sequence[Notice] = ()
+
+
 def _trial(
     name: str,
     manoeuvre: Manoeuvre,
@@ -269,62 +280,49 @@ def _trial(
     drawn: Sequence[Sequence[Mapping[str, float]]],
 ) -> tuple[TrialComparison, list[Notice]]:
     reference = ships[0].card
-    found: list[Numbers] = []
-    deviations: list[Numbers] = []
-    outside: list[set[str]] = []
-    tracks, messages = [], []
-    for ship, label, draws in zip(ships, labels, drawn, strict=True):
-        ratio = reference.ship.length_m / ship.card.ship.length_m
-        start = _start(reference, ship.card)
-        run = ship.run(manoeuvre, start)
-        if isinstance(run, str):
-            messages.append(Notice(f"{label}: {name}: {run}"))
-            found.append({})
-            deviations.append({})
-            outside.append(set())
-            continue
-        messages += [notice.of(name).of(label) for notice in (*run.reading.notices, *run.missing)]
-        outside.append(set(run.reading.outside_names))
-        found.append(_scaled(figure_numbers(run.figures), ratio))
-        # Only the numbers of each member are kept: the motions of a thousand would fill gigabytes.
-        spread = member_spread([_numbers(ship.run(manoeuvre, {**start, **member})) for member in draws])
-        deviations.append(_scaled(spread, ratio))
-        tracks.append(_track(label, run.trajectory, ratio))
-    names = dict.fromkeys(figure for figures in found for figure in figures)
-    figures = {
-        figure: _compared(
-            [values.get(figure) for values in found],
-            [errors.get(figure) for errors in deviations],
-            [figure in beyond for beyond in outside],
-        )
-        for figure in names
-    }
-    return TrialComparison(name=name, figures=figures, tracks=tuple(tracks)), messages
+    sailed = [
+        _sailed(manoeuvre, ship, reference, label, draws)
+        for ship, label, draws in zip(ships, labels, drawn, strict=True)
+    ]
+    names = dict.fromkeys(figure for one in sailed for figure in one.figures)
+    figures = {figure: _compared(figure, sailed) for figure in names}
+    messages = [notice.of(name).of(label) for one, label in zip(sailed, labels, strict=True) for notice in one.messages]
+    tracks = tuple(one.track for one in sailed if one.track)
+    return TrialComparison(name=name, figures=figures, tracks=tracks), messages
 
 
-def _compared(
-    values: Sequence[float | None], deviations: Sequence[float | None], outside: Sequence[bool]
-) -> ComparedFigure:
-    first, first_deviation = values[0], deviations[0]
-    differences: list[float | None] = []
-    in_errors: list[float | None] = []
-    for value, deviation in zip(values[1:], deviations[1:], strict=True):
-        apart = None if value is None or first is None else value - first
-        both = None if deviation is None or first_deviation is None else math.hypot(deviation, first_deviation)
-        differences.append(apart)
-        in_errors.append(apart / both if apart is not None and both else None)
-    return ComparedFigure(
-        values=tuple(values),
-        standard_deviations=tuple(deviations),
-        outside_card_range=tuple(outside),
-        differences=tuple(differences),
-        differences_standard_errors=tuple(in_errors),
+def _sailed(
+    manoeuvre: Manoeuvre, ship: TrialShip, reference: SteeredCard, label: str, draws: Sequence[Mapping[str, float]]
+) -> _Sailed:
+    ratio, start = reference.ship.length_m / ship.card.ship.length_m, _start(reference, ship.card)
+    run = ship.run(manoeuvre, start)
+    if isinstance(run, str):
+        return _Sailed(messages=[Notice(run)])
+    return _Sailed(
+        figures=_scaled(figure_numbers(run.figures), ratio),
+        deviations=_scaled(ship.spread(manoeuvre, draws, start), ratio),
+        outside=run.reading.outside_names,
+        track=_track(label, run.trajectory, ratio),
+        messages=[*run.reading.notices, *run.missing],
     )
 
 
-def _numbers(run: Run | str) -> Numbers:
-    """Figures of a run; empty for one that could not be run."""
-    return {} if isinstance(run, str) else figure_numbers(run.figures)
+def _compared(figure: str, sailed: Sequence[_Sailed]) -> ComparedFigure:
+    values = np.array([one.figures.get(figure, math.nan) for one in sailed])
+    deviations = np.array([one.deviations.get(figure, math.nan) for one in sailed])
+    differences, both = values[1:] - values[0], np.hypot(deviations[1:], deviations[0])
+    in_errors = np.divide(differences, both, out=np.full(len(both), math.nan), where=both > 0)
+    return ComparedFigure(
+        values=_known(values),
+        standard_deviations=_known(deviations),
+        outside_card_range=tuple(figure in one.outside for one in sailed),
+        differences=_known(differences),
+        differences_standard_errors=_known(in_errors),
+    )
+
+
+def _known(values: Array) -> tuple[float | None, ...]:
+    return tuple(None if math.isnan(value) else value for value in values.tolist())
 
 
 def _start(reference: SteeredCard, card: SteeredCard) -> dict[str, float]:
@@ -349,44 +347,54 @@ def _track(label: str, run: Trajectory, ratio: float) -> CardTrack:
 
 
 def _notices(cards: Sequence[SteeredCard], labels: Sequence[str]) -> list[Notice]:
-    messages = [doubt.of(label) for card, label in zip(cards, labels, strict=True) for doubt in doubts(card)]
-    reference = cards[0]
-    for card, label in zip(cards, labels, strict=True):
-        ratio = reference.ship.length_m / card.ship.length_m
-        if apart := differences_of_size(reference, card, 1 / ratio):
-            form = "; ".join(apart)
-            messages.append(
-                Notice(f"{label}: is of another form than {labels[0]} (at its size {form}): two ships are compared")
-            )
-        elif not math.isclose(ratio, 1.0, rel_tol=SAME_SIZE):
-            messages.append(
-                Notice(f"{label}: is of another size than {labels[0]}: ships or models of one form are compared")
-            )
-        present = [name for name, value in card.derivatives.items() if value]
-        if assumed := [name for name in present if name not in card.uncertainty]:
-            share = f"{100 * DEFAULT_RELATIVE_ERROR:g} % of their value is taken"
-            text = f"{len(assumed)} derivatives state no standard error: {share}"
-            every = caution(f"standard errors are ASSUMED: {text}") if assumed == present else Notice(text)
-            messages.append(every.of(label))
-        if not math.isclose(ratio, 1.0, rel_tol=1e-6):
-            messages.append(
-                Notice(f"{label}: figures and tracks scaled by Froude's law to a ship {ratio:.4g} times as long")
-            )
-        speed = _start(reference, card).get("initial.u", card.model.speed_mps)
-        if not math.isclose(speed, card.model.speed_mps, rel_tol=1e-3):
-            messages.append(
-                Notice(f"{label}: its trials begin at the reference's speed, {speed:.4g} m/s at its own size")
-            )
-        if _effects(card) != _effects(reference):
-            effects, expected = (", ".join(_effects(ship)) or "none" for ship in (card, reference))
-            messages.append(
-                Notice(f"{label}: its effects ({effects}) are not the reference's ({expected}); the trials have them")
-            )
-        engines = [ship.propulsion is None for ship in (card, reference)]
-        if len(set(engines)) > 1:
-            messages.append(Notice(f"{label}: only one of it and the reference has propulsion: no stop is compared"))
-    return messages
+    named = list(zip(cards, labels, strict=True))
+    found = [doubt.of(label) for card, label in named for doubt in doubts(card)]
+    return found + [
+        notice.of(label)
+        for card, label in named
+        for notice in (
+            *_about_size(card, cards[0], labels[0]),
+            *_about_errors(card),
+            *_about_trials(card, cards[0]),
+        )
+    ]
 
 
-def _effects(card: SteeredCard) -> list[str]:
-    return sorted(effect.name for effect in card.effects)
+def _about_size(card: SteeredCard, reference: SteeredCard, label: str) -> list[Notice]:
+    ratio = reference.ship.length_m / card.ship.length_m
+    if apart := differences_of_size(reference, card, 1 / ratio):
+        form = "; ".join(apart)
+        return [Notice(f"is of another form than {label} (at its size {form}): two ships are compared")]
+    if math.isclose(ratio, 1.0, rel_tol=SAME_SIZE):
+        return []
+    return [Notice(f"is of another size than {label}: ships or models of one form are compared")]
+
+
+def _about_errors(card: SteeredCard) -> list[Notice]:
+    present = [name for name, value in card.derivatives.items() if value]
+    assumed = [name for name in present if name not in card.uncertainty]
+    if not assumed:
+        return []
+    share = f"{100 * DEFAULT_RELATIVE_ERROR:g} % of their value is taken"
+    text = f"{len(assumed)} derivatives state no standard error: {share}"
+    return [caution(f"standard errors are ASSUMED: {text}") if assumed == present else Notice(text)]
+
+
+def _about_trials(card: SteeredCard, reference: SteeredCard) -> list[Notice]:
+    """What differs in the trials: size, speed, effects and engine."""
+    ratio = reference.ship.length_m / card.ship.length_m
+    speed = _start(reference, card).get("initial.u", card.model.speed_mps)
+    effects, expected = (sorted(effect.name for effect in ship.effects) for ship in (card, reference))
+    texts = {
+        f"figures and tracks scaled by Froude's law to a ship {ratio:.4g} times as long": not math.isclose(
+            ratio, 1.0, rel_tol=1e-6
+        ),
+        f"its trials begin at the reference's speed, {speed:.4g} m/s at its own size": not math.isclose(
+            speed, card.model.speed_mps, rel_tol=1e-3
+        ),
+        f"its effects ({', '.join(effects) or 'none'}) are not the reference's ({', '.join(expected) or 'none'}); the "
+        "trials have them": effects != expected,
+        "only one of it and the reference has propulsion: no stop is compared": (card.propulsion is None)
+        != (reference.propulsion is None),
+    }
+    return [Notice(text) for text, holds in texts.items() if holds]

@@ -13,6 +13,7 @@ trials can reach the level at all (Tarone 1990, Biometrics 46).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -109,19 +110,16 @@ def _of_family(figures: Sequence[FigureError], names: Sequence[str]) -> list[One
     for rank, name in enumerate(sorted(alone, key=lambda each: alone[each])):
         least = max(least, min(1.0, (len(alone) - rank) * alone[name]))
         errors, measured = np.array(groups[name]).T
-        above = int(np.sum(errors > 0))
-        same, side = max(above, len(errors) - above), np.sign(2 * above - len(errors))
-        mean = float(np.mean(errors))
-        if least >= SIGN_LEVEL or mean * side <= 0:  # one error to the other side outweighs the others
+        above, mean, size = int(np.sum(errors > 0)), float(np.mean(errors)), abs(float(np.mean(measured)))
+        if least >= SIGN_LEVEL or mean * (2 * above - len(errors)) <= 0:  # one error outweighs the others
             continue
-        percent = 100 * mean / abs(float(np.mean(measured))) if np.mean(measured) else np.nan
         found.append(
             OneSidedError(
                 name=name,
                 trials=len(errors),
-                same_side=same,
+                same_side=max(above, len(errors) - above),
                 mean_error=mean,
-                mean_percent=float(percent),
+                mean_percent=100 * mean / size if size else math.nan,
                 sign_probability=alone[name],
                 probability=least,
             )

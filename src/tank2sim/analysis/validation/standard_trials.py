@@ -9,22 +9,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from tank2sim.analysis.ensemble.draws import draws_with
-from tank2sim.analysis.stability.imo import TRIAL_RUDDER
+from tank2sim.analysis.stability.imo import calm_trial, largest_trial_rudder
 from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredBy, SteeredCard
+from tank2sim.cards.form import ThrusterSection
 from tank2sim.cards.small_craft import cruising_revolutions, pushes_ahead
 from tank2sim.dynamics import build
 from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
-from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
 from tank2sim.notices import Notice
 from tank2sim.simulation.card_range import Numbers, entry_name, single_figures
 from tank2sim.simulation.ensemble import Redrawn
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Manoeuvre, Stop, Turn, Zigzag
-from tank2sim.simulation.run import Run, simulate
+from tank2sim.simulation.run import Run
 from tank2sim.simulation.thruster_manoeuvres import DifferenceTurn, Spin, StraightRun, ThrusterManoeuvre
 from tank2sim.units import from_si, to_si
 
@@ -59,8 +58,7 @@ class TrialShip:
     @property
     def largest_rudder(self) -> float:
         """Rudder of the turning circles, rad: 35 deg, or the largest of the gear."""
-        gear = self.card.steering_gear
-        return min(TRIAL_RUDDER, gear.max_angle_rad if gear and gear.max_angle_rad else TRIAL_RUDDER)
+        return largest_trial_rudder(self.model.defaults)
 
     def run(
         self,
@@ -77,17 +75,27 @@ class TrialShip:
         parameters, inputs : mapping, optional
             Values in place of the model's, by name, SI.
         """
-        calm = undisturbed_inputs(self.model)
-        try:
-            return simulate(
-                self.model,
-                manoeuvre,
-                inputs={**calm, **(inputs or {})},
-                parameters=parameters,
-                integrator=self.integrator,
-            )
-        except InputError as error:
-            return f"{error.place}: {error.problem}" if error.place else error.problem
+        return calm_trial(self.model, manoeuvre, self.integrator, parameters, inputs)
+
+    def spread(
+        self,
+        manoeuvre: Manoeuvre,
+        drawn: Sequence[Mapping[str, float]],
+        parameters: Mapping[str, float] | None = None,
+    ) -> Numbers:
+        """Standard deviation of the figures of a trial over ships with drawn parameters, by :func:`member_spread`.
+
+        Parameters
+        ----------
+        manoeuvre : Manoeuvre
+        drawn : sequence of mapping
+            Values of each ship, by name, SI.
+        parameters : mapping, optional
+            Values that all have in place of the model's.
+        """
+        # Only the numbers of each member are kept: the motions of a thousand would fill gigabytes.
+        runs = (self.run(manoeuvre, {**(parameters or {}), **member}) for member in drawn)
+        return member_spread([{} if isinstance(run, str) else figure_numbers(run.figures) for run in runs])
 
 
 def ship_of(card: SteeredCard) -> TrialShip:
@@ -123,22 +131,24 @@ def craft_trials(cards: Sequence[SteeredCard]) -> dict[str, ThrusterManoeuvre]:
     The revolutions are those that all craft reach, in tens of rpm. A craft without thrusters at both sides has the
     straight run alone.
     """
-    ahead = [
-        [thruster for thruster, holds in zip(card.thrusters, pushes_ahead(card), strict=True) if holds]
-        for card in cards
-    ]
-    full = min(thruster.max_radps for thrusters in ahead for thruster in thrusters)
-    astern = min(-thruster.lowest_radps for thrusters in ahead for thruster in thrusters)
-    rooms = [min(full - cruising, cruising + astern) for cruising in map(cruising_revolutions, cards)]
-    difference, spin = CRAFT_SHARE * 2 * min(rooms), CRAFT_SHARE * min(full, astern)
+    each = [_steering_thrusters(card) for card in cards]
+    full = min(thruster.max_radps for thrusters in each for thruster in thrusters)
+    astern = min(-thruster.lowest_radps for thrusters in each for thruster in thrusters)
+    room = min(min(full - cruising, cruising + astern) for cruising in map(cruising_revolutions, cards))
     trials: dict[str, ThrusterManoeuvre] = {"straight": StraightRun(_tens(full))}
-    if all({1.0, -1.0} <= {math.copysign(1, one.y_m) for one in thrusters if one.y_m} for thrusters in ahead):
+    if all({1.0, -1.0} <= {math.copysign(1, one.y_m) for one in thrusters if one.y_m} for thrusters in each):
+        difference, spin = _tens(CRAFT_SHARE * 2 * room), _tens(CRAFT_SHARE * min(full, astern))
         trials |= {
-            "difference to starboard": DifferenceTurn(_tens(difference)),
-            "difference to port": DifferenceTurn(-_tens(difference)),
-            "spin to starboard": Spin(_tens(spin)),
+            "difference to starboard": DifferenceTurn(difference),
+            "difference to port": DifferenceTurn(-difference),
+            "spin to starboard": Spin(spin),
         }
     return {f"{name} ({trial.words})": trial for name, trial in trials.items()}
+
+
+def _steering_thrusters(card: SteeredCard) -> list[ThrusterSection]:
+    """The thrusters that push ahead."""
+    return [thruster for thruster, holds in zip(card.thrusters, pushes_ahead(card), strict=True) if holds]
 
 
 def _tens(revolutions: float) -> float:
@@ -155,9 +165,7 @@ def figure_numbers(figures: Figures) -> Numbers:
     return {name: value for name, value in single if (name in figures or name in overshoots) and name not in excluded}
 
 
-def members(
-    card: SteeredCard, model: Model, count: int, seed: int = SEED
-) -> tuple[tuple[dict[str, float], ...], tuple[Notice, ...]]:
+def members(card: SteeredCard, model: Model, count: int) -> tuple[tuple[dict[str, float], ...], tuple[Notice, ...]]:
     """Parameters of `count` ships drawn within the errors of the card, with notices.
 
     Errors of all numbers are normal, correlated by the card's covariance, or independent without one. Each member has
@@ -172,7 +180,7 @@ def members(
     if not count:
         return (), ()
     errors = joint_errors(card, card_parameters(card, study_model(card)))
-    draws, known = draws_with(errors, seed), set(model.parameter_names)
+    draws, known = draws_with(errors, SEED), set(model.parameter_names)
     found = draws.members(0, count)
     words = Redrawn.of(list(found.beyond.values())).in_words(count)
     members = (zip(draws.names, row, strict=True) for row in found.values.tolist())

@@ -227,29 +227,21 @@ def validate_card(
     finer = replace(model, step_s=model.step_s / 2)
     engines = Integrator(model), Integrator(finer)
     drawn, of_errors = members(card, model, count)
-    known = [(trial, recognise(trial, model)) for trial in trials]
+    known = {trial.name: recognise(trial, model) for trial in trials}
+    whats = [what for what in known.values() if isinstance(what, Recorded)]
+    between = _between_repeats(whats)
     messages = [
-        Notice(f"{trial.name}: no turning circle and no zigzag, for {what}: only replayed")
-        for trial, what in known
+        Notice(f"{name}: no turning circle and no zigzag, for {what}: only replayed")
+        for name, what in known.items()
         if isinstance(what, str)
     ]
     messages += [*joint_errors(card, card_parameters(card, study_model(card))).in_words, *of_errors]
-    whats = [what for _, what in known if isinstance(what, Recorded)]
-    between = _between_repeats(whats)
     figures: list[Validated] = []
-    for trial, what in known:
-        if isinstance(what, str):
-            continue
+    for what in whats:
         found, trouble = _validated(what, engines, drawn, between)
-        copied = fitted_as(card, trial)
-        fitted = copied is not None or made_card(card, trial.name)
-        figures += [replace(figure, required_percent=required_percent, made_card=fitted) for figure in found]
-        messages += trouble
-        if fitted:
-            named = f" (as {copied})" if copied not in (None, trial.name) else ""
-            messages.append(
-                Notice(f"{trial.name}: the card was identified from this trial{named}: its figures are only fitted")
-            )
+        fitted = _fitted(card, what.trial)
+        figures += [replace(figure, required_percent=required_percent, made_card=bool(fitted)) for figure in found]
+        messages += [*trouble, *fitted]
     if whats and not between:
         messages.append(
             Notice(
@@ -262,6 +254,15 @@ def validate_card(
     one_sided = one_sided_errors(figures, (TURN_FIGURES, ZIGZAG_FIGURES))
     messages = [*(error.notice for error in one_sided), *messages]
     return Validation(tuple(figures), count, tuple(dict.fromkeys(messages)), one_sided)
+
+
+def _fitted(card: ManoeuvringCard, trial: Trial) -> list[Notice]:
+    """A notice on a trial that the card was identified from; none of another."""
+    copied = fitted_as(card, trial)
+    if copied is None and not made_card(card, trial.name):
+        return []
+    named = f" (as {copied})" if copied not in (None, trial.name) else ""
+    return [Notice(f"{trial.name}: the card was identified from this trial{named}: its figures are only fitted")]
 
 
 def made_card(card: ManoeuvringCard, trial: str) -> bool:
@@ -288,11 +289,7 @@ def verify(ship: TrialShip, count: int = VALIDATION_MEMBERS) -> tuple[tuple[Veri
             messages.append(Notice(f"{trial}: {run if isinstance(run, str) else fine}"))
             continue
         messages += [notice.of(trial) for notice in (*run.reading.notices, *run.missing)]
-        many = [ship.run(manoeuvre, member) for member in drawn]
-        deviation = member_spread(
-            [{} if isinstance(result, str) else figure_numbers(result.figures) for result in many]
-        )
-        halved = figure_numbers(fine.figures)
+        deviation, halved = ship.spread(manoeuvre, drawn), figure_numbers(fine.figures)
         for name, value in figure_numbers(run.figures).items():
             halving = halved[name] - value if name in halved else None
             rows.append(Verified(trial, name, value, halving, deviation.get(name)))
@@ -307,33 +304,38 @@ def _validated(
 ) -> tuple[list[Validated], list[Notice]]:
     measured = compare_figures(what)
     (coarse, read), (fine, _) = (_repeated(what, engine) for engine in engines)
-    ensemble = [_repeated(what, engines[0], member)[0] for member in drawn]
-    inputs, data = member_spread(ensemble), _read_again(what, engines[0])
-    messages = [
-        Notice(f"{what.trial.name}: {name}: too few members of the ensemble reach it to determine u_input")
-        for name in measured
-        if drawn and name in coarse and name not in inputs
-    ]
-    if what.rudder_rate_radps is None and what.begin_s <= what.trial.time_s[0]:
-        messages.append(
-            Notice(
-                f"{what.trial.name}: the record begins with the order already given, and its first row is taken as the "
-                "execute: if the order was earlier, advance and times are too small by that time"
-            )
-        )
-    if beyond := [name for name in measured if read.outside(name) and name in coarse]:
-        messages[:0] = [notice.of(f"{what.trial.name}: {', '.join(beyond)}") for notice in read.notices]
+    inputs = member_spread([_repeated(what, engines[0], member)[0] for member in drawn])
+    data = _read_again(what, engines[0])
     rows = []
     for name, value in measured.items():
-        simulated, finer = coarse.get(name), fine.get(name)
-        halving = 0.0 if simulated is None or finer is None else abs(simulated - finer)
-        sampled = sampling_step(what.trial) / math.sqrt(12) if name.endswith("_s") else 0.0
-        reading = from_si(name, what.reading_errors.get(name, 0.0))
-        u_data = math.hypot(data.get(name, 0.0), between.get((kind(what), name), 0.0), sampled, reading)
-        u_input = inputs.get(name)
+        halving = abs(coarse[name] - fine[name]) if name in coarse.keys() & fine.keys() else 0.0
+        u_data = math.hypot(data.get(name, 0.0), between.get((kind(what), name), 0.0), *_of_reading(what, name))
         u_num = SAFETY * halving / COVERAGE
-        rows.append(Validated(what.trial.name, what.words, name, value, simulated, u_num, u_input, u_data))
-    return rows, messages
+        figures = value, coarse.get(name), u_num, inputs.get(name), u_data
+        rows.append(Validated(what.trial.name, what.words, name, *figures))
+    shown = [name for name in measured if name in coarse]
+    beyond = ", ".join(name for name in shown if read.outside(name))
+    messages = [notice.of(beyond) for notice in read.notices if beyond]
+    few = [name for name in shown if drawn and name not in inputs]
+    messages += [Notice(f"{name}: too few members of the ensemble reach it to determine u_input") for name in few]
+    return rows, [message.of(what.trial.name) for message in (*messages, *_late_execute(what))]
+
+
+def _late_execute(what: Recorded) -> list[Notice]:
+    if what.rudder_rate_radps is not None or what.begin_s > what.trial.time_s[0]:
+        return []
+    return [
+        Notice(
+            "the record begins with the order already given, and its first row is taken as the execute: if the order "
+            "was earlier, advance and times are too small by that time"
+        )
+    ]
+
+
+def _of_reading(what: Recorded, name: str) -> tuple[float, float]:
+    """Standard errors of a figure by the interval of the samples, and by the errors of what was read."""
+    sampled = sampling_step(what.trial) / math.sqrt(12) if name.endswith("_s") else 0.0
+    return sampled, from_si(name, what.reading_errors.get(name, 0.0))
 
 
 def compare_figures(what: Recorded) -> Numbers:

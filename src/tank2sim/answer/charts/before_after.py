@@ -36,30 +36,47 @@ def before_after_switch(series: Mapping[str, str], field: str = "run") -> str:
     return f"!{of}[{_NAME}] || datum.{field} === {of}[{_NAME}] || indexof({names}, datum.{field}) < 0"
 
 
-def misfit_maps(rows: Sequence[ChartRecord], models: Sequence[str], *, title: str = "") -> ChartSpec:
-    """Misfit of each signal in each trial in noise units, in one scale of colours, to switch between models.
+IN_NOISE = "misfit (noise units)"
+"""What the cells of :func:`misfit_maps` usually hold."""
+
+_SUBTITLE = "Number and colour: root mean square of simulated less measured, in standard deviations of the noise."
+
+
+def misfit_maps(
+    rows: Sequence[ChartRecord],
+    models: Sequence[str],
+    *,
+    title: str = "",
+    what: str = IN_NOISE,
+    subtitle: str = _SUBTITLE,
+    shown: Mapping[str, str] | None = None,
+) -> ChartSpec:
+    """Misfit of each signal in each trial, in one scale of colours, to switch between models.
 
     `rows`: ``group`` (words for a kind of trials, or nothing), ``trial``, ``signal``, ``model`` and ``misfit`` (-)
-    each; `models`: names to switch between, in their order from left to right.
+    each; `models`: names to switch between, in their order from left to right; `what`, `subtitle`: what a cell holds;
+    `shown`: further fields of the tooltip.
     """
     groups = list(dict.fromkeys(row["group"] for row in rows))
     signals = list(dict.fromkeys(row["signal"] for row in rows))
-    subtitle = "Number and colour: root mean square of simulated less measured, in standard deviations of the noise."
+    parts = [[row for row in rows if row["group"] == group] for group in groups]
     return {
-        "vconcat": [_maps([row for row in rows if row["group"] == group], signals, models) for group in groups],
+        "vconcat": [_maps(part, signals, models, what, {"text:N": what, **(shown or {})}) for part in parts],
         "spacing": 18,
         "params": switch(models),
         "title": heading(title, subtitle),
-        "description": f"Misfit by trial and signal in noise units, {' and '.join(models)}.",
+        "description": f"{what[:1].upper()}{what[1:]} by trial and signal, {' and '.join(models)}.",
         "usermeta": STACKS,
     }
 
 
-def _maps(rows: Sequence[ChartRecord], signals: Sequence[str], models: Sequence[str]) -> ChartSpec:
+def _maps(
+    rows: Sequence[ChartRecord], signals: Sequence[str], models: Sequence[str], what: str, shown: Mapping[str, str]
+) -> ChartSpec:
     heads = {model: f"{rows[0]['group']}, {model}".removeprefix(", ") for model in models}
     cells = [
-        {"trial": row["trial"], "signal": row["signal"], "model": row["model"], "head": heads[row["model"]]}
-        | {"misfit": min(row["misfit"], DARKEST), "text": in_noise(row["misfit"])}
+        {name: value for name, value in row.items() if name != "group"}
+        | {"head": heads[row["model"]], "misfit": min(row["misfit"], DARKEST), "text": in_noise(row["misfit"])}
         for row in rows
     ]
     trials = list(dict.fromkeys(row["trial"] for row in rows))
@@ -69,8 +86,8 @@ def _maps(rows: Sequence[ChartRecord], signals: Sequence[str], models: Sequence[
         columns=signals,
         side={"labelLimit": 230},
         foot={"title": "signal", "orient": "bottom", "labelAngle": 0},
-        legend={"title": "misfit (noise units)", "gradientLength": 180},
-        shown={"trial:N": "trial", "signal:N": "signal", "text:N": "misfit (noise units)"},
+        legend={"title": what, "gradientLength": 180},
+        shown={"trial:N": "trial", "signal:N": "signal", **shown},
     ).layers
     cell_px = max(40, 6 * max((len(name) for name in signals), default=0) + 8)
     head = {"title": None, "labelFontSize": 11, "labelAnchor": "start", "labelLimit": 260}

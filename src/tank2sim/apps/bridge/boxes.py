@@ -11,8 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from tank2sim.analysis.validation.ship_track import ShipTrack, quarter
 from tank2sim.apps.bridge.drawings import clock, knots, metres
+from tank2sim.apps.bridge.ship_track import ShipTrack, quarter
 from tank2sim.apps.bridge.study import ORDERS_AHEAD, Bridge, Telegraph
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.effects.loading import mean_draught

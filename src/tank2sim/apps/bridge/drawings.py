@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tank2sim.analysis.validation.ship_track import ShipTrack, TrackMark
+from tank2sim.apps.bridge.ship_track import ShipTrack, TrackMark
 from tank2sim.records.thinning import thin_line
 from tank2sim.units import KNOT_MPS, rounded_up
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, ClassVar
 
 from markupsafe import Markup
 
-from tank2sim.analysis.validation.ship_track import ShipTrack
 from tank2sim.answer.charts.motion import TrackData, track_chart
 from tank2sim.answer.page import filled_template, resource_text
 from tank2sim.answer.parts import Illustration, Section, Table, records_frame, records_table
@@ -17,6 +16,7 @@ from tank2sim.answer.result import Result
 from tank2sim.apps.bridge import boxes
 from tank2sim.apps.bridge.boxes import Box, Row
 from tank2sim.apps.bridge.drawings import Drawing, circles_drawing, stops_drawing
+from tank2sim.apps.bridge.ship_track import ShipTrack
 from tank2sim.apps.bridge.study import SHALLOW, Bridge, BridgeStudy, Telegraph
 from tank2sim.dynamics.effects.loading import mean_draught
 from tank2sim.notices import Notice

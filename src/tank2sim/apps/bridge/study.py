@@ -16,8 +16,8 @@ from scipy.optimize import brentq
 
 from tank2sim.analysis.linearisation import straight_course
 from tank2sim.analysis.stability.imo import TRIAL_RUDDER
-from tank2sim.analysis.validation.ship_track import ShipTrack, TrackMark, TrackStudy, circle_track, stop_track
 from tank2sim.analysis.validation.standard_trials import TrialShip
+from tank2sim.apps.bridge.ship_track import ShipTrack, TrackMark, TrackStudy, circle_track, stop_track
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.examination import doubts
 from tank2sim.dynamics import build

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tank2sim.analysis.influence.percent import change_percent, combined_percent, difference_percent
-from tank2sim.analysis.turning.points import SteadyTurn, TurnInDegrees, TurningPoints
 from tank2sim.apps.steering_cards.card import PrintedInfluence, SteeringCard
+from tank2sim.apps.steering_cards.steady_points import SteadyTurn, TurnInDegrees, TurningPoints
 from tank2sim.apps.steering_cards.two_point_tuning import TwoPointTuning, WantedTurn, levers_of_form, tune_to_two_points
 from tank2sim.arrays import Array, Columns, Number
 from tank2sim.dynamics.model import Model

@@ -29,7 +29,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tank2sim.analysis.turning.points import SteadyTurn, TurnInDegrees, TurningPoints
+from tank2sim.apps.steering_cards.steady_points import SteadyTurn, TurnInDegrees, TurningPoints
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.terms import parse_term
