@@ -104,7 +104,13 @@ def decide(search: Search, false_discovery: float = FALSE_DISCOVERY) -> Decision
 
 
 def enough_to_name(false_discovery: float = FALSE_DISCOVERY) -> float:
-    """Decrease of the score by one more effect from which it is named alone, beyond the penalty of its parameters."""
+    """Decrease of the score by one more effect from which it is named alone, beyond the penalty of its parameters.
+
+    Parameters
+    ----------
+    false_discovery : float
+        As of :func:`decide`.
+    """
     return PRICE + 2 * TEMPER * float(np.log((1 - false_discovery) / false_discovery))
 
 
