@@ -432,8 +432,7 @@ class Likelihood:
             noisy = replace(fit, logs=logs)
             seen = self._observer(linear, noisy)
             solved = self._solved(noisy, seen, columns, free=True)
-            counted = (_mixed(part, solved.weights) for part in (columns.driving, columns.shown, solved.whitened))
-            by_noise = slopes(seen, *counted)
+            by_noise = slopes(seen, *_mixed(columns, solved.weights))
             coefficients_change = solved.change[: columns.coefficient_count]
             by_width = 2 * (
                 len(coefficients_change) - solved.coefficient_variance - coefficients_change @ coefficients_change
@@ -545,7 +544,6 @@ class Likelihood:
             gain,
             float(np.trace(spread[:count, :count])),
             weights,
-            whitened,
         )
 
 
@@ -570,11 +568,11 @@ def least_in_box(normal: Array, pull: Array, low: Array, high: Array) -> Array:
     return x
 
 
-def _mixed(columns: Array, weights: Array) -> Array:
-    """Combinations of columns, the last axis: one product of matrices. Those that are not among them are zero."""
-    count = columns.shape[-1]
-    mixed: Array = (columns.reshape(-1, count) @ weights[:count]).reshape(*columns.shape[:-1], weights.shape[1])
-    return mixed
+def _mixed(columns: FilterColumns, weights: Array) -> tuple[Array, Array]:
+    """Combinations of columns, of which the first alone is shown by sensors: one product of matrices each."""
+    driving, shown = columns.driving, columns.shown
+    mixed = driving.reshape(-1, driving.shape[-1]) @ weights
+    return mixed.reshape(*driving.shape[:-1], -1), shown @ weights[: shown.shape[-1], :1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -590,4 +588,3 @@ class _Solved:
     gain: float
     coefficient_variance: float
     weights: Array
-    whitened: Array
