@@ -545,8 +545,11 @@ class Hypothesis:
         for _ in range(NEWTON_STEPS if moving.any() else 0):
             rates, slopes = (np.array(value) for value in self._newton(xi.T, x.T, u.T, p))
             by_run = slopes.reshape(len(moving), len(x), len(moving)).swapaxes(0, 1)[:, moving][:, :, moving]
+            before = xi.copy()
             xi[:, moving] -= (np.linalg.pinv(by_run) @ rates.T[:, moving, None])[..., 0]
             xi = np.where(moving, xi, trimmed(xi))
+            if np.allclose(xi, before, rtol=1e-12, atol=0.0):
+                break
         return xi
 
 

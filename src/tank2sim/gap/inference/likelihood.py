@@ -146,16 +146,15 @@ class Likelihood:
         names = self.coefficients.names
         if not names:
             return np.zeros((*self._lack.shape, 0))
-        slopes_by_name = hypothesis.coefficient_slopes(self.motion, theta, names)
+        by_name = hypothesis.coefficient_slopes(self.motion, theta, names)
+        by_name *= self.motion.block_s * self._inside[..., None]
         mixing = self.coefficients.mixing
         if hypothesis.moves_clock:  # its delay takes the place of the record's
             mixing = np.where(np.array(names)[:, None] == CLOCK, 0.0, mixing)
-        columns = slopes_by_name @ mixing
-        if self._moves.shape[-1]:
-            late = slopes_by_name[..., [names.index(CLOCK)]] * self._moves[:, :, None, :]
-            columns = np.concatenate([columns, late], axis=-1)
-        scaled: Array = self.motion.block_s * columns * self._inside[..., None]
-        return scaled
+        columns = (by_name.reshape(-1, len(names)) @ mixing).reshape(*by_name.shape[:-1], -1)
+        if not self._moves.shape[-1]:
+            return columns
+        return np.concatenate([columns, by_name[..., [names.index(CLOCK)]] * self._moves[:, :, None, :]], axis=-1)
 
     def residual(self, hypothesis: Hypothesis, theta: Array) -> tuple[Array, Array]:
         """Driving (R, T - 1, 6) and shown (R, T, ny) of the residual at some parameters."""
