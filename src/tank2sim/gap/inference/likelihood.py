@@ -136,7 +136,7 @@ class Likelihood:
         The measured motion contains noise. A force evaluated on it is not a known input: only with the matching slope
         is the likelihood that of the measurements, whatever motion it is linear about.
         """
-        by_state, reading = hypothesis.slopes(self.motion, theta)
+        by_state, reading = hypothesis.slopes(self.motion, theta, self.coefficients.names)
         by_state = by_state * self._inside[..., None]  # zero outside the runs
         return linear_filter(by_state, reading, self.known, self.motion.block_s, self.wide, self.motion.noise_shares)
 
