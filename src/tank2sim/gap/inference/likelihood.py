@@ -104,6 +104,7 @@ class Likelihood:
     ):
         self.motion, self.none, self.coefficients, self.belief = motion, none, coefficients, belief
         self.scale = np.ones(len(belief.logs)) if scale is None else scale
+        self._observers: tuple[tuple[Linear, WaveBand | None, bytes, Observer], ...] = ()
         self._residuals: dict[tuple[tuple[str, ...], tuple[str, ...], bytes], tuple[Array, Array]] = {}
         nothing = np.zeros(0)
         self._unmeasured = none.unmeasured_states(motion, nothing)
@@ -217,10 +218,15 @@ class Likelihood:
     def smooth(self, fit: ExplanationFit) -> tuple[Array, Array]:
         """States of the filter given all measurements (R, T, nz), and the covariance of the unmodelled
         accelerations, given the measurements until then (R, T, 3, 3): an upper bound of that given all."""
-        seen, columns = self._seen(fit)
-        by_coefficients = columns.driving[..., 1 + columns.parameter_count :] @ fit.change
-        states = seen.smooth(columns.driving[..., 0] + by_coefficients, columns.shown[..., 0])
+        seen, states, _ = self._smoothed(fit)
         return states, seen.filtered[..., 6 : 6 + FORCE_STATES, 6 : 6 + FORCE_STATES]
+
+    def _smoothed(self, fit: ExplanationFit) -> tuple[Observer, Array, Array]:
+        """The filter, its states given all measurements (R, T, nz), and what drives by the change of the coefficients
+        (R, T - 1, 6)."""
+        seen, columns = self._seen(fit)
+        added = columns.driving[..., 1 + columns.parameter_count :] @ fit.change
+        return seen, seen.smooth(columns.driving[..., 0] + added, columns.shown[..., 0]), added
 
     def about(self, fit: ExplanationFit) -> Likelihood:
         """The same likelihood, linearised about the smoothed motion of an explanation.
@@ -229,13 +235,10 @@ class Likelihood:
         is that without the waves: what they add within a block is not resolved, and small enough to be linear.
         """
         motion, hypothesis, theta = self.motion, fit.hypothesis, fit.theta
-        seen, columns = self._seen(fit)
-        by_coefficients = columns.driving[..., 1 + columns.parameter_count :] @ fit.change
-        states = seen.smooth(columns.driving[..., 0] + by_coefficients, columns.shown[..., 0])
+        seen, states, added = self._smoothed(fit)
         slow, waves, band = states[..., :6], self.belief.waves, states[..., -2 * FORCE_STATES :]
         if waves is not None:
             slow = slow - waves.moved(band, motion.middles[..., MEASURED_STATES.index("motion.psi")])
-        added = by_coefficients.copy()
         added[..., :FORCE_STATES] += motion.block_s * states[:, :-1, 6 : 6 + FORCE_STATES]
         added *= self._inside / motion.block_s
         between = hypothesis.rates_between(motion, theta) - np.diff(motion.states, axis=1) / motion.step_s
@@ -277,7 +280,14 @@ class Likelihood:
         return self.whiten(fit)[1]
 
     def _observer(self, linear: Linear, fit: ExplanationFit) -> Observer:
-        return observer(linear, fit.noise, self.belief.waves)
+        """The filter at the noise of a fit; the last ones are kept for the next question at the same noise."""
+        noise, waves = fit.logs[:-1].tobytes(), self.belief.waves
+        for motion, band, logs, known in self._observers:
+            if motion is linear and band is waves and logs == noise:
+                return known
+        found = observer(linear, fit.noise, waves)
+        self._observers = (linear, waves, noise, found), *self._observers[:3]
+        return found
 
     def _seen(self, fit: ExplanationFit) -> tuple[Observer, FilterColumns]:
         hypothesis, theta = fit.hypothesis, fit.theta
