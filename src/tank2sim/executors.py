@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import multiprocessing
+import multiprocessing.util
 import os
 import re
 import signal
@@ -143,6 +144,13 @@ def _processes(workers: int | None) -> Iterator[Executor]:
             raise
 
 
+def _end() -> None:
+    """End a process that has done its work, without taking its modules apart: its owner waits for it."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(0)
+
+
 def _prepare() -> None:
     """Prepare a process for work.
 
@@ -150,6 +158,7 @@ def _prepare() -> None:
     is busy for minutes does not outlive, unseen, the one that began it and was killed.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    multiprocessing.util.Finalize(None, _end, exitpriority=-1)
     keep_freed_memory()
     warnings.simplefilter("ignore", PluginWarning)  # the process that began it has printed them
     import scipy.linalg  # noqa: F401  loads the libraries whose threads are limited: each processor has its process

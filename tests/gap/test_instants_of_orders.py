@@ -140,7 +140,7 @@ def test_slopes_in_start_and_instants_are_difference_quotients_of_the_whole_moti
     instants = np.full(len(record.inputs), 0.5)
     instants[rows] = shares
     timed = replace(record, instants=instants)
-    found, still = replayer._slopes_of_motion(timed, start, p, rows), replayer.motion(timed, start, p)
+    found, still = replayer.slopes_of_motion(timed, start, p, rows), replayer.motion(timed, start, p)
     for place, step in enumerate(reach):
         quotient = (moved(place) - still) / step
         assert (np.abs(found[..., place] - quotient) <= 0.01 * np.abs(quotient).max(axis=0) + 1e-6).all()
@@ -153,7 +153,7 @@ def test_a_motion_that_exceeds_all_bounds_counts_as_one_without_change(tmp_path:
     p, record = replayer.model.parameter_values(), input_record(replayer, trials.trials[0])
     start = replayer.guess_initial_state(record, np.array(list(noise_of("model").values())), p)
     turning = start + 1e9 * (np.arange(len(start)) == replayer.model.state_names.index("motion.r"))
-    found = replayer._slopes_of_motion(record, turning, p, np.zeros(0, dtype=np.intp))
+    found = replayer.slopes_of_motion(record, turning, p)
     assert np.isnan(replayer.motion(record, turning, p)).any()
     assert np.isfinite(found).all()
     assert np.abs(found[0, :, replayer.model.state_names.index("motion.psi")]).max() > 0.5

@@ -332,10 +332,10 @@ def test_the_gain_of_one_measurement_is_that_of_the_signals_that_were_seen() -> 
     S = H @ np.diag(start) @ H.T + np.diag(white_noise[known])
     expected = np.zeros((13, 4))
     expected[:, known] = np.diag(start) @ H.T @ np.linalg.inv(S)
-    seeing = np.where(known[:, None], reading, 0.0)[None, None], known[None, None], white_noise[None]
-    nothing = (np.zeros((1, 0, *shape)) for shape in ((6, 6), (6, 3), (13, 13)))
-    transition, push, added = nothing
-    gain, white, filtered = kalman_kernels.covariances(start, transition, push, np.ones(7), added, seeing)
+    seeing = np.where(known[:, None], reading, 0.0)[None, None], known[None, None]
+    nothing, process = np.zeros((1, 0, 6, 6)), (np.ones(7), np.ones(3), np.ones(3), np.ones(3), np.ones(7))
+    motion = nothing, nothing, *seeing
+    gain, white, filtered = kalman_kernels.covariances(motion, process, start, white_noise[None])
     assert gain[0, 0] == pytest.approx(expected, abs=1e-12)
     assert (white[0, 0].T @ white[0, 0])[np.ix_(known, known)] == pytest.approx(np.linalg.inv(S))
     assert filtered[0, 0] == pytest.approx(np.diag(start) - expected[:, known] @ S @ expected[:, known].T)

@@ -113,7 +113,7 @@ class Toy:
     def readings(self, motion, theta, unmeasured=None):
         return motion.in_blocks(motion.states)
 
-    def slopes(self, motion, theta):
+    def slopes(self, motion, theta, names=()):
         runs, blocks = motion.inside.shape
         return np.tile(A, (runs, blocks - 1, 1, 1)), np.tile(np.eye(6), (runs, blocks, 1, 1))
 

@@ -87,7 +87,8 @@ def find_gap(
     """
     from tank2sim.executors import executing_beside
 
-    with executing_beside(executor, workers, "tank2sim.gap.workflow") as pool:  # it starts while this process imports
+    # What fits the explanations is imported there while this process imports the rest and reads the trials.
+    with executing_beside(executor, workers, "tank2sim.gap.inference.fit_all") as pool:
         from tank2sim.api.gap_search import gap_options, search_ship
 
         options = gap_options(effects, without, max_effects, false_discovery, workers, force=force, black_box=black_box)

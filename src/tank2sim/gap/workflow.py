@@ -170,6 +170,7 @@ def run_gap_workflow(
         progress("proving")
         noise = {name: sigma for name, (sigma, _) in _noise(found, decision.best, fitted).items()}
         prover = Prover(card, (fitted, held), found.likelihood, TrialReplays(noise, pool), lowest)
+        prover.begin()
         judged = judge_surroundings(prover, found, judge(prover, found, decision), names)
         if judged.decision.verdict in (MISSING, AMBIGUOUS, COEFFICIENTS):
             progress("refining the coefficients")

@@ -53,9 +53,8 @@ class ArrayFunction:
 
     def __init__(self, function: ca.Function):
         self.function = function if function.is_a("SXFunction") else function.expand()
-        known = (ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST)
-        steps = instructions(self.function)
-        self._program = [(step, None if step.operation in known else _NUMPY[step.operation]) for step in steps]
+        compute = _NUMPY | dict.fromkeys((ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST))
+        self._program = [(compute[step.operation], *step) for step in instructions(self.function)]
 
     def __call__(self, *arguments: Array) -> tuple[Array, ...]:
         """Results (n, elements) each; an argument is (elements,), the same for every row, or (n, elements)."""
@@ -71,9 +70,11 @@ class ArrayFunction:
 
     def _run(self, arguments: Sequence[Array], results: Sequence[Array]) -> None:
         work: list[Any] = [None] * self.function.sz_w()
-        for (operation, to, source, constant), compute in self._program:
-            if compute is not None:
-                work[to[0]] = compute(*[work[place] for place in source])
+        for compute, operation, to, source, constant in self._program:
+            if compute is not None and len(source) == 2:
+                work[to[0]] = compute(work[source[0]], work[source[1]])
+            elif compute is not None:
+                work[to[0]] = compute(work[source[0]])
             elif operation == ca.OP_INPUT:
                 work[to[0]] = arguments[source[0]][source[1]]
             elif operation == ca.OP_CONST:

@@ -170,6 +170,7 @@ class Hypothesis:
         self._chains: dict[float, Chain] = {}
         self._kept_inputs = self._kept_unmeasured = _Kept()
         self._functions: dict[tuple[str, ...], tuple[ArrayFunction, ...]] = {}
+        self._kept_slopes: dict[tuple[str, ...], _Kept] = {}
 
     @property
     def directed(self) -> bool:
@@ -372,26 +373,25 @@ class Hypothesis:
         function, _ = self._sensors(motion.seen)
         return _rowwise(function, *self._in_blocks(motion, theta, unmeasured), self.parameters(theta))
 
-    def slopes(self, motion: MeasuredBatch, theta: Array) -> tuple[Array, Array]:
-        """Rates by states (R, T - 1, 6, 6), and readings by states (R, T, ny, 6)."""
+    def slopes(self, motion: MeasuredBatch, theta: Array, names: Sequence[str] = ()) -> tuple[Array, Array]:
+        """Rates by states (R, T - 1, 6, 6), and readings by states (R, T, ny, 6); `names` are the parameters of the
+        ship of which :meth:`coefficient_slopes` is asked next, along the same motion: one function evaluates both."""
         unmeasured, p = self.unmeasured_states(motion, theta), self.parameters(theta)
         _, reading_slopes = self._sensors(motion.seen)
-        return (
-            _matrices(_rowwise(self._state_slopes, *self._along(motion, theta, unmeasured), p), 6),
-            _matrices(_rowwise(reading_slopes, *self._in_blocks(motion, theta, unmeasured), p), 6),
-        )
+        reading = _rowwise(reading_slopes, *self._in_blocks(motion, theta, unmeasured), p)
+        by_state = self._rates_and_slopes(motion, theta, self._direct(names))[1]
+        return by_state, _matrices(reading, len(MEASURED_STATES))
 
     def coefficient_slopes(self, motion: MeasuredBatch, theta: Array, names: Sequence[str]) -> Array:
         """Rates by parameters of the ship (R, T - 1, 6, len(names)); 0 for parameters that an effect has replaced."""
-        present = [name for name in names if name in self.model]
-        direct = [name for name in present if not name.startswith("steering.")]
+        direct = self._direct(names)
         along, p = self._along(motion, theta, None), self.parameters(theta)
-        columns, base = np.zeros((*along[0].shape, len(names))), _rowwise(self._rates, *along, p)
-        if direct:
-            by_name = _matrices(_rowwise(self._parameter_slopes(tuple(direct)), *along, p), len(direct))
-            columns[..., [names.index(name) for name in direct]] = by_name
-        for name in present:
-            if name.startswith("steering."):  # through the state of the rudder
+        base, _, by_name = self._rates_and_slopes(motion, theta, direct)
+        self._kept_slopes = {}  # they are large
+        columns = np.zeros((*along[0].shape, len(names)))
+        columns[..., [names.index(name) for name in direct]] = by_name
+        for name in names:
+            if name.startswith("steering.") and name in self.model:  # through the state of the rudder
                 moved = p.copy()
                 place = self.model.parameter_names.index(name)
                 moved[place] *= 1 + SMALL_SHARE
@@ -405,6 +405,25 @@ class Hypothesis:
             rates = _rowwise(self._rates, along[0], middles, motion.over_blocks(late[1]), p)
             columns[..., names.index(CLOCK)] = (rates - base) / late_s
         return columns
+
+    def _direct(self, names: Sequence[str]) -> tuple[str, ...]:
+        """Parameters of the model that change rates by themselves."""
+        return tuple(name for name in names if name in self.model and not name.startswith("steering."))
+
+    def _rates_and_slopes(
+        self, motion: MeasuredBatch, theta: Array, names: tuple[str, ...]
+    ) -> tuple[Array, Array, Array]:
+        """Rates (R, T - 1, 6), and their slopes by the measured states and by parameters of the model."""
+
+        def compute(motion: MeasuredBatch, theta: Array) -> Array:
+            function = self._function_of_slopes(names)
+            return _rowwise(function, *self._along(motion, theta, None), self.parameters(theta))
+
+        kept = self._kept_slopes.get(names, _Kept()).at(motion, theta, compute)
+        self._kept_slopes = {names: kept}
+        count = len(MEASURED_STATES)
+        slopes = _matrices(kept.values[..., count:], count + len(names))
+        return kept.values[..., :count], slopes[..., :count], slopes[..., count:]
 
     @property
     def moves_clock(self) -> bool:
@@ -462,10 +481,6 @@ class Hypothesis:
     def _rates(self) -> ArrayFunction:
         return self._function("rates", self._known_rates)
 
-    @cached_property
-    def _state_slopes(self) -> ArrayFunction:
-        return self._function("state_slopes", ca.jacobian(self._known_rates, self._symbols[0]))
-
     def _sensors(self, seen: tuple[str, ...]) -> tuple[ArrayFunction, ...]:
         """Readings of the variables `seen`, and their slopes by measured states."""
         key = "readings", *seen
@@ -475,12 +490,13 @@ class Hypothesis:
             self._functions[key] = self._function("readings", shown), self._function("reading_slopes", slopes)
         return self._functions[key]
 
-    def _parameter_slopes(self, names: tuple[str, ...]) -> ArrayFunction:
-        """Slopes of the rates by parameters of the model."""
+    def _function_of_slopes(self, names: tuple[str, ...]) -> ArrayFunction:
+        """Rates, and their slopes by measured states and by parameters of the model."""
         key = "slopes", *names
         if key not in self._functions:
-            slopes = ca.jacobian(self._known_rates, ca.vcat([self.model.symbol(name) for name in names]))
-            self._functions[key] = (self._function("parameter_slopes", slopes),)
+            by = ca.vcat([self._symbols[0], *(self.model.symbol(name) for name in names)])
+            slopes = ca.vec(ca.jacobian(self._known_rates, by))
+            self._functions[key] = (self._function("rates_and_slopes", ca.vertcat(self._known_rates, slopes)),)
         return self._functions[key][0]
 
     def _shown(self, seen: Sequence[str]) -> ca.SX:
@@ -545,8 +561,11 @@ class Hypothesis:
         for _ in range(NEWTON_STEPS if moving.any() else 0):
             rates, slopes = (np.array(value) for value in self._newton(xi.T, x.T, u.T, p))
             by_run = slopes.reshape(len(moving), len(x), len(moving)).swapaxes(0, 1)[:, moving][:, :, moving]
+            before = xi.copy()
             xi[:, moving] -= (np.linalg.pinv(by_run) @ rates.T[:, moving, None])[..., 0]
             xi = np.where(moving, xi, trimmed(xi))
+            if np.allclose(xi, before, rtol=1e-12, atol=0.0):
+                break
         return xi
 
 

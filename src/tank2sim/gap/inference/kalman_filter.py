@@ -96,6 +96,11 @@ class Linear:
     wide: Array
     noise_shares: Array
 
+    @property
+    def arrays(self) -> kalman_kernels.MotionArrays:
+        """For the loops over time."""
+        return self.transition, self.spreading, self.reading, self.known
+
 
 def linear_filter(
     by_state: Array, reading: Array, known: _Truths, block_s: float, wide: Array, noise_shares: Array
@@ -132,10 +137,8 @@ class Observer:
     ----------
     linear : Linear
     noise : NoiseLevels
-    push : array (R, T - 1, 6, 3), in waves (R, T - 1, 6, 9)
-        Errors of the motion by the accelerations a block before.
-    fading : array (3 + ny,), in waves (5 + ny,)
-        Share of each acceleration and sensor error that remains a block later; real and imaginary part of the band's.
+    process : arrays
+        What accelerations and sensor errors do over a block (:data:`.kalman_kernels.ProcessArrays`).
     gain : array (R, T, nz, ny)
     white : array (R, T, ny, ny)
         Inverse of the lower Cholesky factor of the innovations' covariance.
@@ -147,8 +150,7 @@ class Observer:
 
     linear: Linear
     noise: NoiseLevels
-    push: Array
-    fading: Array
+    process: kalman_kernels.ProcessArrays
     gain: Array
     white: Array
     filtered: Array
@@ -169,32 +171,15 @@ class Observer:
         array (R, T, ny, C)
             0 where nothing was measured.
         """
-        return self.run(driving, shown, keep=False)[0]
-
-    def run(self, driving: Array, shown: Array, *, keep: bool = True) -> tuple[Array, Array]:
-        """Innovations in units of their standard deviation (R, T, ny, C), and states after each measurement
-        (R, T, nz, C) if they are to be kept; arguments as above."""
-        columns = np.ascontiguousarray(driving), np.ascontiguousarray(shown)
-        whitened, after = kalman_kernels.run_filter(self._seeing, self._moving, (self.gain, self.white), columns, keep)
-        return whitened, after
+        return kalman_kernels.whiten(*self._loops, driving, shown)
 
     def smooth(self, driving: Array, shown: Array) -> Array:
         """States given all measurements (R, T, nz), of one column; arguments as in :meth:`whiten` without C."""
-        after = self.run(driving[..., None], shown[..., None])
-        states: Array = kalman_kernels.smooth_backward(self._seeing, self._moving, self._filtering, *after)[..., 0]
-        return states
+        return kalman_kernels.smooth(*self._loops, driving[..., None], shown[..., None])
 
     @property
-    def _seeing(self) -> tuple[Array, _Truths]:
-        return self.linear.reading, self.linear.known
-
-    @property
-    def _moving(self) -> tuple[Array, Array, Array, Array]:
-        return self.linear.transition, self.linear.spreading, self.push, self.fading
-
-    @property
-    def _filtering(self) -> tuple[Array, Array, Array]:
-        return self.gain, self.white, self.filtered
+    def _loops(self) -> tuple[kalman_kernels.MotionArrays, kalman_kernels.ProcessArrays, kalman_kernels.FilterArrays]:
+        return self.linear.arrays, self.process, (self.gain, self.white, self.filtered)
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,57 +215,44 @@ def _pushed(noise: NoiseLevels, block_s: float) -> _Pushed:
 
 def observer(linear: Linear, noise: NoiseLevels, waves: WaveBand | None = None) -> Observer:
     """The filter of a noise, and of forces of waves if any: the covariance recursion, once for all columns."""
-    runs, blocks, ny, _ = linear.reading.shape
-    slow = slice(6, 6 + FORCE_STATES + ny)
     fading = np.exp(-linear.block_s / np.concatenate([noise.force_s, noise.slow_s]))
     levels = np.concatenate([noise.force, noise.slow])
-    start = np.concatenate([linear.wide**2, levels**2, np.zeros(0) if waves is None else np.repeat(waves.level**2, 2)])
+    start = np.concatenate([linear.wide**2, levels**2])
     pushed = _pushed(noise, linear.block_s)
-    B = linear.spreading[..., :FORCE_STATES]
-    nz = len(start)
-    Q = np.zeros((runs, blocks - 1, nz, nz))
-    Q[..., range(6, slow.stop), range(6, slow.stop)] = levels**2 * (1 - fading**2)
-    Q[..., :6, :6] = (B * pushed.way) @ B.swapaxes(-1, -2)
-    Q[..., :6, 6:9] = B * pushed.both
-    push = B * pushed.gain
+    process = fading, pushed.gain, pushed.way, pushed.both, levels**2 * (1 - fading**2)
     if waves is not None:
         block = waves.over(linear.block_s)
-        band = slice(slow.stop, nz)
-        Q[..., range(band.start, nz), range(band.start, nz)] = np.repeat(block.end, 2)
-        Q[..., :6, :6] += (B * block.way) @ B.swapaxes(-1, -2)
-        Q[..., :6, band] = _in_pairs(B * block.with_value, B * block.with_quadrature)
-        push = np.concatenate([push, _in_pairs(B * block.gain.real, -B * block.gain.imag)], axis=-1)
-        fading = np.concatenate([fading, [block.fading.real, block.fading.imag]])
-    Q[..., 6:, :6] = Q[..., :6, 6:].swapaxes(-1, -2)
-    seeing = linear.reading, linear.known, noise.white**2 * linear.noise_shares[:, None]
-    gain, white, filtered = kalman_kernels.covariances(start, linear.transition, push, fading, Q, seeing)
+        pairs = np.tile([block.gain.real, -block.gain.imag], FORCE_STATES)
+        with_band = np.stack([block.with_value, block.with_quadrature], axis=-1).ravel()
+        start = np.concatenate([start, np.repeat(waves.level**2, 2)])
+        process = (
+            np.concatenate([fading, [block.fading.real, block.fading.imag]]),
+            np.concatenate([pushed.gain, pairs]),
+            pushed.way + block.way,
+            np.concatenate([pushed.both, with_band]),
+            np.concatenate([process[-1], np.repeat(block.end, 2)]),
+        )
+    white_noise = noise.white**2 * linear.noise_shares[:, None]
+    gain, white, filtered = kalman_kernels.covariances(linear.arrays, process, start, white_noise)
     # rows without a measurement have S = 1 on their diagonal and count nothing
-    log_det = float(-2 * np.sum(np.log(white[..., range(ny), range(ny)])))
-    return Observer(linear, noise, push, fading, gain, white, filtered, log_det)
+    log_det = float(-2 * np.sum(np.log(np.diagonal(white, axis1=-2, axis2=-1))))
+    return Observer(linear, noise, process, gain, white, filtered, log_det)
 
 
-def _in_pairs(values: Array, quadratures: Array) -> Array:
-    """Columns (..., 3) of accelerations and of their quadratures in turn (..., 6)."""
-    pairs: Array = np.stack([values, quadratures], axis=-1).reshape(*values.shape[:-1], -1)
-    return pairs
-
-
-def slopes(seen: Observer, driving: Array, shown: Array, whitened: Array) -> Array:
+def slopes(seen: Observer, driving: Array, shown: Array) -> Array:
     """Slope of ``sum(log det S) + |whitened|^2`` in the logarithms of the noise (:attr:`NoiseLevels.logs`).
 
-    `whitened` (R, T, ny, C) are the columns that count: the residual, and those of uncertain coefficients each times
-    the root of its covariance; `driving` and `shown` are the columns before the filter.
+    The columns (:meth:`Observer.whiten`) are those that count: the residual, and those of uncertain coefficients each
+    times the root of its covariance.
 
     d(log det V + e'V^-1 e) = tr(V^-1 dV) - e'V^-1 dV V^-1 e, which the backward recursion gives for every noise at
     once: r carries V^-1 e back to the states, N its covariance under the model (Durbin and Koopman, 7.3.3).
     """
     noise, block_s = seen.noise, seen.linear.block_s
-    after = seen.run(driving, shown)[1]
-    moved = seen._seeing, seen._moving, seen._filtering
-    variance, start, fading_slope, way, both, gain, white = kalman_kernels.backward(*moved, whitened, after)
+    variance, start, fading_slope, way, both, gain, white = kalman_kernels.slope_sums(*seen._loops, driving, shown)
     levels = np.concatenate([noise.force, noise.slow])
     times = np.concatenate([noise.force_s, noise.slow_s])
-    fading = seen.fading[: len(levels)]
+    fading = seen.process[0][: len(levels)]
     by_level = 2 * levels**2 * ((1 - fading**2) * variance + start)
     # d fading/d log time = fading h/time; the driving variance is level^2 (1 - fading^2)
     by_time = (fading_slope - 2 * fading * levels**2 * variance) * fading * block_s / times

@@ -2,10 +2,13 @@
 
    The equations are in kalman_filter.py; arrays, arguments and results in kalman_kernels.py. States are ordered as
    there: 6 errors of the motion, 3 accelerations, NY sensor errors, and with WAVES 3 accelerations of a narrow band, each
-   with its quadrature. A row of `known` that is 0 has zeros for its row of the reading matrix H. Matrices are dense and
-   by rows; columns lie next to each other, so that each innermost loop runs over them. NY and WAVES (0 or 1) are
-   defined when this is compiled. */
+   with its quadrature. A row of `known` that is 0 has zeros for its row of the reading matrix H.
+
+   Columns pass in tiles of LANES, each a vector V in every state: a tile stays in the cache over all blocks of a run. A
+   covariance is ROW tiles, the last one filled up with zeros. NY, WAVES (0 or 1) and LANES are defined when this is
+   compiled. */
 #include <math.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -14,294 +17,333 @@
 #else
 #define EXPORT __attribute__((visibility("default")))
 #endif
+#define INLINE static inline __attribute__((always_inline))
+
+#if LANES > 1
+typedef double V __attribute__((vector_size(sizeof(double) * LANES), may_alias));
+#else
+typedef double V;
+#endif
 
 enum { MOTION = 6, FORCES = 3, SHORT = MOTION + FORCES, SLOW = FORCES + NY, BAND = 2 * FORCES * WAVES };
-enum { BAND_AT = MOTION + SLOW, NZ = BAND_AT + BAND, PUSHED = FORCES + BAND };
+enum { BAND_AT = MOTION + SLOW, NZ = BAND_AT + BAND, PUSHED = FORCES + BAND, ROW = (NZ + LANES - 1) / LANES };
 
-/* What a step is made of: transition, spreading, push (MOTION rows each), and the share of each slow process that
-   remains, followed with WAVES by real and imaginary part of that of the band. */
+/* Arguments are structures of addresses and of whole numbers as large as these.
+
+   Motion of all runs: slopes of each step, readings, and what was read. */
 typedef struct {
-  const double *phi, *spreading, *push, *fading;
-} Step;
+  intptr_t runs, blocks;
+  const double *transition, *spreading, *reading;
+  const unsigned char *known;
+} Motion;
 
-/* target += factor * source, over the columns. */
-static inline void add(double *restrict target, double factor, const double *restrict source, int count) {
-  for (int c = 0; c < count; ++c) target[c] += factor * source[c];
+/* Accelerations and sensor errors over a block: the share that remains (SLOW, and with WAVES real and imaginary part of
+   the band's), the change of speed by each value (PUSHED), and what noise adds: the variance of the change of speed
+   (FORCES), its covariance with each value at the end (PUSHED), and the variance of each value (NZ - MOTION). */
+typedef struct {
+  const double *fading, *gain, *way, *both, *end;
+} Process;
+
+/* Gains, inverse roots of the innovations' covariances, covariances after each measurement. */
+typedef struct {
+  double *gain, *white, *filtered;
+} Filter;
+
+/* Element of a matrix that is tiles of `rows` vectors. */
+#define AT(tiles, rows, a, b) (((double *)(tiles))[((b) / LANES * (rows) + (a)) * LANES + (b) % LANES])
+
+/* The first `width` of the numbers at a place, and zeros. */
+INLINE V load(const double *from, int width) {
+  V v;
+  if (width == LANES) {
+    memcpy(&v, from, sizeof v);
+  } else {
+    double lanes[LANES] = {0};
+    for (int c = 0; c < width; ++c) lanes[c] = from[c];
+    memcpy(&v, lanes, sizeof v);
+  }
+  return v;
 }
 
-static inline double dot(const double *restrict a, const double *restrict b, int count) {
-  double total = 0.0;
-  for (int c = 0; c < count; ++c) total += a[c] * b[c];
+INLINE void store(double *to, V v, int width) {
+  if (width == LANES) {
+    memcpy(to, &v, sizeof v);
+  } else {
+    double lanes[LANES];
+    memcpy(lanes, &v, sizeof v);
+    for (int c = 0; c < width; ++c) to[c] = lanes[c];
+  }
+}
+
+INLINE int width_of(int count, int begin) { return count - begin < LANES ? count - begin : LANES; }
+
+static double sum(V v) {
+  double lanes[LANES], total = 0.0;
+  memcpy(lanes, &v, sizeof v);
+  for (int c = 0; c < LANES; ++c) total += lanes[c];
   return total;
 }
 
-/* F z, the whole transition F being (phi, push, 0; 0, fading). */
-static void advance(double *restrict moved, const double *restrict z, Step step, int count) {
-  memset(moved, 0, sizeof(double) * MOTION * count);
+/* F z + B d, the whole transition F being (phi, B gain, 0; 0, fading) and B the spreading; no d if NULL. */
+INLINE void advance(V *moved, const V *z, const double *phi, const double *spreading, Process by, const V *d) {
+  V pushed[MOTION] = {0};
+  const int count = d ? MOTION : FORCES;
+  if (d) memcpy(pushed, d, sizeof pushed);
+  for (int f = 0; f < FORCES; ++f) pushed[f] += by.gain[f] * z[MOTION + f];
+  for (int j = 0; j < BAND; ++j) pushed[j / 2] += by.gain[FORCES + j] * z[BAND_AT + j];
   for (int i = 0; i < MOTION; ++i) {
-    for (int j = 0; j < MOTION; ++j)
-      if (step.phi[i * MOTION + j] != 0.0) add(moved + i * count, step.phi[i * MOTION + j], z + j * count, count);
-    for (int j = 0; j < FORCES; ++j) add(moved + i * count, step.push[i * PUSHED + j], z + (MOTION + j) * count, count);
-    for (int j = 0; j < BAND; ++j)
-      add(moved + i * count, step.push[i * PUSHED + FORCES + j], z + (BAND_AT + j) * count, count);
+    V total = phi[i * MOTION] * z[0];
+    for (int j = 1; j < MOTION; ++j) total += phi[i * MOTION + j] * z[j];
+    for (int j = 0; j < count; ++j) total += spreading[i * MOTION + j] * pushed[j];
+    moved[i] = total;
   }
-  for (int i = MOTION; i < BAND_AT; ++i)
-    for (int c = 0; c < count; ++c) moved[i * count + c] = step.fading[i - MOTION] * z[i * count + c];
-  for (int i = BAND_AT; i < NZ; i += 2)
-    for (int c = 0; c < count; ++c) {
-      const double value = z[i * count + c], quadrature = z[(i + 1) * count + c];
-      moved[i * count + c] = step.fading[SLOW] * value - step.fading[SLOW + 1] * quadrature;
-      moved[(i + 1) * count + c] = step.fading[SLOW + 1] * value + step.fading[SLOW] * quadrature;
-    }
-}
-
-/* F' r. */
-static void carry_back(double *restrict earlier, const double *restrict r, Step step, int count) {
-  memset(earlier, 0, sizeof(double) * SHORT * count);
-  for (int i = MOTION; i < BAND_AT; ++i)
-    for (int c = 0; c < count; ++c) earlier[i * count + c] = step.fading[i - MOTION] * r[i * count + c];
-  for (int i = BAND_AT; i < NZ; i += 2)
-    for (int c = 0; c < count; ++c) {
-      const double value = r[i * count + c], quadrature = r[(i + 1) * count + c];
-      earlier[i * count + c] = step.fading[SLOW] * value + step.fading[SLOW + 1] * quadrature;
-      earlier[(i + 1) * count + c] = step.fading[SLOW] * quadrature - step.fading[SLOW + 1] * value;
-    }
-  for (int i = 0; i < MOTION; ++i) {
-    for (int j = 0; j < MOTION; ++j)
-      if (step.phi[i * MOTION + j] != 0.0) add(earlier + j * count, step.phi[i * MOTION + j], r + i * count, count);
-    for (int j = 0; j < FORCES; ++j)
-      add(earlier + (MOTION + j) * count, step.push[i * PUSHED + j], r + i * count, count);
-    for (int j = 0; j < BAND; ++j)
-      add(earlier + (BAND_AT + j) * count, step.push[i * PUSHED + FORCES + j], r + i * count, count);
+  for (int i = MOTION; i < BAND_AT; ++i) moved[i] = by.fading[i - MOTION] * z[i];
+  for (int i = BAND_AT; i < NZ; i += 2) {
+    moved[i] = by.fading[SLOW] * z[i] - by.fading[SLOW + 1] * z[i + 1];
+    moved[i + 1] = by.fading[SLOW + 1] * z[i] + by.fading[SLOW] * z[i + 1];
   }
 }
 
-static void transpose(double *restrict to, const double *restrict from) {
-  for (int i = 0; i < NZ; ++i)
-    for (int j = 0; j < NZ; ++j) to[j * NZ + i] = from[i * NZ + j];
+/* F' r, and the first FORCES rows of B' r. */
+INLINE void carry_back(V *earlier, V *pushing, const V *r, const double *phi, const double *spreading, Process by) {
+  for (int f = 0; f < FORCES; ++f) {
+    pushing[f] = spreading[f] * r[0];
+    for (int i = 1; i < MOTION; ++i) pushing[f] += spreading[i * MOTION + f] * r[i];
+  }
+  for (int j = 0; j < MOTION; ++j) {
+    V total = phi[j] * r[0];
+    for (int i = 1; i < MOTION; ++i) total += phi[i * MOTION + j] * r[i];
+    earlier[j] = total;
+  }
+  for (int i = MOTION; i < BAND_AT; ++i) earlier[i] = by.fading[i - MOTION] * r[i];
+  for (int f = 0; f < FORCES; ++f) earlier[MOTION + f] += by.gain[f] * pushing[f];
+  for (int i = BAND_AT; i < NZ; i += 2) {
+    const V push = pushing[(i - BAND_AT) / 2];
+    earlier[i] = by.fading[SLOW] * r[i] + by.fading[SLOW + 1] * r[i + 1] + by.gain[FORCES + i - BAND_AT] * push;
+    earlier[i + 1] = by.fading[SLOW] * r[i + 1] - by.fading[SLOW + 1] * r[i] + by.gain[FORCES + i - BAND_AT + 1] * push;
+  }
 }
 
-/* Inverse of the lower Cholesky factor of S; nan if S is not positive definite. */
+static void transpose(V (*to)[NZ], V (*from)[NZ]) {
+  for (int a = 0; a < NZ; ++a)
+    for (int b = 0; b < NZ; ++b) AT(to, NZ, b, a) = AT(from, NZ, a, b);
+}
+
+/* Inverse of the lower Cholesky factor of S, of which the lower half is read; nan if it is not positive definite. */
 static void inverse_root(double *restrict W, const double *restrict S) {
-  double L[NY * NY] = {0};
+  double L[NY * NY];
   memset(W, 0, sizeof(double) * NY * NY);
-  for (int i = 0; i < NY; ++i)
+  for (int i = 0; i < NY; ++i) {
     for (int j = 0; j <= i; ++j) {
       double total = S[i * NY + j];
       for (int c = 0; c < j; ++c) total -= L[i * NY + c] * L[j * NY + c];
       if (i > j) {
-        L[i * NY + j] = total / L[j * NY + j];
+        L[i * NY + j] = total * W[j * NY + j];
       } else if (total > 0.0) {
-        L[i * NY + i] = sqrt(total);
+        W[i * NY + i] = 1.0 / sqrt(total);
       } else {
         for (int c = 0; c < NY * NY; ++c) W[c] = NAN;
         return;
       }
     }
-  for (int i = 0; i < NY; ++i) {
-    W[i * NY + i] = 1.0 / L[i * NY + i];
     for (int j = 0; j < i; ++j) {
       double total = 0.0;
       for (int c = j; c < i; ++c) total -= L[i * NY + c] * W[c * NY + j];
-      W[i * NY + j] = total / L[i * NY + i];
+      W[i * NY + j] = total * W[i * NY + i];
     }
   }
 }
 
-EXPORT void covariances(long runs, long blocks, const double *start, const double *transition, const double *push,
-                        const double *fading, const double *added, const double *reading, const unsigned char *known,
-                        const double *white_noise, double *gain, double *white, double *filtered) {
-  for (long run = 0; run < runs; ++run) {
-    double P[NZ * NZ] = {0}, FP[NZ * NZ], turned[NZ * NZ];
-    for (int a = 0; a < NZ; ++a) P[a * NZ + a] = start[a];
-    for (long k = 0; k < blocks; ++k) {
-      const long at = run * blocks + k;
-      const double *H = reading + at * NY * MOTION;
-      const unsigned char *seen = known + at * NY;
-      double *W = white + at * NY * NY, *K = gain + at * NZ * NY;
-      double HP[NY * NZ] = {0}, S[NY * NY] = {0}, G[NY * NZ]; /* H P, and W H P */
-      for (int i = 0; i < NY; ++i) {
-        if (seen[i]) {
-          memcpy(HP + i * NZ, P + (SHORT + i) * NZ, sizeof(double) * NZ); /* P is symmetric */
-          for (int j = 0; j < MOTION; ++j)
-            if (H[i * MOTION + j] != 0.0) add(HP + i * NZ, H[i * MOTION + j], P + j * NZ, NZ);
-        }
-      }
-      for (int i = 0; i < NY; ++i) {
-        if (seen[i]) {
-          for (int j = 0; j < NY; ++j) {
-            S[i * NY + j] = HP[j * NZ + SHORT + i];
-            for (int a = 0; a < MOTION; ++a) S[i * NY + j] += H[i * MOTION + a] * HP[j * NZ + a];
-          }
-          S[i * NY + i] += white_noise[run * NY + i];
-        } else {
-          S[i * NY + i] = 1.0;
-        }
-      }
-      inverse_root(W, S);
-      memset(G, 0, sizeof G);
-      for (int i = 0; i < NY; ++i)
-        for (int j = 0; j <= i; ++j) add(G + i * NZ, W[i * NY + j], HP + j * NZ, NZ);
-      for (int i = 0; i < NY; ++i)
-        for (int a = 0; a < NZ; ++a) add(P + a * NZ, -G[i * NZ + a], G + i * NZ, NZ);
+/* The covariance P in the light of one measurement; its gain K and the inverse root W of the innovations'. */
+static void measure(V (*P)[NZ], double *K, double *W, const double *H, const unsigned char *seen,
+                    const double *white_noise) {
+  V HP[ROW][NY], G[ROW][NY], KT[ROW][NY]; /* H P, W H P, and K' */
+  double S[NY * NY];
+  memset(HP, 0, sizeof HP);
+  for (int t = 0; t < ROW; ++t)
+    for (int i = 0; i < NY; ++i) {
+      if (!seen[i]) continue;
+      HP[t][i] = P[t][SHORT + i]; /* P is symmetric */
+      for (int j = 0; j < MOTION; ++j) HP[t][i] += H[i * MOTION + j] * P[t][j];
+    }
+  for (int i = 0; i < NY; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      double total = AT(HP, NY, j, SHORT + i);
+      for (int a = 0; a < MOTION; ++a) total += H[i * MOTION + a] * AT(HP, NY, j, a);
+      S[i * NY + j] = seen[i] ? total : 0.0;
+    }
+    S[i * NY + i] = seen[i] ? S[i * NY + i] + white_noise[i] : 1.0;
+  }
+  inverse_root(W, S);
+  for (int t = 0; t < ROW; ++t)
+    for (int i = 0; i < NY; ++i) {
+      G[t][i] = W[i * NY] * HP[t][0];
+      for (int j = 1; j <= i; ++j) G[t][i] += W[i * NY + j] * HP[t][j];
+    }
+  for (int t = 0; t < ROW; ++t) {
+    for (int a = 0; a < NZ; ++a) {
+      V total = P[t][a];
+      for (int i = 0; i < NY; ++i) total -= AT(G, NY, i, a) * G[t][i];
+      P[t][a] = total;
+    }
+    for (int j = 0; j < NY; ++j) {
+      KT[t][j] = W[j * NY + j] * G[t][j];
+      for (int i = j + 1; i < NY; ++i) KT[t][j] += W[i * NY + j] * G[t][i];
+    }
+  }
+  for (int a = 0; a < NZ; ++a)
+    for (int j = 0; j < NY; ++j) K[a * NY + j] = AT(KT, NY, j, a);
+}
+
+/* F P F' and what noise adds, exactly symmetric. */
+static void pass(V (*P)[NZ], const double *phi, const double *spreading, Process by) {
+  V FP[ROW][NZ], turned[ROW][NZ];
+  memset(FP, 0, sizeof FP);
+  for (int t = 0; t < ROW; ++t) advance(FP[t], P[t], phi, spreading, by, NULL);
+  memset(turned, 0, sizeof turned);
+  transpose(turned, FP);
+  for (int t = 0; t < ROW; ++t) advance(P[t], turned[t], phi, spreading, by, NULL);
+  for (int a = 0; a < NZ; ++a)
+    for (int b = 0; b <= a; ++b) {
+      double added = 0.0;
+      const int force = a < SHORT ? a - MOTION : (a - BAND_AT) / 2, place = a < SHORT ? force : FORCES + a - BAND_AT;
+      if (a < MOTION)
+        for (int f = 0; f < FORCES; ++f) added += by.way[f] * spreading[a * MOTION + f] * spreading[b * MOTION + f];
+      else if (b < MOTION)
+        added = a < SHORT || a >= BAND_AT ? by.both[place] * spreading[b * MOTION + force] : 0.0;
+      else if (a == b)
+        added = by.end[a - MOTION];
+      AT(P, NZ, a, b) = AT(P, NZ, b, a) = 0.5 * (AT(P, NZ, a, b) + AT(P, NZ, b, a)) + added;
+    }
+}
+
+EXPORT int covariances(const Motion *of, const Process *by, const double **start, const double **white_noise,
+                       const Filter *found) {
+  for (long run = 0; run < of->runs; ++run) {
+    V P[ROW][NZ];
+    memset(P, 0, sizeof P);
+    for (int a = 0; a < NZ; ++a) AT(P, NZ, a, a) = (*start)[a];
+    for (long k = 0; k < of->blocks; ++k) {
+      const long at = run * of->blocks + k, step = (run * (of->blocks - 1) + k) * MOTION * MOTION;
+      double *filtered = found->filtered + at * NZ * NZ;
+      measure(P, found->gain + at * NZ * NY, found->white + at * NY * NY, of->reading + at * NY * MOTION,
+              of->known + at * NY, *white_noise + run * NY);
       for (int a = 0; a < NZ; ++a)
-        for (int j = 0; j < NY; ++j) {
-          double total = 0.0;
-          for (int i = j; i < NY; ++i) total += G[i * NZ + a] * W[i * NY + j];
-          K[a * NY + j] = total;
-        }
-      memcpy(filtered + at * NZ * NZ, P, sizeof P);
-      if (k + 1 < blocks) {
-        const long step_at = run * (blocks - 1) + k;
-        const Step step = {transition + step_at * MOTION * MOTION, NULL, push + step_at * MOTION * PUSHED, fading};
-        const double *Q = added + step_at * NZ * NZ;
-        advance(FP, P, step, NZ);
-        transpose(turned, FP);
-        advance(P, turned, step, NZ);
-        for (int a = 0; a < NZ; ++a)
-          for (int b = 0; b <= a; ++b)
-            P[a * NZ + b] = P[b * NZ + a] =
-                0.5 * (P[a * NZ + b] + P[b * NZ + a] + Q[a * NZ + b] + Q[b * NZ + a]);
-      }
+        for (int t = 0; t < ROW; ++t) store(filtered + a * NZ + t * LANES, P[t][a], width_of(NZ, t * LANES));
+      if (k + 1 < of->blocks) pass(P, of->transition + step, of->spreading + step, *by);
+    }
+  }
+  return 0;
+}
+
+/* Driving, and what the first `shown_count` of `count` columns show. */
+typedef struct {
+  intptr_t count, shown_count;
+  const double *driving, *shown;
+} Columns;
+
+/* One tile of columns over a run: its innovations, each in units of their deviations, to `whitened` (NY at a block), and
+   its states after each measurement to `after` (NZ at a block) unless that is NULL. */
+INLINE void forward(const Motion *of, Process by, const Filter *filter, Columns columns, long run, int begin, V *whitened,
+                    V *after) {
+  const int width = width_of(columns.count, begin), shown = width_of(columns.shown_count, begin);
+  V z[NZ], e[NY];
+  memset(z, 0, sizeof z);
+  for (long k = 0; k < of->blocks; ++k) {
+    const long at = run * of->blocks + k, step = run * (of->blocks - 1) + k;
+    const double *H = of->reading + at * NY * MOTION, *K = filter->gain + at * NZ * NY;
+    const double *W = filter->white + at * NY * NY;
+    memset(e, 0, sizeof e);
+    for (int i = 0; i < NY; ++i) {
+      if (!of->known[at * NY + i]) continue;
+      if (shown > 0) e[i] = load(columns.shown + (at * NY + i) * columns.shown_count + begin, shown);
+      e[i] -= z[SHORT + i];
+      for (int j = 0; j < MOTION; ++j) e[i] -= H[i * MOTION + j] * z[j];
+    }
+    for (int i = 0; i < NY; ++i) {
+      V total = W[i * NY] * e[0];
+      for (int j = 1; j <= i; ++j) total += W[i * NY + j] * e[j];
+      whitened[k * NY + i] = total;
+    }
+    for (int a = 0; a < NZ; ++a) {
+      V total = z[a];
+      for (int i = 0; i < NY; ++i) total += K[a * NY + i] * e[i];
+      z[a] = total;
+    }
+    if (after) memcpy(after + k * NZ, z, sizeof z);
+    if (k + 1 < of->blocks) {
+      V d[MOTION], moved[NZ];
+      for (int i = 0; i < MOTION; ++i) d[i] = load(columns.driving + (step * MOTION + i) * columns.count + begin, width);
+      advance(moved, z, of->transition + step * MOTION * MOTION, of->spreading + step * MOTION * MOTION, by, d);
+      memcpy(z, moved, sizeof z);
     }
   }
 }
 
-/* Of `count` columns the first `seen_count` have readings in `shown`; those of the others are zero. */
-EXPORT int run_filter(long runs, long blocks, int count, int seen_count, const double *reading,
-                      const unsigned char *known, const double *transition, const double *spreading,
-                      const double *push, const double *fading, const double *gain, const double *white,
-                      const double *driving, const double *shown, int keep, double *whitened, double *after) {
-  double *work = malloc(sizeof(double) * count * (2 * NZ + NY));
-  if (!work) return 1;
-  double *z = work, *moved = work + NZ * count, *e = work + 2 * NZ * count;
-  for (long run = 0; run < runs; ++run) {
-    memset(z, 0, sizeof(double) * NZ * count);
-    for (long k = 0; k < blocks; ++k) {
-      const long at = run * blocks + k;
-      const double *H = reading + at * NY * MOTION, *K = gain + at * NZ * NY, *W = white + at * NY * NY;
-      double *innovations = whitened + at * NY * count;
-      memset(innovations, 0, sizeof(double) * NY * count);
-      for (int i = 0; i < NY; ++i) {
-        double *row = e + i * count;
-        if (!known[at * NY + i]) {
-          memset(row, 0, sizeof(double) * count);
-          continue;
-        }
-        for (int c = 0; c < count; ++c) row[c] = -z[(SHORT + i) * count + c];
-        add(row, 1.0, shown + (at * NY + i) * seen_count, seen_count);
-        for (int j = 0; j < MOTION; ++j)
-          if (H[i * MOTION + j] != 0.0) add(row, -H[i * MOTION + j], z + j * count, count);
-      }
-      for (int i = 0; i < NY; ++i) {
-        for (int a = 0; a < NZ; ++a) add(z + a * count, K[a * NY + i], e + i * count, count);
-        for (int j = 0; j <= i; ++j) add(innovations + i * count, W[i * NY + j], e + j * count, count);
-      }
-      if (keep) memcpy(after + at * NZ * count, z, sizeof(double) * NZ * count);
-      if (k + 1 < blocks) {
-        const long step_at = run * (blocks - 1) + k;
-        const double *spread = spreading + step_at * MOTION * MOTION, *d = driving + step_at * MOTION * count;
-        const Step step = {transition + step_at * MOTION * MOTION, spread, push + step_at * MOTION * PUSHED, fading};
-        advance(moved, z, step, count);
-        for (int i = 0; i < MOTION; ++i)
-          for (int j = 0; j < MOTION; ++j)
-            if (spread[i * MOTION + j] != 0.0) add(moved + i * count, spread[i * MOTION + j], d + j * count, count);
-        double *swapped = z;
-        z = moved;
-        moved = swapped;
-      }
+/* Room for `count` vectors at every block, aligned; to be freed at *raw. NULL without memory. */
+static V *room(long blocks, int count, void **raw) {
+  *raw = malloc(sizeof(V) * (blocks * count + 1));
+  return *raw ? (V *)(((uintptr_t)*raw + sizeof(V) - 1) / sizeof(V) * sizeof(V)) : NULL;
+}
+
+EXPORT int whiten(const Motion *of, const Process *by, const Filter *filter, const Columns *columns, double **whitened) {
+  void *raw;
+  V *tile = room(of->blocks, NY, &raw);
+  if (!tile) return 1;
+  for (long run = 0; run < of->runs; ++run)
+    for (int begin = 0; begin < columns->count; begin += LANES) {
+      const int width = width_of(columns->count, begin);
+      forward(of, *by, filter, *columns, run, begin, tile, NULL);
+      for (long row = 0; row < of->blocks * NY; ++row)
+        store(*whitened + (run * of->blocks * NY + row) * columns->count + begin, tile[row], width);
     }
-  }
-  free(work);
+  free(raw);
   return 0;
 }
 
 /* u = W' e - K' later, and later + H' u in its place: r, what later measurements say of the state before this one. */
-static void measure_back(double *restrict u, double *restrict later, const double *restrict e, const double *K,
-                         const double *W, const double *H, const unsigned char *seen, int count) {
-  memset(u, 0, sizeof(double) * NY * count);
-  for (int i = 0; i < NY; ++i) {
-    for (int j = i; j < NY; ++j) add(u + i * count, W[j * NY + i], e + j * count, count);
-    for (int a = 0; a < NZ; ++a) add(u + i * count, -K[a * NY + i], later + a * count, count);
-  }
+INLINE void measure_back(V *u, V *later, const V *e, const double *K, const double *W, const double *H,
+                         const unsigned char *seen) {
+  memset(u, 0, sizeof(V) * NY);
   for (int i = 0; i < NY; ++i) {
     if (!seen[i]) continue;
-    add(later + (SHORT + i) * count, 1.0, u + i * count, count);
-    for (int j = 0; j < MOTION; ++j)
-      if (H[i * MOTION + j] != 0.0) add(later + j * count, H[i * MOTION + j], u + i * count, count);
+    u[i] = W[i * NY + i] * e[i];
+    for (int j = i + 1; j < NY; ++j) u[i] += W[j * NY + i] * e[j];
+    for (int a = 0; a < NZ; ++a) u[i] -= K[a * NY + i] * later[a];
+  }
+  for (int i = 0; i < NY; ++i) later[SHORT + i] += u[i];
+  for (int j = 0; j < MOTION; ++j) {
+    V total = later[j];
+    for (int i = 0; i < NY; ++i) total += H[i * MOTION + j] * u[i];
+    later[j] = total;
   }
 }
 
-EXPORT int smooth_backward(long runs, long blocks, int count, const double *reading, const unsigned char *known,
-                           const double *transition, const double *push, const double *fading, const double *gain,
-                           const double *white, const double *filtered, const double *whitened, const double *after,
-                           double *states) {
-  double *work = malloc(sizeof(double) * count * (2 * NZ + NY));
-  if (!work) return 1;
-  double *r = work, *later = work + NZ * count, *u = work + 2 * NZ * count;
-  memcpy(states, after, sizeof(double) * runs * blocks * NZ * count);
-  for (long run = 0; run < runs; ++run) {
-    memset(r, 0, sizeof(double) * NZ * count);
-    for (long k = blocks - 1; k >= 0; --k) {
-      const long at = run * blocks + k, step_at = run * (blocks - 1) + k;
-      memset(later, 0, sizeof(double) * NZ * count);
-      if (k + 1 < blocks) {
-        const Step step = {transition + step_at * MOTION * MOTION, NULL, push + step_at * MOTION * PUSHED, fading};
-        carry_back(later, r, step, count);
+/* States given all measurements, of one column. */
+EXPORT int smooth(const Motion *of, const Process *by, const Filter *filter, const Columns *columns, double **states) {
+  void *raw;
+  V *whitened = room(of->blocks, NY + NZ, &raw), *after = whitened + of->blocks * NY;
+  if (!whitened) return 1;
+  for (long run = 0; run < of->runs; ++run) {
+    V r[NZ], later[NZ], pushing[FORCES], u[NY];
+    memset(r, 0, sizeof r);
+    forward(of, *by, filter, *columns, run, 0, whitened, after);
+    for (long k = of->blocks - 1; k >= 0; --k) {
+      const long at = run * of->blocks + k, step = (run * (of->blocks - 1) + k) * MOTION * MOTION;
+      memset(later, 0, sizeof later);
+      if (k + 1 < of->blocks) carry_back(later, pushing, r, of->transition + step, of->spreading + step, *by);
+      for (int a = 0; a < NZ; ++a) {
+        V total = after[k * NZ + a];
+        for (int b = 0; b < NZ; ++b) total += filter->filtered[(at * NZ + a) * NZ + b] * later[b];
+        store(*states + at * NZ + a, total, 1);
       }
-      for (int a = 0; a < NZ; ++a)
-        for (int b = 0; b < NZ; ++b)
-          add(states + (at * NZ + a) * count, filtered[(at * NZ + a) * NZ + b], later + b * count, count);
-      measure_back(u, later, whitened + at * NY * count, gain + at * NZ * NY, white + at * NY * NY,
-                   reading + at * NY * MOTION, known + at * NY, count);
-      double *swapped = r;
-      r = later;
-      later = swapped;
+      measure_back(u, later, whitened + k * NY, filter->gain + at * NZ * NY, filter->white + at * NY * NY,
+                   of->reading + at * NY * MOTION, of->known + at * NY);
+      memcpy(r, later, sizeof r);
     }
   }
-  free(work);
+  free(raw);
   return 0;
-}
-
-/* product = A B, or product = A' B with `by_columns` of A. */
-static void multiply(double *restrict product, const double *restrict A, const double *restrict B, int by_columns) {
-  memset(product, 0, sizeof(double) * NZ * NZ);
-  for (int i = 0; i < NZ; ++i)
-    for (int a = 0; a < NZ; ++a) {
-      const double factor = by_columns ? A[a * NZ + i] : A[i * NZ + a];
-      if (factor != 0.0) add(product + i * NZ, factor, B + a * NZ, NZ);
-    }
-}
-
-/* (I - K H)' N (I - K H) + H' W'W H in the place of N, and the diagonal of W'W + K' N K.
-   Not multiplied out: the terms would cancel where a sensor is good, and with them the last digits of the slopes. */
-static void seen_from_before(double *restrict N, double *restrict D, const double *K, const double *W, const double *H,
-                             const unsigned char *seen) {
-  double correction[NZ * NZ] = {0}, moved[NZ * NZ], WH[NY * NZ] = {0}, NK[NZ * NY] = {0};
-  for (int a = 0; a < NZ; ++a)
-    for (int b = 0; b < NZ; ++b) add(NK + a * NY, N[a * NZ + b], K + b * NY, NY);
-  for (int i = 0; i < NY; ++i) {
-    D[i] = 0.0;
-    for (int j = i; j < NY; ++j) D[i] += W[j * NY + i] * W[j * NY + i];
-    for (int a = 0; a < NZ; ++a) D[i] += K[a * NY + i] * NK[a * NY + i];
-  }
-  for (int a = 0; a < NZ; ++a) correction[a * NZ + a] = 1.0;
-  for (int i = 0; i < NY; ++i) {
-    if (!seen[i]) continue;
-    for (int a = 0; a < NZ; ++a) {
-      add(correction + a * NZ, -K[a * NY + i], H + i * MOTION, MOTION);
-      correction[a * NZ + SHORT + i] -= K[a * NY + i];
-    }
-    for (int j = i; j < NY; ++j) {
-      add(WH + j * NZ, W[j * NY + i], H + i * MOTION, MOTION);
-      WH[j * NZ + SHORT + i] += W[j * NY + i];
-    }
-  }
-  multiply(moved, N, correction, 0);
-  multiply(N, correction, moved, 1);
-  for (int i = 0; i < NY; ++i)
-    for (int a = 0; a < NZ; ++a)
-      if (WH[i * NZ + a] != 0.0) add(N + a * NZ, WH[i * NZ + a], WH + i * NZ, NZ);
 }
 
 /* Sums of the slopes, each over all steps: by the variance of each slow process's driving noise, of its beginning, by
@@ -311,71 +353,145 @@ typedef struct {
   double *variance, *start, *fading, *way, *both, *gain, *white;
 } Sums;
 
-/* What one step adds: r (NZ, C), N and N F are of the later block, F' r, P and `after` of the earlier. */
-static void between(Sums sums, const double *r, const double *N, const double *NF, const double *later,
-                    const double *spread, const double *P, const double *after, double *restrict smooth,
-                    double *restrict pushing, int count) {
-  for (int i = 0; i < SLOW; ++i) {
-    const double *ri = r + (MOTION + i) * count;
-    double *row = smooth + i * count;
-    memcpy(row, after + (MOTION + i) * count, sizeof(double) * count);
-    for (int b = 0; b < NZ; ++b) add(row, P[(MOTION + i) * NZ + b], later + b * count, count);
-    sums.variance[i] += N[(MOTION + i) * (NZ + 1)] - dot(ri, ri, count);
-    sums.fading[i] += -2 * (dot(ri, row, count) - dot(NF + (MOTION + i) * NZ, P + (MOTION + i) * NZ, NZ));
+/* (I - K H)' N (I - K H) + H' W'W H in the place of N, and the diagonal of W'W + K' N K.
+   First N (I - K H), then this from the left: multiplied out, the terms would cancel where a sensor is good, and with
+   them the last digits of the slopes. */
+static void seen_from_before(V (*N)[NZ], double *D, const double *K, const double *W, const double *H,
+                             const unsigned char *seen) {
+  V reading[ROW][NZ], KN[ROW][NY], back[ROW][NY]; /* H, of which the first NY rows are used; K' N */
+  memset(reading, 0, sizeof reading);
+  for (int i = 0; i < NY; ++i) {
+    if (!seen[i]) continue;
+    for (int j = 0; j < MOTION; ++j) AT(reading, NZ, i, j) = H[i * MOTION + j];
+    AT(reading, NZ, i, SHORT + i) = 1.0;
   }
-  for (int f = 0; f < FORCES; ++f) {
-    double BN[NZ] = {0}, BNF[NZ] = {0}, by_way = 0.0;
-    memset(pushing, 0, sizeof(double) * count);
-    for (int i = 0; i < MOTION; ++i) {
-      const double b = spread[i * MOTION + f];
-      add(pushing, b, r + i * count, count);
-      add(BN, b, N + i * NZ, NZ);
-      add(BNF, b, NF + i * NZ, NZ);
+  for (int t = 0; t < ROW; ++t)
+    for (int i = 0; i < NY; ++i) {
+      V total = K[i] * N[t][0];
+      for (int a = 1; a < NZ; ++a) total += K[a * NY + i] * N[t][a];
+      KN[t][i] = total;
     }
-    for (int i = 0; i < MOTION; ++i) by_way += BN[i] * spread[i * MOTION + f];
-    sums.way[f] += by_way - dot(pushing, pushing, count);
-    sums.both[f] += 2 * (BN[MOTION + f] - dot(pushing, r + (MOTION + f) * count, count));
-    sums.gain[f] += -2 * (dot(pushing, smooth + f * count, count) - dot(BNF, P + (MOTION + f) * NZ, NZ));
+  for (int i = 0; i < NY; ++i) {
+    D[i] = 0.0;
+    for (int j = i; j < NY; ++j) D[i] += W[j * NY + i] * W[j * NY + i];
+    for (int a = 0; a < NZ; ++a) D[i] += K[a * NY + i] * AT(KN, NY, i, a);
+  }
+  for (int t = 0; t < ROW; ++t) {
+    V WH[NY];
+    for (int a = 0; a < NZ; ++a) {
+      V total = N[t][a];
+      for (int i = 0; i < NY; ++i) total -= AT(KN, NY, i, a) * reading[t][i];
+      N[t][a] = total;
+    }
+    for (int i = 0; i < NY; ++i) {
+      WH[i] = W[i * NY] * reading[t][0];
+      for (int j = 1; j <= i; ++j) WH[i] += W[i * NY + j] * reading[t][j];
+    }
+    for (int i = 0; i < NY; ++i) {
+      V total = W[i * NY + i] * WH[i];
+      for (int j = i + 1; j < NY; ++j) total += W[j * NY + i] * WH[j];
+      for (int a = 0; a < NZ; ++a) total -= K[a * NY + i] * N[t][a];
+      back[t][i] = total;
+    }
+    for (int i = 0; i < NY; ++i) {
+      if (!seen[i]) continue;
+      for (int j = 0; j < MOTION; ++j) N[t][j] += H[i * MOTION + j] * back[t][i];
+      N[t][SHORT + i] += back[t][i];
+    }
   }
 }
 
-EXPORT int backward(long runs, long blocks, int count, const double *reading, const unsigned char *known,
-                    const double *transition, const double *spreading, const double *push, const double *fading,
-                    const double *gain, const double *white, const double *filtered, const double *whitened,
-                    const double *after, double *variance, double *start, double *by_fading, double *way, double *both,
-                    double *by_gain, double *by_white) {
-  const Sums sums = {variance, start, by_fading, way, both, by_gain, by_white};
-  double *work = malloc(sizeof(double) * count * (2 * NZ + NY + SLOW + 1));
-  if (!work) return 1;
-  double *r = work, *later = r + NZ * count, *u = later + NZ * count;
-  double *smooth = u + NY * count, *pushing = smooth + SLOW * count;
-  for (long run = 0; run < runs; ++run) {
-    double N[NZ * NZ] = {0}, FN[NZ * NZ], NF[NZ * NZ], D[NY];
-    memset(r, 0, sizeof(double) * NZ * count);
-    for (long k = blocks - 1; k >= 0; --k) {
-      const long at = run * blocks + k, step_at = run * (blocks - 1) + k;
-      const double *K = gain + at * NZ * NY, *W = white + at * NY * NY, *H = reading + at * NY * MOTION;
-      memset(later, 0, sizeof(double) * NZ * count);
-      if (k + 1 < blocks) {
-        const double *spread = spreading + step_at * MOTION * MOTION;
-        const Step step = {transition + step_at * MOTION * MOTION, spread, push + step_at * MOTION * PUSHED, fading};
-        carry_back(FN, N, step, NZ);
-        transpose(NF, FN); /* N is symmetric */
-        carry_back(later, r, step, count);
-        between(sums, r, N, NF, later, spread, filtered + at * NZ * NZ, after + at * NZ * count, smooth, pushing, count);
-        carry_back(N, NF, step, NZ);
+/* What covariances add to the sums: N carries the information of later measurements about the states back. */
+static void sum_over_covariances(const Motion *of, Process by, const Filter *filter, long run, Sums sums) {
+  V N[ROW][NZ], FN[ROW][NZ], NF[ROW][NZ], BN[ROW][FORCES], BNF[ROW][FORCES];
+  double D[NY];
+  memset(N, 0, sizeof N);
+  memset(NF, 0, sizeof NF);
+  for (long k = of->blocks - 1; k >= 0; --k) {
+    const long at = run * of->blocks + k, step = (run * (of->blocks - 1) + k) * MOTION * MOTION;
+    if (k + 1 < of->blocks) {
+      const double *phi = of->transition + step, *spreading = of->spreading + step;
+      for (int i = 0; i < SLOW; ++i) sums.variance[i] += AT(N, NZ, MOTION + i, MOTION + i);
+      for (int t = 0; t < ROW; ++t) carry_back(FN[t], BN[t], N[t], phi, spreading, by);
+      transpose(NF, FN); /* N is symmetric */
+      for (int t = 0; t < ROW; ++t) carry_back(N[t], BNF[t], NF[t], phi, spreading, by);
+      for (int i = 0; i < SLOW; ++i) {
+        V by_fading = {0}, by_gain = {0};
+        for (int t = 0; t < ROW; ++t) {
+          const double *P = filter->filtered + (at * NZ + MOTION + i) * NZ + t * LANES;
+          const V row = load(P, width_of(NZ, t * LANES));
+          by_fading += NF[t][MOTION + i] * row;
+          if (i < FORCES) by_gain += BNF[t][i] * row;
+        }
+        sums.fading[i] += 2 * sum(by_fading);
+        if (i < FORCES) sums.gain[i] += 2 * sum(by_gain);
       }
-      measure_back(u, later, whitened + at * NY * count, K, W, H, known + at * NY, count);
-      seen_from_before(N, D, K, W, H, known + at * NY);
-      for (int i = 0; i < NY; ++i)
-        if (known[at * NY + i]) by_white[run * NY + i] += D[i] - dot(u + i * count, u + i * count, count);
-      double *swapped = r;
-      r = later;
-      later = swapped;
+      for (int f = 0; f < FORCES; ++f) {
+        for (int i = 0; i < MOTION; ++i) sums.way[f] += AT(BN, FORCES, f, i) * spreading[i * MOTION + f];
+        sums.both[f] += 2 * AT(BN, FORCES, f, MOTION + f);
+      }
     }
-    for (int i = 0; i < SLOW; ++i)
-      start[i] += N[(MOTION + i) * (NZ + 1)] - dot(r + (MOTION + i) * count, r + (MOTION + i) * count, count);
+    seen_from_before(N, D, filter->gain + at * NZ * NY, filter->white + at * NY * NY, of->reading + at * NY * MOTION,
+                     of->known + at * NY);
+    for (int i = 0; i < NY; ++i)
+      if (of->known[at * NY + i]) sums.white[run * NY + i] += D[i];
   }
-  free(work);
+  for (int i = 0; i < SLOW; ++i) sums.start[i] += AT(N, NZ, MOTION + i, MOTION + i);
+}
+
+/* What a tile of columns takes from the sums; r carries what later measurements say of the states back. */
+static void sum_over_columns(const Motion *of, Process by, const Filter *filter, long run, const V *whitened,
+                             const V *after, Sums sums) {
+  V variance[SLOW] = {0}, fading[SLOW] = {0}, way[FORCES] = {0}, both[FORCES] = {0}, gain[FORCES] = {0}, white[NY] = {0};
+  V r[NZ], later[NZ], pushing[FORCES], u[NY];
+  memset(r, 0, sizeof r);
+  for (long k = of->blocks - 1; k >= 0; --k) {
+    const long at = run * of->blocks + k, step = (run * (of->blocks - 1) + k) * MOTION * MOTION;
+    memset(later, 0, sizeof later);
+    if (k + 1 < of->blocks) {
+      carry_back(later, pushing, r, of->transition + step, of->spreading + step, by);
+      for (int i = 0; i < SLOW; ++i) {
+        V state = after[k * NZ + MOTION + i];
+        for (int b = 0; b < NZ; ++b) state += filter->filtered[(at * NZ + MOTION + i) * NZ + b] * later[b];
+        variance[i] += r[MOTION + i] * r[MOTION + i];
+        fading[i] += r[MOTION + i] * state;
+        if (i < FORCES) gain[i] += pushing[i] * state;
+      }
+      for (int f = 0; f < FORCES; ++f) {
+        way[f] += pushing[f] * pushing[f];
+        both[f] += pushing[f] * r[MOTION + f];
+      }
+    }
+    measure_back(u, later, whitened + k * NY, filter->gain + at * NZ * NY, filter->white + at * NY * NY,
+                 of->reading + at * NY * MOTION, of->known + at * NY);
+    for (int i = 0; i < NY; ++i) white[i] += u[i] * u[i];
+    memcpy(r, later, sizeof r);
+  }
+  for (int i = 0; i < SLOW; ++i) {
+    sums.variance[i] -= sum(variance[i]);
+    sums.fading[i] -= 2 * sum(fading[i]);
+    sums.start[i] -= sum(r[MOTION + i] * r[MOTION + i]);
+  }
+  for (int f = 0; f < FORCES; ++f) {
+    sums.way[f] -= sum(way[f]);
+    sums.both[f] -= 2 * sum(both[f]);
+    sums.gain[f] -= 2 * sum(gain[f]);
+  }
+  for (int i = 0; i < NY; ++i) sums.white[run * NY + i] -= sum(white[i]);
+}
+
+EXPORT int slope_sums(const Motion *of, const Process *by, const Filter *filter, const Columns *columns,
+                      const Sums *sums) {
+  void *raw;
+  V *whitened = room(of->blocks, NY + NZ, &raw), *after = whitened + of->blocks * NY;
+  if (!whitened) return 1;
+  for (long run = 0; run < of->runs; ++run) {
+    sum_over_covariances(of, *by, filter, run, *sums);
+    for (int begin = 0; begin < columns->count; begin += LANES) {
+      forward(of, *by, filter, *columns, run, begin, whitened, after);
+      sum_over_columns(of, *by, filter, run, whitened, after, *sums);
+    }
+  }
+  free(raw);
   return 0;
 }

@@ -22,6 +22,19 @@ from tank2sim.native.library import cached_library
 
 _Truths = NDArray[np.bool_]
 
+MotionArrays = tuple[Array, Array, Array, _Truths]
+"""Transition and spreading (R, T - 1, 6, 6), readings by states (R, T, ny, 6), mask of the measurements (R, T, ny)."""
+
+ProcessArrays = tuple[Array, Array, Array, Array, Array]
+"""Accelerations and sensor errors over a block: the share that remains (3 + ny,), in waves followed by real and
+imaginary part of the band's; the change of speed by each value (3,), in waves also by each value of the band and
+its quadrature (9,); what noise adds: variance of the change of speed (3,), its covariance with each value at
+the end (3,) or (9,), variance of each value at the end (nz - 6,)."""
+
+FilterArrays = tuple[Array, Array, Array]
+"""Gains (R, T, nz, ny), inverse lower Cholesky factors of the innovations' covariances (R, T, ny, ny), and covariances
+after each measurement (R, T, nz, nz)."""
+
 _SOURCE = Path(__file__).with_suffix(".c")
 
 # Products and sums in any order, which makes them twice as fast; nan propagates.
@@ -38,98 +51,50 @@ _FORCES = 3
 """Accelerations that push the motion; with waves, as many of the narrow band and their quadratures come after them."""
 
 
-def covariances(
-    start: Array, transition: Array, push: Array, fading: Array, added: Array, seeing: tuple[Array, _Truths, Array]
-) -> tuple[Array, Array, Array]:
-    """Gains, inverse roots of the innovations' covariances, and covariances after each measurement.
+def covariances(motion: MotionArrays, process: ProcessArrays, start: Array, white_noise: Array) -> FilterArrays:
+    """The filter of one noise; its factors are nan where a covariance is not positive definite, and from there on.
 
     Parameters
     ----------
+    motion, process
     start : array (nz,)
         Variances at the beginning.
-    transition : array (R, T - 1, 6, 6)
-    push : array (R, T - 1, 6, 3) or, in waves, (R, T - 1, 6, 9)
-        Errors of the motion by accelerations a step before.
-    fading : array (3 + ny,) or (5 + ny,)
-        Share of accelerations and sensor errors that remains a step later; real and imaginary part for the band.
-    added : array (R, T - 1, nz, nz)
-        Covariance of the process noise.
-    seeing : arrays (R, T, ny, 6), (R, T, ny), (R, ny)
-        Readings by states, mask of the measurements, variances of their white noise.
-
-    Returns
-    -------
-    gain : array (R, T, nz, ny)
-    white : array (R, T, ny, ny)
-        Lower; nan where the covariance is not positive definite, and from there on.
-    filtered : array (R, T, nz, nz)
+    white_noise : array (R, ny)
+        Variances of the measurements' white noise.
     """
-    reading, known, white_noise = seeing
-    runs, blocks, ny, _ = reading.shape
+    runs, blocks, ny, _ = motion[2].shape
     nz = len(start)
-    gain, white = np.empty((runs, blocks, nz, ny)), np.empty((runs, blocks, ny, ny))
-    filtered = np.empty((runs, blocks, nz, nz))
-    given = start, transition, push, fading, added, reading, known, white_noise
-    _library(ny, _waves(push)).covariances(*_sizes(runs, blocks), *_places(*given, gain, white, filtered))
-    return gain, white, filtered
+    found = np.empty((runs, blocks, nz, ny)), np.empty((runs, blocks, ny, ny)), np.empty((runs, blocks, nz, nz))
+    _run("covariances", motion, process, (start,), (white_noise,), found)
+    return found
 
 
-def run_filter(
-    seeing: tuple[Array, _Truths],
-    moving: tuple[Array, Array, Array, Array],
-    filtering: tuple[Array, Array],
-    columns: tuple[Array, Array],
-    keep: bool,
-) -> tuple[Array, Array]:
-    """Innovations in units of their standard deviation (R, T, ny, C), and states after each measurement.
+def whiten(motion: MotionArrays, process: ProcessArrays, found: FilterArrays, driving: Array, shown: Array) -> Array:
+    """Innovations in units of their standard deviation (R, T, ny, C), 0 where nothing was measured.
 
     Parameters
     ----------
-    seeing : arrays (R, T, ny, 6), (R, T, ny)
-    moving : arrays (R, T - 1, 6, 6), (R, T - 1, 6, 6), (R, T - 1, 6, 3 or 9), (3 + ny or 5 + ny,)
-        Transition, spreading, push and fading.
-    filtering : arrays (R, T, nz, ny), (R, T, ny, ny)
-        Gains and inverse roots.
-    columns : arrays (R, T - 1, 6, C), (R, T, ny, S)
-        Driving, and what the first S of C columns show.
-    keep : bool
-        Whether the states are wanted, (R, T, nz, C); else they are (0, 0, nz, C).
+    motion, process, found
+    driving : array (R, T - 1, 6, C)
+    shown : array (R, T, ny, S)
+        What the first S of C columns show.
     """
-    runs, blocks, ny, shown = columns[1].shape
-    count = columns[0].shape[-1]
-    whitened = np.empty((runs, blocks, ny, count))
-    after = np.empty((runs if keep else 0, blocks if keep else 0, filtering[0].shape[2], count))
-    given = _places(*seeing, *moving, *filtering, *columns)
-    run = _library(ny, _waves(moving[2])).run_filter
-    _need_memory(run(*_sizes(runs, blocks), count, shown, *given, int(keep), *_places(whitened, after)))
-    return whitened, after
+    whitened = np.empty((*shown.shape[:3], driving.shape[-1]))
+    _run("whiten", motion, process, found, _columns(driving, shown), (whitened,))
+    return whitened
 
 
-def smooth_backward(
-    seeing: tuple[Array, _Truths],
-    moving: tuple[Array, Array, Array, Array],
-    filtering: tuple[Array, Array, Array],
-    whitened: Array,
-    after: Array,
-) -> Array:
-    """States given all measurements (R, T, nz, C); arguments as of :func:`run_filter`, and the covariances after each
-    measurement. r carries the information of later measurements about a state."""
-    runs, blocks, ny, count = whitened.shape
-    transition, _, push, fading = moving
-    states = np.empty(after.shape)
-    given = _places(*seeing, transition, push, fading, *filtering, whitened, after, states)
-    _need_memory(_library(ny, _waves(push)).smooth_backward(*_sizes(runs, blocks), count, *given))
+def smooth(motion: MotionArrays, process: ProcessArrays, found: FilterArrays, driving: Array, shown: Array) -> Array:
+    """States given all measurements (R, T, nz); arguments as of :func:`whiten`, with one column."""
+    states = np.empty(found[0].shape[:3])
+    _run("smooth", motion, process, found, _columns(driving, shown), (states,))
     return states
 
 
-def backward(
-    seeing: tuple[Array, _Truths],
-    moving: tuple[Array, Array, Array, Array],
-    filtering: tuple[Array, Array, Array],
-    whitened: Array,
-    after: Array,
+def slope_sums(
+    motion: MotionArrays, process: ProcessArrays, found: FilterArrays, driving: Array, shown: Array
 ) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
-    """Slopes of the cost in the parameters of the noise; arguments as of :func:`smooth_backward`.
+    """Slopes of the cost in the parameters of the noise; arguments as of :func:`whiten`.
 
     Returns
     -------
@@ -140,39 +105,40 @@ def backward(
     white : array (R, ny)
         By the variance of each sensor's white noise in each run.
     """
-    runs, blocks, ny, count = whitened.shape
+    runs, _, ny, _ = shown.shape
     variance, start, fading = np.zeros(3 + ny), np.zeros(3 + ny), np.zeros(3 + ny)
     way, both, gain, white = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros((runs, ny))
     sums = variance, start, fading, way, both, gain, white
-    given = _places(*seeing, *moving, *filtering, whitened, after, *sums)
-    _need_memory(_library(ny, _waves(moving[2])).backward(*_sizes(runs, blocks), count, *given))
+    _run("slope_sums", motion, process, found, _columns(driving, shown), sums)
     return sums
 
 
-def _waves(push: Array) -> bool:
-    """Whether the states hold accelerations of waves."""
-    return bool(push.shape[-1] > _FORCES)
+_Values = tuple[Array | _Truths | int, ...]
+
+
+def _run(loop: str, motion: MotionArrays, process: ProcessArrays, *others: _Values) -> None:
+    """Run a loop on structures of arrays and whole numbers."""
+    runs, blocks, ny, _ = motion[2].shape
+    function = _library(ny, len(process[1]) > _FORCES)[loop]
+    if function(*map(_structure, ((runs, blocks, *motion), process, *others))):
+        raise MemoryError
+
+
+def _columns(driving: Array, shown: Array) -> _Values:
+    return driving.shape[-1], shown.shape[-1], np.ascontiguousarray(driving), np.ascontiguousarray(shown)
 
 
 @cache
 def _library(ny: int, waves: bool) -> ctypes.CDLL:
     """The compiled loops for a number of sensors."""
-    flags = (*_FLAGS, *FLAGS_OF_LANES.get(widest_lanes(), ()), f"-DNY={ny}", f"-DWAVES={int(waves)}")
+    lanes = max(widest_lanes(), 1)
+    flags = (*_FLAGS, *FLAGS_OF_LANES.get(lanes, ()), f"-DNY={ny}", f"-DWAVES={int(waves)}", f"-DLANES={lanes}")
     return ctypes.CDLL(str(cached_library({_SOURCE.name: _SOURCE.read_text(encoding="utf-8")}, flags=flags)))
 
 
-def _sizes(runs: int, blocks: int) -> tuple[ctypes.c_long, ctypes.c_long]:
-    return ctypes.c_long(runs), ctypes.c_long(blocks)
-
-
-def _places(*arrays: Array | _Truths) -> list[ctypes.c_void_p]:
-    """Where arrays are in memory: contiguous ones, for a copy would end too soon."""
-    for array in arrays:
-        if not array.flags.c_contiguous or array.dtype not in (np.float64, np.bool_):
-            raise ValueError(f"an array of {array.dtype} with strides {array.strides}")
-    return [ctypes.c_void_p(array.ctypes.data) for array in arrays]
-
-
-def _need_memory(failed: int) -> None:
-    if failed:
-        raise MemoryError
+def _structure(values: _Values) -> ctypes.Array[ctypes.c_void_p]:
+    """Addresses of arrays, and whole numbers: contiguous arrays alone, for a copy would end too soon."""
+    for value in values:
+        if not isinstance(value, int) and (not value.flags.c_contiguous or value.dtype not in (np.float64, np.bool_)):
+            raise ValueError(f"an array of {value.dtype} with strides {value.strides}")
+    return (ctypes.c_void_p * len(values))(*(v if isinstance(v, int) else v.ctypes.data for v in values))

@@ -104,6 +104,7 @@ class Likelihood:
     ):
         self.motion, self.none, self.coefficients, self.belief = motion, none, coefficients, belief
         self.scale = np.ones(len(belief.logs)) if scale is None else scale
+        self._observers: tuple[tuple[Linear, WaveBand | None, bytes, Observer], ...] = ()
         self._residuals: dict[tuple[tuple[str, ...], tuple[str, ...], bytes], tuple[Array, Array]] = {}
         nothing = np.zeros(0)
         self._unmeasured = none.unmeasured_states(motion, nothing)
@@ -136,7 +137,7 @@ class Likelihood:
         The measured motion contains noise. A force evaluated on it is not a known input: only with the matching slope
         is the likelihood that of the measurements, whatever motion it is linear about.
         """
-        by_state, reading = hypothesis.slopes(self.motion, theta)
+        by_state, reading = hypothesis.slopes(self.motion, theta, self.coefficients.names)
         by_state = by_state * self._inside[..., None]  # zero outside the runs
         return linear_filter(by_state, reading, self.known, self.motion.block_s, self.wide, self.motion.noise_shares)
 
@@ -146,16 +147,15 @@ class Likelihood:
         names = self.coefficients.names
         if not names:
             return np.zeros((*self._lack.shape, 0))
-        slopes_by_name = hypothesis.coefficient_slopes(self.motion, theta, names)
+        by_name = hypothesis.coefficient_slopes(self.motion, theta, names)
+        by_name *= self.motion.block_s * self._inside[..., None]
         mixing = self.coefficients.mixing
         if hypothesis.moves_clock:  # its delay takes the place of the record's
             mixing = np.where(np.array(names)[:, None] == CLOCK, 0.0, mixing)
-        columns = slopes_by_name @ mixing
-        if self._moves.shape[-1]:
-            late = slopes_by_name[..., [names.index(CLOCK)]] * self._moves[:, :, None, :]
-            columns = np.concatenate([columns, late], axis=-1)
-        scaled: Array = self.motion.block_s * columns * self._inside[..., None]
-        return scaled
+        columns = (by_name.reshape(-1, len(names)) @ mixing).reshape(*by_name.shape[:-1], -1)
+        if not self._moves.shape[-1]:
+            return columns
+        return np.concatenate([columns, by_name[..., [names.index(CLOCK)]] * self._moves[:, :, None, :]], axis=-1)
 
     def residual(self, hypothesis: Hypothesis, theta: Array) -> tuple[Array, Array]:
         """Driving (R, T - 1, 6) and shown (R, T, ny) of the residual at some parameters."""
@@ -218,10 +218,15 @@ class Likelihood:
     def smooth(self, fit: ExplanationFit) -> tuple[Array, Array]:
         """States of the filter given all measurements (R, T, nz), and the covariance of the unmodelled
         accelerations, given the measurements until then (R, T, 3, 3): an upper bound of that given all."""
-        seen, columns = self._seen(fit)
-        by_coefficients = columns.driving[..., 1 + columns.parameter_count :] @ fit.change
-        states = seen.smooth(columns.driving[..., 0] + by_coefficients, columns.shown[..., 0])
+        seen, states, _ = self._smoothed(fit)
         return states, seen.filtered[..., 6 : 6 + FORCE_STATES, 6 : 6 + FORCE_STATES]
+
+    def _smoothed(self, fit: ExplanationFit) -> tuple[Observer, Array, Array]:
+        """The filter, its states given all measurements (R, T, nz), and what drives by the change of the coefficients
+        (R, T - 1, 6)."""
+        seen, columns = self._seen(fit)
+        added = columns.driving[..., 1 + columns.parameter_count :] @ fit.change
+        return seen, seen.smooth(columns.driving[..., 0] + added, columns.shown[..., 0]), added
 
     def about(self, fit: ExplanationFit) -> Likelihood:
         """The same likelihood, linearised about the smoothed motion of an explanation.
@@ -230,13 +235,10 @@ class Likelihood:
         is that without the waves: what they add within a block is not resolved, and small enough to be linear.
         """
         motion, hypothesis, theta = self.motion, fit.hypothesis, fit.theta
-        seen, columns = self._seen(fit)
-        by_coefficients = columns.driving[..., 1 + columns.parameter_count :] @ fit.change
-        states = seen.smooth(columns.driving[..., 0] + by_coefficients, columns.shown[..., 0])
+        seen, states, added = self._smoothed(fit)
         slow, waves, band = states[..., :6], self.belief.waves, states[..., -2 * FORCE_STATES :]
         if waves is not None:
             slow = slow - waves.moved(band, motion.middles[..., MEASURED_STATES.index("motion.psi")])
-        added = by_coefficients.copy()
         added[..., :FORCE_STATES] += motion.block_s * states[:, :-1, 6 : 6 + FORCE_STATES]
         added *= self._inside / motion.block_s
         between = hypothesis.rates_between(motion, theta) - np.diff(motion.states, axis=1) / motion.step_s
@@ -278,7 +280,14 @@ class Likelihood:
         return self.whiten(fit)[1]
 
     def _observer(self, linear: Linear, fit: ExplanationFit) -> Observer:
-        return observer(linear, fit.noise, self.belief.waves)
+        """The filter at the noise of a fit; the last ones are kept for the next question at the same noise."""
+        noise, waves = fit.logs[:-1].tobytes(), self.belief.waves
+        for motion, band, logs, known in self._observers:
+            if motion is linear and band is waves and logs == noise:
+                return known
+        found = observer(linear, fit.noise, waves)
+        self._observers = (linear, waves, noise, found), *self._observers[:3]
+        return found
 
     def _seen(self, fit: ExplanationFit) -> tuple[Observer, FilterColumns]:
         hypothesis, theta = fit.hypothesis, fit.theta
@@ -427,8 +436,7 @@ class Likelihood:
             noisy = replace(fit, logs=logs)
             seen = self._observer(linear, noisy)
             solved = self._solved(noisy, seen, columns, free=True)
-            counted = (_mixed(part, solved.weights) for part in (columns.driving, columns.shown, solved.whitened))
-            by_noise = slopes(seen, *counted)
+            by_noise = slopes(seen, *_mixed(columns, solved.weights))
             coefficients_change = solved.change[: columns.coefficient_count]
             by_width = 2 * (
                 len(coefficients_change) - solved.coefficient_variance - coefficients_change @ coefficients_change
@@ -541,7 +549,6 @@ class Likelihood:
             gain,
             float(np.trace(spread[:count, :count])),
             weights,
-            whitened,
         )
 
 
@@ -566,11 +573,11 @@ def least_in_box(normal: Array, pull: Array, low: Array, high: Array) -> Array:
     return x
 
 
-def _mixed(columns: Array, weights: Array) -> Array:
-    """Combinations of columns, the last axis: one product of matrices. Those that are not among them are zero."""
-    count = columns.shape[-1]
-    mixed: Array = (columns.reshape(-1, count) @ weights[:count]).reshape(*columns.shape[:-1], weights.shape[1])
-    return mixed
+def _mixed(columns: FilterColumns, weights: Array) -> tuple[Array, Array]:
+    """Combinations of columns, of which the first alone is shown by sensors: one product of matrices each."""
+    driving, shown = columns.driving, columns.shown
+    mixed = driving.reshape(-1, driving.shape[-1]) @ weights
+    return mixed.reshape(*driving.shape[:-1], -1), shown @ weights[: shown.shape[-1], :1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -605,4 +612,3 @@ class _Solved:
     gain: float
     coefficient_variance: float
     weights: Array
-    whitened: Array

@@ -104,6 +104,12 @@ class Prover:
     replays: TrialReplays
     lowest_mps: float = math.inf
 
+    def begin(self) -> None:
+        """Begin the replays by the given card, which depend on no explanation."""
+        fitted, held = self.trials
+        self.replays.begin(self.card, fitted)
+        self.replays.begin(self._lowered(self.card), held)
+
     def prove(self, best: ExplanationFit, named: NamedEffects | None = None) -> Proof:
         """The card with the effects of an explanation, and with coefficients fitted together with them if fitted trials
         are then followed better by :data:`BETTER`; replays of the fitted trials by both cards.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -180,9 +179,8 @@ class Replayer:
         """States (k + 1, nx) at the ends of integration steps."""
         return self._steps.run(start, inputs, p, np.array(self._constants(p)).ravel(), lengths[:, None])
 
-    @cached_property
-    def _sensitivity(self) -> Sensitivity:
-        return Sensitivity(self.model, (), _sensors(self.model, self.seen))
+    def _sensitivity(self, free: tuple[str, ...]) -> Sensitivity:
+        return Sensitivity(self.model, free, _sensors(self.model, self.seen))
 
     def _integration_steps(self, record: InputRecord) -> tuple[Array, Array, NDArray[np.intp]]:
         """The integration steps of a record, kept for its next motion."""
@@ -292,7 +290,7 @@ class Replayer:
                 compared: NDArray[np.bool_] = compared,
             ) -> Array:
                 begun, shares = values[:size], values[size:]
-                by_value = self._slopes_of_motion(self._given_at(part, moved, shares), begun, p, moved)
+                by_value = self.slopes_of_motion(self._given_at(part, moved, shares), begun, p, moved)
                 of_prior = np.diag(np.append(1 / spread, np.full(len(shares), math.sqrt(12.0))))
                 return np.concatenate([(by_value / sigma[:, None])[compared], of_prior])
 
@@ -310,27 +308,38 @@ class Replayer:
                 return None
         return self._given_at(record, rows, unknown[size:]), unknown[:size], remaining
 
-    def _slopes_of_motion(self, record: InputRecord, start: Array, p: Array, rows: NDArray[np.intp]) -> Array:
-        """Derivatives (m, ny, nx + len(rows)) of the compared readings in the initial state and in the instants of the
-        steps of the order at `rows`; a motion that exceeds all bounds counts as one without change.
+    def slopes_of_motion(
+        self,
+        record: InputRecord,
+        start: Array,
+        p: Array,
+        rows: NDArray[np.intp] | None = None,
+        free: tuple[str, ...] = (),
+    ) -> Array:
+        """Derivatives (m, ny, nx + len(rows) + len(free)) of the compared readings in the initial state, in the
+        instants of the steps of the order at `rows`, and in parameters of the model that no sensor shows by itself; a
+        motion that exceeds all bounds counts as one without change.
 
         An order that is given later by dt keeps the rates before it for so long: the state behind changes by the
         difference of the rates, times dt.
         """
+        rows = np.zeros(0, dtype=np.intp) if rows is None else rows
         lengths, inputs, places = self._integration_steps(record)
+        sensitivity, nx, steps = self._sensitivity(free), len(start), len(start) + len(rows)
         with np.errstate(all="ignore"):
             states = self._between(start, lengths, inputs, p)
-            tangents = self._sensitivity.tangents(states[:-1], inputs, p, lengths)
-            by = np.zeros((len(states), len(start), len(start) + len(rows)))
-            by[0, :, : len(start)] = np.eye(len(start))
+            tangents = sensitivity.tangents(states[:-1], inputs, p, lengths)
+            by = np.zeros((len(states), nx, steps + len(free)))
+            by[0, :, :nx] = np.eye(nx)
+            by[1:, :, steps:] = tangents[:, :, nx:]
             instants = record.time_s[0] + np.append(0.0, np.cumsum(lengths))
             given, spans = record.given_s[rows], np.diff(record.time_s)[rows - 1]
             at = np.clip(np.searchsorted(instants, given - 1e-9 * spans), 1, len(inputs) - 1)
-            before, after = (self._sensitivity.rates(states[at], inputs[steps], p) for steps in (at - 1, at))
-            by[at, :, np.arange(len(start), by.shape[2])] = (before - after) * spans[:, None]
-            self._sensitivity.propagate(by, tangents)
+            before, after = (sensitivity.rates(states[at], inputs[then], p) for then in (at - 1, at))
+            by[at, :, np.arange(nx, steps)] = (before - after) * spans[:, None]
+            sensitivity.propagate(by, tangents)
             compared = places[record.compared]
-            seen = self._sensitivity.shown_by_states(states[compared], record.inputs[record.compared], p)
+            seen = sensitivity.shown_by_states(states[compared], record.inputs[record.compared], p)
             slopes: Array = seen @ by[compared]
         return np.nan_to_num(slopes, posinf=0.0, neginf=0.0)
 
@@ -393,7 +402,7 @@ class Replayer:
             size = np.sqrt(np.bincount(column, residual**2, len(sigma)) / number)
             beyond = INSTANTS * np.maximum(size**2 - sigma**2, 0) if wrong else 0.0
             weights = np.sqrt(sigma**2 + beyond)
-            slopes = self._slopes_of_motion(record, start, p, np.zeros(0, dtype=np.intp))[known]
+            slopes = self.slopes_of_motion(record, start, p)[known]
             if not (np.isfinite(weights).all() and np.isfinite(slopes).all()):
                 break
             if wrong and turn and np.allclose(weights, before, rtol=0.02):

@@ -23,7 +23,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.ship import mass_fault
 from tank2sim.gap.inference.likelihood import least_in_box
-from tank2sim.gap.proof.open_loop import InputRecord, Replayer, difference_slopes, first_state, input_record
+from tank2sim.gap.proof.open_loop import InputRecord, Replayer, first_state, input_record
 from tank2sim.gap.proof.replay import replayer_of
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.records.trials import Trial
@@ -36,10 +36,6 @@ _STEPS = 5
 
 _SETTLED = 0.02
 """A step that lowers the cost by less than this share is the last (project choice)."""
-
-_REACH = 0.05
-"""Differences are taken over this share of a coefficient's prior spread (project choice: rounding and curvature are
-both far below the noise)."""
 
 _HALVES = 4
 """A step that does not lower the cost is halved so often at most."""
@@ -177,22 +173,16 @@ def _linearised(
 ) -> _Linearised:
     """A trial about its present initial state and coefficients; of infinite cost without a positive mass."""
     replayer, sigma = _replayer(card, driven_by, noise)
-    of_ship = zip(replayer.model.parameter_names, map(float, _parameters(replayer, prior, values)), strict=True)
-    if mass_fault(replayer.model, dict(of_ship)):
+    p = _parameters(replayer, prior, values)
+    if mass_fault(replayer.model, dict(zip(replayer.model.parameter_names, map(float, p), strict=True))):
         nothing, count = np.zeros((len(begun.start), len(values))), len(values)
         return _Linearised(math.inf, np.zeros(count), np.zeros((count, count)), np.zeros(len(begun.start)), nothing)
     record, start = begun.record, begun.start
-    known = ~np.isnan(record.readings)
-
-    def misfit(start: Array, values: Array) -> Array:
-        motion = replayer.motion(record, start, _parameters(replayer, prior, values))
-        residual: Array = ((motion - record.readings) / sigma)[known]
-        return residual
-
-    residual, from_guess = misfit(start, values), (start - begun.guess) / begun.spread
-    by_value = difference_slopes(lambda at: misfit(start, at), values, residual, _REACH * prior.spread)
-    by_start = difference_slopes(lambda at: misfit(at, values), start, residual, 1e-4 * replayer.nominal)
-    by_value, by_start = np.nan_to_num(by_value), np.nan_to_num(by_start)
+    known, free = ~np.isnan(record.readings), tuple(f"derivatives.{name}" for name in prior.names)
+    residual = ((replayer.motion(record, start, p) - record.readings) / sigma)[known]
+    from_guess = (start - begun.guess) / begun.spread
+    slopes = (replayer.slopes_of_motion(record, start, p, free=free) / sigma[:, None])[known]
+    by_start, by_value = slopes[:, : len(start)], slopes[:, len(start) :]
     both = by_start.T @ by_value
     right = np.column_stack([np.nan_to_num(by_start.T @ residual) + from_guess / begun.spread, both])
     solved: Array = np.linalg.solve(by_start.T @ by_start + np.diag(begun.spread**-2.0), right).astype(np.float64)
