@@ -47,10 +47,10 @@ from tank2sim.cards import ManoeuvringCard, read_card
 from tank2sim.errors import InputError
 from tank2sim.files import write_whole
 from tank2sim.gap.diagnosis.residuals import estimates
-from tank2sim.gap.inference.prior import PRICE, likelihood_from_card
+from tank2sim.gap.inference.prior import likelihood_from_card
 from tank2sim.gap.outcome.export import NOISE_FLOOR, in_file_units
 from tank2sim.gap.result import AMBIGUOUS, COEFFICIENTS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY
-from tank2sim.gap.search.decision import decide
+from tank2sim.gap.search.decision import decide, enough_to_name
 from tank2sim.gap.search.detection_limit import could_hide
 from tank2sim.gap.search.explanations import search
 from tank2sim.gap.workflow import GapOptions, run_gap_workflow
@@ -219,7 +219,7 @@ def _decided(group: str, made: Made, card: ManoeuvringCard, files: dict[str, lis
     begin = time.perf_counter()
     found = search(likelihood_from_card(card, measured(files["fit"], card)))
     decision = decide(found)
-    hides = could_hide(found, decision.best, PRICE)
+    hides = could_hide(found, decision.best, enough_to_name())
     seconds = time.perf_counter() - begin
     named = estimates(decision.best) if decision.verdict in (MISSING, AMBIGUOUS) else []
     return Said(

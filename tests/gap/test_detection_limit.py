@@ -62,6 +62,14 @@ def test_what_could_hide_goes_with_the_root_of_what_is_enough(card) -> None:
     assert set(limits["current"]) == {"speed_mps"} and set(limits) == set(HIDDEN)
 
 
+def test_what_could_hide_of_a_changed_derivative_is_beyond_the_errors_of_the_card(card) -> None:
+    """2 % of Yr and Nr where the card states none; three of these, and 1.64 for the estimate's own."""
+    known = replace(card, uncertainty={name: 0.05 * abs(card.derivatives[name]) for name in ("Yr", "Nr")})
+    stated, assumed = (sizes(judged(each), 1.0)["linear_yaw_damping"]["factor"] for each in (known, card))
+    assert stated >= (3 + SURE) * 0.05 * 0.999
+    assert (3 + SURE) * 0.02 * 0.999 <= assumed < stated
+
+
 def test_half_a_small_wind_adds_half_the_force_beyond_still_air(card) -> None:
     """Still air slows a ship without any wind: that does not show a wind."""
     likelihood = judged(card)

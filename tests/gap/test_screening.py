@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -116,10 +117,20 @@ def check(screen: Screen, base: ExplanationFit, places: list[int]) -> None:
 
 
 def test_gains_are_those_of_least_squares(screened) -> None:
+    none = none_of(screened.likelihood)
     for place in range(len(screened.every)):
-        check(screened, screened.base, [place])
+        check(screened, none, [place])
     for a, b in ((0, 2), (0, 9), (10, 11), (4, 0)):
-        check(screened, screened.base, [a, b])
+        check(screened, none, [a, b])
+
+
+def test_a_screen_at_another_noise_and_width_is_the_one_that_begins_there(damped, screened) -> None:
+    none = none_of(damped)
+    louder = replace(none, logs=none.logs + np.log(2.0))
+    moved, begun = screened.at(louder), Screen(damped, louder, screened.every)
+    np.testing.assert_allclose(moved.gram, begun.gram, rtol=1e-9, atol=1e-9 * np.abs(begun.gram).max())
+    assert moved.cost == pytest.approx(begun.cost, rel=1e-12) != screened.cost
+    assert [one.gain for one in moved.singles()] == pytest.approx([one.gain for one in begun.singles()])
 
 
 def test_gains_next_to_an_effect_that_is_there_are_those_of_least_squares(card, damped) -> None:

@@ -29,7 +29,7 @@ from tank2sim.gap.diagnosis.residuals import (
 from tank2sim.gap.improve_card import Found, at_rest
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.fit_all import StageReport
-from tank2sim.gap.inference.prior import PRICE, candidate_explanations, likelihood_from_card
+from tank2sim.gap.inference.prior import candidate_explanations, likelihood_from_card
 from tank2sim.gap.outcome.next_test import Explanation, next_test
 from tank2sim.gap.outcome.notices import gap_notices, of_tried_effects
 from tank2sim.gap.proof.card_fitness import improvement_objections
@@ -50,7 +50,7 @@ from tank2sim.gap.result import (
     Passed,
     Rival,
 )
-from tank2sim.gap.search.decision import Decision, decide
+from tank2sim.gap.search.decision import Decision, decide, enough_to_name
 from tank2sim.gap.search.detection_limit import could_hide
 from tank2sim.gap.search.explanations import CLOSE, Search, search
 from tank2sim.identification.trials.assessment.other_ship import evidence_of_other_ship, not_of_ship
@@ -177,7 +177,7 @@ def run_gap_workflow(
             judged = replace(judged, proof=prover.refine(judged.proof))
         opened = replace(judged, proof=prover.open_holdout(judged.proof))  # the verdict is fixed
         progress("where and how much")
-        gap = _assemble_gap(prover, found, opened, with_black_box=options.black_box)
+        gap = _assemble_gap(prover, found, opened, options)
         tried = of_tried_effects(names, candidate_explanations(card, fitted.driven_by))
         progress("trying the improved card")
         return replace(
@@ -223,17 +223,17 @@ def _processes(options: GapOptions, executor: Executor | None) -> Iterator[Execu
         yield pool
 
 
-def _assemble_gap(prover: Prover, found: Search, judged: Judged, *, with_black_box: bool) -> Gap:
+def _assemble_gap(prover: Prover, found: Search, judged: Judged, options: GapOptions) -> Gap:
     """The results that follow from the decision."""
     card, (fitted, held), replays = prover.card, prover.trials, prover.replays
     decision, proof = judged.decision, judged.proof
     estimated = proof.named.estimated
-    box = _begin_black_box(card, proof, replays) if with_black_box else None
+    box = _begin_black_box(card, proof, replays) if options.black_box else None
     sensors, every = sensor_faults(estimated), (*fitted.trials, *held.trials)
     figures_before = _begun(replays, figures, card, every, proof.results, "before")
     corrected_trials = _after(every, fitted, held, sensors)
     figures_after = _begun(replays, figures, proof.improved, corrected_trials, proof.results, "after")
-    hidden = could_hide(found, decision.best, PRICE)
+    hidden = could_hide(found, decision.best, enough_to_name(options.false_discovery))
     force = force_lacking(found.likelihood, found.none)
     agreement = each_trial(found.likelihood, decision.best) if estimated else {}
     waves = found.likelihood.belief.waves

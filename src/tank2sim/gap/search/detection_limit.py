@@ -142,7 +142,8 @@ def _shares(
     likelihood: Likelihood, noises: Sequence[ExplanationFit], every: Sequence[Variant], enough: float
 ) -> list[Array]:
     """Shares of each variant's amplitudes, each alone, at which it would show even at the noise that hides it best."""
-    screens = [Screen(likelihood, noise, every) for noise in noises]
+    first = Screen(likelihood, noises[0], every)
+    screens = [first, *(first.at(noise) for noise in noises[1:])]
     shares = []
     for place, variant in enumerate(every):
         priced = int(np.count_nonzero(variant.hypothesis.prior[1] == 0))

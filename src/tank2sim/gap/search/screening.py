@@ -8,6 +8,7 @@ any set of columns follows from one Gram matrix.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, product
@@ -153,18 +154,46 @@ class Screen:
     """
 
     def __init__(self, likelihood: Likelihood, base: ExplanationFit, every: Sequence[Variant]):
-        self.likelihood, self.base = likelihood, base
+        self.likelihood = likelihood
         self.every = tuple(variant for variant in every if variant.effect not in base.hypothesis.effects)
         assumed = base.hypothesis
-        linear = likelihood.linear(assumed, base.theta) if assumed.effects else likelihood.base
-        seen = observer(linear, base.noise, likelihood.belief.waves)
-        columns = likelihood.columns(assumed, base.theta, likelihood.coefficient_columns).scaled(base.width)
-        driving = np.concatenate([columns.driving, *(variant.driving for variant in self.every)], axis=-1)
+        self._linear = likelihood.linear(assumed, base.theta) if assumed.effects else likelihood.base
+        self._columns = columns = likelihood.columns(assumed, base.theta, likelihood.coefficient_columns)
+        self._driving = np.concatenate([columns.driving, *(variant.driving for variant in self.every)], axis=-1)
         of_coefficients = np.zeros((*columns.shown.shape[:-1], columns.driving.shape[-1] - columns.shown.shape[-1]))
         of_variants = [-variant.shown for variant in self.every]
-        shown = np.concatenate([columns.shown, of_coefficients, *of_variants], axis=-1)
-        flat = seen.whiten(driving, shown).reshape(-1, driving.shape[-1])
-        gram = flat.T @ flat
+        self._shown = np.concatenate([columns.shown, of_coefficients, *of_variants], axis=-1)
+        widths = [variant.driving.shape[-1] for variant in self.every]
+        ends = 1 + np.cumsum(widths)
+        self.places = [np.arange(end - width, end) for end, width in zip(ends, widths, strict=True)]
+        price = np.log(likelihood.count / COUNTED)
+        self._prices = [np.count_nonzero(variant.hypothesis.prior[1] == 0) * price for variant in self.every]
+        signs = [np.zeros((1, 3))] + [variant.signs for variant in self.every]
+        self._size, negative, positive = np.concatenate(signs).T
+        self._negative, self._positive = negative > 0, positive > 0
+        self._project(base)
+
+    def at(self, noisy: ExplanationFit) -> Screen:
+        """The same at another noise and width.
+
+        Parameters
+        ----------
+        noisy : ExplanationFit
+            Of the same effects and sizes as the base.
+        """
+        other = copy(self)
+        other.__dict__.pop("_alone", None)
+        other._project(noisy)
+        return other
+
+    def _project(self, base: ExplanationFit) -> None:
+        """Gram matrix of residual and variants at the noise of a fit, what is assumed projected out, and its cost."""
+        likelihood, columns, assumed = self.likelihood, self._columns, base.hypothesis
+        seen = observer(self._linear, base.noise, likelihood.belief.waves)
+        flat = seen.whiten(self._driving, self._shown).reshape(-1, self._driving.shape[-1])
+        factors = np.ones(flat.shape[-1])
+        factors[: columns.driving.shape[-1]] = columns.factors(base.width)
+        gram = flat.T @ flat * np.outer(factors, factors)
         count = columns.driving.shape[-1]
         # The coefficients (with a prior) and the assumed effects (without) are projected out of the residual.
         held = np.arange(1, count)
@@ -176,14 +205,6 @@ class Screen:
         self.gram = gram[np.ix_(kept, kept)] - mixed.T @ cho_solve(inner, mixed)
         believed = likelihood.belief.cost(base.logs)[0]
         self.cost = float(seen.log_det + self.gram[0, 0] + 2 * np.sum(np.log(np.diag(inner[0]))) + believed)
-        widths = [variant.driving.shape[-1] for variant in self.every]
-        ends = 1 + np.cumsum(widths)
-        self.places = [np.arange(end - width, end) for end, width in zip(ends, widths, strict=True)]
-        price = np.log(likelihood.count / COUNTED)
-        self._prices = [np.count_nonzero(variant.hypothesis.prior[1] == 0) * price for variant in self.every]
-        signs = [np.zeros((1, 3))] + [variant.signs for variant in self.every]
-        self._size, negative, positive = np.concatenate(signs).T
-        self._negative, self._positive = negative > 0, positive > 0
 
     def of(self, chosen: Sequence[int]) -> tuple[float, Array]:
         """Gain of some variants together, and the shares of their amplitudes; none where a sign is not allowed."""
