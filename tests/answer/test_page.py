@@ -89,7 +89,7 @@ def test_the_page_is_the_same_in_every_process(html):
     code = (
         "import hashlib\n"
         "from tests.answer.example import example_page\n"
-        "from tank2sim.answer.parts import render_page\n"
+        "from tank2sim.answer.page import render_page\n"
         "print(hashlib.sha256(render_page(example_page()).encode()).hexdigest())"
     )
     command, root = [sys.executable, "-c", code], Path(__file__).parents[2]

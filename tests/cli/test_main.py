@@ -131,12 +131,22 @@ CONTROL = re.compile(r"\x1b\[[0-9;]*m")
 FRAME = re.compile("[\u2500-\u257f]")
 
 
-def on_terminal(folder: Path, **environment: str) -> str:
+WIDE = """
+from dataclasses import replace
+from tank2sim.answer.parts import table
+from tank2sim.cli.console import show_table
+heads = [f"figure {chr(97 + place)}" for place in range(20)]
+show_table(replace(table("Figures", heads, [[1000.25 + place for place in range(20)]]), wide=True))
+"""
+
+
+def on_terminal(folder: Path, script: str = SCRIPT, **environment: str) -> str:
     """What a command's output is on a terminal."""
     plain = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "FORCE_COLOR")}
     ours, theirs = pty.openpty()
     wide = {"TERM": "xterm-256color", "COLUMNS": "120"}
-    with subprocess.Popen(LINE, cwd=folder, stdout=theirs, stderr=theirs, env=plain | wide | environment) as process:
+    line = [sys.executable, "-c", script]
+    with subprocess.Popen(line, cwd=folder, stdout=theirs, stderr=theirs, env=plain | wide | environment) as process:
         os.close(theirs)
         text = b""
         while True:
@@ -162,3 +172,16 @@ def test_colours_on_a_terminal_are_left_out_on_demand_and_a_pipe_gets_plain_colu
     assert "\x1b" not in piped and not FRAME.search(piped)
     words = [FRAME.sub(" ", CONTROL.sub("", text)).split() for text in (coloured, plain, piped)]
     assert words[0] == words[1] == words[2] and "advance" in words[2]
+
+
+@pytest.mark.parametrize("kind", ["dumb", "xterm-256color"])
+def test_no_number_of_a_wide_table_is_cut_on_a_narrow_terminal(tmp_path: Path, kind: str) -> None:
+    words = FRAME.sub(" ", CONTROL.sub("", on_terminal(tmp_path, WIDE, TERM=kind, COLUMNS="60"))).split()
+    assert [word for word in words if word.startswith("10")] == [f"{1000.25 + place:.4g}" for place in range(20)]
+
+
+def test_no_number_of_any_table_is_broken_on_a_narrow_terminal(tmp_path: Path) -> None:
+    text = on_terminal(tmp_path, WIDE.replace("wide=True", "wide=False"), COLUMNS="60")
+    words = FRAME.sub(" ", CONTROL.sub("", text)).split()
+    assert [word for word in words if word.startswith("10")] == [f"{1000.25 + place:.4g}" for place in range(20)]
+    assert words.count("figure") == 20

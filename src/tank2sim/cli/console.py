@@ -27,21 +27,32 @@ _WIDEST = 1000
 
 
 def show_table(shown: Table) -> None:
-    """Print a table with its notes; numbers are aligned right. A wide one breaks no cell.
+    """Print a table with its notes; numbers are aligned right and never broken; in a wide one no cell is.
 
     Frames are drawn on a terminal; a pipe and a file get columns with spaces between them.
     """
     grid = Grid(header_style="bold", pad_edge=False, box=HEAVY_HEAD if screen.is_terminal else None)
-    for place, head in enumerate(shown.heads):
-        numeric = all(isinstance(row[place], int | float) or row[place] is None for row in shown.rows)
+    digits = [column.digits for column in shown.columns]
+    texts = [[one_line(cell_text(*cell)) for cell in zip(row, digits, strict=True)] for row in shown.rows]
+    of_numbers = [
+        all(isinstance(row[place], int | float) or row[place] is None for row in shown.rows)
+        for place in range(len(shown.heads))
+    ]
+    for head, numeric in zip(shown.heads, of_numbers, strict=True):
         justify: Literal["left", "right"] = "right" if numeric else "left"
         grid.add_column(escape(head), justify=justify, overflow="fold", no_wrap=shown.wide)
-    digits = [column.digits for column in shown.columns]
-    for row in shown.rows:
-        grid.add_row(*(escape(one_line(cell_text(*cell))) for cell in zip(row, digits, strict=True)))
+    for row in texts:
+        grid.add_row(*map(escape, row))
     screen.print(escape(one_line(shown.caption)), style="italic", soft_wrap=True)
-    needed = Measurement.get(screen, screen.options.update(width=_WIDEST), grid).maximum if shown.wide else 0
-    Console(width=max(needed, screen.width), highlight=False, stderr=screen.stderr).print(grid)
+    room = Measurement.get(screen, screen.options.update(width=_WIDEST), grid)
+    if not shown.wide and room.maximum > screen.width:
+        for place, column in enumerate(grid.columns):
+            words = [*shown.heads[place].split(), *(row[place] for row in texts)]
+            column.width = max(map(len, words)) if of_numbers[place] else None
+        room = Measurement.get(screen, screen.options.update(width=_WIDEST), grid)
+    # Without a height, Rich cuts numbers at 80 characters on a terminal that calls itself dumb.
+    width = max(room.maximum if shown.wide else room.minimum, screen.width)
+    Console(width=width, height=screen.height, highlight=False, stderr=screen.stderr).print(grid)
     for note in shown.notes:
         screen.print(escape(one_line(note)), soft_wrap=True)
 

@@ -140,7 +140,8 @@ def test_a_card_whose_rudder_turns_to_the_other_side_is_compared_by_size_too() -
     assert effect(-2.0, 0.0, -1.0).less(2.0) == (0.0, pytest.approx(0.2))
     assert effect(-1.0, 0.0, -1.0).less(0.5) == (0.5, pytest.approx(0.1))
     assert _beyond("a", [effect(-1.0, 0.03, -1.0)], 2.0) == ""
-    assert "to the other side" in _beyond("a", [effect(1.0, 0.03, -1.0)], 2.0)
+    assert "more than" in _beyond("a", [effect(5.0, 0.03, -0.3)], 2.0)
+    assert "to the other side" in _beyond("a", [effect(-1.0, 0.03, 1.0)], 2.0)
     assert effect(3.0, 0.3, 1.0, 0.2).less(2.0) == (1.0, pytest.approx(np.hypot(np.hypot(0.3, 0.4), 0.3)))
 
 

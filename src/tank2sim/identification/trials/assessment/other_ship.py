@@ -171,12 +171,15 @@ class RudderEffect:
         return RudderEffect(self.measured, 1.0, self.covariance * np.outer([1, 0], [1, 0]))
 
     def less(self, factor: float) -> tuple[float, float]:
-        """The measured coefficient less `factor` times the card's, positive to the side of the card's rudder, and
-        its standard error (Fieller 1954)."""
+        """The measured coefficient less `factor` times the card's, and its standard error (Fieller 1954).
+
+        Where drift hides the side of both, they are compared by size.
+        """
         weights = np.array([1.0, -factor])
         model = _MODEL_ERROR * max(abs(self.measured), abs(factor * self.modelled))
         error = np.hypot(np.sqrt(weights @ self.covariance @ weights), model)
-        return float(np.sign(self.modelled) * (self.measured - factor * self.modelled)), float(error)
+        side = -1.0 if max(self.measured, self.modelled) < 0 else 1.0
+        return side * (self.measured - factor * self.modelled), float(error)
 
 
 def _effect(problem: Problem, runs: Sequence[SampledRun]) -> RudderEffect | None:
