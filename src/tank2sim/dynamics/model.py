@@ -221,7 +221,7 @@ class Model:
     @cached_property
     def defaults(self) -> Mapping[str, float]:
         """Start values of the parameters by name."""
-        return dict(zip(self.parameter_names, self.parameter_values().tolist(), strict=True))
+        return self.parameters_by_name(self.parameter_values())
 
     @cached_property
     def _by_name(self) -> dict[str, Variable]:
@@ -271,6 +271,10 @@ class Model:
     def parameter_values(self, changed: Mapping[str, float] | None = None) -> Array:
         """The parameter vector p: start values, with the values of `changed` (by name) in place."""
         return _values(self.parameters, changed or {})
+
+    def parameters_by_name(self, p: Array) -> dict[str, float]:
+        """The values of a parameter vector `p` by name."""
+        return dict(zip(self.parameter_names, p.tolist(), strict=True))
 
     def with_values(self, changed: Mapping[str, float]) -> Model:
         """The model with parameters that start at the values of `changed` (by name) in place of their own."""

@@ -80,7 +80,7 @@ def simulate(
         remedy = f"give more than 0 and less than {LONGEST_RUN_S:g} s"
         raise ArgumentError("duration_s", "", f"is {duration_s:g} s", remedy)
     integrator = integrator or Integrator(model)
-    values = dict(zip(model.parameter_names, model.parameter_values(parameters).tolist(), strict=True))
+    values = model.parameters_by_name(model.parameter_values(parameters))
     start = manoeuvre.start(model) if isinstance(manoeuvre, ThrusterManoeuvre) else {}
     running = Running(integrator, inputs, {**start, **(parameters or {})})
     manoeuvre.drive(running, values["ship.length"] / values["ship.speed"], duration_s)

@@ -75,7 +75,7 @@ def boat_parameters(model: Model) -> BoatParameters:
     """
     model = in_calm(model)
     SitlShip(model)  # refuses a vessel that has not even a length
-    values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    values = model.defaults
     settle = _SETTLING * values["ship.length"] / values["ship.speed"]
     part = CRUISE_PERCENT / 100
     ship = SitlShip(model, values["ship.speed"])

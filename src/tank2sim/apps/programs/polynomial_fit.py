@@ -21,7 +21,7 @@ import numpy as np
 import tomlkit
 
 from tank2sim.apps.programs.conventions import roll_in_file
-from tank2sim.apps.programs.program_files import PolynomialFit, standard_manoeuvres, start_values
+from tank2sim.apps.programs.program_files import PolynomialFit, standard_manoeuvres
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard, MmgCard
 from tank2sim.cards.covariance import Covariance, not_referring
@@ -68,7 +68,7 @@ def scattered_motions(model: Model, motions: Array, scatter: float = SCATTER) ->
 
     `motions` (n, 4): u, v, r, rudder, SI; `scatter`: Over :data:`SPREADS`. Returns :data:`SCATTERED_MOTIONS` of them.
     """
-    values = start_values(model)
+    values = model.defaults
     u0, length = values["ship.speed"], values["ship.length"]
     largest = values.get("steering.max_angle", math.pi / 2)
     generator = np.random.default_rng(_SEED)

@@ -24,7 +24,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tank2sim.apps.programs.program_files import start_values
 from tank2sim.apps.programs.xdyn_expressions import XDYN_STATES, Definitions, read_expressions
 from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard, SteeredCard
@@ -132,7 +131,7 @@ def values_at(model: Model, names: Sequence[str], run: Trajectory) -> Array:
 
 def written_body(card: SteeredCard, model: Model, run: Trajectory) -> XdynBody:
     """The equations of a model, checked at the rows of a run."""
-    values = start_values(model)
+    values = model.defaults
     rigid, stated = _masses(model, values, run)
     total = (stated + stated.T) / 2
     states: dict[str, ca.SX] = {}

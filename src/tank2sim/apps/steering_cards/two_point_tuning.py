@@ -195,7 +195,7 @@ def tune_to_two_points(model: Model, levers: Levers, first: WantedTurn, second: 
     want = np.log(np.abs([first.value, second.value]))
     unknown = _followed(system, unknown, have, want)
     hull, rudder = np.exp(unknown[-2:]).tolist()
-    start = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    start = model.defaults
     changed: dict[str, float] = levers.scaled(start, hull, rudder)
     after = [points.turn_at(wanted.rudder_rad, changed)[0] for wanted in (first, second)]
     for wanted, turn in zip((first, second), after, strict=True):
@@ -231,9 +231,7 @@ class _System:
         n = points.y.numel()
         self.unknown = ca.SX.sym("unknown", 2 * n + 2)
         goal = ca.SX.sym("goal", 2)
-        numbers = {
-            name: ca.SX(value) for name, value in zip(model.parameter_names, model.parameter_values(), strict=True)
-        }
+        numbers = {name: ca.SX(value) for name, value in model.defaults.items()}
         scaled = levers.scaled(numbers, ca.exp(self.unknown[-2]), ca.exp(self.unknown[-1]))
         p = ca.vcat([ca.SX(scaled.get(name, numbers[name])) for name in model.parameter_names])
         rows: list[ca.SX] = []

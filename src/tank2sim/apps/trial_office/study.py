@@ -328,7 +328,7 @@ def _recognised(trials: Sequence[Trial], notes: TrialNotes, model: Model) -> tup
             unknown[trial.name] = one
         else:
             found.append(one)
-    speed = float(model.parameter_values()[model.parameter_names.index("ship.speed")])
+    speed = model.defaults["ship.speed"]
     for words, figures in notes.figures.items():
         manoeuvre = parse_manoeuvre(words)
         assert isinstance(manoeuvre, Turn | Zigzag | Stop)

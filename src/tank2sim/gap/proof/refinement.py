@@ -177,8 +177,7 @@ def _linearised(
 ) -> _Linearised:
     """A trial about its present initial state and coefficients; of infinite cost without a positive mass."""
     replayer, sigma = _replayer(card, driven_by, noise)
-    of_ship = zip(replayer.model.parameter_names, map(float, _parameters(replayer, prior, values)), strict=True)
-    if mass_fault(replayer.model, dict(of_ship)):
+    if mass_fault(replayer.model, replayer.model.parameters_by_name(_parameters(replayer, prior, values))):
         nothing, count = np.zeros((len(begun.start), len(values))), len(values)
         return _Linearised(math.inf, np.zeros(count), np.zeros((count, count)), np.zeros(len(begun.start)), nothing)
     record, start = begun.record, begun.start

@@ -146,7 +146,7 @@ def in_range(run: SampledRun, model: Model, speeds: tuple[float, float], least_s
     speed = next((column for column in columns if np.count_nonzero(~np.isnan(column)) > 1), None)
     if speed is None:
         return (run,)
-    p = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
+    p = model.defaults
     width = max(1, round(0.5 * p["ship.length"] / p["ship.speed"] / run.step_s))
     smooth = uniform_filter1d(straight_over_gaps(run.times, speed), width)
     inside = (smooth >= speeds[0]) & (smooth <= speeds[1])
@@ -239,7 +239,5 @@ def ordered_rudder(model: Model) -> OrderedRudder | None:
     x[place], u[command] = angle, driving[0]
     after = runge_kutta_step(model)(x, u, model.parameter_values(), driving[1])[place]
     step = ca.Function("gear", [angle, driving], [ca.densify(after)])
-    values = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
-    return OrderedRudder(
-        Chain(step), float(values["steering.time_constant"]), float(values["ship.length"] / values["ship.speed"])
-    )
+    values = model.defaults
+    return OrderedRudder(Chain(step), values["steering.time_constant"], values["ship.length"] / values["ship.speed"])
