@@ -194,6 +194,10 @@ class Model:
         """Name of the model with the file it was built from, as messages begin: ``card.toml (Mariner class)``."""
         return f"{self.source} ({self.name})" if self.source else self.name
 
+    def fault(self, place: str, problem: str, remedy: str) -> InputError:
+        """An error about this model, to be raised: its place, the problem, and the remedy."""
+        return InputError(self.origin, place, problem, remedy)
+
     @property
     def variables(self) -> tuple[Variable, ...]:
         """All variables: states, inputs, parameters, quantities."""
@@ -266,7 +270,7 @@ class Model:
             low, high = variable.accepted_range
             if not low <= value <= high:
                 remedy = f"it lies between {low:g} and {high:g} {variable.unit}: {variable.description}"
-                raise InputError(self.origin, variable.name, f"cannot be {value:g} {variable.unit}", remedy)
+                raise self.fault(variable.name, f"cannot be {value:g} {variable.unit}", remedy)
 
     def parameter_values(self, changed: Mapping[str, float] | None = None) -> Array:
         """The parameter vector p: start values, with the values of `changed` (by name) in place."""

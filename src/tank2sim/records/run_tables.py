@@ -149,7 +149,7 @@ def _mapped(table: CsvTable, units: Mapping[str, str], columns: Mapping[str, Col
         column = _stated(table, heading, units.get(heading, ""), entry)
         if column.quantity in found:
             both = f"columns {found[column.quantity].heading} and {heading}"
-            raise InputError(table.path, both, f"are both {column.quantity}", "take one out of [columns]")
+            raise table.fault(both, f"are both {column.quantity}", "take one out of [columns]")
         found[column.quantity] = column
     mapped = {column.heading for column in found.values()}
     for heading in table.columns:
@@ -159,18 +159,18 @@ def _mapped(table: CsvTable, units: Mapping[str, str], columns: Mapping[str, Col
         quantity = _without_unit(_last_part(heading))
         if named is None and quantity in RUN_QUANTITIES and quantity not in found:
             remedy = f"give one in [columns]: {quantity} = {{ quantity = '{quantity}', unit = ... }}"
-            raise InputError(table.path, f"column {heading}", f"has no unit of {quantity}", remedy)
+            raise table.fault(f"column {heading}", f"has no unit of {quantity}", remedy)
         if named is not None and named.quantity not in found:
             found[named.quantity] = named
         elif named is not None and not columns:
             both = f"columns {found[named.quantity].heading} and {heading}"
-            raise InputError(table.path, both, "are one quantity in two units", "delete one of them")
+            raise table.fault(both, "are one quantity in two units", "delete one of them")
     if "waveform time" in table.columns and "t" not in found:
         found["t"] = _MappedColumn("waveform time", "t", 1.0, 0.0)
     if not found or "t" not in found:
         present = ", ".join(table.columns)
         problem = "no column is known" if not found else "no column is the time"
-        raise InputError(table.path, "header", problem, f"name them in [columns] of the campaign; there are: {present}")
+        raise table.fault("header", problem, f"name them in [columns] of the campaign; there are: {present}")
     values = {_si_name(column.quantity): _in_si(table, column) for column in found.values()}
     headings = {_si_name(column.quantity): column.heading for column in found.values()}
     return replace(table, columns=values, headings=headings)
@@ -195,7 +195,7 @@ def _heading(table: CsvTable, stated: str) -> str:
         matches = [name for name in table.columns if re.search(rf"(^|[/.]){re.escape(stated)}$", bare(name))]
         if len(matches) == 1:
             return matches[0]
-    raise InputError(table.path, "header", f"there is no column {stated}", close_name(stated, table.columns))
+    raise table.fault("header", f"there is no column {stated}", close_name(stated, table.columns))
 
 
 def _stated(table: CsvTable, heading: str, unit_in_file: str, entry: ColumnEntry | str) -> _MappedColumn:
@@ -205,24 +205,22 @@ def _stated(table: CsvTable, heading: str, unit_in_file: str, entry: ColumnEntry
         entry = ColumnEntry(quantity=entry)
     quantity, factor = _quantity(entry.quantity)
     if not quantity:
-        raise InputError(
-            table.path, place, f"{entry.quantity} is not a quantity", f"known are: {', '.join(RUN_QUANTITIES)}"
-        )
+        raise table.fault(place, f"{entry.quantity} is not a quantity", f"known are: {', '.join(RUN_QUANTITIES)}")
     suffix = RUN_QUANTITIES[quantity]
     in_file = unit_in_file or _unit_of_heading(heading)
     known = unit_factor(in_file, suffix) if in_file else None
     if entry.unit is not None:
         factor = unit_factor(entry.unit, suffix)
         if factor is None:
-            raise InputError(table.path, place, f"{entry.unit} is not a unit of {quantity}", f"its SI unit is {suffix}")
+            raise table.fault(place, f"{entry.unit} is not a unit of {quantity}", f"its SI unit is {suffix}")
     if entry.factor is not None:
         return _MappedColumn(heading, quantity, entry.sign * entry.factor * (factor or 1.0), entry.offset)
     if factor is not None and known is not None and not math.isclose(factor, known, rel_tol=1e-6):
         problem = f"is in {in_file} by the file, and in another unit by the map"
-        raise InputError(table.path, place, problem, "correct the unit, or give a factor to SI")
+        raise table.fault(place, problem, "correct the unit, or give a factor to SI")
     if factor is None and known is None:
         problem = f"has no unit of {quantity}" + (f" ({in_file} is none)" if in_file else "")
-        raise InputError(table.path, place, problem, f"give one in [columns]: unit = '{suffix}'")
+        raise table.fault(place, problem, f"give one in [columns]: unit = '{suffix}'")
     return _MappedColumn(heading, quantity, entry.sign * (factor if factor is not None else known or 1.0), entry.offset)
 
 

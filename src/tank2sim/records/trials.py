@@ -80,6 +80,10 @@ class Trial:
         """Name of a signal's column in the file."""
         return self.columns.get(signal, signal)
 
+    def fault(self, place: str, problem: str, remedy: str) -> InputError:
+        """An error about this trial, to be raised: its place, the problem, and the remedy."""
+        return InputError(self.path, place, problem, remedy)
+
 
 @dataclass(frozen=True)
 class TrialReader:
@@ -153,7 +157,7 @@ def window(trial: Trial, begin_s: float, end_s: float) -> Trial:
     inside = (trial.time_s >= begin_s) & (trial.time_s <= end_s)
     if np.count_nonzero(inside) < 2:
         span = f"the trial lasts from {trial.time_s[0]:g} s to {trial.time_s[-1]:g} s"
-        raise InputError(trial.path, "", f"has no two rows between {begin_s:g} s and {end_s:g} s", span)
+        raise trial.fault("", f"has no two rows between {begin_s:g} s and {end_s:g} s", span)
     return select_rows(trial, np.flatnonzero(inside))
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from tank2sim.apps.ardupilot.physics import NEUTRAL_US, REACH_US, REST_FORCE_MPS2, SitlShip
 from tank2sim.dynamics.effects.surroundings import in_calm
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
 
 CRUISE_PERCENT = 50
 """Throttle of the cruise, per cent: ArduPilot's own default of CRUISE_THROTTLE."""
@@ -88,7 +87,7 @@ def boat_parameters(model: Model) -> BoatParameters:
     rate, speed = ship.state("motion.r"), math.hypot(ship.state("motion.u"), ship.state("motion.v"))
     if not rate > 0:
         problem = f"turns with {math.degrees(rate):.3g} deg/s at full steering to starboard"
-        raise InputError(model.origin, "", problem, "check the signs and sizes of the card with simulate")
+        raise model.fault("", problem, "check the signs and sizes of the card with simulate")
     return BoatParameters(
         skid=ship.skid,
         cruise_throttle_percent=CRUISE_PERCENT,

@@ -194,7 +194,7 @@ def _candidates(card: ManoeuvringCard, ship: SailedShip) -> tuple[list[TrialMano
             information.append(each[place])
     if not any(each.manoeuvre in _USUAL for each in found):
         problem = "leaves all bounds in every manoeuvre of the usual set"
-        raise InputError(card.source, "", problem, "check the card with tank2sim simulate")
+        raise card.fault("", problem, "check the card with tank2sim simulate")
     return found, np.stack(information)
 
 

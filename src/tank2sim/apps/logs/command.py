@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from tank2sim.api.verbs import Written, verb
-from tank2sim.errors import ArgumentError, InputError
+from tank2sim.errors import ArgumentError
 from tank2sim.files import folder_made, write_together
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def log(
         craft = None if card is None else as_vessel(card)
         if craft is not None and craft.steered().steered_by is SteeredBy.RUDDER:
             remedy = "give the card of a small craft; of a ship with a rudder run identify on the trials"
-            raise InputError(craft.card.source, "model.kind", f"is {craft.card.model.kind}", remedy)
+            raise craft.card.fault("model.kind", f"is {craft.card.model.kind}", remedy)
         voyage = make_voyage([_read(name, file) for name, file in named.items()], stated)
         found = find_stretches(voyage)
         cuts = cut_trials(voyage, found)

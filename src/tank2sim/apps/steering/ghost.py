@@ -10,7 +10,6 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
 from tank2sim.notices import Notice
 from tank2sim.records.trials import Trial
 from tank2sim.units import KNOT_MPS
@@ -60,7 +59,7 @@ def ghost_of(trial: Trial, model: Model) -> Ghost:
         name: np.asarray(values, dtype=float) for name, values in trial.signals.items() if np.isfinite(values).any()
     }
     if not {"x_m", "y_m"} <= set(signals):
-        raise InputError(trial.path, "columns x_m, y_m", "hold no track", "a ghost needs positions: leave out --ghost")
+        raise trial.fault("columns x_m, y_m", "hold no track", "a ghost needs positions: leave out --ghost")
     start = {f"initial.{name}": _first(signals[key]) for name, unit in _START if (key := f"{name}_{unit}") in signals}
     course, way = _approach(trial.time_s, signals["x_m"], signals["y_m"])
     start["initial.psi"] = _first(signals["psi_rad"]) if "psi_rad" in signals else course

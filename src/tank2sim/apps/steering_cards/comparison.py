@@ -38,11 +38,11 @@ def form_of(card: SteeringCard, name: str) -> SteeringForm:
     Raises InputError: the model is not on the card, or its form is not in the catalogue.
     """
     if name not in card.models:
-        raise InputError(card.source, "models", f"none is called {name!r}", f"one of {', '.join(card.models)}")
+        raise card.fault("models", f"none is called {name!r}", f"one of {', '.join(card.models)}")
     form = STEERING_FORMS.get(card.models[name].form)
     if form is None:
         known = f"one of {', '.join(STEERING_FORMS)} was expected"
-        raise InputError(card.source, f"{card.place(name)}.form", f"is {card.models[name].form!r}", known)
+        raise card.fault(f"{card.place(name)}.form", f"is {card.models[name].form!r}", known)
     return form
 
 
@@ -73,10 +73,10 @@ def model_of(card: SteeringCard, name: str) -> Model:
     known = [coefficient.name for coefficient in form.coefficients]
     for key in given:
         if key not in known:
-            raise InputError(card.source, f"{place}.{key}", f"is not a coefficient of {form.name}", ", ".join(known))
+            raise card.fault(f"{place}.{key}", f"is not a coefficient of {form.name}", ", ".join(known))
     if missing := not_given(card, name):
         problem = f"{form.title}: {', '.join(missing)} not given"
-        raise InputError(card.source, place, problem, "; ".join(form.missing) or "add them")
+        raise card.fault(place, problem, "; ".join(form.missing) or "add them")
     model = steering_model(card.ship.name, form, given, card.ship.length_m, card.ship.speed_mps)
     return replace(model, source=card.source)
 
@@ -210,7 +210,7 @@ def draught_polynomials(card: SteeringCard) -> dict[str, tuple[float, ...]]:
 
 def _influence(card: SteeringCard) -> PrintedInfluence:
     if card.influence is None:
-        raise InputError(card.source, "influence", "this section is missing", "add it, or ask for the turns alone")
+        raise card.fault("influence", "this section is missing", "add it, or ask for the turns alone")
     return card.influence
 
 
@@ -219,7 +219,7 @@ def _draught(card: SteeringCard, name: str) -> float:
     printed = _influence(card)
     if draught is None or draught not in printed.draughts_m:
         place = f"{card.place(name)}.draught_m"
-        raise InputError(card.source, place, f"is {draught}", "it must be one of influence.draughts_m")
+        raise card.fault(place, f"is {draught}", "it must be one of influence.draughts_m")
     return draught
 
 
@@ -334,9 +334,7 @@ def compare_steering_models(card: SteeringCard, rudder_deg: float | None = None)
     """
     names = complete(card)
     if not names:
-        raise InputError(
-            card.source, "models", "none has all its coefficients", "; ".join(missing_of(card).popitem()[1])
-        )
+        raise card.fault("models", "none has all its coefficients", "; ".join(missing_of(card).popitem()[1]))
     printed = card.influence
     rudder = rudder_deg or (math.degrees(printed.rudder_rad) if printed else 20.0)
     main = printed.model if printed else names[0]

@@ -129,7 +129,7 @@ class TurningPoints:
         places = [self.model.state_names.index(name) for name in (*self.equations.names, "rudder.angle")]
         found = corrector_step(self._equations(p), start[places] / self.equations.scale * (1 - self.yaw), self.yaw)
         if found is None:
-            raise InputError(self.model.origin, "", "keeps no straight course", "check the card's coefficients")
+            raise self.model.fault("", "keeps no straight course", "check the card's coefficients")
         return found[0]
 
     def _turn(self, y: Array, p: Array) -> SteadyTurn:
@@ -138,7 +138,7 @@ class TurningPoints:
 
     def _fault(self, rudder_rad: float, problem: str) -> InputError:
         place = f"rudder {math.degrees(rudder_rad):.4g} deg"
-        return InputError(self.model.origin, place, problem, "give another rudder angle, or check the card")
+        return self.model.fault(place, problem, "give another rudder angle, or check the card")
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
 from tank2sim.identification.trials.methods.gauss_newton import least_squares_steps
 from tank2sim.identification.trials.problem.estimation_problem import driven_model
 from tank2sim.records.trials import Trial, sampling_step
@@ -460,9 +459,9 @@ def input_record(replayer: Replayer, trial: Trial) -> InputRecord:
     """
     model, record = replayer.model, motion_record(replayer.model, trial, replayer.seen)
     if len(record.time_s) < _FEWEST_ROWS:
-        raise InputError(trial.path, "", f"has only {len(record.time_s)} rows", "leave it out")
+        raise trial.fault("", f"has only {len(record.time_s)} rows", "leave it out")
     if np.isnan(record.measured).all():
-        raise InputError(trial.path, "header", "has none of the signals to be compared", "give u_mps, r_degps, ...")
+        raise trial.fault("header", "has none of the signals to be compared", "give u_mps, r_degps, ...")
     time, sampling = record.time_s, sampling_step(trial)
     known = model.defaults
     step = max(1, int(model.step_s / sampling + 1e-6)) * sampling

@@ -95,13 +95,13 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unu
     names = [trial.name for trial in trials]
     for trial in trials:
         if names.count(trial.name) > 1:
-            raise InputError(trial.path, "", "has the name of another trial", "give each file once, under its own name")
+            raise trial.fault("", "has the name of another trial", "give each file once, under its own name")
     alike = refuse_copies(trials)
     by_angle = ["delta_rad" in trial.signals for trial in trials]
     if any(by_angle) and not all(by_angle):
         odd = trials[by_angle.index(False)]
         remedy = "give trials that all have delta_deg, or all only delta_order_deg"
-        raise InputError(odd.path, "header", "has no delta_deg, but other trials have", remedy)
+        raise odd.fault("header", "has no delta_deg, but other trials have", remedy)
     notices = [*alike, *_of_audit(audited), *_of_reading(remarks), *dict.fromkeys(notices)]
     doubts = tuple(
         RecordDoubt(Path(name).stem, finding.column, finding.likely_truth)
@@ -165,7 +165,7 @@ def _refuse_other_revolutions(trial: Trial, card: ManoeuvringCard) -> None:
         problem = (
             f"reaches {largest * rpm:.3g} rpm at {speed:.3g} m/s, and the card's nominal_rpm is {nominal * rpm:.3g}"
         )
-        raise InputError(trial.path, "column of the revolutions", problem, "give both in revolutions a minute")
+        raise trial.fault("column of the revolutions", problem, "give both in revolutions a minute")
 
 
 def at_size_of(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
@@ -181,18 +181,18 @@ def at_size_of(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
     elif speed is None:
         return trial, 1.0
     elif speed == 0:
-        raise InputError(trial.path, "", "the ship does not move in it", "leave it out: it holds no motion")
+        raise trial.fault("", "the ship does not move in it", "leave it out: it holds no motion")
     else:
         ratio = (card.model.speed_mps / speed) ** 2
     factor = min((1.0, scale, 1 / scale), key=lambda candidate: abs(math.log(ratio / candidate)))
     off = abs(math.log(ratio / factor))
     if trial.length_m is not None and off > SAME_LENGTH:
         problem = f"is of a ship or model of {trial.length_m:g} m, and the card of one of {card.ship.length_m:g} m"
-        raise InputError(trial.path, "", problem, f"neither is the other at 1:{scale:g}; give the card of that ship")
+        raise trial.fault("", problem, f"neither is the other at 1:{scale:g}; give the card of that ship")
     if trial.length_m is None and trial.scale is None and off > 2 * math.log(FARTHEST_FROUDE):
         problem = f"reaches {speed:.3g} m/s, and the card is of {card.model.speed_mps:.3g} m/s"
         remedy = "if one of the two is a model, add the comment '# scale: LAMBDA' (ship length over model length)"
-        raise InputError(trial.path, "", problem, remedy)
+        raise trial.fault("", problem, remedy)
     return (trial if factor == 1 else froude_scaled(trial, factor)), factor
 
 

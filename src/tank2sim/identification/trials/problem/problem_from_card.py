@@ -19,7 +19,7 @@ from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, stu
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.mmg.hull import MMG_TERMS
 from tank2sim.dynamics.roll import roll_terms
-from tank2sim.errors import ArgumentError, InputError
+from tank2sim.errors import ArgumentError
 from tank2sim.identification.trials.problem.estimation_problem import (
     DrivenShip,
     Estimate,
@@ -244,10 +244,10 @@ def problem_from_card(
             raise ArgumentError("hold", "", f"{name} is not an estimated parameter", f"estimated are {text}")
         del free[held]
     if not free:
-        raise InputError(card.source, "derivatives", "nothing is left to estimate", "give derivatives with a value")
+        raise card.fault("derivatives", "nothing is left to estimate", "give derivatives with a value")
     seen = seen_in(model, trials)
     if not seen:
-        raise InputError(trials[0].path, "header", "none of its signals can be compared", "give u_mps, r_degps, ...")
+        raise trials[0].fault("header", "none of its signals can be compared", "give u_mps, r_degps, ...")
     prepared = [
         prepare(model, trial, seen, orders_before=True, rudder=gear.angle(trial) if gear else None) for trial in trials
     ]
@@ -258,7 +258,7 @@ def problem_from_card(
     if not runs:
         low, high = card.model.speed_range_mps
         problem = f"never goes for long at {low:g} to {high:g} m/s, where the card holds"
-        raise InputError(trials[0].path, "", problem, "change model.valid_speed_mps of the card, or leave it out")
+        raise trials[0].fault("", problem, "change model.valid_speed_mps of the card, or leave it out")
     values = np.array(list(free.values()))
     return Problem(model, tuple(free), values[:, 0], values[:, 1], runs, ship=ship)
 

@@ -19,7 +19,6 @@ from scipy.ndimage import uniform_filter1d
 from tank2sim.arrays import Array
 from tank2sim.dynamics.build import KEPT_MODELS
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
 from tank2sim.records.audit.noise import white_noise
 from tank2sim.records.trials import Trial, sampling_step
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS, means_of_lines, motion_record
@@ -106,7 +105,7 @@ def prepare(
     begin = float(trial.time_s[0]) + 0.5 * (stride - 1) * sampling
     grid: Array = begin + step * np.arange(count, dtype=float)
     if count < 10:
-        raise InputError(trial.path, "", f"is only {trial.time_s[-1] - trial.time_s[0]:g} s long", "leave it out")
+        raise trial.fault("", f"is only {trial.time_s[-1] - trial.time_s[0]:g} s long", "leave it out")
     edges = np.append(grid, grid[-1] + step)
     columns = [record.means(column, edges, given_before=orders_before) for column in range(record.inputs.shape[1])]
     if rudder is not None:
@@ -115,7 +114,7 @@ def prepare(
     inputs[-1] = inputs[-2]
     measured = [_averaged(trial.time_s, signal, grid, step, stride) for signal in record.measured.T]
     if np.isnan(measured).all():
-        raise InputError(trial.path, "header", "has none of the signals to be compared", "give u_mps, r_degps, ...")
+        raise trial.fault("header", "has none of the signals to be compared", "give u_mps, r_degps, ...")
     return SampledRun(trial.name, begin, step, inputs, np.column_stack(measured), tuple(seen), str(trial.path))
 
 
