@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -197,6 +197,29 @@ def froude_scaled(trial: Trial, length_ratio: float) -> Trial:
     noise = {name: value * factors[_unit(name)] for name, value in trial.noise.items()}
     length = None if trial.length_m is None else trial.length_m * length_ratio
     return replace(trial, time_s=trial.time_s * math.sqrt(length_ratio), signals=signals, noise=noise, length_m=length)
+
+
+def mean_wind(trials: Iterable[Trial]) -> tuple[float, float] | None:
+    """Mean true wind of trials, a mean of vectors over all samples; None if no trial has it.
+
+    The components to north and east are averaged, as ISO 15016:2015 averages the true wind of two runs: opposite winds
+    cancel.
+
+    Returns
+    -------
+    speed, direction : float
+        m/s, and where it comes from, rad clockwise from north, 0 to 2 pi.
+    """
+    names = "wind_speed_mps", "wind_direction_rad"
+    winds = [[trial.signals[name] for name in names] for trial in trials if set(names) <= set(trial.signals)]
+    if not winds:
+        return None
+    speed, direction = np.hstack(winds)
+    north, east = speed * np.cos(direction), speed * np.sin(direction)
+    if np.isnan(north).all():
+        return None
+    mean_north, mean_east = float(np.nanmean(north)), float(np.nanmean(east))
+    return math.hypot(mean_north, mean_east), math.atan2(mean_east, mean_north) % math.tau
 
 
 def unwrapped(angle: Array, period: float = math.tau) -> Array:

@@ -211,7 +211,7 @@ OTHER_MEANINGS = {
     'quantity.startswith("wind")': "the same",
     'startswith(("wind", "current"))': "beginnings of the names of columns",
     'in ("max", "current")': "names of files of the system",
-    '"bank": "Polygon"': "kind of a feature of a scenario",
+    '"bank": _Kind(': "kind of a feature of a scenario",
     '"bank": {}': "the same",
     'document.pop("waves"': "section of a card",
     '"water_depth": np.inf': "argument of a solver",
