@@ -20,7 +20,7 @@ from tank2sim.files import first_bytes, read_bytes, refuse_folder
 from tank2sim.records.campaign_form import ColumnEntry, FilesSection
 from tank2sim.records.csv_table import LARGEST, CsvTable, read_table, table_of_rows
 from tank2sim.records.spelt_units import unit_factor
-from tank2sim.records.text_layout import WHITESPACE, cells_of, decoded_text, text_layout
+from tank2sim.records.text_layout import WHITESPACE, TextLayout, cells_of, decoded_text, lines_of_text, text_layout
 from tank2sim.records.workbook import is_workbook, workbook_text
 from tank2sim.units import to_si
 
@@ -98,30 +98,15 @@ def _table_of_arrays(path: Path, raw: Sequence[RawColumn]) -> CsvTable:
 
 def _text_table(path: Path, files: FilesSection) -> tuple[CsvTable, dict[str, str]]:
     """Columns by their names in the file, and the units of its row of units."""
-    data = read_bytes(path)
-    text = workbook_text(path) if is_workbook(data) else decoded_text(data)[0]
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    lines = [*[""] * min(files.skip_lines, len(lines)), *lines[files.skip_lines :]]
-    separator = _SEPARATORS.get(files.separator or "", files.separator or "")
-    comma = None if files.decimal is None else files.decimal == ","
-    if files.widths:
-        ends = np.cumsum(files.widths).tolist()
-        cut = [[line[begin:end].strip() for begin, end in zip([0, *ends], ends, strict=False)] for line in lines]
-        lines = [";".join(cells) if any(cells) else "" for cells in cut]
-        separator = ";"
-    layout = text_layout(path, lines, separator, comma)
-    names = list(layout.names)
-    if files.names:
-        if len(files.names) != len(names):
-            problem = f"are {len(files.names)}, and {path.name} has {len(names)} columns"
-            raise InputError(path, "files.names", problem, "name each column")
-        names = list(files.names)
-    body = [
-        (number, line.strip(" ") if layout.separator != WHITESPACE else line)
-        for number, line in enumerate(lines, start=1)
-        if number > layout.skip and line.strip() and not line.startswith("#")
-    ]
-    rows = [_canonical(path, number, line, layout.separator, layout.comma) for number, line in body]
+    lines = _lines(path, files)
+    separator = ";" if files.widths else _SEPARATORS.get(files.separator or "", files.separator or "")
+    layout = text_layout(path, lines, separator, None if files.decimal is None else files.decimal == ",")
+    names = list(files.names or layout.names)
+    if len(names) != len(layout.names):
+        problem = f"are {len(names)}, and {path.name} has {len(layout.names)} columns"
+        raise InputError(path, "files.names", problem, "name each column")
+    body = layout.rows(lines)
+    rows = [_canonical(path, number, line, layout) for number, line in body]
     if all(row.endswith(",") for row in rows) and all(row.count(",") == len(names) for row in rows):
         rows = [row[:-1] for row in rows]  # a separator after the last column
     table = table_of_rows(path, names, rows, np.array([number for number, _ in body], dtype=np.int64))
@@ -130,15 +115,28 @@ def _text_table(path: Path, files: FilesSection) -> tuple[CsvTable, dict[str, st
     return table, dict(zip(names, layout.units, strict=False))
 
 
-def _canonical(path: Path, number: int, line: str, separator: str, comma: bool) -> str:
+def _lines(path: Path, files: FilesSection) -> list[str]:
+    """Lines of a file; those to be skipped are empty, and columns of stated widths are separated by semicolons."""
+    data = read_bytes(path)
+    lines = lines_of_text(workbook_text(path) if is_workbook(data) else decoded_text(data)[0])
+    lines = [*[""] * min(files.skip_lines, len(lines)), *lines[files.skip_lines :]]
+    if not files.widths:
+        return lines
+    ends = np.cumsum(files.widths).tolist()
+    cut = [[line[begin:end].strip() for begin, end in zip([0, *ends], ends, strict=False)] for line in lines]
+    return [";".join(cells) if any(cells) else "" for cells in cut]
+
+
+def _canonical(path: Path, number: int, line: str, layout: TextLayout) -> str:
     """A row with commas between cells and points in numbers."""
-    if comma and "." in line:
+    if layout.comma and "." in line:
         remedy = "write numbers with one decimal sign and nothing between thousands, or give [files] decimal"
         raise InputError(path, f"line {number}", "has points and decimal commas", remedy)
+    line, separator = line.strip(" "), layout.separator
     if separator == "," and '"' not in line:
         return line
     cells = cells_of(line, separator) if separator == WHITESPACE or '"' in line else line.split(separator)
-    return ",".join(cell.replace(",", ".") if comma else cell for cell in cells)
+    return ",".join(cell.replace(",", ".") if layout.comma else cell for cell in cells)
 
 
 def _mapped(table: CsvTable, units: Mapping[str, str], columns: Mapping[str, ColumnEntry | str]) -> CsvTable:
