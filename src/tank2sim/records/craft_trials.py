@@ -62,14 +62,14 @@ def read_craft_trial(path: Path | CsvTable, thrusters: Sequence[ThrusterSection]
     names = [name for name, values in driven.items() if not _known(values)]
     if all(_known(values) for values in orders.values()):
         names = []
-    for name in (*names, "x_m", "y_m", "psi_rad"):
-        if not _known(columns.get(name)):
-            remedy = (
-                f"a craft with thrusters {', '.join(thruster.name for thruster in thrusters)} needs t_s, x_m, y_m, "
-            )
-            remedy += "psi_deg and of each thruster " + ", ".join(f"n_{thruster.name}_rpm" for thruster in thrusters)
-            remedy += f" or its order, {', '.join(f'order_{thruster.name}' for thruster in thrusters)}"
-            raise InputError(path, "header", f"lacks {re.sub('_rad$', '_deg', name.replace('_radps', '_rpm'))}", remedy)
+    missing = next((name for name in (*names, "x_m", "y_m", "psi_rad") if not _known(columns.get(name))), None)
+    if missing:
+        every, measured, ordered = (
+            ", ".join(form.format(thruster.name) for thruster in thrusters) for form in ("{}", "n_{}_rpm", "order_{}")
+        )
+        remedy = f"a craft with thrusters {every} needs t_s, x_m, y_m, psi_deg and of each thruster {measured} or its "
+        in_file = re.sub("_rad$", "_deg", missing.replace("_radps", "_rpm"))
+        raise InputError(path, "header", f"lacks {in_file}", f"{remedy}order, {ordered}")
     driven |= _azimuths(path, thrusters, columns)
     signals = {name: values for name, values in (driven | orders).items() if values is not None and _known(values)}
     signals |= {name: columns[name] for name in CRAFT_SIGNALS if name in columns}

@@ -212,7 +212,6 @@ OTHER_MEANINGS = {
     'startswith(("wind", "current"))': "beginnings of the names of columns",
     'in ("max", "current")': "names of files of the system",
     '"bank": _Kind(': "kind of a feature of a scenario",
-    '"bank": {}': "the same",
     'document.pop("waves"': "section of a card",
     '"water_depth": np.inf': "argument of a solver",
     '"loading": (': "parameter of loaded_rudder",

@@ -191,16 +191,11 @@ def runs_of_matrix(path: Path, runs: TankRuns) -> tuple[tuple[RunGroup, ...], li
         slower += abs(row.get("speed") or 1.0) != 1.0
     if not found:
         raise InputError(path, "", "has no run", "give a row for each run")
-    notices = []
-    if assumed:
-        notices.append(
-            Notice(f"{path.name}: {assumed} oscillating runs without a frequency have a middle one of this tank")
-        )
-    if slower:
-        notices.append(
-            Notice(f"{path.name}: {slower} rows at other speeds are taken at the test speed, v' and r' as given")
-        )
-    return tuple(found), notices
+    said = {
+        "oscillating runs without a frequency have a middle one of this tank": assumed,
+        "rows at other speeds are taken at the test speed, v' and r' as given": slower,
+    }
+    return tuple(found), [Notice(f"{path.name}: {count} {words}") for words, count in said.items() if count]
 
 
 def _number(path: Path, number: int, key: str, cells: list[str], place: int) -> float:

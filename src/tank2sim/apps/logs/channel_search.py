@@ -153,15 +153,7 @@ def _common_beginning(first: str, second: str) -> int:
 
 def _unnamed_positions(search: ChannelSearch) -> list[_Pair]:
     """The only two streams without a name whose track, as latitude and longitude, a heading or a course follows."""
-    slow = [
-        stream
-        for stream in search.streams
-        if not stream.quantity
-        and stream.unit in ("", "deg")
-        and len(stream.values) >= FEW_SAMPLES
-        and 0 < np.ptp(stream.values) < _LONGEST_VOYAGE_DEG
-        and np.abs(stream.values).max() <= 180
-    ]
+    slow = [stream for stream in search.streams if not stream.quantity and _could_be_position(stream)]
     angles = [s for s in search.streams if s.quantity in ("heading", "cog") or (not s.quantity and _circular(s))]
     found = []
     for first, second in itertools.permutations(slow[:_MOST_TRIED], 2):
@@ -176,6 +168,12 @@ def _unnamed_positions(search: ChannelSearch) -> list[_Pair]:
     for stream in found[0] if len(found) == 1 else ():
         search.rename(search.stream(stream.name), stream.quantity)
     return found if len(found) == 1 else []
+
+
+def _could_be_position(stream: LogStream) -> bool:
+    if stream.unit not in ("", "deg") or len(stream.values) < FEW_SAMPLES:
+        return False
+    return 0 < float(np.ptp(stream.values)) < _LONGEST_VOYAGE_DEG and float(np.abs(stream.values).max()) <= 180
 
 
 def _track(first: LogStream, second: LogStream) -> ReferenceMotion | None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -73,7 +74,14 @@ def _utc_of(data: dict[str, Any]) -> Array:
 
 
 def _streams(topics: dict[tuple[str, int], dict[str, Any]], boot: float, airframe: int) -> Iterator[LogStream]:
-    ordered = any(name in ("actuator_motors", "actuator_servos") for name, _ in topics)
+    readers: dict[str, Callable[[str, Array, dict[str, Any]], Iterator[LogStream]]] = {
+        "vehicle_attitude": _attitude,
+        "esc_status": _shafts,
+        "actuator_servos": _rudder_order,
+        "actuator_motors": partial(_motor_orders, airframe),
+    }
+    if not any(name in ("actuator_motors", "actuator_servos") for name, _ in topics):
+        readers["actuator_outputs"] = _pulses  # logs of before PX4 1.13 have pulses alone
     for (name, instance), data in topics.items():
         time = data["timestamp"] * 1e-6 - boot
         label = name if instance == 0 and (name, 1) not in topics else f"{name}[{instance}]"
@@ -89,23 +97,36 @@ def _streams(topics: dict[tuple[str, int], dict[str, Any]], boot: float, airfram
                 if name == "rpm" and ("rpm", 1) in topics:  # a guess, which the turn confirms or not
                     meaning = (("rpm_port", "rpm_starboard")[min(instance, 1)], "")
                 yield LogStream(f"{label}.{field}", time, values, unit, *meaning)
-        if name == "vehicle_attitude":
-            roll, yaw = heading_of_quaternion(*(data[f"q[{place}]"].astype(float) for place in range(4)))
-            yield LogStream(f"{label}.heading", time, yaw % (2 * np.pi), "rad", "heading", "format")
-            yield LogStream(f"{label}.heel", time, roll, "rad", "heel", "format")
-        if name == "esc_status":  # of two, PX4 numbers the right one first, which the turn confirms
-            speeds = {key: values for key, values in _columns(data, ".esc_rpm") if np.abs(values).max() > 0}
-            quantities = ("rpm",) if len(speeds) == 1 else ("rpm_starboard", "rpm_port")
-            yield from _orders(label, time, speeds, "rpm", quantities)
-        if name == "actuator_servos":
-            yield from _orders(name, time, _controls(data), "1", ("rudder_order",), "name")
-        if name == "actuator_motors":
-            two = ("thrust_order_starboard", "thrust_order_port") if airframe == _AIRFRAME_ROVER_DIFFERENTIAL else ()
-            controls = _controls(data)
-            yield from _orders(name, time, controls, "1", {1: ("rpm_order",), 2: two}.get(len(controls), ()))
-        if name == "actuator_outputs" and not ordered:  # logs of before PX4 1.13 have pulses alone
-            for key, pulses in _columns(data, "output["):
-                yield LogStream(f"{label}.{key}", time, np.where(pulses > 0, pulses, np.nan), "us")
+        if name in readers:
+            yield from readers[name](label, time, data)
+
+
+def _attitude(label: str, time: Array, data: dict[str, Any]) -> Iterator[LogStream]:
+    roll, yaw = heading_of_quaternion(*(data[f"q[{place}]"].astype(float) for place in range(4)))
+    yield LogStream(f"{label}.heading", time, yaw % (2 * np.pi), "rad", "heading", "format")
+    yield LogStream(f"{label}.heel", time, roll, "rad", "heel", "format")
+
+
+def _shafts(label: str, time: Array, data: dict[str, Any]) -> Iterator[LogStream]:
+    """Revolutions; of two shafts, PX4 numbers the right one first, which the turn confirms."""
+    speeds = {key: values for key, values in _columns(data, ".esc_rpm") if np.abs(values).max() > 0}
+    quantities = ("rpm",) if len(speeds) == 1 else ("rpm_starboard", "rpm_port")
+    return _orders(label, time, speeds, "rpm", quantities)
+
+
+def _rudder_order(label: str, time: Array, data: dict[str, Any]) -> Iterator[LogStream]:
+    return _orders(label, time, _controls(data), "1", ("rudder_order",), "name")
+
+
+def _motor_orders(airframe: int, label: str, time: Array, data: dict[str, Any]) -> Iterator[LogStream]:
+    two = ("thrust_order_starboard", "thrust_order_port") if airframe == _AIRFRAME_ROVER_DIFFERENTIAL else ()
+    controls = _controls(data)
+    return _orders(label, time, controls, "1", {1: ("rpm_order",), 2: two}.get(len(controls), ()))
+
+
+def _pulses(label: str, time: Array, data: dict[str, Any]) -> Iterator[LogStream]:
+    for key, pulses in _columns(data, "output["):
+        yield LogStream(f"{label}.{key}", time, np.where(pulses > 0, pulses, np.nan), "us")
 
 
 def _columns(data: dict[str, Any], part: str) -> list[tuple[str, Array]]:

@@ -352,19 +352,21 @@ def compare_steering_models(card: SteeringCard, rudder_deg: float | None = None)
         influence={name: influence_of(card, name, rudder) for name in same},
         manoeuvres={name: ModelFigures(turn.figures, zigzag.figures) for name, (turn, zigzag) in runs.items()},
         combined_predictions={name: combined_prediction(card, name) for name in candidates} if printed else {},
-        printed_influence=PrintedCoefficients(
-            draught_m=printed.draughts_m[-1],
-            K_percent={name: values[-1] for name, values in printed.K_percent.items() if values},
-            misread_as=dict(printed.misread_as),
-        )
-        if printed
-        else None,
+        printed_influence=_at_last_draught(printed) if printed else None,
         influence_over_draught=draught_polynomials(card) if printed else {},
         two_point_tuning=tuning,
         missing=missing_of(card),
         titles={name: entry.title for name, entry in card.models.items()},
         diagrams=SteeringDiagrams(_diagrams(card, largest, same, (main, tuning)), _known_points(card)),
         histories={card.models[name].title: _circle(turn.trajectory) for name, (turn, _) in runs.items()},
+    )
+
+
+def _at_last_draught(printed: PrintedInfluence) -> PrintedCoefficients:
+    return PrintedCoefficients(
+        draught_m=printed.draughts_m[-1],
+        K_percent={name: values[-1] for name, values in printed.K_percent.items() if values},
+        misread_as=dict(printed.misread_as),
     )
 
 
