@@ -110,7 +110,7 @@ def _layout(file: Path, lines: Sequence[str]) -> TextLayout:
 
 
 def _with_point(cell: str, comma: bool) -> str:
-    """A cell whose decimal sign is a point; one that has both signs is no number."""
+    """A cell with a decimal point; one with both signs stays a text that cannot be read."""
     if not comma:
         return cell
     return f"{cell} (point)" if "." in cell else cell.replace(",", ".")

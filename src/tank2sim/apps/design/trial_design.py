@@ -128,10 +128,7 @@ def design_of_trial(
     ship = SailedShip(Explanation("card", card, free, errors.covariance), seen, 0.0)
     of, information = _candidates(card, ship)
     target = slopes.of([parameter.short for parameter in parameters], slopes.at_card) @ ship.axes
-    if not np.abs(target).max(axis=1).all():
-        row = int(np.argmin(np.abs(target).max(axis=1)))
-        problem = "does not depend on any coefficient of the card with an error"
-        raise ArgumentError("figures", figures[row].text, problem, "state errors in [uncertainty] of the card")
+    _refuse_independent(figures, target)
     cost = np.array([each.total_s for each in of])
     block = InformationBlock(np.eye(ship.axes.shape[1]), information, target_matrices([row[None] for row in target]))
     every = Allocation((block,), cost)
@@ -166,6 +163,15 @@ def design_of_trial(
         coefficients=_coefficients(ship.axes, block, counts, usual * budget / usual_s, free, errors.covariance),
         sensors=dict(sensors),
     )
+
+
+def _refuse_independent(figures: Sequence[InfluenceFigure], target: Array) -> None:
+    """Refuse a figure whose slopes, a row of `target`, are all zero."""
+    largest = np.abs(target).max(axis=1)
+    if not largest.all():
+        figure = figures[int(np.argmin(largest))].text
+        problem = "does not depend on any coefficient of the card with an error"
+        raise ArgumentError("figures", figure, problem, "state errors in [uncertainty] of the card")
 
 
 def _candidates(card: ManoeuvringCard, ship: SailedShip) -> tuple[list[TrialManoeuvre], Array]:

@@ -73,24 +73,18 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unu
     remarks: dict[str, list[Notice]] = {}
     for item in given:
         read = item if isinstance(item, Trial) else read_trial_file(item)
-        remarks[read.path.name] = list(read.notices)
         trial, findings = audit_and_repair(read)
-        path = trial.path
-        if wrong := next((finding for finding in findings if finding.open), None):  # not the quantity of its name
-            place = f"column{'s' * (len(wrong.columns) > 1)} {wrong.column}"
-            remedy = f"probably {wrong.likely_truth}: correct the file, or leave the column out"
-            raise InputError(wrong.source, place, wrong.what, remedy)
-        audited[path.name] = list(findings)
-        if not set(RUDDERS) & set(trial.signals):
-            raise InputError(path, "column of the rudder", "has no usable reading", "give the rudder in more rows")
+        _refuse_faults(trial, findings)
+        name = trial.path.name
+        remarks[name], audited[name] = list(read.notices), list(findings)
         notices += _unused(trial, card) if report_unused else []
         if empty := int(np.isnan(trial.signals["delta_rad" if "delta_rad" in trial.signals else RUDDERS[1]]).sum()):
             words = "taken as straight between its readings"
-            notices.append(Notice(f"{path.name}: the rudder is empty in {empty} rows: {words}"))
+            notices.append(Notice(f"{name}: the rudder is empty in {empty} rows: {words}"))
         scaled, factor = at_size_of(trial, card)
         _refuse_other_revolutions(scaled, card)
         if factor != 1:
-            notices.append(Notice(f"{path.name}: scaled by Froude's law to a ship {factor:.4g} times as long"))
+            notices.append(Notice(f"{name}: scaled by Froude's law to a ship {factor:.4g} times as long"))
         trials.append(scaled)
     names = [trial.name for trial in trials]
     for trial in trials:
@@ -110,6 +104,17 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unu
         if not _taken_so(finding)
     )
     return Measured(tuple(trials), "angle" if all(by_angle) else "order", tuple(notices), doubts=doubts)
+
+
+def _refuse_faults(trial: Trial, findings: Iterable[Finding]) -> None:
+    """Refuse a trial with a column that is not the quantity of its name, or without a rudder."""
+    wrong = next((finding for finding in findings if finding.open), None)
+    if wrong is not None:
+        place = f"column{'s' * (len(wrong.columns) > 1)} {wrong.column}"
+        remedy = f"probably {wrong.likely_truth}: correct the file, or leave the column out"
+        raise InputError(wrong.source, place, wrong.what, remedy)
+    if not set(RUDDERS) & set(trial.signals):
+        raise trial.fault("column of the rudder", "has no usable reading", "give the rudder in more rows")
 
 
 def _taken_so(finding: Finding) -> bool:

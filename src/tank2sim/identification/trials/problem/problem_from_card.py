@@ -233,16 +233,11 @@ def problem_from_card(
     model = driven_model(card, ship.driven_by)
     gear = ordered_rudder(driven_model(card, "order")) if driven_by == "order" else None
     free = free_parameters(card, inertia=inertia)
-    turned = [trial.signals["n_radps"] for trial in trials if "n_radps" in trial.signals]
-    spread = float(np.nanstd(np.concatenate(turned))) if turned else 0.0
-    if (known := card.propulsion) is not None and known.Xnn and spread > REVOLUTIONS_VARY * known.nominal_radps:
+    known = card.propulsion
+    if known is not None and known.Xnn and _spread_of_revolutions(trials) > REVOLUTIONS_VARY * known.nominal_radps:
         free[REVOLUTIONS] = known.Xnn, REVOLUTIONS_ERROR * abs(known.Xnn)
     for name in hold:
-        held = next((key for key in (name, f"mmg.{name}") if key in free), f"derivatives.{name}")
-        if held not in free:
-            text = " ".join(parameter.removeprefix("derivatives.") for parameter in free)
-            raise ArgumentError("hold", "", f"{name} is not an estimated parameter", f"estimated are {text}")
-        del free[held]
+        del free[_estimated_name(name, free)]
     if not free:
         raise card.fault("derivatives", "nothing is left to estimate", "give derivatives with a value")
     seen = seen_in(model, trials)
@@ -261,6 +256,21 @@ def problem_from_card(
         raise trials[0].fault("", problem, "change model.valid_speed_mps of the card, or leave it out")
     values = np.array(list(free.values()))
     return Problem(model, tuple(free), values[:, 0], values[:, 1], runs, ship=ship)
+
+
+def _spread_of_revolutions(trials: Sequence[Trial]) -> float:
+    """Standard deviation over all trials, rad/s; 0 if none has revolutions."""
+    turned = [trial.signals["n_radps"] for trial in trials if "n_radps" in trial.signals]
+    return float(np.nanstd(np.concatenate(turned))) if turned else 0.0
+
+
+def _estimated_name(name: str, free: Mapping[str, object]) -> str:
+    """Full name of a free parameter; ArgumentError if none has this name."""
+    found = next((key for key in (name, f"mmg.{name}", f"derivatives.{name}") if key in free), None)
+    if found is None:
+        text = " ".join(parameter.removeprefix("derivatives.") for parameter in free)
+        raise ArgumentError("hold", "", f"{name} is not an estimated parameter", f"estimated are {text}")
+    return found
 
 
 def with_captive(problem: Problem, card: ManoeuvringCard, captive: CaptiveRuns | None) -> Problem:
