@@ -20,7 +20,7 @@ from tank2sim.apps.design.study import Certainty, PlannedCoefficient
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.estimates import RELATIVE_ERROR
-from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
+from tank2sim.dynamics.card_parameters import CardParameter, JointErrors, card_parameters, joint_errors, study_model
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.gap.outcome.next_test import Explanation, SailedShip
 from tank2sim.gap.outcome.next_test_candidates import Candidate, candidate_manoeuvres, orders_csv
@@ -117,11 +117,7 @@ def design_of_trial(
     InputError: the ship does not show a figure, leaves all bounds in every manoeuvre, or the time is too short.
     """
     slopes = figure_slopes(card, figures, (), draws=0, seed=0, one_side=one_side)
-    stated = {name: RELATIVE_ERROR * abs(value) for name, value in card.derivatives.items() if value}
-    known = replace(card, uncertainty={**stated, **card.uncertainty})
-    estimated = free_parameters(known)  # as identify estimates them: without accelerations
-    parameters = [each for each in card_parameters(known, study_model(known)) if each.name in estimated]
-    errors = joint_errors(known, parameters)
+    parameters, errors = _prior(card)
     free = tuple(parameter.name for parameter in parameters)
     model = study_model(card)
     seen = {name: size for name, size in sensors.items() if name in model}
@@ -163,6 +159,15 @@ def design_of_trial(
         coefficients=_coefficients(ship.axes, block, counts, usual * budget / usual_s, free, errors.covariance),
         sensors=dict(sensors),
     )
+
+
+def _prior(card: ManoeuvringCard) -> tuple[list[CardParameter], JointErrors]:
+    """Parameters that :func:`.identify` estimates (no accelerations), and their errors before the trial."""
+    assumed = {name: RELATIVE_ERROR * abs(value) for name, value in card.derivatives.items() if value}
+    known = replace(card, uncertainty={**assumed, **card.uncertainty})
+    estimated = free_parameters(known)
+    parameters = [each for each in card_parameters(known, study_model(known)) if each.name in estimated]
+    return parameters, joint_errors(known, parameters)
 
 
 def _refuse_independent(figures: Sequence[InfluenceFigure], target: Array) -> None:

@@ -161,13 +161,19 @@ def _unnamed_positions(search: ChannelSearch) -> list[_Pair]:
         track = _track(*pair) if pair else None
         if pair is None or track is None:
             continue
-        others = [angle for angle in angles[:_MOST_TRIED] if angle not in (first, second)]
-        followed = [direction_evidence(*search.angle(angle), track) for angle in others]
-        if any(evidence.known > AGREES and evidence.sign > 0 for evidence in followed):
+        if _is_followed(search, track, [angle for angle in angles[:_MOST_TRIED] if angle not in (first, second)]):
             found.append(pair)
-    for stream in found[0] if len(found) == 1 else ():
+    if len(found) != 1:
+        return []
+    for stream in found[0]:
         search.rename(search.stream(stream.name), stream.quantity)
-    return found if len(found) == 1 else []
+    return found
+
+
+def _is_followed(search: ChannelSearch, track: ReferenceMotion, angles: Iterable[LogStream]) -> bool:
+    """Whether one of the angles follows a track as a heading or a course does."""
+    followed = [direction_evidence(*search.angle(angle), track) for angle in angles]
+    return any(evidence.known > AGREES and evidence.sign > 0 for evidence in followed)
 
 
 def _could_be_position(stream: LogStream) -> bool:
