@@ -154,13 +154,14 @@ def _mapped(table: CsvTable, units: Mapping[str, str], columns: Mapping[str, Col
         if heading in mapped:
             continue
         named = _by_name(heading, units.get(heading, ""))
-        quantity = _without_unit(_last_part(heading))
-        if named is None and quantity in RUN_QUANTITIES and quantity not in found:
-            remedy = f"give one in [columns]: {quantity} = {{ quantity = '{quantity}', unit = ... }}"
-            raise table.fault(f"column {heading}", f"has no unit of {quantity}", remedy)
-        if named is not None and named.quantity not in found:
-            found[named.quantity] = named
-        elif named is not None and not columns:
+        quantity = named.quantity if named else _without_unit(_last_part(heading))
+        if named is None:
+            if quantity in RUN_QUANTITIES and quantity not in found:
+                remedy = f"give one in [columns]: {quantity} = {{ quantity = '{quantity}', unit = ... }}"
+                raise table.fault(f"column {heading}", f"has no unit of {quantity}", remedy)
+        elif quantity not in found:
+            found[quantity] = named
+        elif not columns:
             both = f"columns {found[named.quantity].heading} and {heading}"
             raise table.fault(both, "are one quantity in two units", "delete one of them")
     if "waveform time" in table.columns and "t" not in found:

@@ -12,6 +12,7 @@ import numpy as np
 from tank2sim.apps.logs.clock import board_start
 from tank2sim.apps.logs.streams import (
     FIELDS,
+    LogFinding,
     LogStream,
     VesselLog,
     fault,
@@ -49,11 +50,7 @@ def read_px4_ulog(path: Path) -> VesselLog:
         topics = {(name, instance): data for (name, instance), data in topics.items() if name != "sensor_gps"}
     receivers = [data for (name, _), data in topics.items() if name in _RECEIVERS]
     gps = next((data for data in receivers if _utc_of(data).any()), None)
-    boot, findings = 0.0, [note("no GPS of it has a UTC: the trials have no date")]
-    if gps is not None:
-        known = gps["time_utc_usec"] > 0
-        lag, findings = gps["timestamp"][known] * 1e-6 - gps["time_utc_usec"][known] * 1e-6, []
-        boot = board_start(lag, "sensor_gps", findings)
+    boot, findings = _boot(gps)
     streams = list(_streams(topics, boot, int(log.initial_parameters.get("CA_AIRFRAME", -1))))
     if not streams:
         raise InputError(path, "", "no topic of it is understood", "log sensor_gps, vehicle_attitude, actuator_*")
@@ -66,6 +63,16 @@ def read_px4_ulog(path: Path) -> VesselLog:
     if lost := sum(dropout.duration for dropout in log.dropouts):
         findings.append(note(f"{len(log.dropouts)} dropouts of the logger, {lost / 1000:.3g} s in all"))
     return VesselLog(path, "PX4 ULog", tuple(streams), counts, tuple(findings), gps is not None)
+
+
+def _boot(gps: dict[str, Any] | None) -> tuple[float, list[LogFinding]]:
+    """Time of the board at UTC 0, s, and faults of the receiver's clock."""
+    if gps is None:
+        return 0.0, [note("no GPS of it has a UTC: the trials have no date")]
+    findings: list[LogFinding] = []
+    known = gps["time_utc_usec"] > 0
+    lag = gps["timestamp"][known] * 1e-6 - gps["time_utc_usec"][known] * 1e-6
+    return board_start(lag, "sensor_gps", findings), findings
 
 
 def _utc_of(data: dict[str, Any]) -> Array:

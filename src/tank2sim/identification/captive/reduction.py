@@ -160,14 +160,7 @@ def _reduction(campaign: Campaign, options: ReductionOptions) -> Reduction:
         {force: forces[force].selection.equations for force in "YN"},
         {force: forces[force].solution for force in "YN"},
     )
-    stated = campaign.uncertainty.model_fields_set
-    unstated_delay = delay if not delays and "force_delay_s" not in stated else None
-    possible_s = unstated_delay.possible_s if unstated_delay and unstated_delay.alike else 0.0
-    angle_rad = alignment.angle_rad if alignment and alignment.shown and "alignment_rad" not in stated else 0.0
-    forces = {
-        force: replace(result, shifts=_common_shifts(campaign, result, possible_s, angle_rad))
-        for force, result in forces.items()
-    }
+    forces = _with_common_shifts(campaign, forces, None if delays else delay, alignment)
     derivatives = {name: found for result in forces.values() for name, found in _derivatives(result).items()}
     _refuse_thrust(campaign, derivatives)
     alone = oscillations(campaign, runs)
@@ -185,6 +178,22 @@ def _reduction(campaign: Campaign, options: ReductionOptions) -> Reduction:
         delay=delay,
         alignment=alignment,
     )
+
+
+def _with_common_shifts(
+    campaign: Campaign,
+    forces: Mapping[str, ForceResult],
+    delay: DelayEstimate | None,
+    alignment: AlignmentEstimate | None,
+) -> dict[str, ForceResult]:
+    """The results with the shifts by a delay and a misalignment whose errors the campaign does not state."""
+    stated = campaign.uncertainty.model_fields_set
+    delay_s = delay.possible_s if delay and delay.alike and "force_delay_s" not in stated else 0.0
+    angle_rad = alignment.angle_rad if alignment and alignment.shown and "alignment_rad" not in stated else 0.0
+    return {
+        force: replace(result, shifts=_common_shifts(campaign, result, delay_s, angle_rad))
+        for force, result in forces.items()
+    }
 
 
 def _without_runs(campaign: Campaign, left_out: Sequence[str]) -> InputError:
