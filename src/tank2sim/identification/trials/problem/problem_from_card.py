@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -12,11 +12,13 @@ from scipy.ndimage import uniform_filter1d
 from tank2sim.arrays import Array
 from tank2sim.cards.card import TORQUE_COEFFICIENTS, ManoeuvringCard, MmgCard
 from tank2sim.cards.covariance_reading import read_covariance
+from tank2sim.cards.form import EffectEntry
 from tank2sim.cards.reading import revised
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
 from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
 from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.effects.effect import EffectParameter
 from tank2sim.dynamics.mmg.hull import MMG_TERMS
 from tank2sim.dynamics.roll import roll_terms
 from tank2sim.errors import ArgumentError
@@ -199,18 +201,20 @@ def free_parameters(card: ManoeuvringCard, *, inertia: bool = False) -> dict[str
             if error > 0 and key not in TORQUE_COEFFICIENTS:
                 free[f"mmg.{key}"] = card.interaction(key), error
     for entry in card.effects:
-        effect = EFFECTS[entry.name]
-        for parameter in effect.parameters:
-            optional = parameter.optional or (parameter.default is not None and parameter.absent is not None)
-            if parameter.input_name or (optional and parameter.name not in entry.parameters):
-                continue  # an input, or a part of the effect that the card does not have
-            error = entry.uncertainty.get(
-                parameter.name, ASSUMED_EFFECT_ERROR * (parameter.maximum - parameter.lowest(card))
-            )
-            if error <= 0:  # stated as certain
-                continue
-            free[f"{effect.name}.{parameter.stem}"] = parameter.value(entry.parameters, card), error
+        for parameter in _parts_present(entry):
+            span = parameter.maximum - parameter.lowest(card)
+            error = entry.uncertainty.get(parameter.name, ASSUMED_EFFECT_ERROR * span)
+            if error > 0:  # 0: stated as certain
+                free[f"{entry.name}.{parameter.stem}"] = parameter.value(entry.parameters, card), error
     return free
+
+
+def _parts_present(entry: EffectEntry) -> Iterator[EffectParameter]:
+    """Parameters of an effect, without inputs and without parts of the effect that the card does not have."""
+    for parameter in EFFECTS[entry.name].parameters:
+        optional = parameter.optional or (parameter.default is not None and parameter.absent is not None)
+        if not parameter.input_name and (not optional or parameter.name in entry.parameters):
+            yield parameter
 
 
 def problem_from_card(
