@@ -336,10 +336,9 @@ def compare_steering_models(card: SteeringCard, rudder_deg: float | None = None)
     if not names:
         raise card.fault("models", "none has all its coefficients", "; ".join(missing_of(card).popitem()[1]))
     printed = card.influence
-    rudder = rudder_deg or (math.degrees(printed.rudder_rad) if printed else 20.0)
-    main = printed.model if printed else names[0]
+    main, usual_deg = (printed.model, math.degrees(printed.rudder_rad)) if printed else (names[0], 20.0)
+    rudder = rudder_deg or usual_deg
     same = [name for name in names if card.models[name].draught_m == card.models[main].draught_m]
-    candidates = [name for name in names if name not in same and card.models[name].form == card.models[main].form]
     turns = {name: turns_of(card, name) for name in names}
     runs = {name: _runs(card, name, rudder) for name in same}
     tuning = tuned(card, main)
@@ -351,7 +350,7 @@ def compare_steering_models(card: SteeringCard, rudder_deg: float | None = None)
         steady_turns={name: tuple(turn.in_degrees() for turn in row) for name, row in turns.items()},
         influence={name: influence_of(card, name, rudder) for name in same},
         manoeuvres={name: ModelFigures(turn.figures, zigzag.figures) for name, (turn, zigzag) in runs.items()},
-        combined_predictions={name: combined_prediction(card, name) for name in candidates} if printed else {},
+        combined_predictions=_combined_predictions(card, main, names),
         printed_influence=_at_last_draught(printed) if printed else None,
         influence_over_draught=draught_polynomials(card) if printed else {},
         two_point_tuning=tuning,
@@ -360,6 +359,15 @@ def compare_steering_models(card: SteeringCard, rudder_deg: float | None = None)
         diagrams=SteeringDiagrams(_diagrams(card, largest, same, (main, tuning)), _known_points(card)),
         histories={card.models[name].title: _circle(turn.trajectory) for name, (turn, _) in runs.items()},
     )
+
+
+def _combined_predictions(card: SteeringCard, main: str, names: Sequence[str]) -> dict[str, CombinedPrediction]:
+    """Table 5 for the models of the main model's form at other draughts; empty without printed influence."""
+    if card.influence is None:
+        return {}
+    form, draught = card.models[main].form, card.models[main].draught_m
+    others = [name for name in names if card.models[name].form == form and card.models[name].draught_m != draught]
+    return {name: combined_prediction(card, name) for name in others}
 
 
 def _at_last_draught(printed: PrintedInfluence) -> PrintedCoefficients:
