@@ -1,13 +1,14 @@
 """Reading trials of every format, and what is done to them as a whole."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tank2sim.errors import InputError
 from tank2sim.records.reading import looks_like_a_trial, read_trial_file
-from tank2sim.records.trials import froude_scaled, sampling_step, window, with_signals
+from tank2sim.records.trials import froude_scaled, mean_wind, sampling_step, window, with_signals
 from tests.records.motions import motion, trial
 
 GOOD = "t_s,delta_deg,u_mps,r_degps,psi_deg\n0,0,1,0,350\n1,10,2,1,359\n2,-10,3,-1,8\n"
@@ -220,6 +221,18 @@ def test_a_window_holds_both_its_ends():
     assert all(len(values) == 101 for values in part.signals.values())
     with pytest.raises(InputError, match="has no two rows between 70 s and 80 s"):
         window(part, 70.0, 80.0)
+
+
+def test_the_mean_wind_is_a_mean_of_vectors_over_the_samples_of_all_trials(write):
+    rows = "t_s,delta_deg,r_degps,wind_speed_mps,wind_direction_deg\n0,0,0,3,90\n1,0,0,4,0\n2,0,0,,0\n3,0,0,9,\n"
+    windy = read_trial_file(write(rows))
+    calm = replace(windy, signals={"delta_rad": windy.signals["delta_rad"]})
+    assert mean_wind([windy, calm]) == pytest.approx((2.5, np.arctan2(3, 4)))
+    opposite = replace(
+        windy, signals=windy.signals | {"wind_direction_rad": windy.signals["wind_direction_rad"] + np.pi}
+    )
+    assert mean_wind([windy, opposite])[0] == pytest.approx(0, abs=1e-12)
+    assert mean_wind([calm]) is None
 
 
 def test_changed_signals_leave_the_others_and_say_so(write):

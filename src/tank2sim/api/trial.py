@@ -232,10 +232,10 @@ def fitted_and_held(
         raise InputError("trials", "", "is empty", "give a file of a trial or a folder with trials")
     for trial in held.trials:
         if trial.name in {trial_fitted.name for trial_fitted in fitted.trials}:
-            raise InputError(trial.path, "", "is both fitted and held out", "hold out what is not fitted")
+            raise trial.fault("", "is both fitted and held out", "hold out what is not fitted")
     held = replace(held, notices=(*refuse_copies(fitted.trials, held.trials), *held.notices))
     for trial in held.trials:
         if ship and (name := fitted_as(ship, trial)) is not None:
             problem = f"is held out, and {card.source} was fitted to it: it is the record of {name}"
-            raise InputError(trial.path, "", problem, "hold out what the card was not fitted to")
+            raise trial.fault("", problem, "hold out what the card was not fitted to")
     return fitted, held

@@ -181,7 +181,7 @@ def _check_errors(card: Card, path: Path, names: Sequence[str], matrix: Array) -
                 raise InputError(path, f"covariance of {name}", problem, f"at most {LARGEST_PRIME:g} was expected")
         if isinstance(stated, int | float) and abs(stated - error) > _ROUNDING * max(abs(stated), error):
             problem = f"is {stated:.4g}, and {path.name} says {error:.4g}"
-            raise InputError(card.source, key, problem, "make them agree, or take the line '# covariance: ...' out")
+            raise card.fault(key, problem, "make them agree, or take the line '# covariance: ...' out")
 
 
 def _uncertainty_of(name: str) -> str:

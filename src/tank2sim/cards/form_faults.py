@@ -21,6 +21,14 @@ _RELATIONS = {
 }
 """Kind of fault to the name of the bound in pydantic's words and in a message."""
 
+_EXPECTED = {
+    "finite_number": "a finite number",
+    "float_type": "a number",
+    "int_type": "a number",
+    "string_type": "a text",
+}
+"""Kind of fault to the value that was expected."""
+
 
 def form_fault(
     error: ValidationError, source: str | Path, spelt: Mapping[str, str], *, form: type[BaseModel], what: str
@@ -73,12 +81,8 @@ def _problem_and_remedy(fault: Any, key: str, form: type[BaseModel], what: str) 
             inside = _in_a_section(key, form) if len(fault["loc"]) == 1 else []
             remedy = f"did you mean {inside[0]}?" if inside else suggestion(key, _siblings(fault["loc"], form))
             return f"is not a key of {what}", remedy
-        case "finite_number":
-            return f"is {short(given)}", "a finite number was expected"
-        case "float_type" | "int_type":
-            return f"is {short(given)}", "a number was expected"
-        case "string_type":
-            return f"is {short(given)}", "a text was expected"
+        case kind if kind in _EXPECTED:
+            return f"is {short(given)}", f"{_EXPECTED[kind]} was expected"
         case kind if kind in _RELATIONS:
             bound, relation = _RELATIONS[kind]
             return f"is {_shown(key, given)}", f"a number {relation} {_shown(key, wanted[bound])} was expected"

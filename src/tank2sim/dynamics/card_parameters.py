@@ -178,7 +178,7 @@ def _thrusters(card: SteeredCard) -> list[CardParameter]:
 
 
 def _effects(card: SteeredCard, model: Model) -> list[CardParameter]:
-    values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    values = model.defaults
     found = []
     for number, entry in enumerate(card.effects):
         effect = EFFECTS[entry.name]

@@ -194,6 +194,10 @@ class Model:
         """Name of the model with the file it was built from, as messages begin: ``card.toml (Mariner class)``."""
         return f"{self.source} ({self.name})" if self.source else self.name
 
+    def fault(self, place: str, problem: str, remedy: str) -> InputError:
+        """An error about this model, to be raised: its place, the problem, and the remedy."""
+        return InputError(self.origin, place, problem, remedy)
+
     @property
     def variables(self) -> tuple[Variable, ...]:
         """All variables: states, inputs, parameters, quantities."""
@@ -221,7 +225,7 @@ class Model:
     @cached_property
     def defaults(self) -> Mapping[str, float]:
         """Start values of the parameters by name."""
-        return dict(zip(self.parameter_names, self.parameter_values().tolist(), strict=True))
+        return self.parameters_by_name(self.parameter_values())
 
     @cached_property
     def _by_name(self) -> dict[str, Variable]:
@@ -266,11 +270,15 @@ class Model:
             low, high = variable.accepted_range
             if not low <= value <= high:
                 remedy = f"it lies between {low:g} and {high:g} {variable.unit}: {variable.description}"
-                raise InputError(self.origin, variable.name, f"cannot be {value:g} {variable.unit}", remedy)
+                raise self.fault(variable.name, f"cannot be {value:g} {variable.unit}", remedy)
 
     def parameter_values(self, changed: Mapping[str, float] | None = None) -> Array:
         """The parameter vector p: start values, with the values of `changed` (by name) in place."""
         return _values(self.parameters, changed or {})
+
+    def parameters_by_name(self, p: Array) -> dict[str, float]:
+        """The values of a parameter vector `p` by name."""
+        return dict(zip(self.parameter_names, p.tolist(), strict=True))
 
     def with_values(self, changed: Mapping[str, float]) -> Model:
         """The model with parameters that start at the values of `changed` (by name) in place of their own."""

@@ -157,9 +157,9 @@ def mass_fault(model: Model, p: Mapping[str, float]) -> str:
     return "" if _is_positive(matrix) else NOT_POSITIVE
 
 
-def mass_faults(model: Model, p: Mapping[str, Array]) -> list[str]:
-    """As :func:`mass_fault` for many ships, with parameters (n,) each."""
-    matrix = _mass_matrix(model, p)
+def mass_faults(model: Model, p: Array) -> list[str]:
+    """As :func:`mass_fault` for each of n ships, with parameter vectors `p` (n, parameters)."""
+    matrix = _mass_matrix(model, dict(zip(model.parameter_names, p.T, strict=True)))
     singular, positive = np.broadcast_arrays(_is_singular(matrix), _is_positive(matrix))
     return [str(fault) for fault in np.where(singular, SINGULAR, np.where(positive, "", NOT_POSITIVE))]
 

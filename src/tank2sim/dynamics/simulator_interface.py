@@ -121,11 +121,8 @@ def with_external_forces(model: Model) -> Model:
     """
     if not all(f"force.{name}" in model for name in "XYN"):
         return model
-    length, speed, mass = (
-        model.parameter_values()[model.parameter_names.index(f"ship.{name}")] for name in ("length", "speed", "mass")
-    )
-    force = float(mass * speed**2 / length) / 100  # the order of a ship's resistance at the speed of expansion
-    length = float(length)
+    length, speed, mass = (model.defaults[f"ship.{name}"] for name in ("length", "speed", "mass"))
+    force = mass * speed**2 / length / 100  # the order of a ship's resistance at the speed of expansion
     at, besides = "at external.point_x, external.point_y", "in addition to the moment of the force at its point"
     outside = "Point of the external force"
     described = (

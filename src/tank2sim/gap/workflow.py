@@ -17,7 +17,7 @@ from tank2sim.arguments import FALSE_DISCOVERY, MOST_EFFECTS
 from tank2sim.cards.card import Card, ManoeuvringCard, SteeredBy, SteeredCard
 from tank2sim.cards.examination import doubts
 from tank2sim.cards.form import EffectEntry
-from tank2sim.errors import ArgumentError, InputError
+from tank2sim.errors import ArgumentError
 from tank2sim.executors import executing, processes_to_begin
 from tank2sim.gap.diagnosis.misfit_location import equation_of, figures, places
 from tank2sim.gap.diagnosis.residuals import (
@@ -165,7 +165,7 @@ def run_gap_workflow(
         except FloatingPointError as error:
             problem = f"gives no finite forces along the motion of the trials ({error})"
             remedy = "check the units of its numbers and of the trials' columns"
-            raise InputError(card.source, "", problem, remedy) from None
+            raise card.fault("", problem, remedy) from None
         decision = decide(found, options.false_discovery)
         progress("proving")
         noise = {name: sigma for name, (sigma, _) in _noise(found, decision.best, fitted).items()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -20,7 +19,7 @@ from tank2sim.records.captive_record import CaptiveRun
 from tank2sim.records.csv_table import LARGEST
 from tank2sim.records.run_tables import RUN_QUANTITIES
 from tank2sim.records.spelt_units import unit_factor
-from tank2sim.records.text_layout import cells_of, decoded_text, text_layout
+from tank2sim.records.text_layout import TextLayout, cells_of, decoded_text, lines_of_text, rows_of_text, text_layout
 
 LEAST_FORCE = 1e-9
 """A column of forces that stays below it (N, N m or prime) was not measured. Project choice: the resistance of a model,
@@ -87,28 +86,34 @@ def _refuse_missing(columns: Mapping[str, Sequence[str]], heading: str, source: 
 
 def _columns(file: Path) -> tuple[list[int], dict[str, list[str]], dict[str, str]]:
     """Line numbers of the rows, cells by the headings of their columns, and units by these, if there are any."""
-    text, _ = decoded_text(read_all_bytes(file))
-    every = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    numbered = [(n, line) for n, line in enumerate(every, start=1) if line.strip() and line.lstrip()[0] != "#"]
-    if len(numbered) < 2:
+    lines = lines_of_text(decoded_text(read_all_bytes(file))[0])
+    layout = _layout(file, lines)
+    rows = layout.rows(lines)
+    cells = [[_with_point(cell.strip(), layout.comma) for cell in cells_of(row, layout.separator)] for _, row in rows]
+    columns: dict[str, list[str]] = {}
+    for place, head in enumerate(layout.names):
+        columns.setdefault(head, [row[place] if place < len(row) else "" for row in cells])
+    return [number for number, _ in rows], columns, dict(zip(layout.names, layout.units, strict=True))
+
+
+def _layout(file: Path, lines: Sequence[str]) -> TextLayout:
+    """The layout of a table of averages. A CSV with commas has one header line, and columns of text may outnumber its
+    numbers."""
+    rows = rows_of_text(lines)
+    if len(rows) < 2:
         raise InputError(file, "", "has no rows under a header", "give a header and a row for each condition")
-    units: dict[str, str] = {}
-    if "," in numbered[0][1] and not re.search("[;\t]", numbered[0][1]):
-        rows = [[cell.strip() for cell in next(csv.reader([line], skipinitialspace=True))] for _, line in numbered]
-        heads, rows = rows[0], rows[1:]
-        numbered = numbered[1:]
-    else:
-        layout = text_layout(file, every)
-        numbered = [(number, line) for number, line in numbered if number > layout.skip]
-        heads, units = list(layout.names), dict(zip(layout.names, layout.units, strict=True))
-        rows = [[cell.strip() for cell in cells_of(line, layout.separator)] for _, line in numbered]
-        if layout.comma:
-            rows = [[cell.replace(",", ".") if "." not in cell else f"{cell} (point)" for cell in row] for row in rows]
-    cells = {
-        head: [row[place] if place < len(row) else "" for row in rows]
-        for place, head in reversed(list(enumerate(heads)))
-    }
-    return [number for number, _ in numbered], {head: cells[head] for head in heads}, units
+    number, header = rows[0]
+    if "," not in header or re.search("[;\t]", header):
+        return text_layout(file, lines)
+    names = tuple(cell.strip() for cell in cells_of(header, ","))
+    return TextLayout(",", comma=False, names=names, units=("",) * len(names), skip=number)
+
+
+def _with_point(cell: str, comma: bool) -> str:
+    """A cell with a decimal point; one with both signs stays a text that cannot be read."""
+    if not comma:
+        return cell
+    return f"{cell} (point)" if "." in cell else cell.replace(",", ".")
 
 
 def _refuse_other_unit(file: Path, heading: str, key: str, unit: str, factor: float) -> None:

@@ -16,7 +16,6 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.errors import InputError
 from tank2sim.records.campaign_form import OSCILLATING, ColumnEntry, FilesSection, RunSheet, RunType, TankTest
 from tank2sim.records.csv_table import CsvTable
 from tank2sim.records.run_tables import read_run_table
@@ -136,7 +135,7 @@ def _yaw_rate(table: CsvTable, sheet: RunSheet, psi: Array | None, time: Array) 
     if sheet.type not in ("pure_yaw", "yaw_with_drift", "steady_turn"):
         return np.zeros(len(time))
     if psi is None:
-        raise InputError(table.path, "header", "there is neither r_radps nor psi_rad", "add one of them")
+        raise table.fault("header", "there is neither r_radps nor psi_rad", "add one of them")
     return np.asarray(np.gradient(np.unwrap(psi), time))
 
 
@@ -152,9 +151,9 @@ def _sway_velocity(table: CsvTable, sheet: RunSheet, motion: tuple[Array, Array 
         return measured
     if sheet.type == "pure_sway":
         if y is None:
-            raise InputError(table.path, "header", "there is neither v_mps nor y_m", "add one of them")
+            raise table.fault("header", "there is neither v_mps nor y_m", "add one of them")
         return np.asarray(np.gradient(y, time))
     drifts = ("static_drift", "drift_and_rudder", "steady_turn", "yaw_with_drift")
     if sheet.drift_rad is None and sheet.type in drifts:
-        raise InputError(table.path, "header", "there is no v_mps, and the campaign gives no drift", "give one of them")
+        raise table.fault("header", "there is no v_mps, and the campaign gives no drift", "give one of them")
     return np.asarray(-speed * np.sin(sheet.drift_rad or 0.0))

@@ -59,17 +59,11 @@ def read_craft_trial(path: Path | CsvTable, thrusters: Sequence[ThrusterSection]
     shaft = columns.get("n_radps") if len(thrusters) == 1 else None  # of the log, if single
     driven = {f"n_{thruster.name}_radps": columns.get(f"n_{thruster.name}_radps", shaft) for thruster in thrusters}
     orders = {f"order_{thruster.name}_radps": _ordered(path, thruster, columns) for thruster in thrusters}
-    names = [name for name, values in driven.items() if not _known(values)]
-    if all(_known(values) for values in orders.values()):
-        names = []
-    for name in (*names, "x_m", "y_m", "psi_rad"):
-        if not _known(columns.get(name)):
-            remedy = (
-                f"a craft with thrusters {', '.join(thruster.name for thruster in thrusters)} needs t_s, x_m, y_m, "
-            )
-            remedy += "psi_deg and of each thruster " + ", ".join(f"n_{thruster.name}_rpm" for thruster in thrusters)
-            remedy += f" or its order, {', '.join(f'order_{thruster.name}' for thruster in thrusters)}"
-            raise InputError(path, "header", f"lacks {re.sub('_rad$', '_deg', name.replace('_radps', '_rpm'))}", remedy)
+    needed = () if all(map(_known, orders.values())) else driven
+    present = {name for name, values in {**columns, **driven}.items() if _known(values)}
+    missing = [name for name in (*needed, "x_m", "y_m", "psi_rad") if name not in present]
+    if missing:
+        raise _without_column(table, missing[0], thrusters)
     driven |= _azimuths(path, thrusters, columns)
     signals = {name: values for name, values in (driven | orders).items() if values is not None and _known(values)}
     signals |= {name: columns[name] for name in CRAFT_SIGNALS if name in columns}
@@ -77,6 +71,15 @@ def read_craft_trial(path: Path | CsvTable, thrusters: Sequence[ThrusterSection]
     signals |= {name: np.where(held, np.nan, signals[name]) for name in ("x_m", "y_m")}
     headings = {name: table.heading(name) for name in CRAFT_SIGNALS if name in signals}
     return Trial(path, time, signals | {"psi_rad": unwrapped(signals["psi_rad"])}, columns=headings)
+
+
+def _without_column(table: CsvTable, name: str, thrusters: Sequence[ThrusterSection]) -> InputError:
+    every, measured, ordered = (
+        ", ".join(form.format(thruster.name) for thruster in thrusters) for form in ("{}", "n_{}_rpm", "order_{}")
+    )
+    remedy = f"a craft with thrusters {every} needs t_s, x_m, y_m, psi_deg and of each thruster {measured} or its order"
+    in_file = re.sub("_rad$", "_deg", name.replace("_radps", "_rpm"))
+    return table.fault("header", f"lacks {in_file}", f"{remedy}, {ordered}")
 
 
 def _held(x: Array, y: Array) -> NDArray[np.bool_]:

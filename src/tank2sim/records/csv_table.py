@@ -91,6 +91,10 @@ class CsvTable:
         """Where a cell is, for messages: ``line 12, column psi_deg``."""
         return f"{self.counts} {self.lines[row]}, column {self.heading(name)}"
 
+    def fault(self, place: str, problem: str, remedy: str) -> InputError:
+        """An error about this table, to be raised: its place, the problem, and the remedy."""
+        return InputError(self.path, place, problem, remedy)
+
     def column(self, name: str) -> Array:
         """Values of a column, (rows,).
 
@@ -101,7 +105,7 @@ class CsvTable:
         """
         if name not in self.columns:
             present = ", ".join(self.heading(other) for other in self.columns)
-            raise InputError(self.path, "header", f"there is no column {name}", f"add it; the columns are {present}")
+            raise self.fault("header", f"there is no column {name}", f"add it; the columns are {present}")
         return self.columns[name]
 
     def increasing(self, name: str) -> Array:
@@ -117,7 +121,7 @@ class CsvTable:
         if falls.size:
             row = int(falls[0]) + 1
             problem = f"{values[row]:.10g} does not come after {values[row - 1]:.10g} of the row before"
-            raise InputError(self.path, self.place(row, name), problem, "sort the rows, and give each value once")
+            raise self.fault(self.place(row, name), problem, "sort the rows, and give each value once")
         return values
 
     def filled_column(self, name: str, remedy: str = "give each row its value") -> Array:
@@ -131,7 +135,7 @@ class CsvTable:
         values = self.column(name)
         empty = np.flatnonzero(np.isnan(values))
         if empty.size:
-            raise InputError(self.path, self.place(int(empty[0]), name), "is empty", remedy)
+            raise self.fault(self.place(int(empty[0]), name), "is empty", remedy)
         return values
 
     def positive_comment(self, key: str) -> float | None:
@@ -144,7 +148,7 @@ class CsvTable:
         """
         value = self.comment_number(key)
         if value is not None and value <= 0:
-            raise InputError(self.path, f"comment {key}", f"is {value:g}", "a positive number was expected")
+            raise self.fault(f"comment {key}", f"is {value:g}", "a positive number was expected")
         return value
 
     def positive_comments(self, keys: Iterable[str]) -> dict[str, float]:
@@ -165,10 +169,10 @@ class CsvTable:
         number = _number(text)
         if number is None:
             problem = f"{_quoted(text)} is not a number" if "\n" not in text else "is given more than once"
-            raise InputError(self.path, f"comment {key}", problem, f"write one line such as '# {key}: 11.63'")
+            raise self.fault(f"comment {key}", problem, f"write one line such as '# {key}: 11.63'")
         if abs(number) > LARGEST:
             problem = f"{_quoted(text)} is too large"
-            raise InputError(self.path, f"comment {key}", problem, f"at most {LARGEST:g} can be")
+            raise self.fault(f"comment {key}", problem, f"at most {LARGEST:g} can be")
         return number
 
     def refuse_misspelt_keys(self, known: Sequence[str]) -> None:
@@ -188,7 +192,7 @@ class CsvTable:
             near = difflib.get_close_matches(plain, spellings, n=1, cutoff=_RESEMBLES)
             if near:
                 problem = f"{_quoted(shown)} resembles a key and is none"
-                raise InputError(self.path, f"comment {key}", problem, f"write '# {spellings[near[0]]}: ...'")
+                raise self.fault(f"comment {key}", problem, f"write '# {spellings[near[0]]}: ...'")
 
     def si(self) -> CsvTable:
         """The table in SI and radians, its columns renamed by :func:`tank2sim.units.to_si` (psi_deg to psi_rad).
@@ -204,7 +208,7 @@ class CsvTable:
             si_name, factor = to_si(name, 1.0)
             if si_name in columns:
                 both = f"columns {headings[si_name]} and {self.heading(name)}"
-                raise InputError(self.path, both, "are one quantity in two units", "delete one of them")
+                raise self.fault(both, "are one quantity in two units", "delete one of them")
             columns[si_name] = values if factor == 1.0 else values * factor
             headings[si_name] = self.heading(name)
         return replace(self, columns=columns, headings=headings)

@@ -111,4 +111,4 @@ def _refuse_falling_time(trial: Trial) -> None:
         row = int(falls[0]) + 1
         problem = f"{trial.time_s[row]:.10g} does not come after {trial.time_s[row - 1]:.10g} of the row before"
         remedy = "sort the rows and give each time once; 'tank2sim audit' shows more"
-        raise InputError(trial.path, f"row {row + 1}, column {trial.heading('t_s')}", problem, remedy)
+        raise trial.fault(f"row {row + 1}, column {trial.heading('t_s')}", problem, remedy)

@@ -20,7 +20,7 @@ from tank2sim.files import first_bytes, read_bytes, refuse_folder
 from tank2sim.records.campaign_form import ColumnEntry, FilesSection
 from tank2sim.records.csv_table import LARGEST, CsvTable, read_table, table_of_rows
 from tank2sim.records.spelt_units import unit_factor
-from tank2sim.records.text_layout import WHITESPACE, cells_of, decoded_text, text_layout
+from tank2sim.records.text_layout import WHITESPACE, TextLayout, cells_of, decoded_text, lines_of_text, text_layout
 from tank2sim.records.workbook import is_workbook, workbook_text
 from tank2sim.units import to_si
 
@@ -98,30 +98,15 @@ def _table_of_arrays(path: Path, raw: Sequence[RawColumn]) -> CsvTable:
 
 def _text_table(path: Path, files: FilesSection) -> tuple[CsvTable, dict[str, str]]:
     """Columns by their names in the file, and the units of its row of units."""
-    data = read_bytes(path)
-    text = workbook_text(path) if is_workbook(data) else decoded_text(data)[0]
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    lines = [*[""] * min(files.skip_lines, len(lines)), *lines[files.skip_lines :]]
-    separator = _SEPARATORS.get(files.separator or "", files.separator or "")
-    comma = None if files.decimal is None else files.decimal == ","
-    if files.widths:
-        ends = np.cumsum(files.widths).tolist()
-        cut = [[line[begin:end].strip() for begin, end in zip([0, *ends], ends, strict=False)] for line in lines]
-        lines = [";".join(cells) if any(cells) else "" for cells in cut]
-        separator = ";"
-    layout = text_layout(path, lines, separator, comma)
-    names = list(layout.names)
-    if files.names:
-        if len(files.names) != len(names):
-            problem = f"are {len(files.names)}, and {path.name} has {len(names)} columns"
-            raise InputError(path, "files.names", problem, "name each column")
-        names = list(files.names)
-    body = [
-        (number, line.strip(" ") if layout.separator != WHITESPACE else line)
-        for number, line in enumerate(lines, start=1)
-        if number > layout.skip and line.strip() and not line.startswith("#")
-    ]
-    rows = [_canonical(path, number, line, layout.separator, layout.comma) for number, line in body]
+    lines = _lines(path, files)
+    separator = ";" if files.widths else _SEPARATORS.get(files.separator or "", files.separator or "")
+    layout = text_layout(path, lines, separator, None if files.decimal is None else files.decimal == ",")
+    names = list(files.names or layout.names)
+    if len(names) != len(layout.names):
+        problem = f"are {len(names)}, and {path.name} has {len(layout.names)} columns"
+        raise InputError(path, "files.names", problem, "name each column")
+    body = layout.rows(lines)
+    rows = [_canonical(path, number, line, layout) for number, line in body]
     if all(row.endswith(",") for row in rows) and all(row.count(",") == len(names) for row in rows):
         rows = [row[:-1] for row in rows]  # a separator after the last column
     table = table_of_rows(path, names, rows, np.array([number for number, _ in body], dtype=np.int64))
@@ -130,15 +115,28 @@ def _text_table(path: Path, files: FilesSection) -> tuple[CsvTable, dict[str, st
     return table, dict(zip(names, layout.units, strict=False))
 
 
-def _canonical(path: Path, number: int, line: str, separator: str, comma: bool) -> str:
+def _lines(path: Path, files: FilesSection) -> list[str]:
+    """Lines of a file; those to be skipped are empty, and columns of stated widths are separated by semicolons."""
+    data = read_bytes(path)
+    lines = lines_of_text(workbook_text(path) if is_workbook(data) else decoded_text(data)[0])
+    lines = [*[""] * min(files.skip_lines, len(lines)), *lines[files.skip_lines :]]
+    if not files.widths:
+        return lines
+    ends = np.cumsum(files.widths).tolist()
+    cut = [[line[begin:end].strip() for begin, end in zip([0, *ends], ends, strict=False)] for line in lines]
+    return [";".join(cells) if any(cells) else "" for cells in cut]
+
+
+def _canonical(path: Path, number: int, line: str, layout: TextLayout) -> str:
     """A row with commas between cells and points in numbers."""
-    if comma and "." in line:
+    if layout.comma and "." in line:
         remedy = "write numbers with one decimal sign and nothing between thousands, or give [files] decimal"
         raise InputError(path, f"line {number}", "has points and decimal commas", remedy)
+    line, separator = line.strip(" "), layout.separator
     if separator == "," and '"' not in line:
         return line
     cells = cells_of(line, separator) if separator == WHITESPACE or '"' in line else line.split(separator)
-    return ",".join(cell.replace(",", ".") if comma else cell for cell in cells)
+    return ",".join(cell.replace(",", ".") if layout.comma else cell for cell in cells)
 
 
 def _mapped(table: CsvTable, units: Mapping[str, str], columns: Mapping[str, ColumnEntry | str]) -> CsvTable:
@@ -149,28 +147,29 @@ def _mapped(table: CsvTable, units: Mapping[str, str], columns: Mapping[str, Col
         column = _stated(table, heading, units.get(heading, ""), entry)
         if column.quantity in found:
             both = f"columns {found[column.quantity].heading} and {heading}"
-            raise InputError(table.path, both, f"are both {column.quantity}", "take one out of [columns]")
+            raise table.fault(both, f"are both {column.quantity}", "take one out of [columns]")
         found[column.quantity] = column
     mapped = {column.heading for column in found.values()}
     for heading in table.columns:
         if heading in mapped:
             continue
         named = _by_name(heading, units.get(heading, ""))
-        quantity = _without_unit(_last_part(heading))
-        if named is None and quantity in RUN_QUANTITIES and quantity not in found:
-            remedy = f"give one in [columns]: {quantity} = {{ quantity = '{quantity}', unit = ... }}"
-            raise InputError(table.path, f"column {heading}", f"has no unit of {quantity}", remedy)
-        if named is not None and named.quantity not in found:
-            found[named.quantity] = named
-        elif named is not None and not columns:
+        quantity = named.quantity if named else _without_unit(_last_part(heading))
+        if named is None:
+            if quantity in RUN_QUANTITIES and quantity not in found:
+                remedy = f"give one in [columns]: {quantity} = {{ quantity = '{quantity}', unit = ... }}"
+                raise table.fault(f"column {heading}", f"has no unit of {quantity}", remedy)
+        elif quantity not in found:
+            found[quantity] = named
+        elif not columns:
             both = f"columns {found[named.quantity].heading} and {heading}"
-            raise InputError(table.path, both, "are one quantity in two units", "delete one of them")
+            raise table.fault(both, "are one quantity in two units", "delete one of them")
     if "waveform time" in table.columns and "t" not in found:
         found["t"] = _MappedColumn("waveform time", "t", 1.0, 0.0)
     if not found or "t" not in found:
         present = ", ".join(table.columns)
         problem = "no column is known" if not found else "no column is the time"
-        raise InputError(table.path, "header", problem, f"name them in [columns] of the campaign; there are: {present}")
+        raise table.fault("header", problem, f"name them in [columns] of the campaign; there are: {present}")
     values = {_si_name(column.quantity): _in_si(table, column) for column in found.values()}
     headings = {_si_name(column.quantity): column.heading for column in found.values()}
     return replace(table, columns=values, headings=headings)
@@ -195,7 +194,7 @@ def _heading(table: CsvTable, stated: str) -> str:
         matches = [name for name in table.columns if re.search(rf"(^|[/.]){re.escape(stated)}$", bare(name))]
         if len(matches) == 1:
             return matches[0]
-    raise InputError(table.path, "header", f"there is no column {stated}", close_name(stated, table.columns))
+    raise table.fault("header", f"there is no column {stated}", close_name(stated, table.columns))
 
 
 def _stated(table: CsvTable, heading: str, unit_in_file: str, entry: ColumnEntry | str) -> _MappedColumn:
@@ -205,24 +204,22 @@ def _stated(table: CsvTable, heading: str, unit_in_file: str, entry: ColumnEntry
         entry = ColumnEntry(quantity=entry)
     quantity, factor = _quantity(entry.quantity)
     if not quantity:
-        raise InputError(
-            table.path, place, f"{entry.quantity} is not a quantity", f"known are: {', '.join(RUN_QUANTITIES)}"
-        )
+        raise table.fault(place, f"{entry.quantity} is not a quantity", f"known are: {', '.join(RUN_QUANTITIES)}")
     suffix = RUN_QUANTITIES[quantity]
     in_file = unit_in_file or _unit_of_heading(heading)
     known = unit_factor(in_file, suffix) if in_file else None
     if entry.unit is not None:
         factor = unit_factor(entry.unit, suffix)
         if factor is None:
-            raise InputError(table.path, place, f"{entry.unit} is not a unit of {quantity}", f"its SI unit is {suffix}")
+            raise table.fault(place, f"{entry.unit} is not a unit of {quantity}", f"its SI unit is {suffix}")
     if entry.factor is not None:
         return _MappedColumn(heading, quantity, entry.sign * entry.factor * (factor or 1.0), entry.offset)
     if factor is not None and known is not None and not math.isclose(factor, known, rel_tol=1e-6):
         problem = f"is in {in_file} by the file, and in another unit by the map"
-        raise InputError(table.path, place, problem, "correct the unit, or give a factor to SI")
+        raise table.fault(place, problem, "correct the unit, or give a factor to SI")
     if factor is None and known is None:
         problem = f"has no unit of {quantity}" + (f" ({in_file} is none)" if in_file else "")
-        raise InputError(table.path, place, problem, f"give one in [columns]: unit = '{suffix}'")
+        raise table.fault(place, problem, f"give one in [columns]: unit = '{suffix}'")
     return _MappedColumn(heading, quantity, entry.sign * (factor if factor is not None else known or 1.0), entry.offset)
 
 

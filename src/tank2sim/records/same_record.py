@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from tank2sim.arrays import Array
-from tank2sim.errors import InputError
 from tank2sim.notices import Notice, caution
 from tank2sim.records.audit.noise import resolution, rounding, white_noise
 from tank2sim.records.trials import MEASURED_COLUMNS, Trial, usual_step
@@ -150,9 +149,9 @@ def refuse_copies(trials: Sequence[Trial], others: Sequence[Trial] | None = None
         if alike is Likeness.COPY:
             if others is None:
                 problem = f"is the record of {before.path.name} again"
-                raise InputError(trial.path, "", problem, "give each record once: a copy is not a second run")
+                raise trial.fault("", problem, "give each record once: a copy is not a second run")
             problem = f"is both fitted and held out: it is the record of {before.path.name}"
-            raise InputError(trial.path, "", problem, "hold out what is not fitted")
+            raise trial.fault("", problem, "hold out what is not fitted")
         if alike is not None:
             proves = "as a hold-out it proves nothing" if others is not None else "it is not a second run"
             notices.append(caution(f"{trial.path.name} {_SAID[alike].format(before.path.name)}: {proves}."))

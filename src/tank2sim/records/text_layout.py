@@ -50,6 +50,10 @@ class TextLayout:
     units: tuple[str, ...]
     skip: int
 
+    def rows(self, lines: Sequence[str]) -> list[tuple[int, str]]:
+        """The rows of values, each with the number of its line (from 1)."""
+        return [(number, line) for number, line in rows_of_text(lines) if number > self.skip]
+
 
 def decoded_text(data: bytes, *, complete: bool = True) -> tuple[str, str]:
     """Text of the bytes of a file, and its encoding: UTF-16 and UTF-8 by their marks, UTF-8 if it can be, else
@@ -71,6 +75,17 @@ def decoded_text(data: bytes, *, complete: bool = True) -> tuple[str, str]:
     return data.decode("cp1252", errors="replace"), "cp1252"
 
 
+def lines_of_text(text: str) -> list[str]:
+    """Lines of a text, however they end."""
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+
+
+def rows_of_text(lines: Sequence[str]) -> list[tuple[int, str]]:
+    """The lines that are neither empty nor comments, each with its number (from 1)."""
+    numbered = enumerate(lines, start=1)
+    return [(number, line) for number, line in numbered if line.strip() and not line.lstrip().startswith("#")]
+
+
 def text_layout(path: object, lines: Sequence[str], separator: str = "", comma: bool | None = None) -> TextLayout:
     """How the lines of a table are written.
 
@@ -79,34 +94,38 @@ def text_layout(path: object, lines: Sequence[str], separator: str = "", comma: 
 
     Raises InputError: There are no rows.
     """
-    numbered = [(number, line) for number, line in enumerate(lines) if line.strip() and not line.startswith("#")]
+    numbered = rows_of_text(lines)
     if len(numbered) < 2:
         raise InputError(str(path), "", "has no rows", "give a table with a line of names and rows of values")
     separator, width = _separator([line for _, line in numbered[-_SAMPLE:]], separator)
     first = _first_row(numbered, separator, width)
+    skip = numbered[first][0] - 1
     names, units = _head([line for _, line in numbered[:first]], separator, width)
     if not names:
-        remarks = [line.lstrip("#% ") for line in lines[: numbered[first][0]] if line.startswith("#")]
+        remarks = [line.lstrip("#% ") for line in lines[:skip] if line.startswith("#")]
         names, units = _head(remarks, separator, width)
-    body = [line for _, line in numbered[first:]]
-    if comma is None and separator == ",":  # quotation marks alone distinguish commas between cells and in numbers
-        comma = any(re.search(r'"\s*[+-]?\d*,\d+', line) for line in body[:_SAMPLE])
-    elif comma is None:
-        mark = r"\s" if separator == WHITESPACE else re.escape(separator)
-        comma = any(re.search(rf"(?:^|{mark})\s*[+-]?\d*,\d+", line) for line in body[:_SAMPLE])
-        comma = comma or any(re.search(r"\d,\d", line) for line in body[-_SAMPLE:])
+    if comma is None:
+        comma = _has_decimal_commas([line for _, line in numbered[first:]], separator)
     names = [*names, *[""] * (width - len(names))]
     names = [name.strip() or f"column {place}" for place, name in enumerate(names, start=1)]
     names = [name if names.index(name) == place else f"{name} ({place + 1})" for place, name in enumerate(names)]
     units = [*units, *[""] * len(names)][: len(names)]
-    return TextLayout(separator, comma, tuple(names), tuple(map(unit_of_text, units)), numbered[first][0])
+    return TextLayout(separator, comma, tuple(names), tuple(map(unit_of_text, units)), skip)
+
+
+def _has_decimal_commas(body: Sequence[str], separator: str) -> bool:
+    if separator == ",":  # quotation marks alone distinguish commas between cells and in numbers
+        return any(re.search(r'"\s*[+-]?\d*,\d+', line) for line in body[:_SAMPLE])
+    mark = r"\s" if separator == WHITESPACE else re.escape(separator)
+    first = any(re.search(rf"(?:^|{mark})\s*[+-]?\d*,\d+", line) for line in body[:_SAMPLE])
+    return first or any(re.search(r"\d,\d", line) for line in body[-_SAMPLE:])
 
 
 def cells_of(line: str, separator: str) -> list[str]:
     """Cells of a line, as written."""
     if separator == WHITESPACE:
         return line.split()
-    return next(csv.reader([line], delimiter=separator), [])
+    return next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
 
 
 def _separator(sample: Sequence[str], known: str) -> tuple[str, int]:

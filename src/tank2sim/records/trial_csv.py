@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.errors import InputError
 from tank2sim.notices import Notice
 from tank2sim.records.csv_table import CsvTable, read_table
 from tank2sim.records.signals.columns import SignalName
@@ -71,10 +70,10 @@ def _refuse_slips(table: CsvTable, names: list[str]) -> None:
     if len(near) == 1:
         ((name, right),) = near.items()
         remedy = f"call it as {right} (or with another unit of that kind), or delete the column"
-        raise InputError(table.path, f"column {table.heading(name)}", "is not a signal of a trial", remedy)
+        raise table.fault(f"column {table.heading(name)}", "is not a signal of a trial", remedy)
     columns = ", ".join(table.heading(name) for name in near)
     remedy = "call them as " + ", ".join(near.values()) + " (or with other units of that kind), or delete the columns"
-    raise InputError(table.path, f"columns {columns}", "are not signals of a trial", remedy)
+    raise table.fault(f"columns {columns}", "are not signals of a trial", remedy)
 
 
 def _meant(name: str) -> str | None:
@@ -89,25 +88,25 @@ def _check_content(table: CsvTable, signals: dict[str, Array]) -> None:
     if not any(name in signals for name in RUDDERS):
         present = ", ".join(table.heading(name) for name in table.columns)
         remedy = f"add delta_deg (angle) or delta_order_deg (order); the columns are {present}"
-        raise InputError(table.path, "header", "there is no rudder", remedy)
+        raise table.fault("header", "there is no rudder", remedy)
     for name in ("wind_speed_mps", "current_speed_mps"):
         if name in signals and np.any(signals[name] < 0):
             remedy = "a speed is 0 or more, and its direction says where it goes or comes from"
-            raise InputError(table.path, f"column {table.heading(name)}", "has negative values", remedy)
+            raise table.fault(f"column {table.heading(name)}", "has negative values", remedy)
     if not any(name in signals for name in MEASURED_COLUMNS):
         remedy = "add at least one measured column, such as r_degps, psi_deg or u_mps"
-        raise InputError(table.path, "header", "nothing measured is in it", remedy)
+        raise table.fault("header", "nothing measured is in it", remedy)
     if len(table.lines) < 2:
-        raise InputError(table.path, "", "has a single row", "give the manoeuvre row by row")
+        raise table.fault("", "has a single row", "give the manoeuvre row by row")
     for name, values in signals.items():
         if np.isnan(values).all():
-            raise InputError(table.path, f"column {table.heading(name)}", "has no value", "delete the column")
+            raise table.fault(f"column {table.heading(name)}", "has no value", "delete the column")
 
 
 def _rudder_sign(table: CsvTable) -> str:
     sign = table.comments.get("rudder_sign", "starboard").strip()
     if sign not in ("port", "starboard"):
-        raise InputError(table.path, "comment rudder_sign", f"is {sign!r}", "write port or starboard")
+        raise table.fault("comment rudder_sign", f"is {sign!r}", "write port or starboard")
     return sign
 
 
@@ -126,9 +125,9 @@ def _noise(table: CsvTable) -> dict[str, float]:
             name, value = words[0], np.nan
         if len(words) != 2 or not 0 < value < np.inf:
             remedy = "write such as '# noise: u_mps 0.03, psi_deg 0.1', with positive standard deviations"
-            raise InputError(table.path, "comment noise", f"{part.strip()!r} is not understood", remedy)
+            raise table.fault("comment noise", f"{part.strip()!r} is not understood", remedy)
         if name not in TRIAL_SIGNALS or name not in table.columns:
-            raise InputError(table.path, "comment noise", f"there is no column {words[0]}", "name a measured column")
+            raise table.fault("comment noise", f"there is no column {words[0]}", "name a measured column")
         stated[name] = value
     return stated
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -80,6 +80,10 @@ class Trial:
         """Name of a signal's column in the file."""
         return self.columns.get(signal, signal)
 
+    def fault(self, place: str, problem: str, remedy: str) -> InputError:
+        """An error about this trial, to be raised: its place, the problem, and the remedy."""
+        return InputError(self.path, place, problem, remedy)
+
 
 @dataclass(frozen=True)
 class TrialReader:
@@ -153,7 +157,7 @@ def window(trial: Trial, begin_s: float, end_s: float) -> Trial:
     inside = (trial.time_s >= begin_s) & (trial.time_s <= end_s)
     if np.count_nonzero(inside) < 2:
         span = f"the trial lasts from {trial.time_s[0]:g} s to {trial.time_s[-1]:g} s"
-        raise InputError(trial.path, "", f"has no two rows between {begin_s:g} s and {end_s:g} s", span)
+        raise trial.fault("", f"has no two rows between {begin_s:g} s and {end_s:g} s", span)
     return select_rows(trial, np.flatnonzero(inside))
 
 
@@ -193,6 +197,28 @@ def froude_scaled(trial: Trial, length_ratio: float) -> Trial:
     noise = {name: value * factors[_unit(name)] for name, value in trial.noise.items()}
     length = None if trial.length_m is None else trial.length_m * length_ratio
     return replace(trial, time_s=trial.time_s * math.sqrt(length_ratio), signals=signals, noise=noise, length_m=length)
+
+
+def mean_wind(trials: Iterable[Trial]) -> tuple[float, float] | None:
+    """Mean true wind of trials, a mean of vectors over all samples; None if no trial has it.
+
+    The components to north and east are averaged: opposite winds cancel.
+
+    Returns
+    -------
+    speed, direction : float
+        m/s, and where it comes from, rad clockwise from north, 0 to 2 pi.
+    """
+    names = "wind_speed_mps", "wind_direction_rad"
+    winds = [[trial.signals[name] for name in names] for trial in trials if set(names) <= set(trial.signals)]
+    if not winds:
+        return None
+    speed, direction = np.hstack(winds)
+    north, east = speed * np.cos(direction), speed * np.sin(direction)
+    if np.isnan(north).all():
+        return None
+    mean_north, mean_east = float(np.nanmean(north)), float(np.nanmean(east))
+    return math.hypot(mean_north, mean_east), math.atan2(mean_east, mean_north) % math.tau
 
 
 def unwrapped(angle: Array, period: float = math.tau) -> Array:

@@ -123,12 +123,12 @@ class IdentificationResult(Result[IdentificationStudy]):
     @property
     def estimates(self) -> pd.DataFrame:
         """Estimates by name: value and standard error, prime or SI, rudder positive to starboard."""
-        import pandas as pd
-
-        study = self.study
-        names = [f"derivatives.{name}" if name in study.derivatives else name for name in study.parameters]
-        rows = [(entry.value, entry.standard_error) for entry in study.parameters.values()]
-        return pd.DataFrame(rows, columns=["value", "standard_error"], index=pd.Index(names, name="name"))
+        terms = self.study.derivatives
+        rows = [
+            (f"derivatives.{name}" if name in terms else name, entry.value, entry.standard_error)
+            for name, entry in self.study.parameters.items()
+        ]
+        return data_frame(rows, columns=["name", "value", "standard_error"], index="name")
 
     @property
     def figures(self) -> pd.DataFrame:

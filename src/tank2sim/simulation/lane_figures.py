@@ -125,7 +125,7 @@ class LaneManoeuvres:
 
     def __init__(self, model: Model, lanes: int | None = None, longest: float | None = None):
         self.model, self._longest = model, longest
-        if "initial.trim" in model and model.parameter_values()[model.parameter_names.index("initial.trim")]:
+        if model.defaults.get("initial.trim"):
             raise NoLanesError("a ship that is trimmed first is not run in lanes")
         if not {*_BEGINS, "motion.u", "motion.v", "motion.r"} <= set(model.state_names):
             raise NoLanesError("the model does not describe a ship")
@@ -199,7 +199,7 @@ class LaneManoeuvres:
     ) -> tuple[bool, float]:
         """Figures of one ship with more events than lanes keep; if it could be run; when it left the range, s."""
         (manoeuvre, duration, inputs), model = asked, self.model
-        parameters = dict(zip(model.parameter_names, p.tolist(), strict=True))
+        parameters = model.parameters_by_name(p)
         count = len(next(iter(figures.values())))
         for values in figures.values():
             values[number] = np.nan

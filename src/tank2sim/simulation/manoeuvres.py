@@ -256,7 +256,7 @@ class Stop(SwitchedManoeuvre):
         if not thruster_commands(model):
             if "propeller.speed" not in model.input_names:
                 problem = "is missing: the ship's engine cannot be stopped or reversed"
-                raise InputError(model.origin, "propulsion", problem, "add [propulsion] to the card")
+                raise model.fault("propulsion", problem, "add [propulsion] to the card")
             propeller = model["propeller.speed"]
             assert isinstance(propeller, Input)
             engines = [propeller]

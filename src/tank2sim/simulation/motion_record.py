@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
 from tank2sim.records.trials import ROWS_TO_SHOW_AN_ORDER, Trial, sampling_step
 
 STATES = {
@@ -99,7 +98,7 @@ def motion_record(model: Model, trial: Trial, seen: Sequence[str]) -> MotionReco
     lasts, sampling = float(trial.time_s[-1] - trial.time_s[0]), sampling_step(trial)
     if lasts > MOST_INSTANTS_A_ROW * len(trial.time_s) * sampling:
         problem = f"lasts {lasts:g} s, and has {len(trial.time_s)} rows, most of them {sampling:g} s apart"
-        raise InputError(trial.path, f"column {trial.heading('t_s')}", problem, "correct the time, or cut the record")
+        raise trial.fault(f"column {trial.heading('t_s')}", problem, "correct the time, or cut the record")
     inputs = np.tile(model.input_values(), (len(trial.time_s), 1))
     orders = np.zeros(inputs.shape[1], dtype=bool)
     for name, values in _input_signals(model, trial).items():

@@ -118,8 +118,8 @@ def recognise(trial: Trial, model: Model) -> Recorded | str:
     held = held_rudders(trial)
     if not held:
         return "its rudder is not held over"
-    values = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
-    ship_time = float(values["ship.length"] / values["ship.speed"])
+    values = model.defaults
+    ship_time = values["ship.length"] / values["ship.speed"]
     smooth = _motion(trial, model, ship_time)
     if smooth is None:
         return "it has no heading or no positions"

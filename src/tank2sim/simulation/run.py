@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import ArgumentError, InputError
+from tank2sim.errors import ArgumentError
 from tank2sim.notices import Notice
 from tank2sim.records.csv_table import LONGEST_RUN_S
 from tank2sim.simulation.card_range import CardRangeReading, reading
@@ -80,7 +80,7 @@ def simulate(
         remedy = f"give more than 0 and less than {LONGEST_RUN_S:g} s"
         raise ArgumentError("duration_s", "", f"is {duration_s:g} s", remedy)
     integrator = integrator or Integrator(model)
-    values = dict(zip(model.parameter_names, model.parameter_values(parameters).tolist(), strict=True))
+    values = model.parameters_by_name(model.parameter_values(parameters))
     start = manoeuvre.start(model) if isinstance(manoeuvre, ThrusterManoeuvre) else {}
     running = Running(integrator, inputs, {**start, **(parameters or {})})
     manoeuvre.drive(running, values["ship.length"] / values["ship.speed"], duration_s)
@@ -103,17 +103,15 @@ def _refuse_other_steering(model: Model, manoeuvre: Manoeuvre) -> None:
     if isinstance(manoeuvre, ThrusterManoeuvre):
         if not thruster_commands(model):
             remedy = f"it takes {MANOEUVRE_FORMS}" if "rudder.command" in model else "give the card of a small craft"
-            raise InputError(model.origin, manoeuvre.words, "needs thrusters, and it has none", remedy)
+            raise model.fault(manoeuvre.words, "needs thrusters, and it has none", remedy)
         return
     if "rudder.command" in model:
         return
     if not thruster_commands(model):
-        raise InputError(
-            model.origin, "", "has no rudder", "manoeuvres need the card of a ship (kind linear, abkowitz or mmg)"
-        )
+        raise model.fault("", "has no rudder", "manoeuvres need the card of a ship (kind linear, abkowitz or mmg)")
     if not isinstance(manoeuvre, Stop | Orders):
         remedy = f"it is steered by thrusters: {THRUSTER_FORMS}"
-        raise InputError(model.origin, manoeuvre.words, "needs a rudder, and it has none", remedy)
+        raise model.fault(manoeuvre.words, "needs a rudder, and it has none", remedy)
 
 
 def _not_shown(trajectory: Trajectory, figures: Figures) -> tuple[Notice, ...]:

@@ -154,7 +154,7 @@ class Running:
             bad = ~(np.isfinite(x).all(axis=1) & np.isfinite(result.y).all(axis=1))
             when = f"t = {t[int(np.argmax(bad))]:.1f} s"
             remedy = "check the card's derivatives, or order less rudder: the model is not valid there"
-            raise InputError(self.model.origin, when, RUNAWAY, remedy)
+            raise self.model.fault(when, RUNAWAY, remedy)
         return result
 
     def _advance_to(self, end: float, beyond: Callable[[Array], Array] | None = None) -> bool:

@@ -9,7 +9,6 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
 
 _TRIM_STEPS = 50
 _TRIM_ACCURACY = 1e-13  # of the change in a Newton step, relative to the nominal size of a state
@@ -45,7 +44,7 @@ def steady_motion(model: Model, x: Array, u: Array, p: Array) -> Array:
         if not np.isfinite(change) or change < _TRIM_ACCURACY:
             break
     if not change < 1e-9:
-        raise InputError(model.origin, "initial.trim", "no steady motion exists near the start", "start without it")
+        raise model.fault("initial.trim", "no steady motion exists near the start", "start without it")
     return x
 
 
@@ -63,9 +62,7 @@ def straight_course(
     Raises InputError: The model is not a ship, or the course does not exist.
     """
     if "rudder.angle" not in model:
-        raise InputError(
-            model.origin, "", "has no rudder", "this needs the card of a ship (kind linear, abkowitz or mmg)"
-        )
+        raise model.fault("", "has no rudder", "this needs the card of a ship (kind linear, abkowitz or mmg)")
     p = model.parameter_values() if parameters is None else parameters
     u = model.input_values() if inputs is None else inputs.copy()
     x = np.array(model.initial(p)).ravel()
@@ -94,7 +91,7 @@ def straight_course(
     residuals = np.abs(np.array(residual(with_unknown(solution.x), u, p)).ravel())
     if not np.all(residuals < 1e-9) or abs(solution.x[1]) > np.pi / 4:
         problem = "no rudder angle below 45 deg holds a straight course"
-        raise InputError(model.origin, "", problem, _cause(np.array(slope(x, u, p))[:, unknown]))
+        raise model.fault("", problem, _cause(np.array(slope(x, u, p))[:, unknown]))
     x = with_unknown(solution.x)
     u[model.input_names.index("rudder.command")] = solution.x[1]
     return OperatingPoint(x, u, p)

@@ -12,7 +12,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tank2sim.dynamics.model import Input, Model, Parameter
-from tank2sim.errors import InputError
 from tank2sim.simulation.running import Running, SwitchedManoeuvre, SwitchingPlan
 from tank2sim.units import from_si
 
@@ -52,9 +51,7 @@ def _opposed(model: Model, words: str) -> dict[str, float]:
     """As :func:`thruster_sides`; a craft without a thruster at one of the sides is refused."""
     sides = thruster_sides(model)
     if not {1.0, -1.0} <= set(sides.values()):
-        raise InputError(
-            model.origin, "thrusters", f"are not on both sides, and {words} needs them", "give orders with file:"
-        )
+        raise model.fault("thrusters", f"are not on both sides, and {words} needs them", "give orders with file:")
     return sides
 
 
@@ -66,7 +63,7 @@ def _within(model: Model, orders: dict[str, float], words: str) -> dict[str, flo
         if not low * (1 + 1e-9) <= value <= high * (1 + 1e-9):
             ordered, lowest, highest = (from_si("n_rpm", speed) for speed in (value, low, high))
             problem = f"orders {ordered:.4g} rpm of {name.split('.')[1]}"
-            raise InputError(model.origin, words, problem, f"it turns at {lowest:.4g} to {highest:.4g} rpm")
+            raise model.fault(words, problem, f"it turns at {lowest:.4g} to {highest:.4g} rpm")
     return orders
 
 

@@ -301,7 +301,7 @@ def ships_of(model: Model, count: int, values: Mapping[str, Array]) -> tuple[Arr
     for name, value in values.items():
         if name in places:
             p[:, places[name]] = value
-    return p, mass_faults(model, dict(zip(model.parameter_names, p.T, strict=True)))
+    return p, mass_faults(model, p)
 
 
 def _with_runaways(troubles: Sequence[str], fine: Sequence[bool] | NDArray[np.bool_]) -> list[str]:

@@ -20,7 +20,6 @@ from tank2sim.cards.craft_terms import CRAFT_ADDED_MASSES
 from tank2sim.dynamics.craft_autopilot import CraftGains, craft_autopilot_model, thrust_limits
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.rigid_body import inertia
-from tank2sim.errors import InputError
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.simulation.trial_file import histories
 
@@ -152,7 +151,7 @@ def _damped(
         if min(-pole.real / abs(pole) for pole in poles) >= LEAST_DAMPING:
             return gains, autopilot, poles
     problem = f"leaves a pole of the closed loop at {poles[0]:.3g} 1/s however fast the autopilot"
-    raise InputError(card.source, "derivatives", problem, "check the damping of the card, or give another speed")
+    raise card.fault("derivatives", problem, "check the damping of the card, or give another speed")
 
 
 def craft_gains(card: SteeredCard, speed_mps: float, faster: float = 1.0) -> CraftGains:
@@ -199,13 +198,13 @@ def _effectiveness(card: SteeredCard) -> Array:
     for place, thruster in enumerate(card.thrusters):
         if thruster.max_azimuth_rad is not None:
             remedy = "the autopilot needs thrusters that do not turn"
-            raise InputError(card.source, f"thrusters.{place}.max_azimuth_rad", "lets it turn", remedy)
+            raise card.fault(f"thrusters.{place}.max_azimuth_rad", "lets it turn", remedy)
     angles = np.array([thruster.azimuth_rad for thruster in card.thrusters])
     x, y = (np.array([getattr(thruster, key) for thruster in card.thrusters]) for key in ("x_m", "y_m"))
     gives = np.stack([np.cos(angles), x * np.sin(angles) - y * np.cos(angles)])
     if np.linalg.matrix_rank(gives) < 2:
         problem = "give no yaw moment that is free of their surge force"
-        raise InputError(card.source, "thrusters", problem, "the autopilot needs one at port and one at starboard")
+        raise card.fault("thrusters", problem, "the autopilot needs one at port and one at starboard")
     return gives
 
 
@@ -214,7 +213,7 @@ def _largest_moments(card: SteeredCard, gives: Array, speed_mps: float) -> tuple
     bounds = [tuple(map(float, thrust_limits(thruster, speed_mps))) for thruster in card.thrusters]
     if any(high <= 0 for _, high in bounds):
         problem = f"give no thrust ahead at {speed_mps:.4g} m/s"
-        raise InputError(card.source, "thrusters", problem, "give a lower speed")
+        raise card.fault("thrusters", problem, "give a lower speed")
     least, most = (np.array(column, dtype=float) for column in zip(*bounds, strict=True))
     by = np.linalg.pinv(gives)
     within = {"A_ub": np.vstack([by, -by]), "b_ub": np.concatenate([most, -least]), "bounds": [(None, None)] * 2}
@@ -230,7 +229,7 @@ def _settled(loop: HeadingLoop, speed_mps: float, duration_s: float) -> Array:
     state: Array = states[-1].copy()
     if not np.isfinite(state).all() or abs(state[names.index("motion.u")] - speed_mps) > 0.1 * speed_mps:
         problem = f"does not come to {speed_mps:.4g} m/s under the autopilot: {state[names.index('motion.u')]:.4g} m/s"
-        raise InputError(loop.model.origin, "", problem, "give a speed that its thrusters hold")
+        raise loop.model.fault("", problem, "give a speed that its thrusters hold")
     state[[names.index("motion.x"), names.index("motion.y")]] = 0.0
     return state
 

@@ -163,9 +163,7 @@ def design_heading(
 def steering_plant(ship: Model, speed_mps: float | None = None) -> SteeringPlant:
     """The ship with its gear at a speed, for design. Raises as :func:`design_heading`."""
     if "rudder.angle" not in ship:
-        raise InputError(
-            ship.origin, "", "has no rudder", "an autopilot needs the card of a ship (linear, abkowitz or mmg)"
-        )
+        raise ship.fault("", "has no rudder", "an autopilot needs the card of a ship (linear, abkowitz or mmg)")
     values = ship.defaults
     slowest, fastest = values["ship.slowest"], values["ship.fastest"]
     if speed_mps is not None and not slowest <= speed_mps <= fastest:
@@ -175,11 +173,11 @@ def steering_plant(ship: Model, speed_mps: float | None = None) -> SteeringPlant
     hull = state_space(ship, point, states=["motion.v", "motion.r"], inputs=["rudder.angle"], outputs=["motion.r"])
     remedy = "check Yd and Nd of the card, and its rudder_sign"
     if not abs(hull.B[1, 0]) > 0:
-        raise InputError(ship.origin, "", "its rudder has no effect on yaw", remedy)
+        raise ship.fault("", "its rudder has no effect on yaw", remedy)
     found = stability(ship, speed_mps)
     K, T = found.nomoto.dimensional.K_per_s, found.nomoto.dimensional.T_s
     if not K / T > 0:
-        raise InputError(ship.origin, "", "the rudder turns the ship the wrong way", remedy)
+        raise ship.fault("", "the rudder turns the ship the wrong way", remedy)
     lag = values[acting_variable(ship, "steering.time_constant")]
     A = np.zeros((4, 4))
     A[:2, :2], A[:2, 3:], A[2, 1], A[3, 3] = hull.A, hull.B, 1.0, -1 / lag

@@ -13,7 +13,6 @@ from tank2sim.arrays import Array
 from tank2sim.dynamics.autopilot_loop import closed_loop_model
 from tank2sim.dynamics.effects import acting_variable
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.trajectory import Trajectory
 
@@ -82,7 +81,7 @@ class HeadingLoop:
         made = Trajectory(self.model, time, x, u, y)
         if not made.is_finite():
             remedy = "choose another design, or a smaller course change"
-            raise InputError(self.model.origin, "", "the motion leaves all bounds", remedy)
+            raise self.model.fault("", "the motion leaves all bounds", remedy)
         return made
 
 

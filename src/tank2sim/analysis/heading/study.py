@@ -361,8 +361,8 @@ def _not_stable(ship: Model, design: HeadingDesign, speed: float | None) -> Inpu
     problem = f"the loop of the {design.kind} design is not stable"
     if growing := growing_effects(ship, speed):
         problem += f": the ship's own motion in {', '.join(growing)} grows, with the rudder fixed, too"
-        return InputError(ship.origin, "effects", problem, "check the parameters of the effect that it belongs to")
-    return InputError(ship.origin, "", problem, "choose another design, or check the steering gear of the card")
+        return ship.fault("effects", problem, "check the parameters of the effect that it belongs to")
+    return ship.fault("", problem, "choose another design, or check the steering gear of the card")
 
 
 def _design(ship: Model, settings: StudySettings) -> HeadingDesign:

@@ -194,7 +194,7 @@ class Study:
         return {name: (value, None) for name, value in found.items()}
 
     def _run(self, manoeuvre: FigureManoeuvre, p: Array, duration_s: float | None = None) -> Run:
-        values = dict(zip(self.model.parameter_names, p.tolist(), strict=True))
+        values = self.model.parameters_by_name(p)
         model, integrator = self.model, self._integrator
         run = simulate(model, manoeuvre, parameters=values, integrator=integrator, duration_s=duration_s)
         if not self._known:

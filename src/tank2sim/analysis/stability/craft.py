@@ -26,7 +26,7 @@ from tank2sim.arrays import Array, ComplexNumber, Unbounded
 from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.form import ThrusterSection
 from tank2sim.dynamics.build import build
-from tank2sim.errors import ArgumentError, InputError
+from tank2sim.errors import ArgumentError
 from tank2sim.notices import Notice
 from tank2sim.simulation.ensemble import Ask, MemberResult
 from tank2sim.units import from_si, to_si
@@ -216,7 +216,7 @@ class CraftMotions:
         sides = self._equations.sides
         if not {1.0, -1.0} <= set(sides.values()):
             problem = "is not steered by thrusters at both sides, and has no rudder"
-            raise InputError(card.source, "thrusters", problem, "give one at port and one at starboard")
+            raise card.fault("thrusters", problem, "give one at port and one at starboard")
         steering = [one for one in card.thrusters if f"thrusters.{one.name}.command" in sides]
         self.low, self.high = max(one.lowest_radps for one in steering), min(one.max_radps for one in steering)
         self.p = self.model.parameter_values()
@@ -291,7 +291,7 @@ class CraftMotions:
         found = self._steady(given, near)
         if not found.converged and found.residual > _SMALL:
             problem = "has no steady motion with these thrusters"
-            raise InputError(self.model.origin, "", problem, "check thrust and damping, or give another speed")
+            raise self.model.fault("", problem, "check thrust and damping, or give another speed")
         return found
 
     def _steady(self, given: Mapping[str, float], near: Mapping[str, float]) -> _SteadyMotion:

@@ -21,7 +21,6 @@ from tank2sim.analysis.stability.straight_line import speed_acts
 from tank2sim.analysis.turning.diagram import hull_states
 from tank2sim.arrays import Array, Number
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
 
 SPEEDS = 25
 """Speeds at which C' is reported, evenly over the card's range."""
@@ -175,9 +174,7 @@ def stability_margin(model: Model, speed_mps: float | None = None) -> Margin:
     courses, z = straight_courses(model, shown, speed_mps)
     course = _Course.near(courses, z, model.parameter_values({} if speed_mps is None else {"initial.u": speed_mps}))
     if course is None:
-        raise InputError(
-            model.origin, "", "the slopes of its forces are not finite numbers", "check the derivatives of the card"
-        )
+        raise model.fault("", "the slopes of its forces are not finite numbers", "check the derivatives of the card")
     names, total, slope = model.parameter_names, course.by_parameters(), course.slopes
     influences = [
         _influence(course, name, place, float(total[place]))

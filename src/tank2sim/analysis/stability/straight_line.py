@@ -121,7 +121,7 @@ def stability(model: Model, speed_mps: float | None = None) -> Stability:
         The model is not a ship, or has no straight course.
     """
     point = straight_course(model, speed_mps)
-    values = dict(zip(model.parameter_names, point.p.tolist(), strict=True))
+    values = model.parameters_by_name(point.p)
     at = dict(zip(model.state_names, point.x.tolist(), strict=True))
     speed = float(np.hypot(at["motion.u"], at["motion.v"]))
     length, density = values["ship.length"], values["ship.water_density"]

@@ -28,7 +28,6 @@ from tank2sim.analysis.turning.continuation import Bounds, Curve, corrector_step
 from tank2sim.arrays import Array
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
 from tank2sim.notices import Notice, caution
 from tank2sim.simulation.card_range import exceeded_range
 from tank2sim.simulation.thruster_manoeuvres import thruster_sides
@@ -330,11 +329,11 @@ def steady_turning(model: Model) -> SteadyTurning:
     straight = corrector_step(equations, guess, equations.yaw)
     if straight is None or not straight[0][0] > 0:
         remedy = "check X0, Xu, Xuu and Xuuu of the card: resistance and thrust balance at no speed near u0"
-        raise InputError(model.origin, "", "keeps no steady speed on a straight course", remedy)
+        raise model.fault("", "keeps no steady speed on a straight course", remedy)
     largest = largest_rudder(model)
     if not abs(straight[0][-1]) < largest:
         problem = f"needs {math.degrees(straight[0][-1]):.3g} deg of rudder to go straight: more than the gear has"
-        raise InputError(model.origin, "", problem, "check Y0 and N0 of the card")
+        raise model.fault("", problem, "check Y0 and N0 of the card")
     most = np.full(len(guess), _MOST_ELSE)
     most[:3] = _FASTEST, _FASTEST, _MOST_YAW
     most[-1] = largest

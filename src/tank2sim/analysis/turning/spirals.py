@@ -20,7 +20,6 @@ from tank2sim.analysis.turning.diagram import SteadyTurning, largest_rudder
 from tank2sim.arrays import Array
 from tank2sim.dynamics.effects import undisturbed_inputs
 from tank2sim.dynamics.model import Input, Model, Quantity, State
-from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import SPIRAL_RUDDERS_DEG, SpiralManoeuvre
 from tank2sim.simulation.run import simulate
@@ -93,7 +92,7 @@ def reverse_spiral(model: Model, turning: SteadyTurning, nomoto: Nomoto) -> Spir
     running = Running(Integrator(held), calm)
     rudders, steady = _held(running, rates, _ship_time(model))
     if not np.isfinite(rudders).all():
-        raise InputError(model.origin, "reverse spiral", "the motion leaves all bounds", "check the card's derivatives")
+        raise model.fault("reverse spiral", "the motion leaves all bounds", "check the card's derivatives")
     return _points(turning, rudders, rates, steady, only_stable=False)
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from tank2sim.apps.ardupilot.physics import NEUTRAL_US, REACH_US, REST_FORCE_MPS2, SitlShip
 from tank2sim.dynamics.effects.surroundings import in_calm
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
 
 CRUISE_PERCENT = 50
 """Throttle of the cruise, per cent: ArduPilot's own default of CRUISE_THROTTLE."""
@@ -75,7 +74,7 @@ def boat_parameters(model: Model) -> BoatParameters:
     """
     model = in_calm(model)
     SitlShip(model)  # refuses a vessel that has not even a length
-    values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    values = model.defaults
     settle = _SETTLING * values["ship.length"] / values["ship.speed"]
     part = CRUISE_PERCENT / 100
     ship = SitlShip(model, values["ship.speed"])
@@ -88,7 +87,7 @@ def boat_parameters(model: Model) -> BoatParameters:
     rate, speed = ship.state("motion.r"), math.hypot(ship.state("motion.u"), ship.state("motion.v"))
     if not rate > 0:
         problem = f"turns with {math.degrees(rate):.3g} deg/s at full steering to starboard"
-        raise InputError(model.origin, "", problem, "check the signs and sizes of the card with simulate")
+        raise model.fault("", problem, "check the signs and sizes of the card with simulate")
     return BoatParameters(
         skid=ship.skid,
         cruise_throttle_percent=CRUISE_PERCENT,

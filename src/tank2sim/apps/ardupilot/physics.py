@@ -17,7 +17,6 @@ import numpy as np
 from tank2sim.analysis.stability.imo import TRIAL_RUDDER
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Input, Model, Parameter
-from tank2sim.errors import InputError
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.thruster_manoeuvres import thruster_sides
 
@@ -103,7 +102,7 @@ class SitlShip:
         self.skid = {1.0, -1.0} <= set(self.sides.values())
         if not self.skid and not {"rudder.command", "propeller.speed"} <= set(model.input_names):
             remedy = "give a craft with thrusters at both sides, or a ship with [propulsion]"
-            raise InputError(model.origin, "", "has no thrusters at both sides, and no rudder with an engine", remedy)
+            raise model.fault("", "has no thrusters at both sides, and no rudder with an engine", remedy)
         start = {"initial.u": speed_mps} if "initial.u" in model.parameter_names else {}
         self._p = model.parameter_values(start)
         places = [model.state_names.index(name) for name in _RATES]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -98,18 +98,20 @@ def figure_slopes(
         raise ArgumentError("figures", bad.text, problem, "ask for another figure, or for another rudder")
     free = np.array([parameter.name in known for parameter in study.parameters])
     covariance = np.where(np.outer(free, free), errors.covariance, 0.0)
-    rng = np.random.default_rng(seed)
-    found = [at_card]
-    for values in rng.multivariate_normal(study.values, covariance, size=draws, method="eigh"):
+    ships = np.random.default_rng(seed).multivariate_normal(study.values, covariance, size=draws, method="eigh")
+    found = np.stack([at_card, *_slopes_of_ships(study, ships, mean)])
+    return FigureSlopes(tuple(figures), mean @ study.base, study.parameters, at_card, found, errors, study.notices)
+
+
+def _slopes_of_ships(study: Study, ships: Array, mean: Array) -> Iterator[Array]:
+    """Slopes of the `mean` figures at each of the ships (draws, parameters) that shows all of them."""
+    for values in ships:
         try:
             slopes = mean @ study.slopes_at(values)[1]
         except InputError:
             continue
         if np.isfinite(slopes).all():
-            found.append(slopes)
-    return FigureSlopes(
-        tuple(figures), mean @ study.base, study.parameters, at_card, np.stack(found), errors, study.notices
-    )
+            yield slopes
 
 
 def hydrodynamic_derivatives(card: ManoeuvringCard) -> dict[str, float]:

@@ -167,15 +167,7 @@ def runs_of_matrix(path: Path, runs: TankRuns) -> tuple[tuple[RunGroup, ...], li
     cannot be read.
     """
     table = list(csv.reader(io.StringIO(read_text(path).removeprefix("\ufeff"))))
-    names = [re.sub(r"\(.*\)|\s", "", name).lower() for name in (table[0] if table else [])]
-    places = {
-        key: names.index(name)
-        for key, known in _COLUMNS.items()
-        if (name := next((n for n in known if n in names), ""))
-    }
-    if not {"drift", "rudder", "sway", "yaw"} & places.keys():
-        remedy = "name columns beta_deg, delta_deg, v_prime, r_prime"
-        raise InputError(path, "header", "has no column of drift, rudder, v' or r'", remedy)
+    places = _places_of_columns(path, table[0] if table else [])
     found: list[RunGroup] = []
     assumed, slower = 0, 0
     for number, cells in enumerate(table[1:], start=2):
@@ -191,16 +183,22 @@ def runs_of_matrix(path: Path, runs: TankRuns) -> tuple[tuple[RunGroup, ...], li
         slower += abs(row.get("speed") or 1.0) != 1.0
     if not found:
         raise InputError(path, "", "has no run", "give a row for each run")
-    notices = []
-    if assumed:
-        notices.append(
-            Notice(f"{path.name}: {assumed} oscillating runs without a frequency have a middle one of this tank")
-        )
-    if slower:
-        notices.append(
-            Notice(f"{path.name}: {slower} rows at other speeds are taken at the test speed, v' and r' as given")
-        )
-    return tuple(found), notices
+    said = {
+        "oscillating runs without a frequency have a middle one of this tank": assumed,
+        "rows at other speeds are taken at the test speed, v' and r' as given": slower,
+    }
+    return tuple(found), [Notice(f"{path.name}: {count} {words}") for words, count in said.items() if count]
+
+
+def _places_of_columns(path: Path, header: Sequence[str]) -> dict[str, int]:
+    """Places of the columns by their keys, the first of the known names of each."""
+    names = [re.sub(r"\(.*\)|\s", "", name).lower() for name in header]
+    present = {key: [name for name in known if name in names] for key, known in _COLUMNS.items()}
+    places = {key: names.index(known[0]) for key, known in present.items() if known}
+    if not {"drift", "rudder", "sway", "yaw"} & places.keys():
+        remedy = "name columns beta_deg, delta_deg, v_prime, r_prime"
+        raise InputError(path, "header", "has no column of drift, rudder, v' or r'", remedy)
+    return places
 
 
 def _number(path: Path, number: int, key: str, cells: list[str], place: int) -> float:

@@ -347,25 +347,25 @@ def _assumptions(design: CaptiveDesign, draws: int) -> list[Notice]:
         ]
         if forces and f"{kind}_share" not in stated:
             lacking.append(f"{kind} of {', '.join(forces)} {100 * share:g} % of the range")
-    if "gain_relative" not in stated:
-        lacking.append(f"gain {100 * gauges.gain_relative:g} %")
-    if "rate_hz" not in stated:
-        lacking.append(f"{gauges.rate_hz:g} independent readings a second")
+    others = {
+        "gain_relative": f"gain {100 * gauges.gain_relative:g} %",
+        "rate_hz": f"{gauges.rate_hz:g} independent readings a second",
+    }
+    lacking += [text for key, text in others.items() if key not in stated]
     found = []
     if lacking:
         found.append(
             caution(f"ASSUMED standard errors of the gauges ([gauges] of the tank states none): {', '.join(lacking)}")
         )
     found += _assumed_of_card(design.card) if draws else ()
-    carriage, model = tank.carriage.model_fields_set, tank.model.model_fields_set
-    body = tank.carriage
-    lengths = {
-        "model": None if "length_m" in model else f"model of {runs.length_m:.3g} m",
-        "way": None if "length_m" in carriage else f"carriage way {body.length_m:g} m",
-        "acceleration": None if "acceleration_mps2" in carriage else f"acceleration {body.acceleration_mps2:g} m/s2",
-        "waiting": None if "waiting_s" in carriage else f"waiting time {body.waiting_s:g} s",
+    carriage = tank.carriage
+    of_carriage = {
+        "length_m": f"carriage way {carriage.length_m:g} m",
+        "acceleration_mps2": f"acceleration {carriage.acceleration_mps2:g} m/s2",
+        "waiting_s": f"waiting time {carriage.waiting_s:g} s",
     }
-    missing = [text for text in lengths.values() if text]
+    missing = [] if "length_m" in tank.model.model_fields_set else [f"model of {runs.length_m:.3g} m"]
+    missing += [text for key, text in of_carriage.items() if key not in carriage.model_fields_set]
     if missing:
         found.append(caution(f"ASSUMED of the tank, because it is not stated: {', '.join(missing)}"))
     return found

@@ -15,7 +15,7 @@ from tank2sim.answer.charts.curves import Plot, PlotSeries, curve_chart
 from tank2sim.answer.charts.parts import plain, series_look
 from tank2sim.answer.charts.rows import runs_of
 from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, channel, layer, layered, tooltips
-from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, records_table, table
+from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table, data_frame, records_table, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.design.captive_design import CaptiveDesign
 from tank2sim.apps.design.plan_files import campaign_template, plan_csv
@@ -46,10 +46,8 @@ class DesignResult(Result[_S]):
     @property
     def figures(self) -> pd.DataFrame:
         """Figures by name: value of the card's ship, standard errors by the design and by the usual programme."""
-        import pandas as pd
-
-        rows = {name: asdict(one) for name, one in self.study.figures.items()}
-        return pd.DataFrame.from_dict(rows, orient="index").dropna(axis=1, how="all").rename_axis("figure")
+        rows = [{"figure": name, **asdict(one)} for name, one in self.study.figures.items()]
+        return data_frame(rows, index="figure").dropna(axis=1, how="all")
 
     def _certainty(self, text: str, seconds: float, unit: str) -> Section:
         charts = _certainty_charts(self.study.certainty, seconds, unit)
@@ -145,9 +143,7 @@ class CampaignDesignResult(DesignResult[CampaignStudy]):
     def runs(self) -> pd.DataFrame:
         """The runs in their order: type, speed, angles, frequency, amplitudes, length of the record, time in the
         tank."""
-        import pandas as pd
-
-        return pd.DataFrame([asdict(row) for row in self.study.runs]).set_index("run")
+        return data_frame(map(asdict, self.study.runs), index="run")
 
     @property
     def plan(self) -> str:
@@ -255,9 +251,7 @@ class TrialDesignResult(DesignResult[TrialStudy]):
     @property
     def manoeuvres(self) -> pd.DataFrame:
         """The manoeuvres in their order: repeats, length (s), time with approach (min), file of the orders."""
-        import pandas as pd
-
-        return pd.DataFrame([asdict(one) for one in self.study.manoeuvres]).set_index("manoeuvre")
+        return data_frame(map(asdict, self.study.manoeuvres), index="manoeuvre")
 
     @property
     def plan(self) -> str:

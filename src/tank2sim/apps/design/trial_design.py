@@ -20,7 +20,7 @@ from tank2sim.apps.design.study import Certainty, PlannedCoefficient
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.estimates import RELATIVE_ERROR
-from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
+from tank2sim.dynamics.card_parameters import CardParameter, JointErrors, card_parameters, joint_errors, study_model
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.gap.outcome.next_test import Explanation, SailedShip
 from tank2sim.gap.outcome.next_test_candidates import Candidate, candidate_manoeuvres, orders_csv
@@ -117,21 +117,14 @@ def design_of_trial(
     InputError: the ship does not show a figure, leaves all bounds in every manoeuvre, or the time is too short.
     """
     slopes = figure_slopes(card, figures, (), draws=0, seed=0, one_side=one_side)
-    stated = {name: RELATIVE_ERROR * abs(value) for name, value in card.derivatives.items() if value}
-    known = replace(card, uncertainty={**stated, **card.uncertainty})
-    estimated = free_parameters(known)  # as identify estimates them: without accelerations
-    parameters = [each for each in card_parameters(known, study_model(known)) if each.name in estimated]
-    errors = joint_errors(known, parameters)
+    parameters, errors = _prior(card)
     free = tuple(parameter.name for parameter in parameters)
     model = study_model(card)
     seen = {name: size for name, size in sensors.items() if name in model}
     ship = SailedShip(Explanation("card", card, free, errors.covariance), seen, 0.0)
     of, information = _candidates(card, ship)
     target = slopes.of([parameter.short for parameter in parameters], slopes.at_card) @ ship.axes
-    if not np.abs(target).max(axis=1).all():
-        row = int(np.argmin(np.abs(target).max(axis=1)))
-        problem = "does not depend on any coefficient of the card with an error"
-        raise ArgumentError("figures", figures[row].text, problem, "state errors in [uncertainty] of the card")
+    _refuse_independent(figures, target)
     cost = np.array([each.total_s for each in of])
     block = InformationBlock(np.eye(ship.axes.shape[1]), information, target_matrices([row[None] for row in target]))
     every = Allocation((block,), cost)
@@ -168,6 +161,24 @@ def design_of_trial(
     )
 
 
+def _prior(card: ManoeuvringCard) -> tuple[list[CardParameter], JointErrors]:
+    """Parameters that :func:`.identify` estimates (no accelerations), and their errors before the trial."""
+    assumed = {name: RELATIVE_ERROR * abs(value) for name, value in card.derivatives.items() if value}
+    known = replace(card, uncertainty={**assumed, **card.uncertainty})
+    estimated = free_parameters(known)
+    parameters = [each for each in card_parameters(known, study_model(known)) if each.name in estimated]
+    return parameters, joint_errors(known, parameters)
+
+
+def _refuse_independent(figures: Sequence[InfluenceFigure], target: Array) -> None:
+    """Refuse a figure whose slopes, a row of `target`, are all zero."""
+    largest = np.abs(target).max(axis=1)
+    if not largest.all():
+        figure = figures[int(np.argmin(largest))].text
+        problem = "does not depend on any coefficient of the card with an error"
+        raise ArgumentError("figures", figure, problem, "state errors in [uncertainty] of the card")
+
+
 def _candidates(card: ManoeuvringCard, ship: SailedShip) -> tuple[list[TrialManoeuvre], Array]:
     """Candidates of all lengths, the longest last, with their information; without those out of bounds."""
     found: list[TrialManoeuvre] = []
@@ -194,7 +205,7 @@ def _candidates(card: ManoeuvringCard, ship: SailedShip) -> tuple[list[TrialMano
             information.append(each[place])
     if not any(each.manoeuvre in _USUAL for each in found):
         problem = "leaves all bounds in every manoeuvre of the usual set"
-        raise InputError(card.source, "", problem, "check the card with tank2sim simulate")
+        raise card.fault("", problem, "check the card with tank2sim simulate")
     return found, np.stack(information)
 
 

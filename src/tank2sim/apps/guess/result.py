@@ -12,7 +12,7 @@ from tank2sim.answer.charts.parts import series_look
 from tank2sim.answer.charts.rows import RowPlot, names_of, row_layers, runs_of
 from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, layered
 from tank2sim.answer.numbers import format_number
-from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, records_table, table
+from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, data_frame, records_table, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.guess.study import GuessedFigure, GuessStudy
 from tank2sim.cards import ManoeuvringCard
@@ -59,14 +59,13 @@ class GuessResult(Result[GuessStudy]):
     @property
     def figures(self) -> pd.DataFrame:
         """Figures by key (m, deg): given, and quantiles of 5, 50 and 95 % by the dimensions alone and found."""
-        import pandas as pd
-
-        rows = {}
+        rows = []
         for key, figure in self.study.figures.items():
             before, after = figure.by_dimensions, figure.found
             spread = {"by_dimensions_p5": before.p5, "by_dimensions_p50": before.p50, "by_dimensions_p95": before.p95}
-            rows[key] = {"given": figure.given, **spread, "p5": after.p5, "p50": after.p50, "p95": after.p95}
-        return pd.DataFrame.from_dict(rows, orient="index").rename_axis("figure")
+            found = {"p5": after.p5, "p50": after.p50, "p95": after.p95}
+            rows.append({"figure": key, "given": figure.given, **spread, **found})
+        return data_frame(rows, index="figure")
 
     @property
     def headline(self) -> tuple[str, ...]:

@@ -365,7 +365,7 @@ class PosterFigures:
         """Figures (n,) by key of ships with parameters `values` (n, k); nan where a ship does not show one."""
         p = np.tile(self._model.parameter_values(), (len(values), 1))
         p[:, self._places] = values
-        faults = mass_faults(self._model, dict(zip(self._model.parameter_names, p.T, strict=True)))
+        faults = mass_faults(self._model, p)
         bad = np.array([bool(fault) for fault in faults])
         found = {}
         for name, manoeuvre in POSTER_MANOEUVRES.items():

@@ -6,9 +6,9 @@ import math
 import tempfile
 from array import array
 from collections import Counter, defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -77,44 +77,59 @@ def read_ardupilot_bin(path: Path) -> VesselLog:
 
     Raises InputError: The file is not such a log, or no message of it is understood.
     """
-    library = optional_library("pymavlink.DFReader", "logs", path)
-    try:
-        if first_bytes(path, 2) == _MAGIC:
-            tables, units, params, unread = _dataflash_tables(library.DFReader_binary(str(path)))
-        else:
-            with tempfile.TemporaryDirectory() as folder:
-                copy = Path(folder) / "log.log"  # the library reads one byte a letter
-                copy.write_bytes(b"".join(text_lines(path)))
-                tables, units, params, unread = _dataflash_tables(library.DFReader_text(str(copy)))
-    except Exception as error:
-        raise unreadable(path, error, "give a whole dataflash log") from None
-    receivers = [table for (kind, _), table in tables.items() if kind.startswith("GPS") and _has_clock(table)]
+    log = _dataflash(path)
+    receivers = [table for (kind, _), table in log.tables.items() if kind.startswith("GPS") and _has_clock(table)]
     gps = next((table for table in receivers if _has_fix(table).any()), None)
     boot, findings = _boot(gps)
     leaps = any(finding.kind == "fault" for finding in findings)
-    findings += not_used("messages", unread)
-    streams = []
-    for (kind, instance), table in tables.items():
+    findings += not_used("messages", log.others)
+    streams = tuple(_dataflash_streams(log, boot, by_receiver=gps is not None and not leaps))
+    if not streams:
+        raise InputError(path, "", "no message of it is understood", "log GPS, ATT, IMU and RCOU")
+    counts = {"messages": sum(len(table["TimeUS"]) for table in log.tables.values())}
+    return VesselLog(path, "ArduPilot dataflash", streams, counts, tuple(findings), gps is not None)
+
+
+class _Dataflash(NamedTuple):
+    """Columns by message and instance, units by message and field, parameters, and the number of all other messages."""
+
+    tables: Mapping[tuple[str, Any], _Table]
+    units: Mapping[tuple[str, str], str]
+    params: Mapping[str, float]
+    others: dict[str, int]
+
+
+def _dataflash(path: Path) -> _Dataflash:
+    library = optional_library("pymavlink.DFReader", "logs", path)
+    try:
+        if first_bytes(path, 2) == _MAGIC:
+            return _dataflash_tables(library.DFReader_binary(str(path)))
+        with tempfile.TemporaryDirectory() as folder:
+            copy = Path(folder) / "log.log"  # the library reads one byte a letter
+            copy.write_bytes(b"".join(text_lines(path)))
+            return _dataflash_tables(library.DFReader_text(str(copy)))
+    except Exception as error:
+        raise unreadable(path, error, "give a whole dataflash log") from None
+
+
+def _dataflash_streams(log: _Dataflash, boot: float, *, by_receiver: bool) -> Iterator[LogStream]:
+    """Streams in UTC; the fixes of a GPS have the time of the receiver if `by_receiver`."""
+    for (kind, instance), table in log.tables.items():
         time = table["TimeUS"] * 1e-6 - boot
-        label = kind if instance in (0, None) and (kind, 1) not in tables else f"{kind}[{instance:.0f}]"
+        label = kind if instance in (0, None) and (kind, 1) not in log.tables else f"{kind}[{instance:.0f}]"
+        fixes = kind in ("GPS", "GPS2") and _has_clock(table)
+        stamps = _utc(table) if fixes and by_receiver else time
+        valid = _status(table) >= _FIX if fixes else np.True_
         for field, (unit, quantity) in _FIELDS.get(kind, {}).items():
             if field not in table or (kind == "XKF1" and instance):
                 continue
-            values, stamps = table[field], time
-            if kind in ("GPS", "GPS2") and _has_clock(table):
-                stamps = time if leaps or gps is None else _utc(table)
-                values = np.where(_status(table) >= _FIX, values, np.nan)
-            stated, meaning = unit_of_text(units.get((kind, field), "")) or unit, (quantity, "format")
+            stated, meaning = unit_of_text(log.units.get((kind, field), "")) or unit, (quantity, "format")
             if kind in ("RPM", "ESC"):  # whose they are is a guess, which the turn confirms or not
-                meaning = _shaft(field, instance, table, sum(other == kind for other, _ in tables))
-            streams.append(LogStream(f"{label}.{field}", stamps, values, stated, *meaning))
+                meaning = _shaft(field, instance, table, sum(other == kind for other, _ in log.tables))
+            yield LogStream(f"{label}.{field}", stamps, np.where(valid, table[field], np.nan), stated, *meaning)
         if kind == "RCOU":
             pulses = {number: table.get(f"C{number}", table.get(f"Ch{number}")) for number in range(1, 17)}
-            streams += _servo_orders(time, pulses, params)
-    if not streams:
-        raise InputError(path, "", "no message of it is understood", "log GPS, ATT, IMU and RCOU")
-    counts = {"messages": sum(len(table["TimeUS"]) for table in tables.values())}
-    return VesselLog(path, "ArduPilot dataflash", tuple(streams), counts, tuple(findings), gps is not None)
+            yield from _servo_orders(time, pulses, log.params)
 
 
 def _has_clock(table: _Table) -> bool:
@@ -156,10 +171,7 @@ def _shaft(field: str, instance: Any, table: _Table, instances: int) -> tuple[st
     return {0: "rpm_port", 1: "rpm_starboard"}.get(int(field[-1]) - 1 if numbered else instance, ""), ""
 
 
-def _dataflash_tables(
-    reader: Any,
-) -> tuple[dict[tuple[str, Any], _Table], dict[tuple[str, str], str], Mapping[str, float], dict[str, int]]:
-    """Columns by message and instance, units by message and field, parameters, and the number of all other messages."""
+def _dataflash_tables(reader: Any) -> _Dataflash:
     wanted = {*_FIELDS, "RCOU"}
     rows: dict[tuple[str, Any], _Rows] = defaultdict(_rows)
     units: dict[tuple[str, str], str] = {}
@@ -177,7 +189,7 @@ def _dataflash_tables(
     counts = reader.counts if isinstance(reader.counts, dict) else dict(enumerate(reader.counts))
     numbers = {form.name: counts.get(key, 0) for key, form in reader.formats.items()}
     others = {kind: number for kind, number in numbers.items() if number and kind not in {*wanted, *_FORMAL}}
-    return {key: _table(group) for key, group in rows.items()}, units, reader.params, others
+    return _Dataflash({key: _table(group) for key, group in rows.items()}, units, reader.params, others)
 
 
 def _table(rows: _Rows) -> _Table:

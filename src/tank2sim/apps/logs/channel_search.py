@@ -153,15 +153,7 @@ def _common_beginning(first: str, second: str) -> int:
 
 def _unnamed_positions(search: ChannelSearch) -> list[_Pair]:
     """The only two streams without a name whose track, as latitude and longitude, a heading or a course follows."""
-    slow = [
-        stream
-        for stream in search.streams
-        if not stream.quantity
-        and stream.unit in ("", "deg")
-        and len(stream.values) >= FEW_SAMPLES
-        and 0 < np.ptp(stream.values) < _LONGEST_VOYAGE_DEG
-        and np.abs(stream.values).max() <= 180
-    ]
+    slow = [stream for stream in search.streams if not stream.quantity and _could_be_position(stream)]
     angles = [s for s in search.streams if s.quantity in ("heading", "cog") or (not s.quantity and _circular(s))]
     found = []
     for first, second in itertools.permutations(slow[:_MOST_TRIED], 2):
@@ -169,13 +161,25 @@ def _unnamed_positions(search: ChannelSearch) -> list[_Pair]:
         track = _track(*pair) if pair else None
         if pair is None or track is None:
             continue
-        others = [angle for angle in angles[:_MOST_TRIED] if angle not in (first, second)]
-        followed = [direction_evidence(*search.angle(angle), track) for angle in others]
-        if any(evidence.known > AGREES and evidence.sign > 0 for evidence in followed):
+        if _is_followed(search, track, [angle for angle in angles[:_MOST_TRIED] if angle not in (first, second)]):
             found.append(pair)
-    for stream in found[0] if len(found) == 1 else ():
+    if len(found) != 1:
+        return []
+    for stream in found[0]:
         search.rename(search.stream(stream.name), stream.quantity)
-    return found if len(found) == 1 else []
+    return found
+
+
+def _is_followed(search: ChannelSearch, track: ReferenceMotion, angles: Iterable[LogStream]) -> bool:
+    """Whether one of the angles follows a track as a heading or a course does."""
+    followed = [direction_evidence(*search.angle(angle), track) for angle in angles]
+    return any(evidence.known > AGREES and evidence.sign > 0 for evidence in followed)
+
+
+def _could_be_position(stream: LogStream) -> bool:
+    if stream.unit not in ("", "deg") or len(stream.values) < FEW_SAMPLES:
+        return False
+    return 0 < float(np.ptp(stream.values)) < _LONGEST_VOYAGE_DEG and float(np.abs(stream.values).max()) <= 180
 
 
 def _track(first: LogStream, second: LogStream) -> ReferenceMotion | None:

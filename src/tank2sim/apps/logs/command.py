@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from tank2sim.api.verbs import Written, verb
-from tank2sim.errors import ArgumentError, InputError
+from tank2sim.errors import ArgumentError
 from tank2sim.files import folder_made, write_together
 
 if TYPE_CHECKING:
@@ -74,8 +74,6 @@ def log(
     from tank2sim.apps.logs.study import study_log
     from tank2sim.apps.logs.trial_files import cut_trials
     from tank2sim.apps.logs.voyage import make_voyage
-    from tank2sim.cards import SteeredBy
-    from tank2sim.dynamics.vessel import as_vessel
     from tank2sim.records.csv_table import is_frame
 
     if isinstance(files, str | Path) or is_frame(files):
@@ -89,10 +87,7 @@ def log(
         channels = folder / CHANNELS_FILE
     with nullcontext() if folder is None else folder_made(folder):
         stated = channels if isinstance(channels, ChannelSet) or channels is None else read_channels(Path(channels))
-        craft = None if card is None else as_vessel(card)
-        if craft is not None and craft.steered().steered_by is SteeredBy.RUDDER:
-            remedy = "give the card of a small craft; of a ship with a rudder run identify on the trials"
-            raise InputError(craft.card.source, "model.kind", f"is {craft.card.model.kind}", remedy)
+        craft = None if card is None else _craft(card)
         voyage = make_voyage([_read(name, file) for name, file in named.items()], stated)
         found = find_stretches(voyage)
         cuts = cut_trials(voyage, found)
@@ -114,6 +109,18 @@ def _read(name: str, file: str | Path | pd.DataFrame) -> VesselLog:
         path = Path(folder) / f"{name}.csv"
         file.to_csv(path, index=file.index.name is not None)
         return replace(read_log(path), path=Path(name))
+
+
+def _craft(card: Vessel | str | Path) -> Vessel:
+    """A small craft; InputError for a ship with a rudder."""
+    from tank2sim.cards import SteeredBy
+    from tank2sim.dynamics.vessel import as_vessel
+
+    craft = as_vessel(card)
+    if craft.steered().steered_by is SteeredBy.RUDDER:
+        remedy = "give the card of a small craft; of a ship with a rudder run identify on the trials"
+        raise craft.card.fault("model.kind", f"is {craft.card.model.kind}", remedy)
+    return craft
 
 
 def _identified(craft: Vessel, cuts: Sequence[TrialCut]) -> CraftIdentificationResult | None:

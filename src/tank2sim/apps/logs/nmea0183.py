@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import datetime as dt
+import itertools
 import math
 import re
 from collections import Counter, defaultdict
@@ -407,23 +408,28 @@ class _Reader:
     def _instruments(self, findings: list[LogFinding]) -> Iterator[tuple[str, str, np.ndarray, Array]]:
         """Kind, name, lines and values of each field of each instrument; talkers that follow each other are one."""
         for kind in dict.fromkeys(kind for kind, _ in self.series):
-            groups: list[list[str]] = []
-            for talker in [talker for other, talker in self.series if other == kind]:
-                home = next((group for group in groups if not self._together(kind, [*group, talker])), None)
-                if home is None:
-                    groups.append([talker])
-                else:
-                    home.append(talker)
+            groups = self._groups(kind)
             if len(groups) > 1:
                 names = ", ".join("/".join(group) for group in groups)
                 text = f"{kind} comes from {len(groups)} instruments at the same time: {names}"
                 findings.append(note(text, kind))
-            for fields in ([self.series[kind, talker] for talker in group] for group in groups):
-                for name in dict.fromkeys(name for field in fields for name in field):
+            for group in groups:
+                fields = [self.series[kind, talker] for talker in group]
+                for name in dict.fromkeys(itertools.chain(*fields)):
                     parts = [field[name] for field in fields if name in field]
                     lines = np.concatenate([np.array(part.lines) for part in parts])
                     order = np.argsort(lines, kind="stable")
                     yield kind, name, lines[order], np.concatenate([np.array(part.values) for part in parts])[order]
+
+    def _groups(self, kind: str) -> list[list[str]]:
+        """Talkers of a kind of sentence, those that follow each other in one group."""
+        groups: list[list[str]] = []
+        for talker in (talker for other, talker in self.series if other == kind):
+            home = next((group for group in groups if not self._together(kind, [*group, talker])), None)
+            if home is None:
+                groups.append(home := [])
+            home.append(talker)
+        return groups
 
     def _together(self, kind: str, talkers: list[str]) -> bool:
         """Whether the sentences of these talkers lie between each other."""

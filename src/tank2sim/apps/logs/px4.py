@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 from tank2sim.apps.logs.clock import board_start
 from tank2sim.apps.logs.streams import (
     FIELDS,
+    LogFinding,
     LogStream,
     VesselLog,
     fault,
@@ -48,11 +50,7 @@ def read_px4_ulog(path: Path) -> VesselLog:
         topics = {(name, instance): data for (name, instance), data in topics.items() if name != "sensor_gps"}
     receivers = [data for (name, _), data in topics.items() if name in _RECEIVERS]
     gps = next((data for data in receivers if _utc_of(data).any()), None)
-    boot, findings = 0.0, [note("no GPS of it has a UTC: the trials have no date")]
-    if gps is not None:
-        known = gps["time_utc_usec"] > 0
-        lag, findings = gps["timestamp"][known] * 1e-6 - gps["time_utc_usec"][known] * 1e-6, []
-        boot = board_start(lag, "sensor_gps", findings)
+    boot, findings = _boot(gps)
     streams = list(_streams(topics, boot, int(log.initial_parameters.get("CA_AIRFRAME", -1))))
     if not streams:
         raise InputError(path, "", "no topic of it is understood", "log sensor_gps, vehicle_attitude, actuator_*")
@@ -67,13 +65,30 @@ def read_px4_ulog(path: Path) -> VesselLog:
     return VesselLog(path, "PX4 ULog", tuple(streams), counts, tuple(findings), gps is not None)
 
 
+def _boot(gps: dict[str, Any] | None) -> tuple[float, list[LogFinding]]:
+    """Time of the board at UTC 0, s, and faults of the receiver's clock."""
+    if gps is None:
+        return 0.0, [note("no GPS of it has a UTC: the trials have no date")]
+    findings: list[LogFinding] = []
+    known = gps["time_utc_usec"] > 0
+    lag = gps["timestamp"][known] * 1e-6 - gps["time_utc_usec"][known] * 1e-6
+    return board_start(lag, "sensor_gps", findings), findings
+
+
 def _utc_of(data: dict[str, Any]) -> Array:
     """UTC of the fixes of a receiver (n,), us since 1970; 0 where it is not known."""
     return np.asarray(data.get("time_utc_usec", np.zeros(len(data["timestamp"]))))
 
 
 def _streams(topics: dict[tuple[str, int], dict[str, Any]], boot: float, airframe: int) -> Iterator[LogStream]:
-    ordered = any(name in ("actuator_motors", "actuator_servos") for name, _ in topics)
+    readers: dict[str, Callable[[str, Array, dict[str, Any]], Iterator[LogStream]]] = {
+        "vehicle_attitude": _attitude,
+        "esc_status": _shafts,
+        "actuator_servos": _rudder_order,
+        "actuator_motors": partial(_motor_orders, airframe),
+    }
+    if not any(name in ("actuator_motors", "actuator_servos") for name, _ in topics):
+        readers["actuator_outputs"] = _pulses  # logs of before PX4 1.13 have pulses alone
     for (name, instance), data in topics.items():
         time = data["timestamp"] * 1e-6 - boot
         label = name if instance == 0 and (name, 1) not in topics else f"{name}[{instance}]"
@@ -89,23 +104,36 @@ def _streams(topics: dict[tuple[str, int], dict[str, Any]], boot: float, airfram
                 if name == "rpm" and ("rpm", 1) in topics:  # a guess, which the turn confirms or not
                     meaning = (("rpm_port", "rpm_starboard")[min(instance, 1)], "")
                 yield LogStream(f"{label}.{field}", time, values, unit, *meaning)
-        if name == "vehicle_attitude":
-            roll, yaw = heading_of_quaternion(*(data[f"q[{place}]"].astype(float) for place in range(4)))
-            yield LogStream(f"{label}.heading", time, yaw % (2 * np.pi), "rad", "heading", "format")
-            yield LogStream(f"{label}.heel", time, roll, "rad", "heel", "format")
-        if name == "esc_status":  # of two, PX4 numbers the right one first, which the turn confirms
-            speeds = {key: values for key, values in _columns(data, ".esc_rpm") if np.abs(values).max() > 0}
-            quantities = ("rpm",) if len(speeds) == 1 else ("rpm_starboard", "rpm_port")
-            yield from _orders(label, time, speeds, "rpm", quantities)
-        if name == "actuator_servos":
-            yield from _orders(name, time, _controls(data), "1", ("rudder_order",), "name")
-        if name == "actuator_motors":
-            two = ("thrust_order_starboard", "thrust_order_port") if airframe == _AIRFRAME_ROVER_DIFFERENTIAL else ()
-            controls = _controls(data)
-            yield from _orders(name, time, controls, "1", {1: ("rpm_order",), 2: two}.get(len(controls), ()))
-        if name == "actuator_outputs" and not ordered:  # logs of before PX4 1.13 have pulses alone
-            for key, pulses in _columns(data, "output["):
-                yield LogStream(f"{label}.{key}", time, np.where(pulses > 0, pulses, np.nan), "us")
+        if name in readers:
+            yield from readers[name](label, time, data)
+
+
+def _attitude(label: str, time: Array, data: dict[str, Any]) -> Iterator[LogStream]:
+    roll, yaw = heading_of_quaternion(*(data[f"q[{place}]"].astype(float) for place in range(4)))
+    yield LogStream(f"{label}.heading", time, yaw % (2 * np.pi), "rad", "heading", "format")
+    yield LogStream(f"{label}.heel", time, roll, "rad", "heel", "format")
+
+
+def _shafts(label: str, time: Array, data: dict[str, Any]) -> Iterator[LogStream]:
+    """Revolutions; of two shafts, PX4 numbers the right one first, which the turn confirms."""
+    speeds = {key: values for key, values in _columns(data, ".esc_rpm") if np.abs(values).max() > 0}
+    quantities = ("rpm",) if len(speeds) == 1 else ("rpm_starboard", "rpm_port")
+    return _orders(label, time, speeds, "rpm", quantities)
+
+
+def _rudder_order(label: str, time: Array, data: dict[str, Any]) -> Iterator[LogStream]:
+    return _orders(label, time, _controls(data), "1", ("rudder_order",), "name")
+
+
+def _motor_orders(airframe: int, label: str, time: Array, data: dict[str, Any]) -> Iterator[LogStream]:
+    two = ("thrust_order_starboard", "thrust_order_port") if airframe == _AIRFRAME_ROVER_DIFFERENTIAL else ()
+    controls = _controls(data)
+    return _orders(label, time, controls, "1", {1: ("rpm_order",), 2: two}.get(len(controls), ()))
+
+
+def _pulses(label: str, time: Array, data: dict[str, Any]) -> Iterator[LogStream]:
+    for key, pulses in _columns(data, "output["):
+        yield LogStream(f"{label}.{key}", time, np.where(pulses > 0, pulses, np.nan), "us")
 
 
 def _columns(data: dict[str, Any], part: str) -> list[tuple[str, Array]]:

@@ -10,7 +10,18 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from tank2sim.answer.charts.motion import History, Signal, TimeMark, TrackData, history_chart, track_chart
-from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, Table, Verdict, records_table, table
+from tank2sim.answer.parts import (
+    Cell,
+    Column,
+    Illustration,
+    KeyFigure,
+    Section,
+    Table,
+    Verdict,
+    data_frame,
+    records_table,
+    table,
+)
 from tank2sim.answer.result import Result
 from tank2sim.apps.logs.channels import CHANNELS_FILE, channels_text
 from tank2sim.apps.logs.gear import LoggedGear
@@ -84,16 +95,12 @@ class LogResult(Result[LogStudy]):
     @property
     def channels(self) -> pd.DataFrame:
         """Channels, a row each: quantity, stream, unit, sign, confidence, use, why."""
-        import pandas as pd
-
-        return pd.DataFrame([asdict(channel) for channel in self.study.channels])
+        return data_frame(map(asdict, self.study.channels))
 
     @property
     def stretches(self) -> pd.DataFrame:
         """Stretches, a row each: kind, UTC, begin and duration (s), rudder, heading change (deg), speeds, file."""
-        import pandas as pd
-
-        return pd.DataFrame([{**asdict(stretch), "kind": stretch.kind.value} for stretch in self.study.stretches])
+        return data_frame([{**asdict(stretch), "kind": stretch.kind.value} for stretch in self.study.stretches])
 
     @property
     def identified(self) -> CraftIdentificationResult | None:
@@ -105,10 +112,8 @@ class LogResult(Result[LogStudy]):
     @property
     def series(self) -> dict[str, pd.DataFrame]:
         """Quantity to a frame of ``time_s`` (UTC, s since 1970) and ``value`` (SI) of each channel in use."""
-        import pandas as pd
-
         series = self.voyage.series if self.voyage else {}
-        return {name: pd.DataFrame({"time_s": entry.time_s, "value": entry.values}) for name, entry in series.items()}
+        return {name: data_frame({"time_s": entry.time_s, "value": entry.values}) for name, entry in series.items()}
 
     @property
     def current(self) -> DriftCurrent | None:

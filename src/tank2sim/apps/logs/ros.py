@@ -64,6 +64,19 @@ def read_ros_bag(path: Path) -> VesselLog:
 
     Raises InputError: The file is cut off or is not a bag, or no message of it has a number.
     """
+    topics, failed = _topics(path)
+    findings = [note(f"{topic} cannot be decoded ({why})", topic) for topic, why in failed.items()]
+    simulated = _simulated_times(topics, findings)
+    streams = [stream for topic in topics for stream in topic.streams(simulated, findings)]
+    if not streams:
+        raise InputError(path, "", "no message of it holds a number", "record topics with measured values")
+    counts = {"messages": sum(len(topic.received) for topic in topics), "undecoded_topics": len(failed)}
+    form = "MCAP" if _suffix(path) == ".mcap" else "ROS bag"
+    return VesselLog(path, form, tuple(streams), counts, tuple(findings), simulated is None)
+
+
+def _topics(path: Path) -> tuple[list[_Topic], dict[str, str]]:
+    """Topics of a bag with their messages, and by name of the error the topics that cannot be decoded."""
     highlevel = optional_library("rosbags.highlevel", "logs", path)
     stores = optional_library("rosbags.typesys", "logs", path)
     store = stores.get_typestore(stores.Stores.LATEST)
@@ -88,14 +101,7 @@ def read_ros_bag(path: Path) -> VesselLog:
     except Exception as error:
         remedy = "it may be cut off: repair it with 'rosbag reindex' or 'mcap recover'"
         raise unreadable(path, error, remedy, "cannot be read to its end") from None
-    findings = [note(f"{topic} cannot be decoded ({why})", topic) for topic, why in failed.items()]
-    simulated = _simulated_times(topics.values(), findings)
-    streams = [stream for topic in topics.values() for stream in topic.streams(simulated, findings)]
-    if not streams:
-        raise InputError(path, "", "no message of it holds a number", "record topics with measured values")
-    counts = {"messages": sum(len(topic.received) for topic in topics.values()), "undecoded_topics": len(failed)}
-    form = "MCAP" if _suffix(path) == ".mcap" else "ROS bag"
-    return VesselLog(path, form, tuple(streams), counts, tuple(findings), simulated is None)
+    return list(topics.values()), failed
 
 
 def _named(path: Path, folder: Path) -> Path:

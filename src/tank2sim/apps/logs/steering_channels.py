@@ -171,6 +171,13 @@ def _judge_rudder(search: ChannelSearch, stream: LogStream) -> None:
             search.findings.append(note(f"{stream.name} is positive to port", stream.name))
     if found.confidence < DIFFERS:
         search.fault(stream.name, found.why)
+    _doubt_rudder(found, zero)
+    search.add(found)
+
+
+def _doubt_rudder(found: Judgement, zero: float) -> None:
+    """Lower the confidence in a rudder whose kind, unit, size or zero is uncertain."""
+    stream = found.stream
     if stream.quantity == "rudder_order" and not stream.unit and found.unit == "deg":
         found.doubt(_DOUBTED, "; deg by its size, and it may be in %")
     if stream.quantity == "rudder_angle" and stream.stated_by == "name" and _held_share(stream) > _HOLDS:
@@ -183,31 +190,36 @@ def _judge_rudder(search: ChannelSearch, stream: LogStream) -> None:
         found.doubt(0.6, "; its unit is known by its size alone")
     if zero:
         found.doubt(STATED["name"], f"; {zero:.4g} on straight legs is taken as its zero")
-    search.add(found)
 
 
 def _find_unnamed_rudder(search: ChannelSearch) -> None:
     """The stream without a name that leads the turn as a rudder does; none where no rate of turn is known."""
     rates = [best.confidence for name in ("yaw_rate", "heading") if (best := search.best(name)) is not None]
+    candidates = _leading_the_turn(search) if rates else []
+    rivals = [evidence.known for evidence, stream in candidates if not _alike(candidates[0][1], stream)]
+    for place, (evidence, stream) in enumerate(candidates):
+        why = f"by content alone: {evidence.text}"
+        if not rivals or (place == 0 and evidence.known > rivals[0] + _CLEARLY):
+            confidence = 0.75 if max(rates) > 0.8 else 0.7
+        else:
+            confidence = 0.7 if place == 0 else 0.5
+            why += f"; the same is true of {', '.join(other.name for _, other in candidates if other is not stream)}"
+        quantity = "rudder_order" if _held_share(stream) > _HOLDS else "rudder_angle"
+        unit = stream.unit or rudder_unit(stream.values)
+        search.add(Judgement(stream, confidence, why, unit, evidence.sign), quantity)
+
+
+def _leading_the_turn(search: ChannelSearch) -> list[tuple[ContentEvidence, LogStream]]:
+    """Streams without a name that the turn follows as it follows a rudder, the clearest first."""
     taken = {channel.stream for channel in search.found if channel.confidence >= USED_FROM}
-    candidates: list[tuple[ContentEvidence, LogStream]] = []
-    for stream in search.streams if rates else ():
+    found: list[tuple[ContentEvidence, LogStream]] = []
+    for stream in search.streams:
         if stream.name in taken or stream.quantity or np.ptp(stream.values) == 0 or names_another(stream.name):
             continue
         evidence = _evidence(search, *search.thin(stream))
         if evidence.known > AGREES and evidence.lag_s >= 1.0 and (stream.unit or rudder_unit(stream.values)):
-            candidates.append((evidence, stream))
-    candidates.sort(key=lambda entry: -entry[0].known)
-    for place, (evidence, stream) in enumerate(candidates):
-        quantity = "rudder_order" if _held_share(stream) > _HOLDS else "rudder_angle"
-        others = [entry for entry in candidates if not _alike(candidates[0][1], entry[1])]
-        clear = not others or (place == 0 and evidence.known > others[0][0].known + _CLEARLY)
-        why = f"by content alone: {evidence.text}"
-        if not clear:
-            why += f"; the same is true of {', '.join(other.name for _, other in candidates if other is not stream)}"
-        confidence = (0.75 if max(rates) > 0.8 else 0.7) if clear else 0.7 if place == 0 else 0.5
-        unit = stream.unit or rudder_unit(stream.values)
-        search.add(Judgement(stream, confidence, why, unit, evidence.sign), quantity)
+            found.append((evidence, stream))
+    return sorted(found, key=lambda entry: -entry[0].known)
 
 
 def _alike(first: LogStream, second: LogStream) -> bool:

@@ -212,30 +212,42 @@ class _TableClock:
         known = (*self.named, *self.dates)
         self.clocks = [name for name in first if name not in known and _LIKE_TIME.match(first[name])]
         self.first = first
+        self.leftmost = list(self.columns)[:1]
 
     def times(self) -> tuple[Array, bool, set[str]]:
         """Times (rows,), whether they are UTC, and the columns that they are made of."""
-        leftmost = list(self.columns)[:1]
-        for name in [*self.named, *self.dates, *self.clocks, *leftmost]:
+        found = self._dated() or self._of_day() or self._from_beginning()
+        if found is not None:
+            return found
+        problem = "it is not a log of a known format, and as a table there is no column of time"
+        remedy = "give a column of ISO 8601 times, of date and time, or of seconds"
+        raise InputError(self.path, "header", problem, remedy)
+
+    def _dated(self) -> tuple[Array, bool, set[str]] | None:
+        for name in [*self.named, *self.dates, *self.clocks, *self.leftmost]:
             found = self._counted(name) if name in self.numbers else self._written(name)
             if found is not None:
                 return found[0], True, {name, *found[1]}
-        for name in [*self.named, *self.clocks, *leftmost]:
+        return None
+
+    def _of_day(self) -> tuple[Array, bool, set[str]] | None:
+        for name in [*self.named, *self.clocks, *self.leftmost]:
             of_day = _clock(self.columns[name]) if re.match(r"\d{1,2}:\d\d", self.first[name]) else None
             if name in self.numbers and self._stated_count(name) is None:
                 of_day = _clock_of_numbers(self.numbers[name])
             if of_day is not None:
                 self._note(name, "has times of day without a date: the trials have no date")
                 return over_midnight(of_day), False, {name}
-        for name in self.named or leftmost:
+        return None
+
+    def _from_beginning(self) -> tuple[Array, bool, set[str]] | None:
+        for name in self.named or self.leftmost:
             values = self.numbers.get(name, np.zeros(0))
             steps = np.diff(values[np.isfinite(values)])
             if len(steps) and (steps >= 0).mean() > 0.9:
                 self._note(name, "counts from the beginning of the log: the trials have no date")
                 return values * (self._stated_count(name) or self._count_by_motion(name)), False, {name}
-        problem = "it is not a log of a known format, and as a table there is no column of time"
-        remedy = "give a column of ISO 8601 times, of date and time, or of seconds"
-        raise InputError(self.path, "header", problem, remedy)
+        return None
 
     def _note(self, name: str, text: str) -> None:
         self.findings.append(note(f"{name} {text}", name))

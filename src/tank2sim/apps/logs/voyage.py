@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from tank2sim.apps.logs.channel_search import find_channels
-from tank2sim.apps.logs.channels import SURE_FROM, ChannelSet
+from tank2sim.apps.logs.channels import SURE_FROM, ChannelSet, LogChannel
 from tank2sim.apps.logs.clock import gaps_of, tidied, utc_text
 from tank2sim.apps.logs.content import AGREES
 from tank2sim.apps.logs.quantities import QUANTITIES
@@ -252,18 +252,7 @@ _ESSENTIAL = ("rudder_angle", "rudder_order", "heading", "yaw_rate")
 
 def _to_confirm(found: ChannelSet) -> list[LogFinding]:
     """Findings of channels in use that are not sure, and of quantities whose only streams are not used."""
-    findings, others = [], []
-    for channel in found.channels:
-        if not channel.use or channel.confidence >= SURE_FROM:
-            continue
-        words = QUANTITIES[channel.quantity].words
-        if channel.confidence < 0.8 and channel.quantity in _ESSENTIAL:
-            text = f"{words} is taken from {channel.stream} ({channel.why}): to be confirmed"
-            findings.append(fault(text, channel.stream))
-        else:
-            others.append(f"{words} ({channel.stream})")
-    if others:
-        findings.append(note(f"to be confirmed in channels.toml: {', '.join(others)}"))
+    findings = _unsure([channel for channel in found.channels if channel.use and channel.confidence < SURE_FROM])
     used = {channel.quantity: channel.stream for channel in found.channels if channel.use}
     for quantity in _ESSENTIAL:
         best = next((channel for channel in found.channels if channel.quantity == quantity), None)
@@ -276,6 +265,19 @@ def _to_confirm(found: ChannelSet) -> list[LogFinding]:
         text += 'channels.toml (quantity = "heading", offset = less the variation in deg, + east, and the deviation)'
         findings.append(fault(text, name))
     return findings
+
+
+def _unsure(channels: Iterable[LogChannel]) -> list[LogFinding]:
+    """Faults of doubtful channels without which no manoeuvre is understood, and one note of all others."""
+    findings, others = [], []
+    for channel in channels:
+        words = QUANTITIES[channel.quantity].words
+        if channel.confidence < 0.8 and channel.quantity in _ESSENTIAL:
+            text = f"{words} is taken from {channel.stream} ({channel.why}): to be confirmed"
+            findings.append(fault(text, channel.stream))
+        else:
+            others.append(f"{words} ({channel.stream})")
+    return [*findings, note(f"to be confirmed in channels.toml: {', '.join(others)}")] if others else findings
 
 
 def _derived(series: dict[str, QuantitySeries]) -> tuple[dict[str, QuantitySeries], tuple[float, float] | None]:

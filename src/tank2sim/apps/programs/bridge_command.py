@@ -36,7 +36,7 @@ from tank2sim.apps.programs.bridge_command_yaw import (
     moment_astern,
     sailed,
 )
-from tank2sim.apps.programs.program_files import FigureChange, ProgramFiles, start_values
+from tank2sim.apps.programs.program_files import FigureChange, ProgramFiles
 from tank2sim.arrays import Array
 from tank2sim.cards.card import Card, MmgCard, SteeredCard
 from tank2sim.cards.small_craft import cruising_revolutions
@@ -116,7 +116,7 @@ def _particular(card: SteeredCard, name: str) -> float:
 
 def _of_ship(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[FigureChange], list[str]]:
     """Numbers of a ship with a rudder, figures before and after, and losses."""
-    values = start_values(model)
+    values = model.defaults
     speed, length = values["ship.speed"], values["ship.length"]
     runs = straight_runs_of_card(model)
     turned = math.radians(runs.pop(HEADING_ASTERN, 0.0))
@@ -222,7 +222,7 @@ def box_mesh(length_m: float, beam_m: float, height_m: float) -> str:
 def _losses_of_ship(model: Model) -> list[str]:
     """Parts of a ship with a rudder that Bridge Command lacks, in numbers."""
     # A card without limits of its gear turns with 35 deg, as IMO's turning circle does.
-    largest = math.degrees(start_values(model).get("steering.max_angle", math.radians(35.0)))
+    largest = math.degrees(model.defaults.get("steering.max_angle", math.radians(35.0)))
     turn = simulate(model, Turn(math.radians(min(largest, LARGEST_RUDDER_DEG)))).figures
     found = []
     if largest > LARGEST_RUDDER_DEG:

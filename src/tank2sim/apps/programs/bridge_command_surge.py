@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tank2sim.apps.programs.program_files import start_values
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.simulation.card_range import single_figures
@@ -98,7 +97,7 @@ def straight_runs(surge: SurgeNumbers, speed_mps: float) -> Runs:
 def _held(model: Model, speed: float, revolutions: float | None) -> Running:
     """60 L/u0 from a speed, at an order of the engine, on a course that a helmsman holds."""
     orders = {} if revolutions is None else {"propeller.speed": revolutions}
-    running, values = Running(Integrator(model), orders, {"initial.u": speed}), start_values(model)
+    running, values = Running(Integrator(model), orders, {"initial.u": speed}), model.defaults
     ship_time, largest = values["ship.length"] / values["ship.speed"], values.get("steering.max_angle", 0.6)
     for _ in range(600):
         rudder = -running.state("motion.psi") - 1.5 * ship_time * running.state("motion.r")
@@ -115,7 +114,7 @@ def straight_runs_of_card(model: Model) -> Runs:
 
     Raises InputError: A run leaves all bounds.
     """
-    speed = start_values(model)["ship.speed"]
+    speed = model.defaults["ship.speed"]
     run = _held(model, 0.5 * speed, None).trajectory()
     way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(run["motion.x"]), np.diff(run["motion.y"])))])
     found: Runs = {}

@@ -19,7 +19,6 @@ import casadi as ca
 import numpy as np
 
 from tank2sim.apps.programs.bridge_command_surge import SurgeNumbers, full_ahead_order
-from tank2sim.apps.programs.program_files import start_values
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.simulation.card_range import single_figures
@@ -146,7 +145,7 @@ def courses_of_card(model: Model, half_mps: float, slow_mps: float | None) -> tu
 
     `half_mps`, `slow_mps`: Speed at half thrust in Bridge Command and of the card (None without an engine).
     """
-    values, asked = start_values(model), []
+    values, asked = model.defaults, []
     largest = min(LARGEST_RUDDER_DEG, math.degrees(values.get("steering.max_angle", math.pi)))
     for angle, side in product(_TURNS_DEG, (1, -1)):
         if angle <= largest + 1e-9:
@@ -177,7 +176,7 @@ def fitted_yaw(
     """
     from scipy.optimize import least_squares
 
-    values = start_values(model)
+    values = model.defaults
     full, shown = values["ship.speed"], ~np.isnan(wanted)
     ship_time, share = values["ship.length"] / full, _share_of_card(model, full)
 

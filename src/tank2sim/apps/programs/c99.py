@@ -13,7 +13,6 @@ from tank2sim.cards import Card, SteeredBy, SteeredCard
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.simulator_interface import with_simulator_interface
-from tank2sim.errors import InputError
 from tank2sim.fmu.c99 import TOLERANCES, PlainShip, plain_ship
 from tank2sim.native.compiler import find_compiler
 from tank2sim.native.library import cached_library
@@ -93,6 +92,6 @@ class PlainIntegrator(Integrator):
         states[0] = x
         for k in range(n):
             if self._step(place, h) != 0 and h > 0:
-                raise InputError(self.model.origin, "", "the motion leaves all bounds in ship.c", "check the card")
+                raise self.model.fault("", "the motion leaves all bounds in ship.c", "check the card")
             states[k + 1] = self._x
         return states

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import comb
 
@@ -70,36 +70,17 @@ def _rewritten(
     stated = tuple(dict.fromkeys([*card.derivatives, *card.uncertainty]))
     names, matrix = shift_matrix(stated, ahead)
     values = matrix @ np.array([card.derivatives.get(name, 0.0) for name in stated])
-    known = read_covariance(card)
-    covariance = np.diag([card.uncertainty.get(name, 0.0) ** 2 for name in stated])
     places = {name: f"derivatives.{card.places.get(name, name)}" for name in names}
-    if known is not None:
-        rows = [row for row, name in enumerate(stated) if places[name] in known.names]
-        columns = [known.names.index(places[stated[row]]) for row in rows]
-        old = np.array([card.file_factor(stated[row]) for row in rows])
-        covariance[np.ix_(rows, rows)] = known.matrix[np.ix_(columns, columns)] / np.outer(old, old)
-    covariance = matrix @ covariance @ matrix.T
+    known = read_covariance(card)
+    covariance = matrix @ _covariance_of(card, stated, known, places) @ matrix.T
 
     def factor(name: str) -> float:
         sign = OPPOSITE.get(card.places.get(name, name), (name, 1.0))[1]
         return sign * file_factor(known_term(name), scales, rudder_to_port=to_port)
 
-    changes: dict[str, object] = {}
-    if wanted.scaling:
-        changes["model.scaling"] = wanted.scaling
-    if wanted.rudder_sign:
-        changes["model.rudder_sign"] = wanted.rudder_sign
-    body = shifted_body(card.rigid_body, ahead)
-    of_mass, of_inertia, of_length = (scales.mass, scales.inertia, scales.length) if scales else (1.0, 1.0, 1.0)
-    changes |= {
-        "rigid_body.mass": _written(body.mass * of_mass),
-        "rigid_body.yaw_inertia": _written(body.yaw_inertia * of_inertia),
-        "rigid_body.x_G": _written(body.x_G * of_length),
-    }
-    if card.roll is not None:
-        changes |= roll_in_file(card.roll, of_inertia, of_length)
-    if card.propulsion is not None and card.model.kind != "mmg":
-        changes["propulsion.Xnn"] = _written(card.propulsion.Xnn * (scales.force if scales else 1.0))
+    stated_conventions = {"model.scaling": wanted.scaling, "model.rudder_sign": wanted.rudder_sign}
+    changes: dict[str, object] = {key: value for key, value in stated_conventions.items() if value}
+    changes |= _body_in_file(card, scales, ahead)
     errors = np.sqrt(np.diag(covariance))
     for name, value, error in zip(names, values, errors, strict=True):
         if name in card.derivatives or value:
@@ -116,6 +97,37 @@ def _rewritten(
     sizes = np.array([factor(names[row]) for row in kept])
     matrix_in_file = covariance[np.ix_(kept, kept)] * np.outer(sizes, sizes)
     return replace(new, covariance=Covariance(tuple(places[names[row]] for row in kept), matrix_in_file))
+
+
+def _covariance_of(
+    card: ManoeuvringCard, stated: Sequence[str], known: Covariance | None, places: Mapping[str, str]
+) -> Array:
+    """Covariance (prime) of the derivatives `stated`: the card's `known` one, else by their standard errors alone."""
+    covariance: Array = np.diag([card.uncertainty.get(name, 0.0) ** 2 for name in stated])
+    if known is not None:
+        rows = [row for row, name in enumerate(stated) if places[name] in known.names]
+        columns = [known.names.index(places[stated[row]]) for row in rows]
+        old = np.array([card.file_factor(stated[row]) for row in rows])
+        covariance[np.ix_(rows, rows)] = known.matrix[np.ix_(columns, columns)] / np.outer(old, old)
+    return covariance
+
+
+def _body_in_file(card: ManoeuvringCard, scales: FileScales | None, ahead: float) -> dict[str, float]:
+    """Rigid body, roll and propulsion by dotted key, about an origin `ahead` lengths forward."""
+    body = shifted_body(card.rigid_body, ahead)
+    force, mass, inertia, length = (
+        (scales.force, scales.mass, scales.inertia, scales.length) if scales else (1.0, 1.0, 1.0, 1.0)
+    )
+    written = {
+        "rigid_body.mass": _written(body.mass * mass),
+        "rigid_body.yaw_inertia": _written(body.yaw_inertia * inertia),
+        "rigid_body.x_G": _written(body.x_G * length),
+    }
+    if card.roll is not None:
+        written |= roll_in_file(card.roll, inertia, length)
+    if card.propulsion is not None and card.model.kind != "mmg":
+        written["propulsion.Xnn"] = _written(card.propulsion.Xnn * force)
+    return written
 
 
 def roll_in_file(roll: Roll, inertia: float, length: float) -> dict[str, float]:

@@ -21,7 +21,7 @@ import numpy as np
 import tomlkit
 
 from tank2sim.apps.programs.conventions import roll_in_file
-from tank2sim.apps.programs.program_files import PolynomialFit, standard_manoeuvres, start_values
+from tank2sim.apps.programs.program_files import PolynomialFit, standard_manoeuvres
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard, MmgCard
 from tank2sim.cards.covariance import Covariance, not_referring
@@ -68,7 +68,7 @@ def scattered_motions(model: Model, motions: Array, scatter: float = SCATTER) ->
 
     `motions` (n, 4): u, v, r, rudder, SI; `scatter`: Over :data:`SPREADS`. Returns :data:`SCATTERED_MOTIONS` of them.
     """
-    values = start_values(model)
+    values = model.defaults
     u0, length = values["ship.speed"], values["ship.length"]
     largest = values.get("steering.max_angle", math.pi / 2)
     generator = np.random.default_rng(_SEED)
@@ -102,10 +102,8 @@ def fit_polynomial(card: MmgCard, model: Model, motions: Array) -> PolynomialFit
     slopes = _force_slopes(card, model, motions, numbers)
     sensitivity = [[float(number == f"derivatives.{name}") for number in numbers] for name in derivatives]
     residuals = {}
-    symmetric = is_symmetric(card)
     for row, force in enumerate("XYNK"[: len(forces)]):
-        every = ABKOWITZ_TERMS[force] if force != "K" else tuple(f"K{name[1:]}" for name in ABKOWITZ_TERMS["Y"])
-        names = [name for name in every if not symmetric or _of_symmetric_ship(name)]
+        names = _terms_of(force, symmetric=is_symmetric(card))
         design = np.column_stack([_powers(name, primes) for name in names])
         sizes = np.sqrt(np.mean(design**2, axis=0))
         found, _, rank, _ = np.linalg.lstsq(design / np.where(sizes > 0, sizes, 1.0), forces[row], rcond=1e-12)
@@ -116,16 +114,27 @@ def fit_polynomial(card: MmgCard, model: Model, motions: Array) -> PolynomialFit
         sensitivity += (np.linalg.lstsq(design / sizes, slopes[row], rcond=1e-12)[0] / sizes[:, None]).tolist()
         error = design @ coefficients - forces[row]
         residuals[force] = float(np.sqrt(np.mean(error**2) / np.mean(forces[row] ** 2)))
-    u0, speed = card.model.speed_mps, np.hypot(motions[:, 0], motions[:, 1])
-    visited = {
-        "u": motions[:, 0] / u0,
-        "drift_deg": np.degrees(np.arctan2(-motions[:, 1], motions[:, 0])),
-        "yaw_rate_prime": motions[:, 2] * card.ship.length_m / speed,
-        "rudder_deg": np.degrees(motions[:, 3]),
-    }
-    ranges = {name: (float(np.quantile(v, 0.005)), float(np.quantile(v, 0.995))) for name, v in visited.items()}
     covariance = None if errors is None else _carried(np.array(sensitivity), errors, numbers)
-    return PolynomialFit(derivatives, _effect_of_revolutions(card, model), residuals, ranges, covariance)
+    revolutions = _effect_of_revolutions(card, model)
+    return PolynomialFit(derivatives, revolutions, residuals, _ranges(card, motions), covariance)
+
+
+def _terms_of(force: str, *, symmetric: bool) -> list[str]:
+    """Terms of the polynomial of a force; the moment K has those of Y."""
+    every = ABKOWITZ_TERMS["Y" if force == "K" else force]
+    return [force + name[1:] for name in every if not symmetric or _of_symmetric_ship(force + name[1:])]
+
+
+def _ranges(card: MmgCard, motions: Array) -> dict[str, tuple[float, float]]:
+    """Ranges of the motions (n, 4), without the outermost 0.5 % at both ends."""
+    u, v, r, rudder = motions.T
+    visited = {
+        "u": u / card.model.speed_mps,
+        "drift_deg": np.degrees(np.arctan2(-v, u)),
+        "yaw_rate_prime": r * card.ship.length_m / np.hypot(u, v),
+        "rudder_deg": np.degrees(rudder),
+    }
+    return {name: (float(np.quantile(x, 0.005)), float(np.quantile(x, 0.995))) for name, x in visited.items()}
 
 
 def _carried(sensitivity: Array, errors: JointErrors, numbers: Sequence[str]) -> Array:

@@ -64,14 +64,9 @@ class ProgramFiles:
     fit: PolynomialFit | None = None  # Where a polynomial replaces an MMG ship
 
 
-def start_values(model: Model) -> dict[str, float]:
-    """Parameters of a model by name."""
-    return dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
-
-
 def standard_manoeuvres(model: Model) -> Iterator[Turn | Zigzag]:
     """Turns and zigzags of a ship to both sides, within the limits of its rudder."""
-    largest = start_values(model).get("steering.max_angle", math.pi / 2)
+    largest = model.defaults.get("steering.max_angle", math.pi / 2)
     for angle, side in product(TURNS_DEG, (1, -1)):
         yield Turn(side * min(math.radians(angle), largest))
     for angle, side in product(ZIGZAGS_DEG, (1, -1)):

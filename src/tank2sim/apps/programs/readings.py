@@ -207,13 +207,7 @@ def read_as(table: CoefficientTable, reading: Reading) -> ReadShip:
     centre = _centre_of_gravity(table, scales)
     about_centre = reading.origin == "centre_of_gravity"
     body = _body(table, scales, centre, about_centre)
-    inertial: dict[str, float] = {}
-    if reading.yaw_rate_terms == "total":
-        inertial = {"Yr": body.mass, "Nr": body.mass * body.x_G}
-        if _speed_scale(table) == "nominal":  # m u r is m (1 + Du') r'
-            inertial |= {"Yru": inertial["Yr"], "Nru": inertial["Nr"]}
-        if any(known_term(name).force == "X" and known_term(name).v + known_term(name).r > 0 for name in numbers):
-            inertial |= {"Xvr": -body.mass, "Xrr": -body.mass * body.x_G}
+    inertial = _inertial_terms(table, body) if reading.yaw_rate_terms == "total" else {}
     names = tuple(dict.fromkeys([*numbers, *(name for name, value in inertial.items() if value)]))
     printed, added = (np.array([source.get(name, 0.0) for name in names]) for source in (numbers, inertial))
     ahead = -centre if about_centre else 0.0
@@ -228,6 +222,18 @@ def read_as(table: CoefficientTable, reading: Reading) -> ReadShip:
     )
     derivatives = dict(zip(every, values.tolist(), strict=True))
     return ReadShip(derivatives, shifted_body(body, ahead) if about_centre else body, vanished)
+
+
+def _inertial_terms(table: CoefficientTable, body: RigidBody) -> dict[str, float]:
+    """Forces of the rigid body (prime) that total terms hold, with the signs that take them out."""
+    mass, moment = body.mass, body.mass * body.x_G
+    found = {"Yr": mass, "Nr": moment}
+    if _speed_scale(table) == "nominal":  # m u r is m (1 + Du') r'
+        found |= {"Yru": mass, "Nru": moment}
+    terms = map(known_term, table.derivatives)
+    if any(term.force == "X" and term.v + term.r > 0 for term in terms):
+        found |= {"Xvr": -mass, "Xrr": -moment}
+    return found
 
 
 def _centre_of_gravity(table: CoefficientTable, scales: FileScales | None) -> float:

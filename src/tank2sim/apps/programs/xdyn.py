@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
-from tank2sim.apps.programs.program_files import ProgramFiles, figure_changes, start_values
+from tank2sim.apps.programs.program_files import ProgramFiles, figure_changes
 from tank2sim.apps.programs.xdyn_body import XdynBody, read_back, values_at, written_body
 from tank2sim.arrays import Array
 from tank2sim.cards import Card, SteeredBy, SteeredCard
@@ -70,7 +70,7 @@ def _runs(card: SteeredCard, model: Model) -> dict[str, Trajectory]:
             return {"turn": simulate(model, DifferenceTurn(_DIFFERENCE * n)).trajectory}
         except InputError:  # no thrusters on both sides
             return {"straight": simulate(model, StraightRun(n)).trajectory}
-    largest = start_values(model).get("steering.max_angle", _TURN_RAD)
+    largest = model.defaults.get("steering.max_angle", _TURN_RAD)
     turn, zigzag = Turn(min(_TURN_RAD, largest)), Zigzag(min(_ZIGZAG_RAD, largest), _ZIGZAG_RAD)
     return {"turn": simulate(model, turn).trajectory, "zigzag": simulate(model, zigzag).trajectory}
 

@@ -24,7 +24,6 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from tank2sim.apps.programs.program_files import start_values
 from tank2sim.apps.programs.xdyn_expressions import XDYN_STATES, Definitions, read_expressions
 from tank2sim.arrays import Array
 from tank2sim.cards import ManoeuvringCard, SteeredCard
@@ -132,7 +131,7 @@ def values_at(model: Model, names: Sequence[str], run: Trajectory) -> Array:
 
 def written_body(card: SteeredCard, model: Model, run: Trajectory) -> XdynBody:
     """The equations of a model, checked at the rows of a run."""
-    values = start_values(model)
+    values = model.defaults
     rigid, stated = _masses(model, values, run)
     total = (stated + stated.T) / 2
     states: dict[str, ca.SX] = {}
@@ -228,19 +227,27 @@ def _written(
         fixed |= {"motion.v": sway, "motion.r": turning}
         named = dict(zip((sway, turning), rolled_motion(states, model.symbol("motion.phi")), strict=True))
     spelt = {one.name: fixed.get(one.name) or found.new_name(one.name) for one in (*others, *quantities)}
-    named |= {spelt[one.name]: one.value for one in quantities if one.name in beforehand}
+    definitions = {spelt[one.name]: one.value for one in quantities}
+    named |= {spelt[name]: definitions[spelt[name]] for name in beforehand}
     named |= {found.new_name(name): value for name, value in terms.items()}
-    named |= {spelt[one.name]: one.value for one in quantities if one.name not in beforehand}
+    named |= definitions
     numbers = {spelt[one.name]: values[one.name] for one in others if one.name in values}
     every = [*(one.symbol for one in (*others, *quantities)), *states.values()]
     spellings = [*(spelt[one.name] for one in (*others, *quantities)), *(ROLLED_STATES[name] for name in states)]
     found.add(every, spellings, {**named, **wanted}, numbers)
     words = found.used_by(wanted)
     used = {spelt[one.name]: one for one in others if spelt[one.name] in words and one.name not in fixed}
+    texts = {name: text for name, text in found.texts.items() if name in words}
+    return texts, *_data_and_commands(used, model, values)
+
+
+def _data_and_commands(
+    used: Mapping[str, Variable], model: Model, values: Mapping[str, float]
+) -> tuple[dict[str, tuple[Variable, float]], dict[str, Variable]]:
+    """Variables by their spellings: those with a known value, and the orders."""
     known = {one.name: one.start for one in model.inputs if not one.name.startswith(_ORDERS)} | dict(values)
     data = {name: (one, known[one.name]) for name, one in used.items() if one.name in known}
-    texts = {name: text for name, text in found.texts.items() if name in words}
-    return texts, data, {name: one for name, one in used.items() if name not in data}
+    return data, {name: one for name, one in used.items() if name not in data}
 
 
 def _at_any_time(value: ca.SX, _: ca.SX) -> ca.SX:

@@ -174,7 +174,7 @@ def analyse(trial: Trial, settings: SignalSettings) -> TrialSignals:
             except InputError as error:
                 notices.append(Notice(f"{SignalName(name).file} is left out: it {error.problem}; {error.remedy}"))
         if not series:
-            raise InputError(trial.path, "", "no signal of it can be analysed", notices[-1])
+            raise trial.fault("", "no signal of it can be analysed", notices[-1])
     notices += [notice for item in series.values() for notice in item.notices]
     whole = file_columns(trial)
     columns = {SignalName(name).file: _analysed(item, settings.segment_s) for name, item in series.items()}

@@ -10,9 +10,8 @@ import numpy as np
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
 from tank2sim.notices import Notice
-from tank2sim.records.trials import Trial
+from tank2sim.records.trials import Trial, mean_wind
 from tank2sim.units import KNOT_MPS
 
 APPROACH = 20
@@ -60,7 +59,7 @@ def ghost_of(trial: Trial, model: Model) -> Ghost:
         name: np.asarray(values, dtype=float) for name, values in trial.signals.items() if np.isfinite(values).any()
     }
     if not {"x_m", "y_m"} <= set(signals):
-        raise InputError(trial.path, "columns x_m, y_m", "hold no track", "a ghost needs positions: leave out --ghost")
+        raise trial.fault("columns x_m, y_m", "hold no track", "a ghost needs positions: leave out --ghost")
     start = {f"initial.{name}": _first(signals[key]) for name, unit in _START if (key := f"{name}_{unit}") in signals}
     course, way = _approach(trial.time_s, signals["x_m"], signals["y_m"])
     start["initial.psi"] = _first(signals["psi_rad"]) if "psi_rad" in signals else course
@@ -71,7 +70,7 @@ def ghost_of(trial: Trial, model: Model) -> Ghost:
         speed_notices.append(
             "steered as in the trial, the rudder follows the measured angle: not through its steering gear"
         )
-    held, wind = _wind(signals, model)
+    held, wind = _wind(trial, model)
     return Ghost(
         label=trial.name,
         time_s=trial.time_s - trial.time_s[0],
@@ -98,13 +97,12 @@ def _speed(signals: Mapping[str, Array], way: float) -> tuple[float, list[str]]:
     return way, [f"no speed: the ship starts at the speed of its first positions, {way / KNOT_MPS:.2f} knots"]
 
 
-def _wind(signals: Mapping[str, Array], model: Model) -> tuple[dict[str, float], list[str]]:
-    """The mean wind of a record, as a vector, as inputs of the model; and what a user should know."""
-    if not {"wind_speed_mps", "wind_direction_rad"} <= set(signals) or "wind.speed" not in model.input_names:
+def _wind(trial: Trial, model: Model) -> tuple[dict[str, float], list[str]]:
+    """The mean wind of a record as inputs of the model, and a notice of it."""
+    wind = mean_wind([trial])
+    if wind is None or "wind.speed" not in model.input_names:
         return {}, []  # that a card without wind leaves it out is reported where the trial is read
-    speed, come = signals["wind_speed_mps"], signals["wind_direction_rad"]
-    north, east = float(np.nanmean(speed * np.cos(come))), float(np.nanmean(speed * np.sin(come)))
-    mean, come_from = math.hypot(north, east), math.atan2(east, north) % math.tau
+    mean, come_from = wind
     text = f"the wind is set to the mean of the record, {mean:.3g} m/s from {math.degrees(come_from):.0f} deg"
     return {"wind.speed": mean, "wind.direction": come_from}, [text]
 

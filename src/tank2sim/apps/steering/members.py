@@ -45,12 +45,12 @@ def members_of(card: SteeredCard, model: Model, count: int = PAGE_MEMBERS, seed:
     if read_covariance(card) is None:
         return []
     draws, _ = draws_of(card, seed)
-    known = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    known = model.defaults
     found: list[dict[str, float]] = []
     for number in range(_TRIES * count):
         (row,), _, (trouble,), _ = draws.members(number, 1)
         values = {name: value for name, value in zip(draws.names, row.tolist(), strict=True) if name in known}
-        if not trouble and not mass_fault(model, known | values):
+        if not trouble and not mass_fault(model, {**known, **values}):
             found.append(values)
         if len(found) == count:
             break

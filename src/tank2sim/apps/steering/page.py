@@ -27,7 +27,6 @@ from tank2sim.apps.steering.ship import (
     thrusters_of,
 )
 from tank2sim.dynamics.model import Input, Model, Parameter
-from tank2sim.errors import InputError
 from tank2sim.escaping import json_in_html
 from tank2sim.notices import Notice
 
@@ -214,7 +213,7 @@ def _scale_of(model: Model) -> _Scale:
         return _CRAFT
     if "rudder.command" not in model.input_names:
         remedy = "a ship (kind linear, abkowitz or mmg) can be steered, and a craft with fixed thrusters at both sides"
-        raise InputError(model.origin, "", "has no rudder and no thrusters that steer", remedy)
+        raise model.fault("", "has no rudder and no thrusters that steer", remedy)
     return _SHIP
 
 

@@ -130,6 +130,10 @@ class SteeringCard:
     points: tuple[SteeringPoint, ...]
     influence: PrintedInfluence | None
 
+    def fault(self, place: str, problem: str, remedy: str) -> InputError:
+        """An error about this card, to be raised: its place, the problem, and the remedy."""
+        return InputError(self.source, place, problem, remedy)
+
     def place(self, model: str) -> str:
         """The place of a model in the file, for messages."""
         return f"models.{list(self.models).index(model)}"

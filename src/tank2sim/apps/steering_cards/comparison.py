@@ -38,11 +38,11 @@ def form_of(card: SteeringCard, name: str) -> SteeringForm:
     Raises InputError: the model is not on the card, or its form is not in the catalogue.
     """
     if name not in card.models:
-        raise InputError(card.source, "models", f"none is called {name!r}", f"one of {', '.join(card.models)}")
+        raise card.fault("models", f"none is called {name!r}", f"one of {', '.join(card.models)}")
     form = STEERING_FORMS.get(card.models[name].form)
     if form is None:
         known = f"one of {', '.join(STEERING_FORMS)} was expected"
-        raise InputError(card.source, f"{card.place(name)}.form", f"is {card.models[name].form!r}", known)
+        raise card.fault(f"{card.place(name)}.form", f"is {card.models[name].form!r}", known)
     return form
 
 
@@ -73,10 +73,10 @@ def model_of(card: SteeringCard, name: str) -> Model:
     known = [coefficient.name for coefficient in form.coefficients]
     for key in given:
         if key not in known:
-            raise InputError(card.source, f"{place}.{key}", f"is not a coefficient of {form.name}", ", ".join(known))
+            raise card.fault(f"{place}.{key}", f"is not a coefficient of {form.name}", ", ".join(known))
     if missing := not_given(card, name):
         problem = f"{form.title}: {', '.join(missing)} not given"
-        raise InputError(card.source, place, problem, "; ".join(form.missing) or "add them")
+        raise card.fault(place, problem, "; ".join(form.missing) or "add them")
     model = steering_model(card.ship.name, form, given, card.ship.length_m, card.ship.speed_mps)
     return replace(model, source=card.source)
 
@@ -210,7 +210,7 @@ def draught_polynomials(card: SteeringCard) -> dict[str, tuple[float, ...]]:
 
 def _influence(card: SteeringCard) -> PrintedInfluence:
     if card.influence is None:
-        raise InputError(card.source, "influence", "this section is missing", "add it, or ask for the turns alone")
+        raise card.fault("influence", "this section is missing", "add it, or ask for the turns alone")
     return card.influence
 
 
@@ -219,7 +219,7 @@ def _draught(card: SteeringCard, name: str) -> float:
     printed = _influence(card)
     if draught is None or draught not in printed.draughts_m:
         place = f"{card.place(name)}.draught_m"
-        raise InputError(card.source, place, f"is {draught}", "it must be one of influence.draughts_m")
+        raise card.fault(place, f"is {draught}", "it must be one of influence.draughts_m")
     return draught
 
 
@@ -334,14 +334,11 @@ def compare_steering_models(card: SteeringCard, rudder_deg: float | None = None)
     """
     names = complete(card)
     if not names:
-        raise InputError(
-            card.source, "models", "none has all its coefficients", "; ".join(missing_of(card).popitem()[1])
-        )
+        raise card.fault("models", "none has all its coefficients", "; ".join(missing_of(card).popitem()[1]))
     printed = card.influence
-    rudder = rudder_deg or (math.degrees(printed.rudder_rad) if printed else 20.0)
-    main = printed.model if printed else names[0]
+    main, usual_deg = (printed.model, math.degrees(printed.rudder_rad)) if printed else (names[0], 20.0)
+    rudder = rudder_deg or usual_deg
     same = [name for name in names if card.models[name].draught_m == card.models[main].draught_m]
-    candidates = [name for name in names if name not in same and card.models[name].form == card.models[main].form]
     turns = {name: turns_of(card, name) for name in names}
     runs = {name: _runs(card, name, rudder) for name in same}
     tuning = tuned(card, main)
@@ -353,20 +350,31 @@ def compare_steering_models(card: SteeringCard, rudder_deg: float | None = None)
         steady_turns={name: tuple(turn.in_degrees() for turn in row) for name, row in turns.items()},
         influence={name: influence_of(card, name, rudder) for name in same},
         manoeuvres={name: ModelFigures(turn.figures, zigzag.figures) for name, (turn, zigzag) in runs.items()},
-        combined_predictions={name: combined_prediction(card, name) for name in candidates} if printed else {},
-        printed_influence=PrintedCoefficients(
-            draught_m=printed.draughts_m[-1],
-            K_percent={name: values[-1] for name, values in printed.K_percent.items() if values},
-            misread_as=dict(printed.misread_as),
-        )
-        if printed
-        else None,
+        combined_predictions=_combined_predictions(card, main, names),
+        printed_influence=_at_last_draught(printed) if printed else None,
         influence_over_draught=draught_polynomials(card) if printed else {},
         two_point_tuning=tuning,
         missing=missing_of(card),
         titles={name: entry.title for name, entry in card.models.items()},
         diagrams=SteeringDiagrams(_diagrams(card, largest, same, (main, tuning)), _known_points(card)),
         histories={card.models[name].title: _circle(turn.trajectory) for name, (turn, _) in runs.items()},
+    )
+
+
+def _combined_predictions(card: SteeringCard, main: str, names: Sequence[str]) -> dict[str, CombinedPrediction]:
+    """Table 5 for the models of the main model's form at other draughts; empty without printed influence."""
+    if card.influence is None:
+        return {}
+    form, draught = card.models[main].form, card.models[main].draught_m
+    others = [name for name in names if card.models[name].form == form and card.models[name].draught_m != draught]
+    return {name: combined_prediction(card, name) for name in others}
+
+
+def _at_last_draught(printed: PrintedInfluence) -> PrintedCoefficients:
+    return PrintedCoefficients(
+        draught_m=printed.draughts_m[-1],
+        K_percent={name: values[-1] for name, values in printed.K_percent.items() if values},
+        misread_as=dict(printed.misread_as),
     )
 
 

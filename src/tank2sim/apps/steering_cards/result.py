@@ -13,7 +13,7 @@ from tank2sim.answer.charts.parts import plain
 from tank2sim.answer.charts.rows import RowPlot, names_of, row_chart, runs_of
 from tank2sim.answer.charts.theme import SHAPES
 from tank2sim.answer.charts.vega import ChartRecord, ChartSpec, PlotAxis, Rule, channel, layer, tooltips
-from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Verdict, records_table, table
+from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Verdict, data_frame, records_table, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.steering_cards.card import SteeringCard
 from tank2sim.apps.steering_cards.comparison import SteeringComparison, SteeringDiagrams
@@ -71,17 +71,13 @@ class SteeringModelsResult(Result[SteeringComparison]):
     @property
     def turns(self) -> pd.DataFrame:
         """Steady turns of every complete model: rudder (deg), radius (m), yaw rate (deg/min), drift (deg), speed."""
-        import pandas as pd
-
         rows = self.study.steady_turns.items()
-        return pd.DataFrame([{"model": model, **asdict(turn)} for model, turns in rows for turn in turns])
+        return data_frame([{"model": model, **asdict(turn)} for model, turns in rows for turn in turns])
 
     @property
     def coefficients(self) -> pd.DataFrame:
         """K %, the change of the radius for 10 % more of a coefficient (rows), by model (columns)."""
-        import pandas as pd
-
-        return pd.DataFrame({model: dict(each.K_percent) for model, each in self.study.influence.items()})
+        return data_frame({model: dict(each.K_percent) for model, each in self.study.influence.items()})
 
     @property
     def headline(self) -> tuple[str, ...]:

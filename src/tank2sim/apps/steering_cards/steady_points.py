@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from tank2sim.analysis.turning.continuation import EDGE, Bounds, corrector_step, follow_branch
+from tank2sim.analysis.turning.continuation import EDGE, Bounds, Curve, corrector_step, follow_branch
 from tank2sim.analysis.turning.diagram import TurningEquations
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
@@ -84,13 +84,9 @@ class TurningPoints:
         p = self.model.parameter_values(parameters)
         straight = self._straight(p)
         side = -1.0 if rudder_rad < 0 else 1.0
-        most = np.where(self.yaw > 0, _MOST_YAW, _MOST)
-        least = -most
-        # Before a fold the rudder lies beyond the straight course's: only the side of the turn has a limit.
-        most[-1], least[-1] = (rudder_rad, -math.pi) if side > 0 else (math.pi, rudder_rad)
         if side * straight[-1] > side * rudder_rad + 1e-9:
             raise self._fault(rudder_rad, "holds the ship on the other side of its straight course")
-        curve = follow_branch(self._equations(p), straight, side * self.yaw, Bounds(least, most))
+        curve = self._branch(p, straight, rudder_rad, np.where(self.yaw > 0, _MOST_YAW, _MOST))
         last: Array = curve.points[-1]
         if curve.ended != EDGE or abs(last[-1] - rudder_rad) > 1e-9:  # the far edge is none of the turn's
             raise self._fault(rudder_rad, "makes no steady turn that follows from the straight course")
@@ -107,12 +103,15 @@ class TurningPoints:
     def diagram(self, largest_rad: float, parameters: Mapping[str, float] | None = None) -> list[SteadyTurn]:
         """The branch from the straight course to a rudder angle, as followed by :meth:`turn_at` (without its start)."""
         p = self.model.parameter_values(parameters)
-        side = -1.0 if largest_rad < 0 else 1.0
-        most = np.full(len(self.yaw), _MOST)
-        least = -most
-        most[-1], least[-1] = (largest_rad, -math.pi) if side > 0 else (math.pi, largest_rad)
-        curve = follow_branch(self._equations(p), self._straight(p), side * self.yaw, Bounds(least, most))
+        curve = self._branch(p, self._straight(p), largest_rad, np.full(len(self.yaw), _MOST))
         return [self._turn(y, p) for y in curve.points if abs(y @ self.yaw) > _LEAST_YAW]
+
+    def _branch(self, p: Array, straight: Array, rudder_rad: float, most: Array) -> Curve:
+        """The branch from the straight course to a rudder angle; the other unknowns stay within +- `most`."""
+        least, side = -most, -1.0 if rudder_rad < 0 else 1.0
+        # Before a fold the rudder lies beyond the straight course's: only the side of the turn has a limit.
+        most[-1], least[-1] = (rudder_rad, -math.pi) if side > 0 else (math.pi, rudder_rad)
+        return follow_branch(self._equations(p), straight, side * self.yaw, Bounds(least, most))
 
     def holds_course(self, parameters: Mapping[str, float] | None = None) -> bool:
         """True if the straight course is stable with the rudder held: all motions of the hull decay."""
@@ -129,7 +128,7 @@ class TurningPoints:
         places = [self.model.state_names.index(name) for name in (*self.equations.names, "rudder.angle")]
         found = corrector_step(self._equations(p), start[places] / self.equations.scale * (1 - self.yaw), self.yaw)
         if found is None:
-            raise InputError(self.model.origin, "", "keeps no straight course", "check the card's coefficients")
+            raise self.model.fault("", "keeps no straight course", "check the card's coefficients")
         return found[0]
 
     def _turn(self, y: Array, p: Array) -> SteadyTurn:
@@ -138,7 +137,7 @@ class TurningPoints:
 
     def _fault(self, rudder_rad: float, problem: str) -> InputError:
         place = f"rudder {math.degrees(rudder_rad):.4g} deg"
-        return InputError(self.model.origin, place, problem, "give another rudder angle, or check the card")
+        return self.model.fault(place, problem, "give another rudder angle, or check the card")
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from tank2sim.answer.parts import Cell, KeyFigure, Section, Table, quantities, table
+from tank2sim.answer.parts import Cell, KeyFigure, Section, Table, data_frame, quantities, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.steering_cards.two_point_tuning import TwoPointStudy, TwoPointTuning
 from tank2sim.cards import Card
@@ -68,10 +68,8 @@ class TurnTuningResult(Result[TwoPointStudy]):
     @property
     def turns(self) -> pd.DataFrame:
         """Both turns: rudder (deg), yaw rate (deg/min) and radius (m) before and after; + to starboard."""
-        import pandas as pd
-
         columns = ["rudder_deg", "rate_before_degpmin", "rate_after_degpmin", "radius_before_m", "radius_after_m"]
-        return pd.DataFrame(_turn_rows(self.study), columns=columns)
+        return data_frame(_turn_rows(self.study), columns=columns)
 
     @property
     def headline(self) -> tuple[str, ...]:

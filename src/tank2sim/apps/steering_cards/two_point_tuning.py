@@ -195,7 +195,7 @@ def tune_to_two_points(model: Model, levers: Levers, first: WantedTurn, second: 
     want = np.log(np.abs([first.value, second.value]))
     unknown = _followed(system, unknown, have, want)
     hull, rudder = np.exp(unknown[-2:]).tolist()
-    start = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    start = model.defaults
     changed: dict[str, float] = levers.scaled(start, hull, rudder)
     after = [points.turn_at(wanted.rudder_rad, changed)[0] for wanted in (first, second)]
     for wanted, turn in zip((first, second), after, strict=True):
@@ -214,12 +214,12 @@ def tune_to_two_points(model: Model, levers: Levers, first: WantedTurn, second: 
 
 def _refuse_opposed(model: Model, wanted: tuple[WantedTurn, WantedTurn], *turns: SteadyTurn) -> None:
     if abs(wanted[0].rudder_rad - wanted[1].rudder_rad) < 1e-6:
-        raise InputError(model.origin, "two points", "have one rudder angle", "give two that are far from each other")
+        raise model.fault("two points", "have one rudder angle", "give two that are far from each other")
     for target, turn in zip(wanted, turns, strict=True):
         if target.yaw_rate_radps is not None and target.yaw_rate_radps * turn.yaw_rate_radps <= 0:
             place = f"rudder {math.degrees(target.rudder_rad):.4g} deg"
             problem = f"a yaw rate of {60 * math.degrees(target.yaw_rate_radps):.4g} deg/min is not to its side"
-            raise InputError(model.origin, place, problem, "rudder and yaw rate are positive to starboard")
+            raise model.fault(place, problem, "rudder and yaw rate are positive to starboard")
 
 
 class _System:
@@ -231,9 +231,7 @@ class _System:
         n = points.y.numel()
         self.unknown = ca.SX.sym("unknown", 2 * n + 2)
         goal = ca.SX.sym("goal", 2)
-        numbers = {
-            name: ca.SX(value) for name, value in zip(model.parameter_names, model.parameter_values(), strict=True)
-        }
+        numbers = {name: ca.SX(value) for name, value in model.defaults.items()}
         scaled = levers.scaled(numbers, ca.exp(self.unknown[-2]), ca.exp(self.unknown[-1]))
         p = ca.vcat([ca.SX(scaled.get(name, numbers[name])) for name in model.parameter_names])
         rows: list[ca.SX] = []
@@ -273,7 +271,7 @@ class _System:
     def fault(self, problem: str) -> InputError:
         """An error about the two points."""
         text = " and ".join(_target_text(target) for target in self.wanted)
-        return InputError(self._model.origin, text, problem, "check both points, or change other coefficients first")
+        return self._model.fault(text, problem, "check both points, or change other coefficients first")
 
 
 def _target_text(wanted: WantedTurn) -> str:

@@ -90,7 +90,7 @@ def _loaded(card: ManoeuvringCard, draught: float, trim: float, own_draught: flo
 
 def _with_formula_errors(values: Mapping[str, float], model: Model, errors: Array, change: float) -> dict[str, float]:
     """Parameters of a member with other linear derivatives, by the error of the formulas for the loading."""
-    own = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    own = model.defaults
     found = {name: value for name, value in values.items() if name in own}
     for name, error in zip(BY_REGRESSION, errors, strict=True):
         full_name = f"derivatives.{name}"

@@ -36,8 +36,7 @@ from tank2sim.identification.trials.assessment.model_selection import hard_rudde
 from tank2sim.identification.trials.assessment.other_ship import evidence_of_other_ship
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
 from tank2sim.notices import Notice, caution
-from tank2sim.records.signals.statistics import mean_and_deviation
-from tank2sim.records.trials import Trial
+from tank2sim.records.trials import Trial, mean_wind
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag, parse_manoeuvre
 from tank2sim.simulation.recorded import repeat, steerable
@@ -328,7 +327,7 @@ def _recognised(trials: Sequence[Trial], notes: TrialNotes, model: Model) -> tup
             unknown[trial.name] = one
         else:
             found.append(one)
-    speed = float(model.parameter_values()[model.parameter_names.index("ship.speed")])
+    speed = model.defaults["ship.speed"]
     for words, figures in notes.figures.items():
         manoeuvre = parse_manoeuvre(words)
         assert isinstance(manoeuvre, Turn | Zigzag | Stop)
@@ -346,9 +345,8 @@ def _state(card: ManoeuvringCard, trials: Sequence[Trial], notes: TrialNotes) ->
     draught, trim = (own, 0.0) if fore is None or aft is None else ((fore + aft) / 2, aft - fore)
     speed = notes.wind_speed_mps
     direction = None if notes.wind_from_deg is None else math.radians(notes.wind_from_deg)
-    measured = [trial.signals for trial in trials if {"wind_speed_mps", "wind_direction_rad"} <= set(trial.signals)]
-    if measured:
-        speed, direction = mean_wind(measured)
+    if recorded := mean_wind(trials):
+        speed, direction = recorded
     return TrialState(
         draught_m=draught,
         trim_m=trim,
@@ -365,29 +363,9 @@ def _wind(one: Tried, state: TrialState, integrator: Integrator) -> dict[str, fl
     """Inputs of the wind in a trial, by its record or else the mean of all; empty without one."""
     if "wind.speed" not in integrator.model.input_names:
         return {}
-    signals = one.trial.signals if one.trial is not None else {}
-    if {"wind_speed_mps", "wind_direction_rad"} <= set(signals):
-        speed, direction = mean_wind([signals])
-    elif state.wind_speed_mps is not None and state.wind_from_rad is not None:
-        speed, direction = state.wind_speed_mps, state.wind_from_rad
-    else:
-        return {}
-    return {"wind.speed": speed, "wind.direction": direction}
-
-
-def mean_wind(records: Sequence[Mapping[str, Array]]) -> tuple[float, float]:
-    """Mean speed (m/s) and direction (rad, from) of the wind in records.
-
-    Parameters
-    ----------
-    records : sequence of mapping
-        Signals ``wind_speed_mps`` and ``wind_direction_rad``.
-    """
-    found = []
-    for name in ("wind_speed_mps", "wind_direction_rad"):
-        values = np.concatenate([signals[name] for signals in records])
-        found.append(mean_and_deviation(name, values[np.isfinite(values)])[0])
-    return found[0], found[1]
+    recorded = mean_wind([one.trial]) if one.trial is not None else None
+    speed, direction = recorded or (state.wind_speed_mps, state.wind_from_rad)
+    return {} if speed is None or direction is None else {"wind.speed": speed, "wind.direction": direction}
 
 
 def _drift(one: Tried, integrator: Integrator, wind: Mapping[str, float]) -> TurnDrift | None:

@@ -233,7 +233,7 @@ def _stop(trial: Trial, model: Model) -> Tried | str:
     t, north, east = (values[begin : end + 1] for values in (time, *place))
     cos, sin = math.cos(psi[begin]), math.sin(psi[begin])
     n, e = north[-1] - north[0], east[-1] - east[0]
-    length = float(model.parameter_values()[model.parameter_names.index("ship.length")])
+    length = model.defaults["ship.length"]
     way = float(np.hypot(np.diff(north[::steps]), np.diff(east[::steps])).sum())
     figures = {
         "track_reach_m": way,

@@ -26,7 +26,7 @@ from tank2sim.dynamics.model import Model
 def straight_inflow(model: Model, name: str = "rudder.inflow") -> float:
     """A flow (m/s) straight ahead at ``ship.speed`` and nominal revolutions; of the right side of two."""
     known = name if name in model else f"{name}_right"
-    values = dict(zip(model.parameter_names, model.parameter_values().tolist(), strict=True))
+    values = model.defaults
     states = ca.DM(model.initial(model.parameter_values()))
     for state, value in (("motion.u", values["ship.speed"]), ("motion.v", 0.0), ("motion.r", 0.0)):
         states[model.state_names.index(state)] = value

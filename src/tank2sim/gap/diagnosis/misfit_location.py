@@ -353,7 +353,7 @@ def _most_changed(card: SteeredCard, name: str) -> str:
 
 def _accelerations(model: Model, count: int = 200) -> Array:
     """du/dt, dv/dt, dr/dt (count, 3) at the same set of motions for any model."""
-    p = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
+    p = model.defaults
     speed, length = p["ship.speed"], p["ship.length"]
     share = np.random.default_rng(0).uniform(-1, 1, (count, 5))
     values = {

@@ -133,10 +133,10 @@ def _shared(
 
 def _gear_errors(card: SteeredCard, model: Model) -> dict[str, float]:
     """Rate and time constant of the steering gear, as uncertain as a coefficient; one that was assumed far more so."""
-    start = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
+    start = model.defaults
     stated = card.steering_gear is not None and card.steering_gear.time_constant_s is not None
     shares = {"steering.max_rate": GEAR, "steering.time_constant": GEAR if stated else ASSUMED_GEAR}
-    return {name: share * float(start[name]) for name, share in shares.items() if start.get(name)}
+    return {name: share * start[name] for name, share in shares.items() if start.get(name)}
 
 
 def with_executes(none: Hypothesis, motion: MeasuredBatch) -> MeasuredBatch:

@@ -162,9 +162,8 @@ class _Fit:
 
     def _parameters(self, names: Sequence[str], changes: Array) -> Array:
         model = self.replayer.model
-        values = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
         moved = {f"derivatives.{name}": change for name, change in zip(names, changes, strict=True)}
-        return model.parameter_values({name: values[name] + float(change) for name, change in moved.items()})
+        return model.parameter_values({name: model.defaults[name] + float(change) for name, change in moved.items()})
 
 
 def closes_gap(passed: Sequence[Passed], limit: float = CLOSES) -> bool:

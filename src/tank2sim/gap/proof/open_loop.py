@@ -15,7 +15,6 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
 from tank2sim.identification.trials.methods.gauss_newton import least_squares_steps
 from tank2sim.identification.trials.problem.estimation_problem import driven_model
 from tank2sim.records.trials import Trial, sampling_step
@@ -469,11 +468,11 @@ def input_record(replayer: Replayer, trial: Trial) -> InputRecord:
     """
     model, record = replayer.model, motion_record(replayer.model, trial, replayer.seen)
     if len(record.time_s) < _FEWEST_ROWS:
-        raise InputError(trial.path, "", f"has only {len(record.time_s)} rows", "leave it out")
+        raise trial.fault("", f"has only {len(record.time_s)} rows", "leave it out")
     if np.isnan(record.measured).all():
-        raise InputError(trial.path, "header", "has none of the signals to be compared", "give u_mps, r_degps, ...")
+        raise trial.fault("header", "has none of the signals to be compared", "give u_mps, r_degps, ...")
     time, sampling = record.time_s, sampling_step(trial)
-    known = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
+    known = model.defaults
     step = max(1, int(model.step_s / sampling + 1e-6)) * sampling
     every = max(1, round(known["ship.length"] / known["ship.speed"] / INSTANTS / step)) * step
     wanted = np.arange(time[0], time[-1] + 1e-6 * sampling, every)
@@ -503,7 +502,7 @@ def input_record(replayer: Replayer, trial: Trial) -> InputRecord:
 
 def delays_of(card: SteeredCard, model: Model, p: Array | None = None) -> dict[str, float]:
     """Delay of each input by the effects of the card at parameters `p`, s."""
-    known = dict(zip(model.parameter_names, model.parameter_values() if p is None else p, strict=True))
+    known = model.defaults if p is None else model.parameters_by_name(p)
     delays: dict[str, float] = {}
     for effect in (EFFECTS[entry.name] for entry in card.effects):
         for name, key in effect.delays.items():

@@ -174,7 +174,7 @@ def _linearised(
     """A trial about its present initial state and coefficients; of infinite cost without a positive mass."""
     replayer, sigma = _replayer(card, driven_by, noise)
     p = _parameters(replayer, prior, values)
-    if mass_fault(replayer.model, dict(zip(replayer.model.parameter_names, map(float, p), strict=True))):
+    if mass_fault(replayer.model, replayer.model.parameters_by_name(p)):
         nothing, count = np.zeros((len(begun.start), len(values))), len(values)
         return _Linearised(math.inf, np.zeros(count), np.zeros((count, count)), np.zeros(len(begun.start)), nothing)
     record, start = begun.record, begun.start

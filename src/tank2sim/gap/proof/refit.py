@@ -102,8 +102,7 @@ def refit_coefficients(
     """
     known = coefficients_of_card(card)
     values = _within_bounds(model, estimates, known)
-    defaults = dict(zip(model.parameter_names, map(float, model.parameter_values()), strict=True))
-    if mass_fault(model, defaults | values):
+    if mass_fault(model, {**model.defaults, **values}):
         estimates = _with_masses_held(estimates)
         values = _within_bounds(model, estimates, known)
     names = tuple(values)

@@ -95,7 +95,7 @@ def _slopes_in_errors(
 ) -> Array:
     """Change of `away` (count, k) by one standard error of each of the k coefficients of the effects' forces."""
     p = model.parameter_values()
-    now, values = away(start, p), dict(zip(model.parameter_names, p, strict=True))
+    now, values = away(start, p), model.defaults
     columns = [np.zeros((len(now), 0))]
     for entry in (entry for entry in card.effects if entry.name in effects):
         names = EFFECTS[entry.name].model_names()

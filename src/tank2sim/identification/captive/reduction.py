@@ -145,19 +145,13 @@ def _reduction(campaign: Campaign, options: ReductionOptions) -> Reduction:
     runs, faults = _credible_runs(campaign, options)
     used, not_used = _used_runs(campaign, moderated(runs), options)
     if not used:
-        messages = [*map(str, faults), *(f"{name}, for {reason}" for name, reason in not_used.items())]
-        remedy = f"the first was left out: {messages[0]}" if messages else "give it runs"
-        raise InputError(campaign.path, "runs", "no run can be used", remedy)
+        raise _without_runs(campaign, [*map(str, faults), *(f"{name}, for {why}" for name, why in not_used.items())])
     selections = _selections(campaign, used, options)
     equations = {force: selection.equations for force, selection in selections.items()}
     delay = delay_estimate(equations)
     delays = force_delays(equations, delay)
     if any(error.corrected for error in delays):  # the forces of oscillating runs are taken a time earlier
-        later_s = delays[0].size
-        runs = [
-            reduced_run(replace(run.run, force_delay_s=run.run.force_delay_s + later_s)) if run.run.oscillates else run
-            for run in runs
-        ]
+        runs = [_with_later_forces(run, delays[0].size) for run in runs]
         used, not_used = _used_runs(campaign, moderated(runs), options)
         selections = _selections(campaign, used, options)
     forces = {force: _force_result(campaign, selection, delays, options) for force, selection in selections.items()}
@@ -166,13 +160,7 @@ def _reduction(campaign: Campaign, options: ReductionOptions) -> Reduction:
         {force: forces[force].selection.equations for force in "YN"},
         {force: forces[force].solution for force in "YN"},
     )
-    stated = campaign.uncertainty.model_fields_set
-    possible_s = 0.0 if delays or "force_delay_s" in stated or delay is None or not delay.alike else delay.possible_s
-    angle_rad = alignment.angle_rad if alignment and alignment.shown and "alignment_rad" not in stated else 0.0
-    forces = {
-        force: replace(result, shifts=_common_shifts(campaign, result, possible_s, angle_rad))
-        for force, result in forces.items()
-    }
+    forces = _with_common_shifts(campaign, forces, None if delays else delay, alignment)
     derivatives = {name: found for result in forces.values() for name, found in _derivatives(result).items()}
     _refuse_thrust(campaign, derivatives)
     alone = oscillations(campaign, runs)
@@ -190,6 +178,34 @@ def _reduction(campaign: Campaign, options: ReductionOptions) -> Reduction:
         delay=delay,
         alignment=alignment,
     )
+
+
+def _with_common_shifts(
+    campaign: Campaign,
+    forces: Mapping[str, ForceResult],
+    delay: DelayEstimate | None,
+    alignment: AlignmentEstimate | None,
+) -> dict[str, ForceResult]:
+    """The results with the shifts by a delay and a misalignment whose errors the campaign does not state."""
+    stated = campaign.uncertainty.model_fields_set
+    delay_s = delay.possible_s if delay and delay.alike and "force_delay_s" not in stated else 0.0
+    angle_rad = alignment.angle_rad if alignment and alignment.shown and "alignment_rad" not in stated else 0.0
+    return {
+        force: replace(result, shifts=_common_shifts(campaign, result, delay_s, angle_rad))
+        for force, result in forces.items()
+    }
+
+
+def _without_runs(campaign: Campaign, left_out: Sequence[str]) -> InputError:
+    remedy = f"the first was left out: {left_out[0]}" if left_out else "give it runs"
+    return InputError(campaign.path, "runs", "no run can be used", remedy)
+
+
+def _with_later_forces(run: ReducedRun, later_s: float) -> ReducedRun:
+    """An oscillating run reduced again with its forces delayed by `later_s` more; any other run as it is."""
+    if not run.run.oscillates:
+        return run
+    return reduced_run(replace(run.run, force_delay_s=run.run.force_delay_s + later_s))
 
 
 def _selections(campaign: Campaign, used: Sequence[ReducedRun], options: ReductionOptions) -> dict[str, Selection]:

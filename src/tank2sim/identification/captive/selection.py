@@ -240,18 +240,10 @@ def trends(campaign: Campaign, selection: Selection) -> tuple[Selection, tuple[T
     if not candidates:
         return selection, ()
     full = campaign_equations(campaign, used.runs, used.force, [*used.names, *map(_slope, candidates)]).held(used.prior)
-    names = list(used.names)
-    shown: list[str] = []
-    while True:
-        found = [_trend(full, names, name, selection) for name in candidates if name not in shown]
-        messages = [trend for trend in found if trend is not None]
-        best = max(messages, key=_ratio, default=None)
-        if best is None or _ratio(best) < _SHOWN_SLOPE:
-            break
-        shown.append(best.name)
-        names.append(_slope(best.name))
+    shown, others = _significant_trends(full, used.names, candidates, selection)
     if not shown:
-        return selection, tuple(messages)
+        return selection, others
+    names = [*used.names, *map(_slope, shown)]
     chosen = [
         Choice(_slope(name), True, "trend", f"{name} changes with the frequency; its value is that at zero frequency")
         for name in shown
@@ -259,7 +251,21 @@ def trends(campaign: Campaign, selection: Selection) -> tuple[Selection, tuple[T
     widened = full.of_terms(names)
     result = replace(selection, equations=widened, spread=fitted_spread(widened), choices=(*selection.choices, *chosen))
     kept = [_trend(full, [term for term in names if term != _slope(name)], name, result) for name in shown]
-    return result, (*(replace(trend, used=True) for trend in kept if trend is not None), *messages)
+    return result, (*(replace(trend, used=True) for trend in kept if trend is not None), *others)
+
+
+def _significant_trends(
+    full: CampaignEquations, names: Sequence[str], candidates: Sequence[str], selection: Selection
+) -> tuple[list[str], tuple[Trend, ...]]:
+    """Terms with a significant trend, taken into the regression one by one, and the trends of the other candidates."""
+    shown: list[str] = []
+    while True:
+        terms, left = [*names, *map(_slope, shown)], [name for name in candidates if name not in shown]
+        others = tuple(trend for name in left if (trend := _trend(full, terms, name, selection)) is not None)
+        best = max(others, key=_ratio, default=None)
+        if best is None or _ratio(best) < _SHOWN_SLOPE:
+            return shown, others
+        shown.append(best.name)
 
 
 def _slope(name: str) -> str:

@@ -245,8 +245,7 @@ def computed_readings(model: Model, names: Sequence[str], units: Array, channels
     inputs = ca.vertcat(
         *(given.get(name, value) for name, value in zip(model.input_names, model.input_values(), strict=True))
     )
-    stated = zip(model.parameter_names, model.parameter_values(), strict=True)
-    parameters = ca.vertcat(*(given.get(name, value) for name, value in stated))
+    parameters = ca.vertcat(*(given.get(name, value) for name, value in model.defaults.items()))
     right = "_right" if "T_left" in channels else ""
     read = [_QUANTITIES[channel] for channel in channels if channel != TORQUE]
     read = [name + right * (name in (_QUANTITIES["T"], _QUANTITIES["F_N"])) for name in read]
@@ -255,7 +254,7 @@ def computed_readings(model: Model, names: Sequence[str], units: Array, channels
     forces = found[:-1]
     if "eta_R" in names:
         curve = {name: theta[names.index(name)] for name in TORQUE_COEFFICIENTS} | {"astern": 0.0}
-        of_ship = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
+        of_ship = model.defaults
         density, diameter = of_ship["ship.water_density"], of_ship["ship.propeller_diameter"]
         torque = density * torque_over_density(curve, ca.SX(diameter), motion[4] / (2 * ca.pi), found[-1])
         forces = ca.vertcat(forces, torque)

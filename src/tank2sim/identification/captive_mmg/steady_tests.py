@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -17,7 +17,7 @@ from tank2sim.identification.captive.harmonics import reduced_run
 from tank2sim.identification.captive.run_faults import record_faults, reduced_faults
 from tank2sim.notices import Notice
 from tank2sim.records.averages import read_columns
-from tank2sim.records.campaign_form import CampaignFile
+from tank2sim.records.campaign_form import CampaignFile, OpenWaterSection
 from tank2sim.records.campaigns import Campaign, read_campaign, read_campaign_form, together
 from tank2sim.records.captive_record import FORCE_COLUMNS, CaptiveRun
 
@@ -163,10 +163,7 @@ def read_steady_tests(path: Path) -> SteadyTests:
     steady = [run for run in campaign.runs if not run.oscillates]
     if faults := [fault for run in steady for fault in islice(_faults(campaign, run), 1)]:
         raise together(faults, can_leave_out=False)
-    without_torque = [run.name for run in steady if run.torque_Nm is None]
-    if 0 < len(without_torque) < len(steady):
-        problem = f"{without_torque[0]} has no torque, and others have"
-        raise InputError(path, "runs", problem, "record it in all runs, or in none")
+    with_torque = _have_torque(steady, path)
     if heeled := next((run.name for run in steady if run.heel_rad), ""):
         problem = f"{heeled} has a heel; the method is of an upright hull"
         raise InputError(path, "averages.columns.heel_rad", problem, "reduce such tests to a polynomial, without --mmg")
@@ -176,7 +173,7 @@ def read_steady_tests(path: Path) -> SteadyTests:
         names=tuple(run.name for run in steady),
         motion=np.array([_motion(run) for run in steady]),
         readings=np.array([_readings(run, form) for run in steady]),
-        open_water=_open_water(form, path, with_torque=not without_torque),
+        open_water=_open_water(form, path, with_torque=with_torque),
         remarks=(*campaign.remarks, *_oscillating(campaign)),
     )
     thrusts = {"T": "thrust", "T_left": "thrust_left"}
@@ -187,6 +184,15 @@ def read_steady_tests(path: Path) -> SteadyTests:
         {thrusts[name]: tests.readings[:, i] for i, name in enumerate(tests.channels) if name in thrusts},
     )
     return tests
+
+
+def _have_torque(runs: Sequence[CaptiveRun], path: Path) -> bool:
+    """Whether the torque was measured; InputError if in some of the runs only."""
+    without = [run.name for run in runs if run.torque_Nm is None]
+    if 0 < len(without) < len(runs):
+        problem = f"{without[0]} has no torque, and others have"
+        raise InputError(path, "runs", problem, "record it in all runs, or in none")
+    return not without
 
 
 def _faults(campaign: Campaign, run: CaptiveRun) -> Iterator[InputError]:
@@ -296,6 +302,24 @@ def _readings(run: CaptiveRun, form: CampaignFile) -> tuple[float, ...]:
     return *map(float, forces), *(float(np.mean(values)) for values in others if values is not None)
 
 
+def _curves(
+    section: OpenWaterSection, path: Path, given: Mapping[str, str | list[float]]
+) -> Mapping[str, Sequence[float]]:
+    """Points of the open-water curves: the lists given, or the columns of the file with the headings given."""
+    headings = {key: heading for key, heading in given.items() if isinstance(heading, str)}
+    lists = {key: points for key, points in given.items() if not isinstance(points, str)}
+    if section.file is None:
+        if headings:
+            raise InputError(path, f"open_water.{next(iter(headings))}", "is missing", "give lists, or a file of them")
+        return lists
+    if lists:
+        raise InputError(
+            path, f"open_water.{next(iter(lists))}", "is a list, and a file is given", "give one of the two"
+        )
+    with named_in(path, path.parent / section.file):
+        return read_columns(path.parent / section.file, headings)
+
+
 def _open_water(form: CampaignFile, path: Path, *, with_torque: bool) -> Array:
     section = form.open_water
     assert section is not None
@@ -305,17 +329,7 @@ def _open_water(form: CampaignFile, path: Path, *, with_torque: bool) -> Array:
             remedy = "give K_Q of the open-water test, or leave the torque out"
             raise InputError(path, "open_water.K_Q", "is missing, and the torque was measured", remedy)
         given["K_Q"] = section.K_Q
-    headings = {key: heading for key, heading in given.items() if isinstance(heading, str)}
-    if section.file is None:
-        if headings:
-            raise InputError(path, f"open_water.{next(iter(headings))}", "is missing", "give lists, or a file of them")
-        values = {key: points for key, points in given.items() if not isinstance(points, str)}
-    else:
-        if headings != given:
-            place = next(key for key in given if key not in headings)
-            raise InputError(path, f"open_water.{place}", "is a list, and a file is given", "give one of the two")
-        with named_in(path, path.parent / section.file):
-            values = read_columns(path.parent / section.file, headings)
+    values = _curves(section, path, given)
     for key, points in values.items():
         if len(points) != len(values["J"]):
             problem = f"has {len(points)} values and J {len(values['J'])}"

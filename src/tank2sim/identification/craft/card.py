@@ -87,7 +87,7 @@ def craft_with(
         remedy = (
             "check the mass, the inertia, and places and largest revolutions of the thrusters: they are taken as exact"
         )
-        raise InputError(card.source, error.place, problem, remedy) from error
+        raise card.fault(error.place, problem, remedy) from error
 
 
 def _with_values(card: SteeredCard, values: Mapping[str, float]) -> SteeredCard:

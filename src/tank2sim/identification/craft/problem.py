@@ -24,7 +24,6 @@ from tank2sim.cards.craft_terms import CRAFT_ADDED_MASSES, VELOCITY_TERMS
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model, Parameter, Quantity, State, same_symbol
-from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.estimation_problem import (
     AND_DIRECTIONS,
     Estimate,
@@ -295,7 +294,7 @@ def craft_driven_by(card: SteeredCard, trials: Sequence[Trial]) -> str:
     for trial in trials:
         if any(f"order_{thruster.name}_radps" not in trial.signals for thruster in card.thrusters):
             problem = "has revolutions and no orders, and another trial has orders alone"
-            raise InputError(trial.path, "header", problem, "give trials of one kind")
+            raise trial.fault("header", problem, "give trials of one kind")
     return "orders"
 
 
@@ -323,7 +322,7 @@ def _directions_measured(trials: Sequence[Trial]) -> bool:
     for trial, by_order in zip(trials, ordered, strict=True):
         if by_order and not all(ordered):
             problem = "has the ordered direction of a thruster, and another trial the measured one"
-            raise InputError(trial.path, "header", problem, "give trials of one kind")
+            raise trial.fault("header", problem, "give trials of one kind")
     return not any(ordered)
 
 

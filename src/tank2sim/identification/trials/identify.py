@@ -178,14 +178,7 @@ def _identified(
         still = kalman(problem, settings=KalmanSettings(scale_prior=False))
         card = card_in(card, without_current(still, card)[1])
     structure, structures, weights, chosen = _choose_structure(card, asked, held, executor)
-    evidence = other_ship(problem_from_card(card, trials.trials, trials.driven_by))  # in the structure of the card
-    fit = None
-    if not evidence or options.force:
-        fit = _fitted(card, structure, asked)
-        evidence += far_from_card(fit.problem, fit.estimate)
-    if fit is None or (evidence and not options.force):
-        remedy = "give the card and the trials of one ship, in the same units and signs, or force the fit"
-        raise not_of_ship(card, trials, evidence, remedy)
+    fit, evidence = _fitted_to_own_trials(card, structure, asked)
     card = card if fit.current is None else card_in(card, fit.current)
     samples = None
     if options.posterior:
@@ -225,6 +218,19 @@ def _identified(
             *fit.estimate.notices,
         ),
     )
+
+
+def _fitted_to_own_trials(card: ManoeuvringCard, structure: str, asked: _Asked) -> tuple[Fit, tuple[str, ...]]:
+    """The fit, and the evidence that the trials are of another ship, which raises unless the fit is forced."""
+    trials, force = asked.trials, asked.options.force
+    evidence = other_ship(problem_from_card(card, trials.trials, trials.driven_by))  # in the structure of the card
+    if not evidence or force:
+        fit = _fitted(card, structure, asked)
+        evidence += far_from_card(fit.problem, fit.estimate)
+        if not evidence or force:
+            return fit, evidence
+    remedy = "give the card and the trials of one ship, in the same units and signs, or force the fit"
+    raise not_of_ship(card, trials, evidence, remedy)
 
 
 def _refuse_options(card: ManoeuvringCard, trials: Measured, options: IdentificationOptions) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -106,6 +107,8 @@ def _stops(card: ManoeuvringCard) -> Iterator[Notice]:
         if speed[-1] < STOPPED * speed[0]:
             yield Notice(f"{words} loses {100 * (1 - speed[-1] / speed[0]):.0f} % of its speed: {near}")
 
+
+_Compared = TypeVar("_Compared")
 
 SET_KEYS = {"fitted": "fit", "held out": "holdout"}
 """Words for a set of trials to its key in the JSON."""
@@ -417,7 +420,6 @@ def study_identification(
     parameters = _parameters(result)
     forced = [caution(f"FORCED: {'; '.join(result.forced)}")] if result.forced else []
     unfinished = [] if result.posterior is None or result.posterior.converged else result.posterior.notices
-    comparisons = {SET_KEYS[word]: (given, found) for word, given, found in result.comparisons}
     return IdentificationStudy(
         ship=result.card.ship.name,
         method=estimate.method,
@@ -436,11 +438,9 @@ def study_identification(
             "fit": _yaw_rate_errors(result.fit),
             "holdout": _yaw_rate_errors(result.holdout) if result.holdout else None,
         },
-        errors_over_windows={
-            key: _errors_over_windows(*comparisons[key]) if key in comparisons else () for key in SET_KEYS.values()
-        },
+        errors_over_windows=_by_set(result, _errors_over_windows),
         figures_are=FIGURES_ARE,
-        figures={key: _figures(*comparisons[key]) if key in comparisons else () for key in SET_KEYS.values()},
+        figures=_by_set(result, _figures),
         structures={
             name: StructureErrors(
                 errors=tuple(structure.errors.tolist()),
@@ -500,6 +500,14 @@ def _misfit(result: Identification) -> IdentificationMisfit:
 def _yaw_rate_errors(comparison: Comparison) -> dict[str, Number]:
     runs = {run.name: run.relative("motion.r") for run in comparison.following if "motion.r" in run.windows}
     return {**runs, "all": pooled(comparison.following, "motion.r")}
+
+
+def _by_set(
+    result: Identification, compare: Callable[[Comparison, Comparison], tuple[_Compared, ...]]
+) -> dict[str, tuple[_Compared, ...]]:
+    """Comparisons of both cards by ``fit`` and ``holdout``; empty for a set without trials."""
+    found = {SET_KEYS[word]: compare(before, now) for word, before, now in result.comparisons}
+    return {key: found.get(key, ()) for key in SET_KEYS.values()}
 
 
 def _errors_over_windows(before: Comparison, found: Comparison) -> tuple[TrialErrors, ...]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tank2sim.arrays import Array
-from tank2sim.errors import InputError
 from tank2sim.records.trials import SIGNALS, Trial
 from tank2sim.units import from_si, to_si
 
@@ -78,4 +77,4 @@ def find_signal(asked: str, trial: Trial) -> str:
         if name in (signal, SignalName(signal).stem) or asked == trial.heading(signal):
             return signal
     columns = ", ".join(SignalName(signal).file for signal in trial.signals)
-    raise InputError(trial.path, f"column {asked}", "is not in the trial", f"give one of {columns}")
+    raise trial.fault(f"column {asked}", "is not in the trial", f"give one of {columns}")

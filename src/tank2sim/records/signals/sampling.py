@@ -100,7 +100,7 @@ def even_series(trial: Trial, name: str, max_gap_s: float | None = None) -> Seri
     known = np.flatnonzero(np.isfinite(values))
     if known.size < FEWEST_SAMPLES:
         problem = f"has {known.size} values, and at least {FEWEST_SAMPLES} are needed"
-        raise InputError(trial.path, column, problem, "give a longer record or leave the column out")
+        raise trial.fault(column, problem, "give a longer record or leave the column out")
     time, values = trial.time_s[known], values[known]
     notices = []
     if known[0] > 0 or known[-1] < len(trial.time_s) - 1:
@@ -115,7 +115,7 @@ def even_series(trial: Trial, name: str, max_gap_s: float | None = None) -> Seri
     limit = (GAP_STEPS + 0.5) * step if max_gap_s is None else max_gap_s
     if (longest := float(time[gap + 1] - time[gap])) > limit:
         problem = f"has no value from {time[gap]:.6g} to {time[gap + 1]:.6g} s, longer than {limit:.3g} s"
-        raise InputError(trial.path, column, problem, "cut the record there, or allow it with --max-gap SECONDS")
+        raise trial.fault(column, problem, "cut the record there, or allow it with --max-gap SECONDS")
     count = round(float(time[-1] - time[0]) / step) + 1
     step = float(time[-1] - time[0]) / (count - 1)
     grid = time[0] + step * np.arange(count, dtype=np.float64)

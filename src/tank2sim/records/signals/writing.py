@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tank2sim.arrays import Array
-from tank2sim.errors import InputError
 from tank2sim.notices import Notice
 from tank2sim.records.signals.columns import DIRECTION_COLUMNS, HELD_COLUMNS, SignalName, file_columns
 from tank2sim.records.signals.sampling import at_grid, even_series
@@ -56,7 +55,7 @@ def thinned(trial: Trial, filtered: Sequence[Filtered], notice: str) -> Trial:
         if len(series.values) != len(time) or abs(series.start_s - time[0]) > series.step_s / 10:
             names = " and ".join(SignalName(other.series.name).file for other in (filtered[0], result))
             remedy = "cut the record to where all columns are known"
-            raise InputError(trial.path, f"columns {names}", "are not known over the same times", remedy)
+            raise trial.fault(f"columns {names}", "are not known over the same times", remedy)
         signals[series.name] = _on_circle(series.name, series.values)
     for name in trial.signals:
         if name in HELD_COLUMNS:

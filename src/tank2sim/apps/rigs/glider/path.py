@@ -169,19 +169,17 @@ def read_programme(path: Path | str) -> GlideProgramme:
     for name in table.columns:
         if name not in _COLUMNS:
             known = "duration_s, path_angle_deg or pitch_deg, roll_deg, buoyancy_kg"
-            raise InputError(
-                table.path, f"column {table.heading(name)}", "is not a column of a programme", f"known: {known}"
-            )
+            raise table.fault(f"column {table.heading(name)}", "is not a column of a programme", f"known: {known}")
     angles = [name for name in ("path_angle_rad", "pitch_rad") if name in table.columns]
     if len(angles) != 1:
         problem = "has both path_angle_deg and pitch_deg" if angles else "has neither path_angle_deg nor pitch_deg"
-        raise InputError(table.path, "header", problem, "give one of them")
+        raise table.fault("header", problem, "give one of them")
     durations = table.column("duration_s")
     steps = tuple(_step(table, row, angles[0]) for row in range(len(durations)))
     programme = GlideProgramme(str(table.path), steps)
     if programme.duration_s > LONGEST_PROGRAMME_S:
         problem = f"lasts {programme.duration_s:g} s"
-        raise InputError(table.path, "column duration_s", problem, f"at most {LONGEST_PROGRAMME_S:g} s can be flown")
+        raise table.fault("column duration_s", problem, f"at most {LONGEST_PROGRAMME_S:g} s can be flown")
     return programme
 
 
@@ -191,17 +189,17 @@ def _step(table: CsvTable, row: int, angle: str) -> ProgrammeStep:
         if not math.isnan(given):
             return given
         if default is None:
-            raise InputError(table.path, table.place(row, name), "is empty", "give each step its value")
+            raise table.fault(table.place(row, name), "is empty", "give each step its value")
         return default
 
     duration = value("duration_s")
     if duration <= 0:
         place = table.place(row, "duration_s")
-        raise InputError(table.path, place, f"is {duration:g}", "a positive number of seconds was expected")
+        raise table.fault(place, f"is {duration:g}", "a positive number of seconds was expected")
     buoyancy = value("buoyancy_kg", math.inf)
     if LARGEST_BUOYANCY_KG < abs(buoyancy) < math.inf:
         place = table.place(row, "buoyancy_kg")
-        raise InputError(table.path, place, f"is {buoyancy:g}", f"at most {LARGEST_BUOYANCY_KG:g} kg either way can be")
+        raise table.fault(place, f"is {buoyancy:g}", f"at most {LARGEST_BUOYANCY_KG:g} kg either way can be")
     return ProgrammeStep(
         duration_s=duration,
         angle_rad=value(angle),

@@ -115,8 +115,7 @@ def steady_glide(
     steep = abs(path_angle_rad)
     if steep < least * (1 - 1e-12):
         with_roll = f" with {math.degrees(roll_rad):g} deg of roll" if roll_rad else ""
-        raise InputError(
-            card.source,
+        raise card.fault(
             "path angle",
             f"{math.degrees(path_angle_rad):g} deg cannot be flown{with_roll}: the drag is too large for the lift",
             f"the smallest that can is {math.degrees(least):.3f} deg",
@@ -148,14 +147,13 @@ def glide_at_pitch(
     least = smallest_angle(card, roll_rad)
     if beyond(least) > 0:
         smallest = beyond(least) + abs(pitch_rad)
-        raise InputError(
-            card.source,
+        raise card.fault(
             "pitch",
             f"at {math.degrees(pitch_rad):g} deg no glide of small incidence exists",
             f"the smallest pitch is {math.degrees(smallest):.3f} deg, on a path of {math.degrees(least):.3f} deg",
         )
     if beyond(_STEEPEST) < 0:
-        raise InputError(card.source, "pitch", f"{math.degrees(pitch_rad):g} deg is a fall", "give less than 89 deg")
+        raise card.fault("pitch", f"{math.degrees(pitch_rad):g} deg is a fall", "give less than 89 deg")
     steep = float(brentq(beyond, least, _STEEPEST, xtol=1e-15, rtol=1e-14))
     return steady_glide(card, sign * steep, roll_rad=roll_rad, buoyancy_kg=buoyancy)
 
@@ -177,7 +175,7 @@ def glide_as_printed(
     size = (section.lift_slope * tau - section.drag_zero) / under if under > 0 else -1.0
     if size <= 0:
         problem = f"{math.degrees(path_angle_rad):g} deg gives no incidence by (8) as printed"
-        raise InputError(card.source, "path angle", problem, "give another angle, or leave --as-printed out")
+        raise card.fault("path angle", problem, "give another angle, or leave --as-printed out")
     drag = size * (section.drag_zero + section.drag_quadratic * size)
     return _glide(card, (path_angle_rad, roll_rad, buoyancy), size, drag, as_printed=True)
 
@@ -256,7 +254,7 @@ def _buoyancy(card: GliderCard, path_angle: float, given: float | None) -> float
     if given * path_angle < 0:
         light, goes = ("light", "dive") if given > 0 else ("heavy", "climb")
         problem = f"{given:+g} kg is {light}, and the glider is to {goes} at {math.degrees(path_angle):g} deg"
-        raise InputError(card.source, "buoyancy", problem, "a light glider climbs (+), a heavy one dives (-)")
+        raise card.fault("buoyancy", problem, "a light glider climbs (+), a heavy one dives (-)")
     if not math.isfinite(given):
-        raise InputError(card.source, "buoyancy", f"{given} kg is not a number", "give kilograms")
+        raise card.fault("buoyancy", f"{given} kg is not a number", "give kilograms")
     return given

@@ -32,7 +32,7 @@ from tank2sim.apps.rigs.glider.transient import (
 from tank2sim.arrays import Array, Columns, Number, Unbounded
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import ArgumentError, InputError
+from tank2sim.errors import ArgumentError
 from tank2sim.notices import Notice
 from tank2sim.simulation.integrator import NO_COMPILER, Integrator
 
@@ -100,7 +100,7 @@ def glide_range(card: GliderCard, glide: SteadyGlide, *, budget_kg: float, depth
     InputError if the glide has no buoyancy or turns.
     """
     if not glide.buoyancy_kg or glide.turn_rate_radps:
-        raise InputError(card.source, "range", "a glide without buoyancy or with roll has no range", "give another")
+        raise card.fault("range", "a glide without buoyancy or with roll has no range", "give another")
     size, steep = abs(glide.buoyancy_kg), abs(glide.path_angle_rad)
     cycles = budget_kg / (2 * size)
     return Range(

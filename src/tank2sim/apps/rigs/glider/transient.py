@@ -76,8 +76,7 @@ def follow_programme(
     first = {f"initial.{name}": orders[0][f"{name}.command"] for name in ("buoyancy", "pitch", "roll")}
     # Newton's first guess: some incidence of the right sign.
     down = -math.copysign(0.04, first["initial.pitch"])
-    names = integrator.model.parameter_names
-    speed = float(integrator.model.parameter_values()[names.index("initial.u")])
+    speed = integrator.model.defaults["initial.u"]
     usual = integrator.model.input_values()[integrator.model.input_names.index("buoyancy.command")]
     pull = math.sqrt(abs(first["initial.buoyancy"] / float(np.abs(usual))))
     start = {"initial.trim": float(pull > 0), "initial.u": speed * pull, "initial.w": speed * pull * down}

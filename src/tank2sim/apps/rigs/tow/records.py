@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tank2sim.arguments import numbers_in
 from tank2sim.arrays import Array
-from tank2sim.errors import ArgumentError, InputError
+from tank2sim.errors import ArgumentError
 from tank2sim.records.csv_table import LONGEST_RUN_S, CsvTable, read_table
 from tank2sim.records.same_record import same_readings
 
@@ -93,19 +93,19 @@ def read_tows(path: Path | str | CsvTable) -> Tows:
     time = table.increasing("t_s")
     remedy = "count the time from the release, t_s = 0, in s"
     if time[0] < 0:
-        raise InputError(table.path, table.place(0, "t_s"), "is before the release", remedy)
+        raise table.fault(table.place(0, "t_s"), "is before the release", remedy)
     if time[-1] > LONGEST_RUN_S:
         problem = f"is {time[-1]:.10g} s after the release, and at most {LONGEST_RUN_S:g} s can be simulated"
-        raise InputError(table.path, table.place(len(time) - 1, "t_s"), problem, remedy)
+        raise table.fault(table.place(len(time) - 1, "t_s"), problem, remedy)
     names = tuple(name for name in table.columns if name != "t_s")
     if not names:
-        raise InputError(table.path, "header", "there is no speed", "add a column speed_1_mps")
+        raise table.fault("header", "there is no speed", "add a column speed_1_mps")
     speed = np.column_stack([_speeds(table, name) for name in names])
     _refuse_copies(table, names, speed[time > 0])
     read = ~np.isnan(speed).all(axis=1)
     if np.count_nonzero(read) < FEWEST_TIMES:
         problem = f"has readings at {np.count_nonzero(read)} times only"
-        raise InputError(table.path, "", problem, f"give readings at {FEWEST_TIMES} times or more")
+        raise table.fault("", problem, f"give readings at {FEWEST_TIMES} times or more")
     force, mass = table.positive_comment("force_N"), table.positive_comment("mass_kg")
     return Tows(table.path, names, time[read], speed[read], force, mass, table.positive_comments(BODY_KEYS))
 
@@ -117,16 +117,16 @@ def _speeds(table: CsvTable, name: str) -> Array:
         other = name.startswith("speed") and not name.endswith("_mps")
         problem = "is not a speed in m/s" if other else "is not a speed of a tow"
         remedy = f"{'convert it to m/s and' if other else 'delete it, or'} call it speed_1_mps, speed_2_mps, ..."
-        raise InputError(table.path, place, problem, remedy)
+        raise table.fault(place, problem, remedy)
     if np.isnan(readings).all():
-        raise InputError(table.path, place, "has no reading", "delete the column")
+        raise table.fault(place, "has no reading", "delete the column")
     if np.nanmax(readings) < _SLOWEST_MPS:
         remedy = "delete the column, or give the speeds in m/s"
-        raise InputError(table.path, place, f"never reaches {_SLOWEST_MPS:g} m/s: no motion", remedy)
+        raise table.fault(place, f"never reaches {_SLOWEST_MPS:g} m/s: no motion", remedy)
     row = int(np.nanargmax(np.abs(readings)))
     if abs(readings[row]) > FASTEST_MPS:
         problem = f"{readings[row]:.6g} m/s is faster than any body is towed"
-        raise InputError(table.path, table.place(row, name), problem, f"give it in m/s, up to {FASTEST_MPS:g}")
+        raise table.fault(table.place(row, name), problem, f"give it in m/s, up to {FASTEST_MPS:g}")
     return readings
 
 
@@ -135,7 +135,7 @@ def _refuse_copies(table: CsvTable, names: tuple[str, ...], moving: Array) -> No
     for first, second in combinations(range(len(names)), 2):
         if same_readings(moving[:, first], moving[:, second]):
             problem, remedy = f"has the readings of {names[first]}", "delete it: a copy is not a second tow"
-            raise InputError(table.path, f"column {names[second]}", problem, remedy)
+            raise table.fault(f"column {names[second]}", problem, remedy)
 
 
 def as_force(force: float | Polynomial) -> Polynomial:

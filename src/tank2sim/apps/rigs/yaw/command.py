@@ -211,7 +211,7 @@ def _simulated(
         if fault.source != str(path):
             raise
         problem = f"the record simulated of it: {fault.problem}"
-        raise InputError(card.source, fault.place, problem, fault.remedy) from None
+        raise card.fault(fault.place, problem, fault.remedy) from None
     write_together({path: yaw_record_text(record)}, inputs=[Path(card.source)])
     return _with_notice(found, similarity_words(record, run.similar_to)) if run.similar_to else found
 

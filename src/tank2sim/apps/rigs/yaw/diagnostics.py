@@ -10,7 +10,6 @@ import numpy as np
 from tank2sim.apps.rigs.yaw.energy import EnergyFit, YawMethodEstimate
 from tank2sim.apps.rigs.yaw.output_error import AngleFit
 from tank2sim.apps.rigs.yaw.records import YawRecord
-from tank2sim.errors import InputError
 from tank2sim.notices import Notice, caution
 from tank2sim.units import in_words
 
@@ -40,7 +39,7 @@ def check_current(records: tuple[YawRecord, ...]) -> Iterator[Notice]:
         yield from (note.of(name) for note in record.notes)
         if largest < _LEAST_A:
             problem = f"stays below {_LEAST_A:g} A: the motor did not turn the body"
-            raise InputError(record.path, "column current_A", problem, "give the current in A")
+            raise record.fault("column current_A", problem, "give the current in A")
         if largest > _STRONG_A:
             yield Notice(f"the current reaches {largest:.3g} A; if the column is in mA, divide it by 1000.").of(name)
         yield from _saturation(record, largest)
@@ -57,7 +56,7 @@ def _saturation(record: YawRecord, largest: float) -> Iterator[Notice]:
             remedy = "run a slower programme, or lower gains"
             if largest > _ANOTHER_UNIT * limit:
                 remedy = f"its largest is {largest:.3g} A: if the column is in mA, divide it by 1000"
-            raise InputError(record.path, "column current_A", problem, remedy)
+            raise record.fault("column current_A", problem, remedy)
     if times.size:
         yield Notice(
             f"{record.path.name}: the motor is saturated at {times[0]:.3f} s, outside the intervals that are evaluated."
@@ -80,14 +79,14 @@ def check_turn(record: YawRecord) -> None:
                 f"programme turns by {programmed:.3g} rad"
             )
             remedy = "check the unit of the angle (phi_rad or phi_deg), max_rate_degps, rise_s and start_s"
-            raise InputError(record.path, "column phi_rad", problem, remedy)
+            raise record.fault("column phi_rad", problem, remedy)
 
 
 def check_sign(record: YawRecord, fit: EnergyFit) -> None:
     """Raise InputError if the motor works against the motion throughout: angle and current have opposite signs."""
     if fit.coefficients[0] < 0 and float(fit.balance.work_J.sum()) < 0:
         problem = "drives the body against its motion throughout, which makes inertia and friction negative"
-        raise InputError(record.path, "column current_A", problem, "give current and angle the same positive sense")
+        raise record.fault("column current_A", problem, "give current and angle the same positive sense")
 
 
 def check_mirror(records: tuple[YawRecord, ...], mirror: tuple[float, ...], limit: float) -> Iterator[Notice]:
@@ -101,7 +100,7 @@ def check_mirror(records: tuple[YawRecord, ...], mirror: tuple[float, ...], limi
                 f"{100 * share:.1f} % of the largest, and {100 * limit:g} % is allowed"
             )
             remedy = "check start_s and rise_s, tune the controller, leave the hump out, or raise mirror_percent"
-            raise InputError(record.path, "", problem, remedy)
+            raise record.fault("", problem, remedy)
     if max(mirror) > _NOT_QUITE_MIRRORED:
         yield Notice(
             f"The accelerating and braking intervals are mirror images to {100 * max(mirror):.1f} % of the largest "
@@ -125,7 +124,7 @@ def check_added_inertia(
             f"kg m2, body and water together have {value + inertia_kgm2:.4g}"
         )
         remedy = "check J_zz, the torque constant, the unit of the current (A), and that the body in air was the same"
-        raise InputError(record.path, "", problem, remedy)
+        raise record.fault("", problem, remedy)
     if value < doubt:
         yield caution(
             f"the added inertia does not differ from zero: {1e4 * value:.3g}e-4 ± {1e4 * doubt / 2:.2g}e-4 "

@@ -27,7 +27,6 @@ from tank2sim.apps.rigs.yaw.model import wall_terms
 from tank2sim.apps.rigs.yaw.programme import dissipation_from_work, inertia_from_work
 from tank2sim.apps.rigs.yaw.records import YawRecord
 from tank2sim.arrays import Array
-from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import column_norms, scaled_condition
 
 Speeds = Literal["actual", "reference"]
@@ -199,11 +198,11 @@ def smooth_angle(record: YawRecord, ends: tuple[float, float]) -> BSpline:
     if len(middle) < needed:
         problem = f"has {len(middle)} steps of the encoder from {begin:.3g} to {end:.3g} s, and {needed} are needed"
         remedy = "take an encoder with more pulses, a faster programme, or sample more often"
-        raise InputError(record.path, "column phi_rad", problem, remedy)
+        raise record.fault("column phi_rad", problem, remedy)
     splines = [spline for knot in KNOTS_S if (spline := _spline(middle, value, knot)) is not None]
     if not splines:
         problem = f"does not move for a while between {begin:.3g} and {end:.3g} s, where the programme moves"
-        raise InputError(record.path, "column phi_rad", problem, "check start_s, rise_s and the encoder")
+        raise record.fault("column phi_rad", problem, "check start_s, rise_s and the encoder")
     return min(splines, key=lambda spline: _cross_validation(spline, middle, value))
 
 
@@ -318,7 +317,7 @@ def fit_energy(balance: Balance, record: YawRecord, programmed: Balance | None =
     freedom = len(rows) - len(balance.terms)
     if freedom < 1 or not scaled_condition(rows) < _HOPELESS:
         problem = f"does not distinguish {', '.join(balance.terms)}"
-        raise InputError(record.path, "", problem, "give more records, or take fewer --terms")
+        raise record.fault("", problem, "give more records, or take fewer --terms")
     instruments = rows if programmed is None else programmed.rows
     norms, scaled = column_norms(rows), (instruments / column_norms(instruments)).T
     inverse = np.linalg.solve(scaled @ (rows / norms), scaled) / norms[:, None]  # (Z'X)^-1 Z'

@@ -269,7 +269,7 @@ def _torque_constant(records: tuple[YawRecord, ...], options: YawOptions) -> tup
     constants = {record.constants.get("torque_constant_NmpA") for record in records}
     if len(constants) > 1:
         place, problem = "comment torque_constant_NmpA", "is not the same in all records"
-        raise InputError(records[0].path, place, problem, "give torque_constant_NmpA")
+        raise records[0].fault(place, problem, "give torque_constant_NmpA")
     (stated,) = constants
     if stated is not None:
         return stated, []

@@ -21,7 +21,6 @@ from tank2sim.apps.rigs.yaw.energy import EnergyFit, Interval, YawMethodEstimate
 from tank2sim.apps.rigs.yaw.model import yaw_rig_model
 from tank2sim.apps.rigs.yaw.records import YawRecord
 from tank2sim.arrays import Array
-from tank2sim.errors import InputError
 from tank2sim.records.audit.weak import newey_west
 from tank2sim.simulation.scheme import runge_kutta_step
 from tank2sim.simulation.sensitivity import augmented_step
@@ -170,7 +169,7 @@ def _humps(record: YawRecord) -> list[_Hump]:
         # With room for rounding: a step more or less changes the result by a good part of its error.
         times: Array = first + step * np.arange(int((last - first) / step + 1e-6), dtype=np.float64)
         if len(times) < 10:
-            raise InputError(record.path, "column t_s", f"has fewer than 10 rows in hump {number + 1}", "sample faster")
+            raise record.fault("column t_s", f"has fewer than 10 rows in hump {number + 1}", "sample faster")
         spline = smooth_angle(record, (first, first + programme.rise_s))
         angles, currents = np.interp(times, time, record.angle_rad), np.diff(np.interp(times, time, work))
         start = float(spline(times[0])), float(spline(times[0], 1))

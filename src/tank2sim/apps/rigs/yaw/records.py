@@ -71,6 +71,10 @@ class YawRecord:
     constants: dict[str, float]
     notes: tuple[Notice, ...] = ()
 
+    def fault(self, place: str, problem: str, remedy: str) -> InputError:
+        """An error about this record, to be raised: its place, the problem, and the remedy."""
+        return InputError(self.path, place, problem, remedy)
+
 
 def read_yaw_record(path: Path | str | CsvTable) -> YawRecord:
     """Read ``t_s,phi_rad,current_A`` (or phi_deg), with the programme in comments.
@@ -96,7 +100,7 @@ def read_yaw_record(path: Path | str | CsvTable) -> YawRecord:
     )
     medium = table.comments.get("medium", "water").strip().lower()
     if medium not in get_args(Medium):
-        raise InputError(table.path, "comment medium", f"is {medium!r}", "write '# medium: air' or '# medium: water'")
+        raise table.fault("comment medium", f"is {medium!r}", "write '# medium: air' or '# medium: water'")
     programme, missing = _programme(table, time)
     unknown = f"the file does not state {' and '.join(missing)} of the programme"
     notes = [f"{unknown}; the values of the published rig are used."] if missing else []
@@ -131,7 +135,7 @@ def refuse_copied_records(records: Sequence[YawRecord]) -> tuple[Notice, ...]:
             alike, name = likeness(seen[number], seen[before]), records[before].path.name
             if alike is Likeness.COPY:
                 remedy = "give each record once: a copy is not a second run"
-                raise InputError(record.path, "", f"is the record of {name} again", remedy)
+                raise record.fault("", f"is the record of {name} again", remedy)
             if alike is Likeness.MIRROR and has_noise(seen[number]):
                 said = f"is the mirror image of {name}, noise included, not a second run"
                 notices.append(caution(f"{record.path.name} {said}."))
@@ -156,7 +160,7 @@ def _programme(table: CsvTable, time: Array) -> tuple[YawProgramme, list[str]]:
     kind = table.comments.get("programme", "unidirectional").strip().lower()
     if kind not in kinds:
         problem, remedy = f"is {kind!r}", f"one of {', '.join(kinds)} was expected"
-        raise InputError(table.path, "comment programme", problem, remedy)
+        raise table.fault("comment programme", problem, remedy)
     stated = {
         "max_rate_radps": _rate(table),
         "rise_s": table.positive_comment("rise_s"),
@@ -172,7 +176,7 @@ def _programme(table: CsvTable, time: Array) -> tuple[YawProgramme, list[str]]:
         humps = _humps(table, time, programme, kind)
         whole = replace(programme, humps=humps, kind="reversing" if kind == "reversing" else "unidirectional")
     except ValueError as error:
-        raise InputError(table.path, "programme", str(error), "correct the comments that describe it") from None
+        raise table.fault("programme", str(error), "correct the comments that describe it") from None
     return whole, missing
 
 
@@ -182,7 +186,7 @@ def _rate(table: CsvTable) -> float | None:
         value = table.comment_number(key)
         if value is not None:
             if value == 0:
-                raise InputError(table.path, f"comment {key}", "is 0", "give the rate that is held")
+                raise table.fault(f"comment {key}", "is 0", "give the rate that is held")
             return to_si(key, value)[1]
     return None
 
@@ -198,5 +202,5 @@ def _humps(table: CsvTable, time: Array, programme: YawProgramme, kind: str) -> 
             f"lasts from {time[0]:g} to {time[-1]:g} s, and {max(humps, 1)} humps of the programme take from "
             f"{programme.start_s:g} s to {programme.start_s + (max(humps, 1) - 1) * programme.period_s + length:g} s"
         )
-        raise InputError(table.path, "", problem, "give the whole record, or correct start_s, rise_s or humps")
+        raise table.fault("", problem, "give the whole record, or correct start_s, rise_s or humps")
     return humps

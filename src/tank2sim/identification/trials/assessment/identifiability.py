@@ -149,7 +149,7 @@ def _large(problem: Problem, values: Array) -> Array:
     derivative of the same force, whichever is largest. In the prime system terms of one force have coefficients of
     one size."""
     size = np.maximum(problem.prior_error, np.abs(values))
-    model = dict(zip(problem.model.parameter_names, problem.parameters(values), strict=True))
+    model = problem.model.parameters_by_name(problem.parameters(values))
     terms = {name: term for name in model if (term := parse_term(_short(name))) is not None}
     for place, name in enumerate(problem.free):
         if name in terms and not terms[name].acceleration:
@@ -166,8 +166,7 @@ def _quietened(form: WeakForm, place: int) -> SampledRun:
     """A run in which every signal that moves no more than its noise is constant."""
     run, motion = form.runs[place].run, form.runs[place].motion
     model = form.problem.model
-    values = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
-    speed, length = float(values["ship.speed"]), float(values["ship.length"])
+    speed, length = (model.defaults[f"ship.{name}"] for name in ("speed", "length"))
     signals = motion.smooth.copy()
     units = (speed, speed, speed / length)
     for column, (name, unit, noise) in enumerate(zip(MEASURED_STATES, units, motion.remaining_noise, strict=False)):

@@ -341,7 +341,7 @@ def bands(
     results = list((map if executor is None else executor.map)(_figures, tasks))
     names = dict.fromkeys(name for figures in results for name in figures)
     if not names:
-        raise InputError(model.origin, "", "the motion leaves all bounds in every member", "check the estimates")
+        raise model.fault("", "the motion leaves all bounds in every member", "check the estimates")
     members = {name: np.array([figures.get(name, np.nan) for figures in results]) for name in names}
     return {name: column for name, column in members.items() if not np.isnan(column).all()}
 

@@ -73,35 +73,29 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unu
     remarks: dict[str, list[Notice]] = {}
     for item in given:
         read = item if isinstance(item, Trial) else read_trial_file(item)
-        remarks[read.path.name] = list(read.notices)
         trial, findings = audit_and_repair(read)
-        path = trial.path
-        if wrong := next((finding for finding in findings if finding.open), None):  # not the quantity of its name
-            place = f"column{'s' * (len(wrong.columns) > 1)} {wrong.column}"
-            remedy = f"probably {wrong.likely_truth}: correct the file, or leave the column out"
-            raise InputError(wrong.source, place, wrong.what, remedy)
-        audited[path.name] = list(findings)
-        if not set(RUDDERS) & set(trial.signals):
-            raise InputError(path, "column of the rudder", "has no usable reading", "give the rudder in more rows")
+        _refuse_faults(trial, findings)
+        name = trial.path.name
+        remarks[name], audited[name] = list(read.notices), list(findings)
         notices += _unused(trial, card) if report_unused else []
         if empty := int(np.isnan(trial.signals["delta_rad" if "delta_rad" in trial.signals else RUDDERS[1]]).sum()):
             words = "taken as straight between its readings"
-            notices.append(Notice(f"{path.name}: the rudder is empty in {empty} rows: {words}"))
+            notices.append(Notice(f"{name}: the rudder is empty in {empty} rows: {words}"))
         scaled, factor = at_size_of(trial, card)
         _refuse_other_revolutions(scaled, card)
         if factor != 1:
-            notices.append(Notice(f"{path.name}: scaled by Froude's law to a ship {factor:.4g} times as long"))
+            notices.append(Notice(f"{name}: scaled by Froude's law to a ship {factor:.4g} times as long"))
         trials.append(scaled)
     names = [trial.name for trial in trials]
     for trial in trials:
         if names.count(trial.name) > 1:
-            raise InputError(trial.path, "", "has the name of another trial", "give each file once, under its own name")
+            raise trial.fault("", "has the name of another trial", "give each file once, under its own name")
     alike = refuse_copies(trials)
     by_angle = ["delta_rad" in trial.signals for trial in trials]
     if any(by_angle) and not all(by_angle):
         odd = trials[by_angle.index(False)]
         remedy = "give trials that all have delta_deg, or all only delta_order_deg"
-        raise InputError(odd.path, "header", "has no delta_deg, but other trials have", remedy)
+        raise odd.fault("header", "has no delta_deg, but other trials have", remedy)
     notices = [*alike, *_of_audit(audited), *_of_reading(remarks), *dict.fromkeys(notices)]
     doubts = tuple(
         RecordDoubt(Path(name).stem, finding.column, finding.likely_truth)
@@ -110,6 +104,17 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unu
         if not _taken_so(finding)
     )
     return Measured(tuple(trials), "angle" if all(by_angle) else "order", tuple(notices), doubts=doubts)
+
+
+def _refuse_faults(trial: Trial, findings: Iterable[Finding]) -> None:
+    """Refuse a trial with a column that is not the quantity of its name, or without a rudder."""
+    wrong = next((finding for finding in findings if finding.open), None)
+    if wrong is not None:
+        place = f"column{'s' * (len(wrong.columns) > 1)} {wrong.column}"
+        remedy = f"probably {wrong.likely_truth}: correct the file, or leave the column out"
+        raise InputError(wrong.source, place, wrong.what, remedy)
+    if not set(RUDDERS) & set(trial.signals):
+        raise trial.fault("column of the rudder", "has no usable reading", "give the rudder in more rows")
 
 
 def _taken_so(finding: Finding) -> bool:
@@ -165,7 +170,7 @@ def _refuse_other_revolutions(trial: Trial, card: ManoeuvringCard) -> None:
         problem = (
             f"reaches {largest * rpm:.3g} rpm at {speed:.3g} m/s, and the card's nominal_rpm is {nominal * rpm:.3g}"
         )
-        raise InputError(trial.path, "column of the revolutions", problem, "give both in revolutions a minute")
+        raise trial.fault("column of the revolutions", problem, "give both in revolutions a minute")
 
 
 def at_size_of(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
@@ -181,18 +186,18 @@ def at_size_of(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
     elif speed is None:
         return trial, 1.0
     elif speed == 0:
-        raise InputError(trial.path, "", "the ship does not move in it", "leave it out: it holds no motion")
+        raise trial.fault("", "the ship does not move in it", "leave it out: it holds no motion")
     else:
         ratio = (card.model.speed_mps / speed) ** 2
     factor = min((1.0, scale, 1 / scale), key=lambda candidate: abs(math.log(ratio / candidate)))
     off = abs(math.log(ratio / factor))
     if trial.length_m is not None and off > SAME_LENGTH:
         problem = f"is of a ship or model of {trial.length_m:g} m, and the card of one of {card.ship.length_m:g} m"
-        raise InputError(trial.path, "", problem, f"neither is the other at 1:{scale:g}; give the card of that ship")
+        raise trial.fault("", problem, f"neither is the other at 1:{scale:g}; give the card of that ship")
     if trial.length_m is None and trial.scale is None and off > 2 * math.log(FARTHEST_FROUDE):
         problem = f"reaches {speed:.3g} m/s, and the card is of {card.model.speed_mps:.3g} m/s"
         remedy = "if one of the two is a model, add the comment '# scale: LAMBDA' (ship length over model length)"
-        raise InputError(trial.path, "", problem, remedy)
+        raise trial.fault("", problem, remedy)
     return (trial if factor == 1 else froude_scaled(trial, factor)), factor
 
 

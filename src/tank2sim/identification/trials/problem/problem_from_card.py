@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -12,14 +12,16 @@ from scipy.ndimage import uniform_filter1d
 from tank2sim.arrays import Array
 from tank2sim.cards.card import TORQUE_COEFFICIENTS, ManoeuvringCard, MmgCard
 from tank2sim.cards.covariance_reading import read_covariance
+from tank2sim.cards.form import EffectEntry
 from tank2sim.cards.reading import revised
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS, LINEAR_TERMS
 from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, study_model
 from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.effects.effect import EffectParameter
 from tank2sim.dynamics.mmg.hull import MMG_TERMS
 from tank2sim.dynamics.roll import roll_terms
-from tank2sim.errors import ArgumentError, InputError
+from tank2sim.errors import ArgumentError
 from tank2sim.identification.trials.problem.estimation_problem import (
     DrivenShip,
     Estimate,
@@ -199,18 +201,20 @@ def free_parameters(card: ManoeuvringCard, *, inertia: bool = False) -> dict[str
             if error > 0 and key not in TORQUE_COEFFICIENTS:
                 free[f"mmg.{key}"] = card.interaction(key), error
     for entry in card.effects:
-        effect = EFFECTS[entry.name]
-        for parameter in effect.parameters:
-            optional = parameter.optional or (parameter.default is not None and parameter.absent is not None)
-            if parameter.input_name or (optional and parameter.name not in entry.parameters):
-                continue  # an input, or a part of the effect that the card does not have
-            error = entry.uncertainty.get(
-                parameter.name, ASSUMED_EFFECT_ERROR * (parameter.maximum - parameter.lowest(card))
-            )
-            if error <= 0:  # stated as certain
-                continue
-            free[f"{effect.name}.{parameter.stem}"] = parameter.value(entry.parameters, card), error
+        for parameter in _parts_present(entry):
+            span = parameter.maximum - parameter.lowest(card)
+            error = entry.uncertainty.get(parameter.name, ASSUMED_EFFECT_ERROR * span)
+            if error > 0:  # 0: stated as certain
+                free[f"{entry.name}.{parameter.stem}"] = parameter.value(entry.parameters, card), error
     return free
+
+
+def _parts_present(entry: EffectEntry) -> Iterator[EffectParameter]:
+    """Parameters of an effect, without inputs and without parts of the effect that the card does not have."""
+    for parameter in EFFECTS[entry.name].parameters:
+        optional = parameter.optional or (parameter.default is not None and parameter.absent is not None)
+        if not parameter.input_name and (not optional or parameter.name in entry.parameters):
+            yield parameter
 
 
 def problem_from_card(
@@ -233,21 +237,16 @@ def problem_from_card(
     model = driven_model(card, ship.driven_by)
     gear = ordered_rudder(driven_model(card, "order")) if driven_by == "order" else None
     free = free_parameters(card, inertia=inertia)
-    turned = [trial.signals["n_radps"] for trial in trials if "n_radps" in trial.signals]
-    spread = float(np.nanstd(np.concatenate(turned))) if turned else 0.0
-    if (known := card.propulsion) is not None and known.Xnn and spread > REVOLUTIONS_VARY * known.nominal_radps:
+    known = card.propulsion
+    if known is not None and known.Xnn and _spread_of_revolutions(trials) > REVOLUTIONS_VARY * known.nominal_radps:
         free[REVOLUTIONS] = known.Xnn, REVOLUTIONS_ERROR * abs(known.Xnn)
     for name in hold:
-        held = next((key for key in (name, f"mmg.{name}") if key in free), f"derivatives.{name}")
-        if held not in free:
-            text = " ".join(parameter.removeprefix("derivatives.") for parameter in free)
-            raise ArgumentError("hold", "", f"{name} is not an estimated parameter", f"estimated are {text}")
-        del free[held]
+        del free[_estimated_name(name, free)]
     if not free:
-        raise InputError(card.source, "derivatives", "nothing is left to estimate", "give derivatives with a value")
+        raise card.fault("derivatives", "nothing is left to estimate", "give derivatives with a value")
     seen = seen_in(model, trials)
     if not seen:
-        raise InputError(trials[0].path, "header", "none of its signals can be compared", "give u_mps, r_degps, ...")
+        raise trials[0].fault("header", "none of its signals can be compared", "give u_mps, r_degps, ...")
     prepared = [
         prepare(model, trial, seen, orders_before=True, rudder=gear.angle(trial) if gear else None) for trial in trials
     ]
@@ -258,9 +257,24 @@ def problem_from_card(
     if not runs:
         low, high = card.model.speed_range_mps
         problem = f"never goes for long at {low:g} to {high:g} m/s, where the card holds"
-        raise InputError(trials[0].path, "", problem, "change model.valid_speed_mps of the card, or leave it out")
+        raise trials[0].fault("", problem, "change model.valid_speed_mps of the card, or leave it out")
     values = np.array(list(free.values()))
     return Problem(model, tuple(free), values[:, 0], values[:, 1], runs, ship=ship)
+
+
+def _spread_of_revolutions(trials: Sequence[Trial]) -> float:
+    """Standard deviation over all trials, rad/s; 0 if none has revolutions."""
+    turned = [trial.signals["n_radps"] for trial in trials if "n_radps" in trial.signals]
+    return float(np.nanstd(np.concatenate(turned))) if turned else 0.0
+
+
+def _estimated_name(name: str, free: Mapping[str, object]) -> str:
+    """Full name of a free parameter; ArgumentError if none has this name."""
+    found = next((key for key in (name, f"mmg.{name}", f"derivatives.{name}") if key in free), None)
+    if found is None:
+        text = " ".join(parameter.removeprefix("derivatives.") for parameter in free)
+        raise ArgumentError("hold", "", f"{name} is not an estimated parameter", f"estimated are {text}")
+    return found
 
 
 def with_captive(problem: Problem, card: ManoeuvringCard, captive: CaptiveRuns | None) -> Problem:

@@ -19,7 +19,6 @@ from scipy.ndimage import uniform_filter1d
 from tank2sim.arrays import Array
 from tank2sim.dynamics.build import KEPT_MODELS
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
 from tank2sim.records.audit.noise import white_noise
 from tank2sim.records.trials import Trial, sampling_step
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS, means_of_lines, motion_record
@@ -106,7 +105,7 @@ def prepare(
     begin = float(trial.time_s[0]) + 0.5 * (stride - 1) * sampling
     grid: Array = begin + step * np.arange(count, dtype=float)
     if count < 10:
-        raise InputError(trial.path, "", f"is only {trial.time_s[-1] - trial.time_s[0]:g} s long", "leave it out")
+        raise trial.fault("", f"is only {trial.time_s[-1] - trial.time_s[0]:g} s long", "leave it out")
     edges = np.append(grid, grid[-1] + step)
     columns = [record.means(column, edges, given_before=orders_before) for column in range(record.inputs.shape[1])]
     if rudder is not None:
@@ -115,7 +114,7 @@ def prepare(
     inputs[-1] = inputs[-2]
     measured = [_averaged(trial.time_s, signal, grid, step, stride) for signal in record.measured.T]
     if np.isnan(measured).all():
-        raise InputError(trial.path, "header", "has none of the signals to be compared", "give u_mps, r_degps, ...")
+        raise trial.fault("header", "has none of the signals to be compared", "give u_mps, r_degps, ...")
     return SampledRun(trial.name, begin, step, inputs, np.column_stack(measured), tuple(seen), str(trial.path))
 
 
@@ -146,7 +145,7 @@ def in_range(run: SampledRun, model: Model, speeds: tuple[float, float], least_s
     speed = next((column for column in columns if np.count_nonzero(~np.isnan(column)) > 1), None)
     if speed is None:
         return (run,)
-    p = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
+    p = model.defaults
     width = max(1, round(0.5 * p["ship.length"] / p["ship.speed"] / run.step_s))
     smooth = uniform_filter1d(straight_over_gaps(run.times, speed), width)
     inside = (smooth >= speeds[0]) & (smooth <= speeds[1])
@@ -239,7 +238,5 @@ def ordered_rudder(model: Model) -> OrderedRudder | None:
     x[place], u[command] = angle, driving[0]
     after = runge_kutta_step(model)(x, u, model.parameter_values(), driving[1])[place]
     step = ca.Function("gear", [angle, driving], [ca.densify(after)])
-    values = dict(zip(model.parameter_names, model.parameter_values(), strict=True))
-    return OrderedRudder(
-        Chain(step), float(values["steering.time_constant"]), float(values["ship.length"] / values["ship.speed"])
-    )
+    values = model.defaults
+    return OrderedRudder(Chain(step), values["steering.time_constant"], values["ship.length"] / values["ship.speed"])
