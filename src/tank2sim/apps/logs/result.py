@@ -261,7 +261,7 @@ class LogResult(Result[LogStudy]):
         ]
         logged = [History("log", time_s=time, values=values)]
         chart = history_chart(logged, shown, title="Logged signals", height_px=70, marks=marks)
-        caption = "Tinted: the stretches that excite the vessel. Times from the begin of the log."
+        caption = "Tinted: the stretches that excite the vessel. Times from the beginning of the log."
         return [Section("Time line", charts=[Illustration(chart, caption=caption)])]
 
     def _channel_tables(self) -> list[Table]:
@@ -276,7 +276,8 @@ class LogResult(Result[LogStudy]):
 
     def _stretch_table(self) -> Table:
         fields = {"kind": "stretch", "begins_s": "", "duration_s": "lasts", "steering": "", "heading_change_deg": ""}
-        fields |= {"reversals": "", "speed_mps": "", "yaw_rate_rms_degps": "rms yaw rate", "file": ""}
+        fields |= {"reversals": "", "speed_mps": "speed at the start", "yaw_rate_rms_degps": "rms yaw rate"}
+        fields["file"] = ""
         return replace(records_table("Stretches", self.study.stretches, fields=fields), wide=True)
 
     def _log_table(self) -> Table:
