@@ -92,6 +92,7 @@ def test_a_craft_compared_with_itself_has_no_empty_table_and_no_words_of_ships(o
     assert found.headline[-1] == "No figure of the manoeuvres differs."
     tables = [table for section in found.sections for table in section.tables]
     assert all(table.rows for table in tables)
+    assert tables[0].caption == "Main figures"  # no ships were drawn
     assert all(column.title in {"trial", "figure", *found.labels} for column in tables[0].columns)
     text = next(section.text for section in found.sections if section.heading == "Coefficients")
     assert text.startswith("In SI units.") and "rudder" not in text

@@ -53,14 +53,13 @@ _COEFFICIENTS = (
     "identical to the reference are not compared."
 )
 _ASSUMED = "An asterisk marks a standard error that the card does not state: 2 % of the value."
-_TRIALS = (
-    "Simulated in calm water from the same approach speed, at the size of the first card's ship. In brackets: standard "
-    "deviation of each figure when the card's coefficients are drawn within their errors. z: difference over the root "
-    "of both variances."
+_TRIALS = "Simulated in calm water from the same approach speed, at the size of the first card's ship."
+_DEVIATIONS = (
+    " In brackets: standard deviation of each figure when the card's coefficients are drawn within their errors. z: "
+    "difference over the root of both variances."
 )
-_PERCENT = (
-    "Points: difference from the reference. Bars: plus and minus two standard deviations, by the errors of both cards."
-)
+_PERCENT = "Points: difference from the reference."
+_BARS = " Bars: plus and minus two standard deviations, by the errors of both cards."
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -219,7 +218,9 @@ class ComparisonResult(Result[CardComparison]):
         chart = _percent_chart(
             percents, self.labels, ", standard errors assumed" * any(card.assumed_errors for card in self.study.cards)
         )
-        drawn = Illustration(chart, caption=_PERCENT, name="figures_of_manoeuvres")
+        drawn_within_errors = any(z is not None for *_, z in percents)
+        text, caption = _TRIALS + _DEVIATIONS * drawn_within_errors, _PERCENT + _BARS * drawn_within_errors
+        drawn = Illustration(chart, caption=caption, name="figures_of_manoeuvres")
         shown = _SHOWN_OF_CRAFT if self.study.craft else _SHOWN
         rows: list[list[Cell]] = [
             [trial.name, with_unit(*in_words(name)), *_with_deviations(row)]
@@ -228,9 +229,9 @@ class ComparisonResult(Result[CardComparison]):
             if name in shown
         ]
         heads = [Column("trial"), Column("figure"), *map(Column, self.labels)]
-        main = table("Main figures (standard deviation)", heads, rows)
+        main = table("Main figures" + " (standard deviation)" * drawn_within_errors, heads, rows)
         tables = [main, *map(self._trial_table, self.study.trials)]
-        return [Section("Figures of manoeuvres", text=_TRIALS, charts=[drawn], tables=tables)]
+        return [Section("Figures of manoeuvres", text=text, charts=[drawn], tables=tables)]
 
     def _trial_table(self, trial: TrialComparison) -> Table:
         heads = [Column("figure"), Column("unit"), *map(Column, self.labels)]
