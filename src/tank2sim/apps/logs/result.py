@@ -173,11 +173,13 @@ class LogResult(Result[LogStudy]):
         since = f" from {study.begins_utc}" if study.begins_utc else ""
         used, exciting = sum(one.use for one in study.channels), sum(one.excites for one in study.stretches)
         lines = [
-            f"{formats}: {study.duration_s:.5g} s{since}, {used} channels in use.",
+            f"{formats}: {study.duration_s:.5g} s{since}, {used} channel{'s' * (used != 1)} in use.",
             f"{exciting} of {len(study.stretches)} stretches excite the vessel. {_cut_in_words(self._cut)}",
         ]
         if self._faults:
-            lines.append(f"{self._faults} faults of the log are noted.")
+            lines.append(
+                "1 fault of the log is noted." if self._faults == 1 else f"{self._faults} faults of the log are noted."
+            )
         lines += [study.gear.words] if study.gear else []
         return (*lines, *(self.identified.headline if self.identified else ()))
 
@@ -201,7 +203,7 @@ class LogResult(Result[LogStudy]):
             *([self._map(study.track)] if study.track else []),
             *self._time_line(),
             Section("Channels", tables=self._channel_tables()),
-            Section("Stretches", tables=[self._stretch_table()]),
+            *([Section("Stretches", tables=[self._stretch_table()])] if study.stretches else []),
             *([_gear_section(study.gear)] if study.gear else []),
             *(craft_sections(study.identified) if study.identified else []),
             Section("Logs", tables=[self._log_table()], folded=True),
