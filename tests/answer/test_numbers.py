@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tank2sim.answer.numbers import format_column, format_number, is_number_text, without_exponents
+from tank2sim.answer.parts import cell_text
 
 
 @pytest.mark.parametrize(
@@ -66,3 +67,11 @@ def test_truth_values_are_no_numbers():
 def test_numbers_in_text_lose_their_exponents_and_all_else_stays() -> None:
     text = "B1, B2: 2.2e+04 (qr) and -3e-09 kg, above 225; 1e5 and file_2e+04x"
     assert without_exponents(text) == "B1, B2: 22\u202f000 (qr) and −3×10⁻⁹ kg, above 225; 1e5 and file_2e+04x"
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"),
+    [(-0.0, "0"), (math.inf, "∞"), (-math.inf, "-∞"), (math.nan, "-"), (-1.25, "-1.25"), ([-0.0], "0")],
+)
+def test_the_screen_shows_no_negative_zero_and_no_word_for_infinity(value, shown):
+    assert cell_text(value) == shown

@@ -222,7 +222,7 @@ def test_a_long_table_is_folded_unless_it_says_otherwise(rows, folded, details):
 
 def test_two_notices_are_seen_and_more_are_folded():
     reader = one_section(notes=["first", "second", "third"])
-    assert reader.words("summary").strip() == "1 more notices"
+    assert reader.words("summary").strip() == "1 more notice"
     assert "third" in reader.words("details") and "second" not in reader.words("details")
 
 

@@ -62,6 +62,8 @@ def test_the_fmu_of_the_controller_is_written(pilot: t2s.AutopilotResult, tmp_pa
         ({"course_change_deg": 0}, "course_change_deg", ""),
         ({"course_change_deg": 171}, "course_change_deg", ""),
         ({"design": "fuzzy"}, "design", ""),
+        ({"heading_weight_deg": 3.0}, "heading_weight_deg", ""),
+        ({"design": "pd", "rudder_weight_deg": 3.0}, "rudder_weight_deg", ""),
         ({"track": [[0, 0]]}, "track", ""),
         ({"track": [0, 1]}, "track", "[0]"),
         ({"track": [[0, 0], [0, 0]]}, "track", "waypoint 2"),

@@ -84,3 +84,26 @@ def test_a_ship_and_a_craft_of_another_size_are_refused(otter) -> None:
         t2s.compare([otter, "mariner"], members=0)
     with pytest.raises(InputError, match=r"ship\.length_m"):
         t2s.compare([otter, otter.replace({"ship.length_m": 2.5})], members=0)
+
+
+def test_a_craft_compared_with_itself_has_no_empty_table_and_no_words_of_ships(otter) -> None:
+    found = t2s.compare([otter, otter], members=0)
+    assert "all 13 coefficients are the reference's own" in found.headline[0]
+    assert found.headline[-1] == "No figure of the manoeuvres differs."
+    tables = [table for section in found.sections for table in section.tables]
+    assert all(table.rows for table in tables)
+    assert tables[0].caption == "Main figures"  # no ships were drawn
+    assert all(column.title in {"trial", "figure", *found.labels} for column in tables[0].columns)
+    text = next(section.text for section in found.sections if section.heading == "Coefficients")
+    assert text.startswith("In SI units.") and "rudder" not in text
+
+
+def test_coefficients_of_a_craft_are_shown_in_si(otter) -> None:
+    found = t2s.compare([otter, otter.replace({"derivatives.Xu": 1.1 * otter.card.derivatives["Xu"]})], members=0)
+    differing = next(
+        table
+        for section in found.sections
+        for table in section.tables
+        if table.caption == "Coefficients that differ, SI"
+    )
+    assert differing.rows[0][:2] == ["Xu", pytest.approx(otter.card.derivatives["Xu"])]

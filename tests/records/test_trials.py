@@ -82,6 +82,11 @@ def test_faulty_csvs_are_refused_with_their_place(write, old, new, said):
         read_trial_file(path)
 
 
+def test_a_trial_of_a_craft_is_refused_with_the_commands_that_take_it(write):
+    with pytest.raises(InputError, match="craft with thrusters are taken by identify"):
+        read_trial_file(write("t_s,psi_deg,order_port,order_starboard\n0,0,0,0\n1,0,0,0\n"))
+
+
 def test_a_wind_of_negative_speed_is_refused(write):
     path = write(GOOD.replace("u_mps", "wind_speed_mps").replace("0,0,1,", "0,0,-1,"))
     with pytest.raises(InputError, match="column wind_speed_mps: has negative values"):

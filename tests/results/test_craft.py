@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from tank2sim.cards import SteeredBy
 from tank2sim.identification.craft.fit import CoefficientVerdict
 from tank2sim.identification.craft.study import (
@@ -113,3 +115,8 @@ def test_results_read_from_their_json_have_the_same_pages() -> None:
     for result in (CraftIdentificationResult(IDENTIFIED), ValidationResult(VALIDATED)):
         again = type(result).read(result.to_dict(), "c.json")
         assert again.page() == result.page() and again.to_dict() == result.to_dict()
+
+
+def test_one_trial_determines_in_the_singular() -> None:
+    found = CraftIdentificationResult(replace(IDENTIFIED, trials=("steps",)))
+    assert "1 trial determines 1 of 2 coefficients" in found.headline[0]

@@ -33,7 +33,12 @@ STUDY = ManoeuvreStudy(
     length_m=100.0,
     beam_m=None,
     manoeuvre="turn:10",
-    figures={"advance_m": 570.0, "advance_lengths": 5.7, "tactical_diameter_m": None},
+    figures={
+        "advance_m": 570.0,
+        "advance_lengths": 5.7,
+        "tactical_diameter_m": None,
+        "tactical_diameter_lengths": None,
+    },
     limits={"advance_lengths": 4.5},
     left_card_range_s=None,
     left_card_range_by="",
@@ -120,3 +125,8 @@ def test_a_result_read_from_its_json_has_no_motion_to_write() -> None:
     assert again.df["x_m"].to_list() == NORTH.tolist()
     with pytest.raises(InputError, match="has not the whole motion"):
         again.to_csv()
+
+
+def test_a_figure_that_the_run_does_not_show_is_named_once():
+    (table,) = [one for section in ManoeuvreResult(STUDY).sections for one in section.tables]
+    assert [note for note in table.notes if "too short" in note] == ["The run is too short to show: tactical diameter."]

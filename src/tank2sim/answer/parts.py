@@ -256,8 +256,10 @@ def cell_text(value: object, digits: int = 5) -> str:
             return "-"
         case bool():
             return "yes" if value else "no"
+        case float() if math.isinf(value):
+            return "∞" if value > 0 else "-∞"
         case float():
-            return f"{value:.{digits}g}"
+            return f"{value + 0.0:.{digits}g}"  # -0.0 + 0.0 is 0.0
         case list() | tuple():
             return ", ".join(cell_text(item, digits) for item in value)
         case _:

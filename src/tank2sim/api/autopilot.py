@@ -118,9 +118,13 @@ def autopilot(
     if course_change_deg == 0:
         raise ArgumentError("course_change_deg", "", "is 0", "give the angle to turn by")
     card = ship.steered()
+    of_lqr = {"heading_weight_deg": heading_weight_deg, "rudder_weight_deg": rudder_weight_deg}
     if card.steered_by is SteeredBy.THRUSTERS:
-        rudders = {"heading_weight_deg": heading_weight_deg, "rudder_weight_deg": rudder_weight_deg}
-        _refuse_rudder(rudders | {"wave_filter_radps": wave_filter_radps, "design": design})
+        remedy = "leave it out: the controller of a craft with thrusters has one design"
+        of_rudder = of_lqr | {"wave_filter_radps": wave_filter_radps, "design": design}
+        _refuse_unused(of_rudder, "is of a rudder", remedy)
+    elif design != "lqr":
+        _refuse_unused(of_lqr, f"is not part of the design {design!r}", "leave it out, or choose lqr")
     weights = LqrWeights(heading_rad=math.radians(heading_weight_deg), rudder_rad=math.radians(rudder_weight_deg))
     settings = StudySettings(
         kind=design,
@@ -148,9 +152,8 @@ def autopilot(
     return AutopilotResult(replace(study, notices=(*study.notices, *compiler_notices())), piloted)
 
 
-def _refuse_rudder(given: dict[str, Any]) -> None:
-    """Refuse arguments of a rudder's controller that are not at their defaults."""
+def _refuse_unused(given: dict[str, Any], problem: str, remedy: str) -> None:
+    """Refuse arguments that the design does not use and that are not at their defaults."""
     usual = {"heading_weight_deg": 5.0, "rudder_weight_deg": 5.0, "design": "pid", "wave_filter_radps": None}
     if name := next((name for name, value in given.items() if value != usual[name]), ""):
-        remedy = "leave it out: the controller of a craft with thrusters has one design"
-        raise ArgumentError(name, "", "is of a rudder", remedy)
+        raise ArgumentError(name, "", problem, remedy)

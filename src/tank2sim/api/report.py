@@ -23,6 +23,8 @@ SHOWN_ENDINGS = (".html", ".htm", ".svg", ".png")
 def make_report(result: Mapping[str, object] | str | Path) -> Result[Any]:
     """Read a result back: its page, tables and charts equal the output of the command that wrote it.
 
+    The JSON of poster, pilotcard and steer holds their data alone: the page shows these, not the sheet or the ship.
+
     Parameters
     ----------
     result : mapping or path

@@ -367,5 +367,7 @@ class CraftCard(SteeredCard):
         return 1 / craft_scale(name, self.scales) if self.model.scaling == "prime" else 1.0
 
 
-CRAFT_COMMANDS = "identify, validate, compare, gap, simulate, stability, autopilot, influence, convert, export, steer"
+CRAFT_COMMANDS = (
+    "identify, validate, compare, gap, simulate, stability, autopilot, influence, convert, export, steer, serve"
+)
 """Commands that take the card of a craft with thrusters."""

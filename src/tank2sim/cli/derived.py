@@ -267,7 +267,9 @@ def _value_option(one: inspect.Parameter, kind: Any, words: str, verb: Verb) -> 
     if kind is bool:
         flags = [f"{option}/--no-{option[2:]}"] if one.default else names
         return _option(flags, name=one.name, is_flag=True, **settings)
-    metavar = unit.upper().replace("/", "P") if unit and not read else stem.upper() if several or read else None
+    metavar = stem.upper() if several or read else None
+    if unit and not read:
+        metavar = unit.upper().replace("/", "P").replace(" ", "")
     settings |= {"multiple": bool(several), "metavar": f"{metavar} ..." if several else metavar}
     if not read:
         settings |= {"type": _type(kind, several), "show_default": default not in (None, "", ())}

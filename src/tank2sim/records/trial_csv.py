@@ -88,6 +88,8 @@ def _check_content(table: CsvTable, signals: dict[str, Array]) -> None:
     if not any(name in signals for name in RUDDERS):
         present = ", ".join(table.heading(name) for name in table.columns)
         remedy = f"add delta_deg (angle) or delta_order_deg (order); the columns are {present}"
+        if any(re.match(r"order_\w|n_\w+_", name) for name in table.columns):
+            remedy += "; trials of a craft with thrusters are taken by identify, validate and gap with its card"
         raise table.fault("header", "there is no rudder", remedy)
     for name in ("wind_speed_mps", "current_speed_mps"):
         if name in signals and np.any(signals[name] < 0):

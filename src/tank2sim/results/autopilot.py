@@ -54,6 +54,14 @@ _HEADING = Signal("psi_deg", "heading", "deg")
 _SPEED = Signal("u_mps", "surge velocity", "m/s")
 _SIGNALS = (_HEADING, Signal("delta_deg", "rudder", "deg"), Signal("r_degps", "yaw rate", "deg/s"))
 
+_KEPT = {
+    "heading_error_deg2s": "integral_of_squared_heading_error_deg2s",
+    "rudder_deg2s": "integral_of_squared_rudder_angle_deg2s",
+    "rudder_travel_degps": "mean_rudder_rate_degps",
+    "rate_limited_percent": "rate_limit_reached_percent",
+    "at_limit_percent": "a_thruster_at_its_limit_percent",
+}
+"""Figures of course keeping whose names do not say enough, and names that do."""
 
 _S = TypeVar("_S", AutopilotStudy, CraftAutopilotStudy)
 
@@ -196,7 +204,8 @@ class ResultWithController(Result[_S]):
             f"{weather['wind_from_deg']:.0f} deg, and waves of {weather['wave_radps']:.3g} rad/s that alone would "
             f"yaw the ship by {weather['wave_yaw_deg']:.3g} deg (standard deviation); seed {weather['seed']:.0f}."
         )
-        return Section("Course keeping", text=text, tables=[quantities(caption, figures)], charts=[chart])
+        shown = {_KEPT.get(name, name): value for name, value in figures.items()}
+        return Section("Course keeping", text=text, tables=[quantities(caption, shown)], charts=[chart])
 
     def _drawn(self, title: str, signals: Sequence[Signal], *names: str, until_s: float = math.inf) -> Illustration:
         """Signals of runs over time."""

@@ -42,22 +42,24 @@ _SHOWN = ("advance_m", "tactical_diameter_m", "overshoot_1_deg", "overshoot_2_de
 _SHOWN_OF_CRAFT = ("final_speed_mps", "steady_diameter_m", "steady_rate_degps", "final_rate_degps")
 """Figures in the table of all trials."""
 
-_COEFFICIENTS = (
+_COEFFICIENTS_OF_SHIPS = (
     "Prime system, in the convention of the first card, the sign of its rudder included. A coefficient belongs to the "
     "speed about which forces are expanded, to the speed that makes them non-dimensional, and to the inertial terms "
     "that it includes. Where cards differ in these, the forces are expanded again to the third order, and the standard "
-    "errors with them. A difference is divided by the root of both variances: beyond 2 it is unlikely to be chance. "
-    "Coefficients identical to the reference are not compared."
+    "errors with them. "
+)
+_COEFFICIENTS = (
+    "A difference is divided by the root of both variances: beyond 2 it is unlikely to be chance. Coefficients "
+    "identical to the reference are not compared."
 )
 _ASSUMED = "An asterisk marks a standard error that the card does not state: 2 % of the value."
-_TRIALS = (
-    "Simulated in calm water from the same approach speed, at the size of the first card's ship. In brackets: standard "
-    "deviation of each figure when the card's coefficients are drawn within their errors. z: difference over the root "
-    "of both variances."
+_TRIALS = "Simulated in calm water from the same approach speed, at the size of the first card's ship."
+_DEVIATIONS = (
+    " In brackets: standard deviation of each figure when the card's coefficients are drawn within their errors. z: "
+    "difference over the root of both variances."
 )
-_PERCENT = (
-    "Points: difference from the reference. Bars: plus and minus two standard deviations, by the errors of both cards."
-)
+_PERCENT = "Points: difference from the reference."
+_BARS = " Bars: plus and minus two standard deviations, by the errors of both cards."
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -140,6 +142,9 @@ class ComparisonResult(Result[CardComparison]):
         return (*map(self._compared_in_words, self.study.summary), *self._largest_in_words())
 
     def _compared_in_words(self, summary: CardSummary) -> str:
+        if not summary.compared and summary.same_number:
+            same = f"all {summary.same_number} coefficients are the reference's own numbers"
+            return f"{summary.card} against {self.labels[0]}: {same}."
         rms = summary.rms_standard_errors
         text = "" if rms is None else f", rms {rms:.3g} (1 by chance)"
         text += f"; {summary.same_number} more are the reference's own numbers" if summary.same_number else ""
@@ -154,6 +159,8 @@ class ComparisonResult(Result[CardComparison]):
         if not percents:
             return []
         label, trial, figure, percent, _ = max(percents, key=lambda row: abs(row[3]))
+        if not percent:
+            return ["No figure of the manoeuvres differs."]
         text = f"{label} differs from {self.labels[0]} most in the {figure} of the {trial}: {percent:+.3g} %."
         sure = [z for *_, z in percents if z is not None]
         beyond = sum(abs(z) > BEYOND_STANDARD_ERRORS for z in sure)
@@ -211,7 +218,9 @@ class ComparisonResult(Result[CardComparison]):
         chart = _percent_chart(
             percents, self.labels, ", standard errors assumed" * any(card.assumed_errors for card in self.study.cards)
         )
-        drawn = Illustration(chart, caption=_PERCENT, name="figures_of_manoeuvres")
+        drawn_within_errors = any(z is not None for *_, z in percents)
+        text, caption = _TRIALS + _DEVIATIONS * drawn_within_errors, _PERCENT + _BARS * drawn_within_errors
+        drawn = Illustration(chart, caption=caption, name="figures_of_manoeuvres")
         shown = _SHOWN_OF_CRAFT if self.study.craft else _SHOWN
         rows: list[list[Cell]] = [
             [trial.name, with_unit(*in_words(name)), *_with_deviations(row)]
@@ -219,14 +228,15 @@ class ComparisonResult(Result[CardComparison]):
             for name, row in trial.figures.items()
             if name in shown
         ]
-        main = table("Main figures (standard deviation)", ("trial", "figure", *self.labels), rows)
+        heads = [Column("trial"), Column("figure"), *map(Column, self.labels)]
+        main = table("Main figures" + " (standard deviation)" * drawn_within_errors, heads, rows)
         tables = [main, *map(self._trial_table, self.study.trials)]
-        return [Section("Figures of manoeuvres", text=_TRIALS, charts=[drawn], tables=tables)]
+        return [Section("Figures of manoeuvres", text=text, charts=[drawn], tables=tables)]
 
     def _trial_table(self, trial: TrialComparison) -> Table:
-        heads: list[str | Column] = ["figure", "unit", *self.labels]
+        heads = [Column("figure"), Column("unit"), *map(Column, self.labels)]
         for label in self.labels[1:]:
-            heads += [f"{label}: difference", Column("z", digits=3)]
+            heads += [Column(f"{label}: difference"), Column("z", digits=3)]
         rows: list[list[Cell]] = []
         for name, row in trial.figures.items():
             if name.endswith("_lengths"):  # the figure in m has the same differences
@@ -239,14 +249,15 @@ class ComparisonResult(Result[CardComparison]):
 
     def _coefficients(self) -> Section:
         study = self.study
+        size, factor = (", SI", 1.0) if study.craft else (" (values and errors times 1000)", 1000.0)
         tables = [
-            *(self._farthest(place, label) for place, label in self._others()),
-            *self._differing("Coefficients that differ (values and errors times 1000)", study.coefficients, 1000.0),
+            *(one for place, label in self._others() if (one := self._farthest(place, label)).rows),
+            *self._differing(f"Coefficients that differ{size}", study.coefficients, factor),
             *self._differing("Parameters of effects that differ, SI", study.effects, 1.0),
         ]
         alike = sum(_on_all(row) and not _differs(row) for row in study.rows)
         alone = [row.name for row in study.rows if not _on_all(row)]
-        texts = [_COEFFICIENTS, _ASSUMED]
+        texts = [("In SI units. " if study.craft else _COEFFICIENTS_OF_SHIPS) + _COEFFICIENTS, _ASSUMED]
         texts += [f"{alike} numbers are the same on all cards."] * bool(alike)
         texts += [f"Not on all cards: {', '.join(alone)}."] * bool(alone)
         charts = []
@@ -265,7 +276,7 @@ class ComparisonResult(Result[CardComparison]):
             [row.name, row.cards[0].value, row.cards[place].value, found.percent, found.standard_errors]
             for _, row, found in farthest
         ]
-        heads = ("coefficient", self.labels[0], label, "difference (%)", "standard errors")
+        heads = ("coefficient", Column(self.labels[0]), Column(label), "difference (%)", "standard errors")
         return table(f"Farthest apart: {label}", heads, rows)
 
     def _differing(self, caption: str, every: Sequence[CoefficientRow], factor: float) -> list[Table]:
@@ -293,11 +304,17 @@ def _beyond(summary: CardSummary) -> KeyFigure:
     note += f"; {summary.same_number} more taken over" if summary.same_number else ""
     return KeyFigure(
         f"{summary.card}: coefficients beyond {BEYOND_STANDARD_ERRORS:g}",
-        f"{beyond} of {compared}",
-        # One in twenty differs by more by chance alone.
-        verdict=Verdict.PASSED if beyond <= 0.05 * compared + 1 else Verdict.CAUTION,
+        f"{beyond} of {compared}" if compared else "none compared",
+        verdict=_verdict(compared, beyond),
         note=note,
     )
+
+
+def _verdict(compared: int, beyond: int) -> Verdict:
+    """One in twenty differs by more by chance alone."""
+    if not compared:
+        return Verdict.NONE
+    return Verdict.PASSED if beyond <= 0.05 * compared + 1 else Verdict.CAUTION
 
 
 def _coefficient_row(row: CoefficientRow, factor: float) -> list[Cell]:

@@ -54,7 +54,7 @@ class CraftIdentificationResult(Result[CraftIdentificationStudy]):
         """How many coefficients the trials determine, how well held-out trials are predicted, and what to run next."""
         study = self.study
         lines = [
-            f"{study.ship}: {len(study.trials)} trials determine {self._determined} of {len(study.coefficients)} "
+            f"{study.ship}: {_trials(len(study.trials))} {self._determined} of {len(study.coefficients)} "
             f"coefficients, {self._identified} of them within a quarter of their value."
         ]
         if study.determination:
@@ -120,3 +120,7 @@ def craft_sections(study: CraftIdentificationStudy) -> list[Section]:
         "the standard error of the card. Not determined: the value is the card's."
     )
     return [Section("Coefficients determined by the trials", text=text, tables=tables)]
+
+
+def _trials(count: int) -> str:
+    return "1 trial determines" if count == 1 else f"{count} trials determine"

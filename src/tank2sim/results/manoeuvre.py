@@ -229,7 +229,7 @@ class ManoeuvreResult(EnsembleResult[ManoeuvreStudy]):
         figures = _without_lengths(self.study.figures)
         numbers = {name: value for name, value in figures.items() if isinstance(value, float | int)}
         lists = {name: value for name, value in figures.items() if isinstance(value, list) and value}
-        missing = [in_words(name)[0] for name, value in self.study.figures.items() if value is None]
+        missing = list(dict.fromkeys(in_words(name)[0] for name, value in figures.items() if value is None))
         tables = [self._figure_table(numbers, missing)] if numbers or missing else []
         tables += [self._list_table(lists)] if lists else []
         ensemble = self.study.ensemble

@@ -115,7 +115,7 @@ def _refuse_other_steering(model: Model, manoeuvre: Manoeuvre) -> None:
 
 
 def _not_shown(trajectory: Trajectory, figures: Figures) -> tuple[Notice, ...]:
-    missing = [in_words(name)[0] for name, value in figures.items() if value is None]
+    missing = dict.fromkeys(in_words(name)[0] for name, value in figures.items() if value is None)
     return (Notice(f"the run of {trajectory.t[-1]:.0f} s does not show: {', '.join(missing)}"),) if missing else ()
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import StateSpace, lsim
 
-from tank2sim.analysis.heading.designs import design_heading
+from tank2sim.analysis.heading.designs import LqrWeights, design_heading
 from tank2sim.analysis.heading.margins import (
     closed_loop_transfer,
     growing_effects,
@@ -100,6 +100,13 @@ def test_margins_are_those_of_a_plain_sweep(loop: tuple[Model, Model]) -> None:
     axis = np.flatnonzero((value.imag[:-1] > 0) != (value.imag[1:] > 0))
     falls = [size[k] for k in axis if value[k].real < 0 and size[k] > 1]
     assert found.gain_margin_down == pytest.approx(1 / min(falls) if falls else 0.0, rel=1e-3, abs=1e-6)
+
+
+def test_a_loop_of_almost_no_gain_amplifies_nothing(loop: tuple[Model, Model]) -> None:
+    ship, _ = loop
+    weak = design_heading(ship, "lqr", weights=LqrWeights(heading_rad=1e7)).autopilot
+    L = _values(loop_transfer(ship, weak), np.logspace(-4, 1, 50_000))
+    assert loop_margins(ship, weak).sensitivity_peak == pytest.approx(1 / np.abs(1 + L).min(), rel=1e-3)
 
 
 def _values(L: object, omega: np.ndarray) -> np.ndarray:

@@ -165,6 +165,23 @@ def test_the_circles_of_a_poster_are_those_of_a_simulated_turn(poster: t2s.Poste
     assert max(map(abs, circle["starboard_m"])) == pytest.approx(run.df["y_m"].abs().max(), rel=0.01)
 
 
+def test_a_poster_read_back_shows_the_figures_of_its_tracks(poster: t2s.PosterResult) -> None:
+    again = t2s.make_report(poster.to_dict())
+    figures = {one.caption: one.df for section in again.sections for one in section.tables}
+    run = t2s.load("mariner").turn(40).figures
+    circles = figures["Turning circles, deep water"].set_index("figure")
+    assert circles.loc["advance (m)", "starboard"] == pytest.approx(run["advance_m"], rel=1e-3)
+    zigzags = figures["Zigzags"].set_index("figure")
+    wanted = t2s.load("mariner").zigzag(10, 10).figures["overshoot_1_deg"]
+    assert zigzags.loc["overshoot 1 (deg)", "10/10 first to starboard"] == pytest.approx(wanted, rel=1e-3)
+
+
+def test_figures_outside_the_range_of_a_card_are_not_shown_as_figures() -> None:
+    found = t2s.load("kvlcc2").poster()
+    tables = {one.caption: one for section in found.sections for one in section.tables}
+    assert {cell for row in tables["Stops"].rows for cell in row[1:]} == {"beyond the card"}
+
+
 def test_the_blanks_of_a_sheet_are_counted(poster: t2s.PosterResult, tmp_path: Path) -> None:
     poster.to_html(tmp_path / "poster.html")
     page = (tmp_path / "poster.html").read_text(encoding="utf-8")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -222,3 +223,9 @@ def test_a_trial_of_several_stretches_of_a_craft_is_one(data, tmp_path) -> None:
         rows = [line for line in (tmp_path / name).read_text().splitlines() if not line.startswith("#")][1:]
         lasts = sum(one.duration_s for one in found.study.stretches if one.file == name)
         assert float(rows[-1].split(",")[0]) > lasts - 1.0
+
+
+def test_without_a_stretch_there_is_no_empty_table(result) -> None:
+    none = replace(result, study=replace(result.study, stretches=()))
+    assert all(table.rows for section in none.sections for table in section.tables)
+    assert "Stretches" not in [section.heading for section in none.sections]

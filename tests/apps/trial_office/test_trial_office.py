@@ -299,6 +299,21 @@ def test_notes_that_are_wrong_are_named(notes: str, place: str, tmp_path: Path) 
     assert place in fault.value.place
 
 
+@pytest.mark.parametrize(
+    ("options", "argument"),
+    [
+        ({"draught_fore_m": 100.0, "draught_aft_m": 5.0}, "draught_fore_m"),
+        ({"draught_fore_m": 5.0}, "draught_aft_m"),
+        ({"wind_speed_mps": 5.0}, "wind_from_deg"),
+        ({"sea_state": 99}, "sea_state"),
+    ],
+)
+def test_arguments_that_are_wrong_are_named(options: dict[str, float], argument: str) -> None:
+    with pytest.raises(t2s.InputError) as fault:
+        t2s.trial_office((), ship="mariner", **options)
+    assert str(fault.value.source) == argument and fault.value.remedy
+
+
 def test_records_without_a_manoeuvre_are_refused(tmp_path: Path) -> None:
     ship = Mariner()
     straight = write_record(tmp_path / "straight.csv", ship.run(lambda _time, _state: None), ship, 1)

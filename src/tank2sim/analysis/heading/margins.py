@@ -136,6 +136,8 @@ def loop_margins(ship: Model, autopilot: Model, speed_mps: float | None = None) 
         control.frd(loop, omega, smooth=True), returnall=True
     )
     up, down = gain[gain > 1], gain[(gain < 1) & (gain > 0)]
+    # A loop of almost no gain comes nearest to -1 at an end of the frequencies.
+    closest = nearest.min() if nearest.size else np.abs(1 + loop(1j * omega)).min()
     delays = np.radians(np.mod(phase, 360.0)) / crossover
     heading = np.abs(whole(1j * omega))[0]
     below = np.flatnonzero(heading < math.sqrt(0.5))
@@ -148,7 +150,7 @@ def loop_margins(ship: Model, autopilot: Model, speed_mps: float | None = None) 
         gain_margin_down=float(down.max()) if down.size else 0.0,
         phase_margin_deg=float(min(phase, key=abs)) if phase.size else math.inf,
         delay_margin_s=float(delays.min()) if delays.size else math.inf,
-        sensitivity_peak=float(1 / nearest.min()),
+        sensitivity_peak=float(1 / closest),
         crossover_radps=float(crossover.max()) if crossover.size else math.nan,
         bandwidth_radps=float(omega[below[0]]) if below.size else math.inf,
         stable=all(pole.real < 0 for pole in poles),

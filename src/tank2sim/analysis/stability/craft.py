@@ -281,7 +281,7 @@ class CraftMotions:
                     difference_rpm=from_si("n_rpm", difference),
                     speed_mps=speed,
                     yaw_rate_degps=math.degrees(r),
-                    drift_deg=-math.degrees(math.asin(v / speed)),
+                    drift_deg=0.0 - math.degrees(math.asin(v / speed)),
                     diameter_m=2 * speed / r,
                 )
         return None

@@ -145,7 +145,7 @@ def stability(model: Model, speed_mps: float | None = None) -> Stability:
         ship=model.name,
         operating_point=StraightCourse(
             speed_mps=speed,
-            drift_deg=float(np.degrees(-np.arcsin(at["motion.v"] / speed))),
+            drift_deg=float(np.degrees(0.0 - np.arcsin(at["motion.v"] / speed))),
             rudder_deg=float(np.degrees(at["rudder.angle"])),
         ),
         eigenvalues=eigenvalues,

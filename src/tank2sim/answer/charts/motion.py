@@ -325,7 +325,7 @@ def varying_histories(columns: _Columns, bands: Mapping[str, BandOverTime], band
         return None
     shaded = [_band(name, band, band_t_s) for name, band in bands.items() if name not in _TRACK]
     run = History("simulated", time_s=_in_si({"t_s": columns["t_s"]})["t_s"], values=table, bands=shaded)
-    held = ", ".join(f"{signal.title} {_held(signal, table[signal.name][0])}" for signal in constant)
+    held = ", ".join(f"{signal.title.partition(',')[0]} {_held(signal, table[signal.name][0])}" for signal in constant)
     said = ["Shaded: nine of ten ships at each time."] if shaded else []
     said += [f"Constant: {held}."] if held else []
     return Illustration(history_chart([run], shown, title="Time histories", height_px=110), caption=" ".join(said))

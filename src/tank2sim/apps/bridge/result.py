@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
@@ -10,16 +10,18 @@ from typing import TYPE_CHECKING, ClassVar
 from markupsafe import Markup
 
 from tank2sim.answer.charts.motion import TrackData, track_chart
+from tank2sim.answer.charts.parts import with_unit
 from tank2sim.answer.page import filled_template, resource_text
-from tank2sim.answer.parts import Illustration, Section, Table, records_frame, records_table
+from tank2sim.answer.parts import Cell, Column, Illustration, Section, Table, records_frame, records_table, table
 from tank2sim.answer.result import Result
 from tank2sim.apps.bridge import boxes
 from tank2sim.apps.bridge.boxes import Box, Row
 from tank2sim.apps.bridge.drawings import Drawing, circles_drawing, stops_drawing
-from tank2sim.apps.bridge.ship_track import ShipTrack
-from tank2sim.apps.bridge.study import SHALLOW, Bridge, BridgeStudy, Telegraph
+from tank2sim.apps.bridge.ship_track import ShipTrack, TrackStudy
+from tank2sim.apps.bridge.study import SHALLOW, Bridge, BridgeStudy, Telegraph, ZigzagStudy
 from tank2sim.dynamics.effects.loading import mean_draught
 from tank2sim.notices import Notice
+from tank2sim.units import in_words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -99,7 +101,12 @@ class BridgeResult(Result[BridgeStudy]):
             if tracks:
                 chart = track_chart(tracks, title=title)
                 charts.append(Illustration(chart, caption="The ship heads up the page."))
-        tables: list[Table] = []
+        tables = [
+            _figures_table(title, {track.name: track for track in getattr(self.study, field)})
+            for field, title in _TRACKS.items()
+        ]
+        tables.append(_figures_table("Zigzags", self.study.zigzags))
+        tables = [one for one in tables if one.rows]
         if self.study.telegraph:
             tables.append(records_table("Engine telegraph", self.study.telegraph, on_screen=False))
         if self.study.full_astern_from:
@@ -117,6 +124,19 @@ class BridgeResult(Result[BridgeStudy]):
 
     def _sheet(self, bridge: Bridge) -> str:
         raise NotImplementedError
+
+
+def _figures_table(caption: str, runs: Mapping[str, TrackStudy | ZigzagStudy]) -> Table:
+    """One row a figure, one column a run; the sheets leave out figures outside the card's range, too."""
+    names = dict.fromkeys(name for run in runs.values() for name in run.figures)
+    rows: list[list[Cell]] = [
+        [
+            with_unit(*in_words(name)),
+            *("beyond the card" if name in run.outside_card_range else run.figures.get(name) for run in runs.values()),
+        ]
+        for name in names
+    ]
+    return table(caption, [Column("figure"), *map(Column, runs)], rows, on_screen=False)
 
 
 class PosterResult(BridgeResult):

@@ -178,11 +178,13 @@ class LogResult(Result[LogStudy]):
         since = f" from {study.begins_utc}" if study.begins_utc else ""
         used, exciting = sum(one.use for one in study.channels), sum(one.excites for one in study.stretches)
         lines = [
-            f"{formats}: {study.duration_s:.5g} s{since}, {used} channels in use.",
+            f"{formats}: {study.duration_s:.5g} s{since}, {used} channel{'s' * (used != 1)} in use.",
             f"{exciting} of {len(study.stretches)} stretches excite the vessel. {_cut_in_words(self._cut)}",
         ]
         if self._faults:
-            lines.append(f"{self._faults} faults of the log are noted.")
+            lines.append(
+                "1 fault of the log is noted." if self._faults == 1 else f"{self._faults} faults of the log are noted."
+            )
         lines += [study.gear.words] if study.gear else []
         return (*lines, *(self.identified.headline if self.identified else ()))
 
@@ -206,7 +208,7 @@ class LogResult(Result[LogStudy]):
             *([self._map(study.track)] if study.track else []),
             *self._time_line(),
             Section("Channels", tables=self._channel_tables()),
-            Section("Stretches", tables=[self._stretch_table()]),
+            *([Section("Stretches", tables=[self._stretch_table()])] if study.stretches else []),
             *([_gear_section(study.gear)] if study.gear else []),
             *(craft_sections(study.identified) if study.identified else []),
             Section("Logs", tables=[self._log_table()], folded=True),
@@ -266,7 +268,7 @@ class LogResult(Result[LogStudy]):
         ]
         logged = [History("log", time_s=time, values=values)]
         chart = history_chart(logged, shown, title="Logged signals", height_px=70, marks=marks)
-        caption = "Tinted: the stretches that excite the vessel. Times from the begin of the log."
+        caption = "Tinted: the stretches that excite the vessel. Times from the beginning of the log."
         return [Section("Time line", charts=[Illustration(chart, caption=caption)])]
 
     def _channel_tables(self) -> list[Table]:
@@ -281,7 +283,8 @@ class LogResult(Result[LogStudy]):
 
     def _stretch_table(self) -> Table:
         fields = {"kind": "stretch", "begins_s": "", "duration_s": "lasts", "steering": "", "heading_change_deg": ""}
-        fields |= {"reversals": "", "speed_mps": "", "yaw_rate_rms_degps": "rms yaw rate", "file": ""}
+        fields |= {"reversals": "", "speed_mps": "speed at the start", "yaw_rate_rms_degps": "rms yaw rate"}
+        fields["file"] = ""
         return replace(records_table("Stretches", self.study.stretches, fields=fields), wide=True)
 
     def _log_table(self) -> Table:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from tank2sim.api.verbs import verb
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.notices import Notice
+from tank2sim.units import in_words
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -121,5 +122,6 @@ def _with_autopilot(model: Model) -> tuple[Model, str, tuple[Notice, ...]]:
         design = design_heading(model)
     except InputError as error:
         return model, "", (Notice(f"no autopilot: {error.problem}"),)
-    gains = ", ".join(f"{name} {value:.3g}" for name, value in design.gains.items())
+    named = ((*in_words(name), value) for name, value in design.gains.items())
+    gains = ", ".join(" ".join((words, f"{value:.3g}", unit)).rstrip() for words, unit, value in named)
     return ship_steered_by_either(model, design.autopilot), f"{design.source}: {gains}", ()

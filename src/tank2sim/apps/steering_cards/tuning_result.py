@@ -126,4 +126,4 @@ def stability_change(tuning: TwoPointTuning) -> tuple[str, ...]:
     if tuning.course_stable_before == tuning.course_stable_after:
         return ()
     verdict = "stable" if tuning.course_stable_after else "unstable"
-    return (f"With these factors the ship becomes {verdict} on a straight course.",)
+    return (f"The factors that meet the two points make the ship {verdict} on a straight course.",)

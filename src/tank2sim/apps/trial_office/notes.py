@@ -10,7 +10,7 @@ from pydantic import Field, ValidationError
 from tank2sim.cards.form import CardSection
 from tank2sim.cards.form_faults import form_fault
 from tank2sim.cards.reading import parsed_toml
-from tank2sim.errors import InputError, close_name
+from tank2sim.errors import ArgumentError, InputError, close_name
 from tank2sim.files import read_text
 from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag, parse_manoeuvre
 
@@ -112,12 +112,18 @@ def notes_with(notes: TrialNotes, source: str | Path, **options: object) -> Tria
         One is out of its bounds, or one of a pair is known without the other.
     """
     given = {name: value for name, value in options.items() if value is not None}
-    together = _checked({**notes.model_dump(exclude_unset=True), **given}, "trials")
+    try:
+        together = notes.model_validate({**notes.model_dump(exclude_unset=True), **given})
+    except ValidationError as fault:
+        first = form_fault(fault, source, {}, form=TrialNotes, what="notes of a trial")
+        raise ArgumentError(first.place, "", first.problem, first.remedy) from None
     for pair in _PAIRS:
         for one, other in (pair, pair[::-1]):
             if getattr(together, one) is not None and getattr(together, other) is None:
-                where = "trials" if one in given else source
-                raise InputError(where, other, f"is missing next to {one}", "give both, or neither")
+                problem, remedy = f"is missing next to {one}", "give both, or neither"
+                if one in given:
+                    raise ArgumentError(other, "", problem, remedy)
+                raise InputError(source, other, problem, remedy)
     return together
 
 

@@ -112,3 +112,14 @@ def test_bad_input_ends_in_one_line_and_exit_2(tmp_path, arguments, words) -> No
 @pytest.mark.parametrize("command", [["simulate", "--manoeuvre", "turn:20"], ["stability"]])
 def test_commands_for_ships_refuse_a_glider(tmp_path, command) -> None:
     refused(tank2sim(command[0], "kulikovsky-velikanov", *command[1:], cwd=tmp_path), "rudder")
+
+
+@pytest.mark.parametrize("argument", [{"roll_deg": 20.0}, {"buoyancy_kg": 1.0}, {"as_printed": True}])
+def test_what_belongs_to_steady_glides_is_refused_without_their_angles(glider: t2s.Ship, argument: dict) -> None:
+    with pytest.raises(t2s.InputError) as refusal:
+        glider.glide(**argument, views=False)
+    assert str(refusal.value.source) == next(iter(argument)) and "angles" in refusal.value.remedy
+
+
+def test_a_programme_is_flown_as_printed_without_angles(glider: t2s.Ship) -> None:
+    assert glider.glide(programme=PROGRAMME, as_printed=True, views=False).study.path_as_printed

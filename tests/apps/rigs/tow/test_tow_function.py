@@ -104,3 +104,10 @@ def test_a_force_that_varies_and_a_known_mass(tmp_path) -> None:
 def test_bad_input_ends_in_one_line_and_exit_2(tmp_path, arguments, words) -> None:
     refused(tank2sim("tow", TOWS, *arguments, cwd=tmp_path), *words)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_card_without_the_drag_that_it_needs_is_refused_by_its_argument() -> None:
+    found = t2s.tow(TOWS, terms="none")
+    with pytest.raises(t2s.InputError) as refusal:
+        _ = found.card
+    assert str(refusal.value.source) == "terms" and "B3" in refusal.value.remedy

@@ -71,7 +71,7 @@ def test_a_record_can_be_simulated_from_a_card_and_gives_its_inertia(folder):
     assert any("two-interval" in notice["text"] for notice in found["notices"])
     refused(tank2sim("yaw", "rig.csv", "--simulate", "alyshev", cwd=folder), "rig.csv", "exists")
     refused(tank2sim("yaw", "a.csv", "b.csv", "--simulate", "alyshev", cwd=folder), "--simulate", "2 records")
-    refused(tank2sim("yaw", "a.csv", "--simulate", "mariner", cwd=folder), "model.kind", "yaw rig")
+    refused(tank2sim("yaw", "a.csv", "--simulate", "mariner", cwd=folder), "model.kind", "yaw_rig", "alyshev")
 
 
 def test_a_simulated_record_that_gives_no_result_is_not_left_behind_and_its_card_is_named(folder):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from tank2sim.api.verbs import verb
 from tank2sim.arguments import AngleArgument, PositiveArgument
+from tank2sim.errors import ArgumentError
 
 if TYPE_CHECKING:
     from tank2sim.apps.rigs.glider.path import GlideProgramme
@@ -68,7 +69,8 @@ def glide(
     Raises
     ------
     InputError
-        The card is not one of a glider, an angle or a step cannot be flown, or the programme is at fault.
+        The card is not one of a glider, an angle or a step cannot be flown, the programme is at fault, or roll or
+        buoyancy is given without the angles that it belongs to.
 
     Examples
     --------
@@ -91,8 +93,13 @@ def glide(
     if reference_area_m2 is not None:
         card = ship.replace({"glider.reference_area_m2": reference_area_m2}).card
         assert isinstance(card, GliderCard)
+    used_by = {"roll_deg": bool(roll_deg), "buoyancy_kg": buoyancy_kg is not None}
+    used_by["as_printed"] = as_printed and programme is None
+    angles = np.atleast_1d(np.asarray(angles_deg, dtype=float))
+    for argument in filter(used_by.get, used_by if not angles.size else ()):
+        raise ArgumentError(argument, "", "is of steady glides", "give their path angles as well (--angles 30)")
     question = GlideQuestion(
-        angles_rad=tuple(np.radians(np.atleast_1d(np.asarray(angles_deg, dtype=float))).tolist()),
+        angles_rad=tuple(np.radians(angles).tolist()),
         roll_rad=math.radians(roll_deg),
         buoyancy_kg=buoyancy_kg,
         programme=read_programme(programme) if isinstance(programme, str | Path) else programme,

@@ -37,6 +37,7 @@ from tank2sim.apps.rigs.tow.study import Ellipse, FittedModel, TowByTow, TowSpee
 from tank2sim.apps.rigs.tow.surge import TOW_PARAMETERS
 from tank2sim.apps.rigs.tow.theory import DragPolynomial, TowedBody, drag_polynomial
 from tank2sim.cards import Card, parse_card
+from tank2sim.errors import ArgumentError
 from tank2sim.identification.conditioning import COLLINEAR
 from tank2sim.units import in_words
 
@@ -133,8 +134,10 @@ class TowResult(Result[TowStudy]):
         Raises
         ------
         InputError
-            No body has these estimates: the total mass is not positive.
+            No body has these estimates: the total mass is not positive. Or B3, which a card needs, was not estimated.
         """
+        if "B3_kgpm" not in self.fit.estimates:
+            raise ArgumentError("terms", "", "leaves out B3, the drag that a surge card needs", "add it (--terms B3)")
         body = self.study.body
         source = f"tank2sim tow {PurePath(self.study.tows).name}, method {self.method}"
         length = body.length_m if body else None

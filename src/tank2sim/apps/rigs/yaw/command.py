@@ -145,7 +145,7 @@ def yaw(
     from tank2sim.records.csv_table import tables_or_paths
 
     constant = _torque_constant(torque_constant_NmpA, reference, reference_inertia_kgm2)
-    known = None if rig is None else rig_card_of(rig, "rig")
+    known = None if rig is None else rig_card_of(rig)
     options = YawOptions(
         inertia_kgm2=inertia_kgm2,
         inertia_error_kgm2=inertia_error_kgm2,
@@ -203,7 +203,7 @@ def _simulated(
     path = sources[0] if sources else None
     if len(sources) != 1 or not isinstance(path, Path):
         raise ArgumentError("simulate", "", f"has {len(sources)} records to write", "give the name of one file")
-    card = rig_card_of(simulate, "simulate")
+    card = rig_card_of(simulate)
     record = simulated_record(card, path, run)
     try:
         found = result([record])
@@ -245,7 +245,7 @@ def simulate_yaw(
     from tank2sim.apps.rigs.yaw.records import yaw_record_text
     from tank2sim.apps.rigs.yaw.simulation import RigRun, rig_card_of, simulated_record
 
-    rig, path = rig_card_of(card, "card"), Path(path)
+    rig, path = rig_card_of(card), Path(path)
     record = simulated_record(rig, path, RigRun(medium, controller, similar_to, noise_A))
     write_together({path: yaw_record_text(record)}, inputs=[Path(rig.source)])
     return path

@@ -329,11 +329,11 @@ def rig_in_air(rig: YawRig) -> YawRig:
     return rig.model_copy(update={**dict.fromkeys(water, 0.0), "braking_quadratic_Nms2": None, "walls": None})
 
 
-def rig_card_of(given: Vessel | Card | str | Path, argument: str) -> YawRigCard:
-    """The card of a yaw rig `given` as `argument`; InputError for a card of another kind."""
+def rig_card_of(given: Vessel | Card | str | Path) -> YawRigCard:
+    """The card of a yaw rig; InputError for a card of another kind."""
     card = as_vessel(given).card
     if not isinstance(card, YawRigCard):
-        raise card.fault("model.kind", f"is {card.model.kind!r}", f"give a card of the yaw rig as {argument}")
+        raise card.fault("model.kind", f"is {card.model.kind}", "a card of kind yaw_rig is needed, such as alyshev")
     return card
 
 
