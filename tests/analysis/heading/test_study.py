@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from tank2sim.analysis.heading.margins import (
     loop_margins,
     loop_transfer,
 )
-from tank2sim.analysis.heading.study import StudySettings, study_autopilot
+from tank2sim.analysis.heading.study import StudySettings, _notices, study_autopilot
 from tank2sim.cards import linear_card, parse_card, read_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.model import Model
@@ -150,3 +151,9 @@ def test_more_speed_is_more_gain(mariner: Model) -> None:
     slow, fast = (loop_margins(mariner, pilot, speed) for speed in (6.0, 9.0))
     assert slow.crossover_radps < fast.crossover_radps
     assert slow.delay_margin_s > fast.delay_margin_s
+
+
+def test_a_loop_that_is_not_stable_is_a_caution() -> None:
+    margins = [SimpleNamespace(speed_mps=speed, stable=stable) for speed, stable in ((5.0, False), (7.7, True))]
+    (found,) = _notices(margins, {}, {})
+    assert found.leads and "5 m/s" in found

@@ -9,8 +9,10 @@ from tank2sim.analysis.stability.imo import imo_criteria
 from tank2sim.analysis.stability.margin import stability_margin
 from tank2sim.analysis.stability.response import steering_responses
 from tank2sim.analysis.stability.straight_line import nomoto, stability, steering_modes
+from tank2sim.analysis.stability.study import _about_speed
 from tank2sim.cards import linear_card, parse_card, read_card
 from tank2sim.dynamics import build
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
 from tank2sim.simulation.manoeuvres import Stop
 from tank2sim.simulation.run import simulate
@@ -313,3 +315,9 @@ def test_a_rudder_that_turns_the_wrong_way_is_the_reason_of_what_is_not_shown() 
     changed = {"derivatives.Yd": -278e-5, "derivatives.Nd": 139e-5}
     criteria = imo_criteria(build(read_card("mariner", changed)))
     assert all(one.found is None and "against its rudder" in one.remark for one in criteria[:-1])
+
+
+@pytest.mark.parametrize(("speed_mps", "leads"), [(99.0, True), (7.0, False)])
+def test_a_speed_outside_the_range_of_the_card_is_a_caution(mariner: Model, speed_mps: float, leads: bool) -> None:
+    notices = _about_speed(mariner, stability(mariner, speed_mps), by_speed=True)
+    assert any(notice.leads for notice in notices) == leads

@@ -424,7 +424,7 @@ def _notices(
     changes: Mapping[str, CourseChange],
 ) -> list[Notice]:
     notices = [
-        Notice(f"the loop is not stable at {margin.speed_mps:.4g} m/s") for margin in margins if not margin.stable
+        caution(f"the loop is not stable at {margin.speed_mps:.4g} m/s") for margin in margins if not margin.stable
     ]
     notices += [
         Notice(f"the course change {name!r} is not settled after {runs[name].t[-1]:.0f} s")

@@ -126,18 +126,18 @@ def _about_speed(model: Model, found: Stability, *, by_speed: bool) -> list[Noti
     values = model.defaults
     slowest, fastest, card_speed = values["ship.slowest"], values["ship.fastest"], values["ship.speed"]
     messages, speed = [], found.operating_point.speed_mps
+    if not slowest <= speed <= fastest:
+        messages.append(caution(f"{speed:.4g} m/s is outside the card's range of {slowest:g} to {fastest:g} m/s"))
     if not by_speed:
-        messages.append(
+        text = (
             f"the forces of this card do not change with speed: a linear card holds at {card_speed:.4g} m/s alone, "
             "C' and the prime numbers are made with that speed, and there is no curve over speed"
         )
-    if not slowest <= speed <= fastest:
-        messages.append(f"{speed:.4g} m/s is outside the card's range of {slowest:g} to {fastest:g} m/s")
+        messages.append(Notice(text))
     if abs(speed / card_speed - 1) > _SAME_SPEED:
-        messages.append(
-            f"steady turns, spirals and the IMO criteria are those at the card's speed, {card_speed:.4g} m/s"
-        )
-    return [Notice(text) for text in messages]
+        text = f"steady turns, spirals and the IMO criteria are those at the card's speed, {card_speed:.4g} m/s"
+        messages.append(Notice(text))
+    return messages
 
 
 def _about_steady_speeds(held: tuple[SteadySpeed, ...]) -> list[Notice]:
