@@ -65,7 +65,7 @@ def straight_courses(
     shown : mapping
         Name of each value to its expression of states, inputs and parameters.
     speed_mps : float, optional
-        Surge velocity of the course whose unknowns are returned; by default that of the model's start.
+        Surge velocity of the course whose unknowns are returned; by default the speed of the model's start.
 
     Raises
     ------

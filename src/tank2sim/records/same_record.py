@@ -17,7 +17,6 @@ from tank2sim.arrays import Array
 from tank2sim.notices import Notice, caution
 from tank2sim.records.audit.noise import resolution, rounding, white_noise
 from tank2sim.records.trials import MEASURED_COLUMNS, Trial, usual_step
-from tank2sim.smoothing import correlated
 
 PRINTED = 1e-3
 """Share of a signal's spread by which printing it with other digits may change it; two runs of one manoeuvre differ by
@@ -392,6 +391,8 @@ def _tracks(
 
 def _shifts(first: TimedSignals, other: TimedSignals, sign: float) -> Iterator[float]:
     """Shifts (s) of the second record's times to try: none, by the first rows, and as the timing signal fits best."""
+    from scipy.signal import correlate  # slow to import
+
     time = other.time_s
     yield from dict.fromkeys((0.0, float(first.time_s[0] - time[0])))
     name = next((name for name in _TIMING if name in first.signals and name in other.signals), None)
@@ -410,7 +411,7 @@ def _shifts(first: TimedSignals, other: TimedSignals, sign: float) -> Iterator[f
     sums = [np.append(0.0, np.cumsum(each**2)) for each in (a, b)]
     energy = sums[0][end] - sums[0][begin] + sums[1][end - behind] - sums[1][begin - behind]
     enough = end - begin >= max(COMMON * min(len(a), len(b)), LEAST_ROWS)
-    match = np.where(enough, 2 * correlated(a, b) / np.maximum(energy, 1e-12 * np.max(energy)), -1.0)
+    match = np.where(enough, 2 * correlate(a, b, method="fft") / np.maximum(energy, 1e-12 * np.max(energy)), -1.0)
     best = int(np.argmax(match))
     if match[best] < _IN_STEP:
         return

@@ -30,7 +30,6 @@ from tank2sim.simulation.rudder_record import HeldAngle, held_rudders, holds_oth
 from tank2sim.simulation.run import Run, simulate
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.simulation.zigzag_reversals import COURSE_ERROR, FittedZigzag, fitted_zigzag
-from tank2sim.smoothing import central_weight, smooth_by_windows
 
 SMOOTHING = 0.3
 """Smoothing time of recorded signals for figures, L/u0 (project choice: below the time of any peak)."""
@@ -258,8 +257,10 @@ def repeat(record: Recorded, integrator: Integrator, parameters: dict[str, float
 
 def _smoothed_noise(trial: Trial, name: str, ship_time: float) -> float:
     """Standard deviation of a signal's noise after smoothing, SI."""
+    from scipy.signal import savgol_coeffs  # slow to import
+
     window = _window(trial.time_s, ship_time)
-    gain = central_weight(window, 3) if window >= 5 else 1.0
+    gain = float(savgol_coeffs(window, 3)[window // 2]) if window >= 5 else 1.0
     return math.sqrt(gain) * trial.noise.get(name, white_noise(trial.signals[name]))
 
 
@@ -362,18 +363,23 @@ def _window(time: Array, ship_time: float) -> int:
 
 
 def _smoothed(time: Array, values: Array, ship_time: float) -> Array:
+    from scipy.signal import savgol_filter  # slow to import
+
     window = _window(time, ship_time)
     if window < 5 or window > len(values):
         return values
-    return smooth_by_windows(values, window, 3)
+    smooth: Array = savgol_filter(values, window, 3)
+    return smooth
 
 
 def _slope(time: Array, values: Array, ship_time: float) -> Array:
     """Time derivative by straight lines through windows: a higher degree would follow noise at a record's ends."""
+    from scipy.signal import savgol_filter  # slow to import
+
     window = _window(time, ship_time)
     if window < 3 or window > len(values):
         return np.asarray(np.gradient(values, time), dtype=np.float64)
-    rise, run = (smooth_by_windows(signal, window, 1, 1) for signal in (values, time))
+    rise, run = (savgol_filter(signal, window, 1, deriv=1) for signal in (values, time))
     return np.asarray(rise / run, dtype=np.float64)
 
 

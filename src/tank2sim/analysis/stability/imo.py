@@ -124,7 +124,7 @@ def calm_trial(
     manoeuvre : Manoeuvre
         One of :mod:`tank2sim.simulation.manoeuvres`.
     integrator : Integrator
-        Of the model.
+        Integrator with the functions of the model.
     parameters, inputs : mapping, optional
         Values in place of the model's, and further inputs, by name, SI.
     """

@@ -120,7 +120,7 @@ def fit_polynomial(card: MmgCard, model: Model, motions: Array) -> PolynomialFit
 
 
 def _terms_of(force: str, *, symmetric: bool) -> list[str]:
-    """Terms of the polynomial of a force; the moment K has those of Y."""
+    """Terms of the polynomial of a force; the moment K has the same terms as Y."""
     every = ABKOWITZ_TERMS["Y" if force == "K" else force]
     return [force + name[1:] for name in every if not symmetric or _of_symmetric_ship(force + name[1:])]
 

@@ -26,7 +26,6 @@ from tank2sim.records.signals.columns import DIRECTION_COLUMNS
 from tank2sim.records.trials import Trial, sampling_step
 from tank2sim.simulation.motion_record import FED
 from tank2sim.simulation.recorded import SMOOTHING
-from tank2sim.smoothing import smooth_by_windows
 
 _Truths = NDArray[np.bool_]
 
@@ -328,10 +327,13 @@ def _at_step(run: SampledRun, step: float) -> SampledRun:
 
 def _smooth(states: Array, ship_steps: float) -> Array:
     """States (n, 6) with heading and position smoothed like velocities: rates over a block are their differences."""
+    from scipy.signal import savgol_filter  # slow to import
+
     window = min(int(SMOOTHING * ship_steps), len(states) - 1) // 2 * 2 + 1
     if window < 5:
         return states
-    return np.hstack([states[:, :3], smooth_by_windows(states[:, 3:], window, 3)])
+    places: Array = savgol_filter(states[:, 3:], window, 3, axis=0)
+    return np.hstack([states[:, :3], places])
 
 
 def _typical(noise: Sequence[Array], least: Array) -> Array:

@@ -242,8 +242,8 @@ def observer(linear: Linear, noise: NoiseLevels, waves: WaveBand | None = None) 
 def slopes(seen: Observer, driving: Array, shown: Array) -> Array:
     """Slope of ``sum(log det S) + |whitened|^2`` in the logarithms of the noise (:attr:`NoiseLevels.logs`).
 
-    The columns (:meth:`Observer.whiten`) are those that count: the residual, and those of uncertain coefficients each
-    times the root of its covariance.
+    The columns (:meth:`Observer.whiten`) are the residual and the uncertain coefficients, each times the root of its
+    covariance.
 
     d(log det V + e'V^-1 e) = tr(V^-1 dV) - e'V^-1 dV V^-1 e, which the backward recursion gives for every noise at
     once: r carries V^-1 e back to the states, N its covariance under the model (Durbin and Koopman, 7.3.3).

@@ -81,7 +81,7 @@ def could_hide(search: Search, best: ExplanationFit, enough: float) -> _Sizes:
             size = min(_beyond_card(variant, amplitude, float(abs(variant.theta[amplitude]) * share)), largest)
             known = sizes.setdefault(variant.effect, {})
             known[parameter.name] = max(size, known.get(parameter.name, 0.0))
-    # Of several typical shapes the first, which is the likeliest.
+    # The first of several typical shapes is the likeliest.
     replacing = {variant.effect: variant for variant in reversed(search.variants) if not variant.amplitudes}
     unseen = [variant for name, variant in replacing.items() if name not in best.hypothesis.effects]
     for variant in (variant for variant in unseen if not variant.hypothesis.recorded):

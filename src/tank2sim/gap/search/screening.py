@@ -179,7 +179,7 @@ class Screen:
         Parameters
         ----------
         noisy : ExplanationFit
-            Of the same effects and sizes as the base.
+            With the same effects and sizes as the base.
         """
         other = copy(self)
         other.__dict__.pop("_alone", None)

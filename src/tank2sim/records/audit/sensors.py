@@ -15,7 +15,6 @@ from tank2sim.records.audit.finding import Finding, Repair, SeenPlaces, changed,
 from tank2sim.records.audit.noise import DEGREE, WINDOW, record_noise, white_noise
 from tank2sim.records.audit.weak import FALSE_ALARM
 from tank2sim.records.trials import MEASURED_COLUMNS, Trial, sampling_step, with_signals
-from tank2sim.smoothing import central_weight
 
 MOTIONS = tuple(name for name in MEASURED_COLUMNS if not name.startswith(("wind_", "current_")))
 """Signals that inertia makes smooth; wind may jump."""
@@ -131,11 +130,13 @@ def _frozen(trial: Trial, name: str, noise: dict[str, float]) -> list[Finding]:
 
 def _spikes(trial: Trial, name: str, values: Array, noise: float, least: float = 0.0) -> list[Finding]:
     """Values far from the median of their neighbours (Hampel 1974), on both sides."""
+    from scipy.signal import savgol_coeffs  # slow to import
+
     known = np.flatnonzero(np.isfinite(values))
     if known.size < 4 * WINDOW:
         return []
     away = values[known] - median_filter(values[known], size=2 * SPIKE_SAMPLES + 1, mode="nearest")
-    noise_share = 1.0 - central_weight(WINDOW, DEGREE)
+    noise_share = 1.0 - float(savgol_coeffs(WINDOW, DEGREE)[WINDOW // 2])
     usual = max(1.4826 * float(np.median(np.abs(away))), noise * float(np.sqrt(noise_share)))
     limit = max(least, max(SPIKE, -float(ndtri(FALSE_ALARM / known.size / 2))) * usual)
     runs = _isolated(values[known], np.abs(away) > limit)

@@ -12,7 +12,6 @@ from scipy.special import stdtrit
 
 from tank2sim.arrays import Array
 from tank2sim.records.trials import Trial, sampling_step
-from tank2sim.smoothing import convolved
 
 Complex = NDArray[np.complex128]
 AuditNumber = TypeVar("AuditNumber", np.float64, np.complex128)
@@ -73,15 +72,17 @@ class AuditWindows:
         return self._convolved(values, 2)
 
     def _convolved(self, values: NDArray[AuditNumber], order: int) -> NDArray[AuditNumber]:
+        from scipy.signal import oaconvolve  # slow to import
+
         if len(values) < self.samples:
             return np.empty(0, dtype=values.dtype)
         missing = ~np.isfinite(values)
         kernel = self._kernel(order)
         filled = np.where(missing, 0, values)
         offset = np.mean(filled)  # the kernels of derivatives sum to zero: less rounding
-        inside = convolved(filled - (offset if order else 0), kernel)[self.samples - 1 : len(values)]
+        inside = oaconvolve(filled - (offset if order else 0), kernel, mode="valid")
         if missing.any():
-            holes = convolved(missing.astype(float), np.ones(self.samples))[self.samples - 1 : len(values)] > 0.5
+            holes = oaconvolve(missing.astype(float), np.ones(self.samples), mode="valid") > 0.5
             inside = np.where(holes, np.nan, inside)
         return np.asarray(inside[:: self.hop or (self.samples + 1) // 2])
 

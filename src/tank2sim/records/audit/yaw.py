@@ -15,7 +15,6 @@ from tank2sim.records.audit.time_base import MISCALIBRATED
 from tank2sim.records.audit.track import audited_track
 from tank2sim.records.audit.weak import AuditWindows, WeakFit, fit, on_uniform_time, windows_of
 from tank2sim.records.trials import Trial, unwrapped
-from tank2sim.smoothing import correlated
 
 _DEGREE = np.pi / 180
 _YAW = ("r_radps", "psi_rad")
@@ -187,20 +186,24 @@ def _at(windows: AuditWindows, rate: Array, heading: Array, step: float, shift: 
 
 def _independent(a: Array, b: Array) -> float:
     """How many independent pairs the correlation of two series (n,) is of: Bartlett (1946), J. R. Stat. Soc. 8."""
+    from scipy.signal import correlate  # slow to import
+
     n = len(a)
     away = (values - values.mean() for values in (a, b))
-    of_each = [correlated(values, values)[n - 1 :] for values in away]
+    of_each = [correlate(values, values, mode="full", method="fft")[n - 1 :] for values in away]
     lags = np.prod([values / max(values[0], np.finfo(float).tiny) for values in of_each], axis=0)[1:]
     return float(n / max(1 + 2 * np.sum((1 - np.arange(1, n) / n) * lags), 1.0))
 
 
 def _coarse_lag(windows: AuditWindows, rate: Array, heading: Array) -> int:
     """Rows by which r is late, from the largest cross-correlation with dpsi/dt, within a tenth of the record."""
+    from scipy.signal import correlate, correlation_lags  # slow to import
+
     every = replace(windows, hop=1)
     r, target = every.mean(rate), every.rate(heading)
     r, target = (np.nan_to_num(values - np.nanmean(values)) for values in (r, target))
-    likeness = correlated(r, target)
-    lags = np.arange(1 - len(target), len(r))
+    likeness = correlate(r, target, mode="full", method="fft")
+    lags = correlation_lags(len(r), len(target))
     near = np.abs(lags) <= len(rate) // 10
     return int(lags[near][np.argmax(np.abs(likeness[near]))])
 

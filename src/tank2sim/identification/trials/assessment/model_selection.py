@@ -52,7 +52,6 @@ from tank2sim.records.trials import RUDDERS
 from tank2sim.simulation.manoeuvres import Turn
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 from tank2sim.simulation.run import simulate
-from tank2sim.smoothing import correlated
 
 FARTHEST = 4
 """One run in this many, of the largest amplitudes, is held out to test extrapolation (project choice)."""
@@ -109,12 +108,14 @@ def effective_samples(series: Sequence[Array]) -> float:
     The sum ends at the first that is not positive (Geyer 1992, Statistical Science 7). `series` are pieces (n, m); the
     m components are taken together, each in units of its own deviation.
     """
+    from scipy.signal import correlate  # slow to import
+
     every = np.concatenate(series)
     size = np.sqrt(np.mean(every**2, axis=0))
     sums = np.zeros(max(map(len, series)))
     for piece in series:
         for column in (piece / np.where(size > 0, size, 1.0)).T:
-            sums[: len(piece)] += correlated(column, column)[len(piece) - 1 :]  # by lag, from 0
+            sums[: len(piece)] += correlate(column, column, method="fft")[len(piece) - 1 :]  # by lag, from 0
     correlations = sums[1:] / sums[0]
     positive = np.cumprod(correlations > 0, dtype=bool)
     return float(max(1.0, len(every) / (1 + 2 * correlations[positive].sum())))

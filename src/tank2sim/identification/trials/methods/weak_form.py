@@ -36,7 +36,6 @@ from tank2sim.notices import Notice
 from tank2sim.simulation.recorded import SMOOTHING, drift_over_ground
 from tank2sim.simulation.rows import RowFunction
 from tank2sim.simulation.sensitivity import Sensitivity
-from tank2sim.smoothing import central_weight, smooth_by_windows
 
 VELOCITIES = ("motion.u", "motion.v", "motion.r")
 POSITION = ("motion.psi", "motion.x", "motion.y")
@@ -174,7 +173,9 @@ def _turned(forward: Array, starboard: Array, angle: Array) -> tuple[Array, Arra
 
 def _slope(column: Array, window: int, step: float) -> Array:
     """Time derivative of a smoothed signal (Savitzky and Golay 1964), nan in gaps of more than its own step."""
-    slope = smooth_by_windows(_filled(column), window, 3, 1, step)
+    from scipy.signal import savgol_filter  # slow to import
+
+    slope: Array = savgol_filter(_filled(column), window, 3, deriv=1, delta=step)
     slope[_in_gaps(column)] = np.nan
     return slope
 
@@ -201,6 +202,8 @@ def _in_gaps(column: Array) -> NDArray[np.bool_]:
 
 def _smoothed(column: Array, window: int) -> tuple[Array, float, float]:
     """A signal without gaps and noise; standard deviation of its noise before and after."""
+    from scipy.signal import savgol_coeffs, savgol_filter  # slow to import
+
     known = ~np.isnan(column)
     share = float(known.mean())
     if share < _SPARSE:
@@ -211,8 +214,8 @@ def _smoothed(column: Array, window: int) -> tuple[Array, float, float]:
             spread[known] = smooth_known
             return _filled(spread), before, after
     whole = _filled(column)
-    smooth = smooth_by_windows(whole, window, 3)
-    gain = central_weight(window, 3)  # the sample's own weight: var(raw - smooth) = (1 - gain) var
+    smooth: Array = savgol_filter(whole, window, 3)
+    gain = float(savgol_coeffs(window, 3)[window // 2])  # the sample's own weight: var(raw - smooth) = (1 - gain) var
     noise = float(np.std(whole - smooth)) / np.sqrt(1 - gain)
     if noise**2 < SMALL_NOISE * float(np.var(whole)):
         return whole, noise, noise
