@@ -406,8 +406,8 @@ def site_current(drifts: Sequence[TurnDrift]) -> SiteCurrent:
     found = np.mean([left[rows].mean(axis=0) for rows in sides], axis=0)
     apart = 0.5 * (measured[sides[0]].mean(axis=0) - measured[sides[-1]].mean(axis=0))
     spreads = [drift.measured.spread_mps for drift in drifts if drift.measured.spread_mps is not None]
-    # What is left is not understood: the scatter of turns to one side, and the difference of the sides after the model's
-    # part. Without a model the two sides differ by the wind, which the mean does not hold.
+    # What is left is not understood: the scatter of turns to one side, and the difference of the sides after the part
+    # of the model. Without a model the two sides differ by the wind, which the mean does not hold.
     unexplained = 0.0
     if len(drifts) > 1 and (modelled or not both):
         unexplained = float(np.sqrt(np.mean((left - found) ** 2) / (len(drifts) - 1)))
