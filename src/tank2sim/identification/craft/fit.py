@@ -102,7 +102,8 @@ class CraftFit:
     problem: Problem
     estimate: KalmanEstimate  # Estimate of the k free parameters
     by_run: Array  # (runs, k, k): Information of each run
-    gust_share: float = 0.0  # Random acceleration in surge that the filter needs, over that by the largest thrust
+    # Random acceleration in surge that the filter needs, over that by the largest thrust; inf if it loses a trial
+    gust_share: float = 0.0
 
     @property
     def holds(self) -> bool:
@@ -141,7 +142,7 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
     """Estimate the free parameters of a craft with the noise levels.
 
     The compass has a deviation where the estimate by velocities shows one. The search begins at that estimate, which is
-    taken itself where the model does not hold (:attr:`CraftFit.holds`). With :data:`FEWEST_TRIALS` the filter searches
+    taken itself where the model does not hold (:attr:`CraftFit.holds`), or where the filter loses a trial. With :data:`FEWEST_TRIALS` the filter searches
     twice: the second time current, wind and bias of each trial are known beforehand as well as they agreed between
     trials the first time (empirical Bayes), for they change slowly.
 
@@ -153,15 +154,19 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
         found = estimate_by_velocities(problem)
     steps = KalmanSettings.iterations if found is None else _STEPS_FROM_NEAR
     settings = KalmanSettings(drifting=True, scale_prior=False, iterations=steps)
-    estimate = _first_estimate(problem, settings, progress, found)
-    fit = _fit_of(problem, estimate)
+    try:
+        fit = _fit_of(problem, _first_estimate(problem, settings, progress, found))
+    except InputError:
+        if found is None or (other := _at_velocities(problem, found)) is None:
+            raise
+        return replace(other, gust_share=np.inf)
     if found is not None and not fit.holds and (other := _at_velocities(problem, found)):
         return replace(other, gust_share=fit.gust_share)
     if len(problem.runs) < FEWEST_TRIALS:
         return fit
-    narrower = with_disturbances(problem, *_disturbances_of(problem, estimate.smoothed))
+    narrower = with_disturbances(problem, *_disturbances_of(problem, fit.estimate.smoothed))
     try:
-        return _fit_of(narrower, kalman(narrower, estimate.values, settings, progress, estimate.levels))
+        return _fit_of(narrower, kalman(narrower, fit.estimate.values, settings, progress, fit.estimate.levels))
     except InputError:  # it stops, or loses a trial: the first estimate stays
         return fit
 

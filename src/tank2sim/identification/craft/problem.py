@@ -187,19 +187,16 @@ def _felt(lag_s: float | None) -> float | None:
 
 
 def twins(card: SteeredCard) -> dict[str, tuple[str, ...]]:
-    """Thruster to the parameters that it shares with the first one, because the card states the same numbers."""
-    keys = {
-        "ahead_Ns2": "ahead",
-        "astern_Ns2": "astern",
-        "speed_loss_kg": "speed_loss",
-        "order_exponent": "order_exponent",
-        "time_constant_s": "time_constant",
-    }
+    """Thruster to the parameters that it shares with the first one, because the card states the same numbers.
+
+    Each has a thrust of its own: two of a make differ, and one of a pair may turn against the hand of its propeller.
+    """
+    shared = {"speed_loss_kg": "speed_loss", "order_exponent": "order_exponent", "time_constant_s": "time_constant"}
     first, *others = card.thrusters
     return {
-        other.name: tuple(keys.values())
+        other.name: tuple(shared.values())
         for other in others
-        if all(getattr(other, key) == getattr(first, key) for key in keys)
+        if all(getattr(other, key) == getattr(first, key) for key in ("ahead_Ns2", "astern_Ns2", *shared))
     }
 
 

@@ -332,10 +332,12 @@ def _instrument_notices(compass: CompassDeviation | None) -> Iterator[Notice]:
 
 def _model_does_not_hold(fit: CraftFit) -> Notice:
     """That the filter explains the trials by more than gusts, and which estimate is given instead."""
-    words = (
-        f"the filter needs random accelerations of {100 * fit.gust_share:.0f} % of that by full thrust, which is more "
-        "than gusts: the model does not hold closely"
-    )
+    words = "the filter loses a trial with the estimate that it finds: the model does not hold closely"
+    if np.isfinite(fit.gust_share):
+        words = (
+            f"the filter needs random accelerations of {100 * fit.gust_share:.0f} % of that by full thrust, which is "
+            "more than gusts: the model does not hold closely"
+        )
     if fit.estimate.method == "kalman":
         return caution(f"{words}, and the coefficients may describe its errors")
     return Notice(f"{words}; the coefficients are those that predict {PREDICTED_S:g} s of free motion best")
