@@ -14,6 +14,7 @@ from scipy.optimize import least_squares
 from scipy.special import stdtrit
 
 from tank2sim.arrays import Array
+from tank2sim.records.trials import usual_step
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.manoeuvres import Zigzag
 from tank2sim.simulation.rudder_record import HeldAngle
@@ -250,7 +251,7 @@ def _approach(time: Array, first: HeldAngle, smooth: dict[str, Array]) -> tuple[
 
 def _dating_noise(time: Array, times: Array, smooth: dict[str, Array]) -> float:
     """Standard deviation of the headings at reversals because of their time resolution of a sample, rad."""
-    return _yaw_rate(time, times, smooth) * float(np.median(np.diff(time))) / math.sqrt(12)
+    return _yaw_rate(time, times, smooth) * usual_step(time) / math.sqrt(12)
 
 
 def _yaw_rate(time: Array, times: Array, smooth: dict[str, Array]) -> float:

@@ -27,13 +27,13 @@ from scipy.integrate import cumulative_trapezoid
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.build import KEPT_MODELS
-from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Input, Model, same_symbol
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tank2sim.identification.trials.problem.sampled_runs import LONGEST_GAP, SampledRun, rudder_at_start
 from tank2sim.notices import Notice
-from tank2sim.simulation.recorded import SMOOTHING, drift_over_ground
+from tank2sim.records.trials import straight_over_gaps
+from tank2sim.simulation.recorded import SMOOTHING, earth_components, velocities_through_water
 from tank2sim.simulation.rows import RowFunction
 from tank2sim.simulation.sensitivity import Sensitivity
 
@@ -150,25 +150,18 @@ def _velocities(model: Model, run: SampledRun, columns: dict[str, Array], window
         north, east = (_slope(columns[name], window, run.step_s) for name in ("motion.x", "motion.y"))
         source = "from the slope of the smoothed positions"
     else:
-        north, east = _turned(*ground, psi)
+        north, east = earth_components(*ground, psi)
         source = "from the velocities over the ground"
-    drift = drift_over_ground(model, run.inputs, _filled(psi))
-    u, v = _turned(north - drift[:, 0], east - drift[:, 1], -psi)
+    u, v = velocities_through_water(model, run.inputs, psi, north, east)
     return {"motion.u": u, "motion.v": v}, source
 
 
 def _complete_positions(columns: dict[str, Array], missing: set[str], step: float) -> None:
     """Add unmeasured positions from the velocities: wind and banks need only their rough course."""
     if missing & {"motion.x", "motion.y"}:
-        rates = _turned(*(_filled(columns[name]) for name in ("motion.u", "motion.v", "motion.psi")))
+        rates = earth_components(*(_filled(columns[name]) for name in ("motion.u", "motion.v", "motion.psi")))
         for name in missing & {"motion.x", "motion.y"}:
             columns[name] = cumulative_trapezoid(rates[name == "motion.y"], dx=step, initial=0.0)
-
-
-def _turned(forward: Array, starboard: Array, angle: Array) -> tuple[Array, Array]:
-    """Components (n,) each after turning the axes back by `angle` (n,): earth axes from body axes."""
-    north, east = earth_velocity(*(ca.DM(values) for values in (forward, starboard, angle)))  # type: ignore[arg-type]
-    return np.array(north).ravel(), np.array(east).ravel()
 
 
 def _slope(column: Array, window: int, step: float) -> Array:
@@ -223,8 +216,7 @@ def _smoothed(column: Array, window: int) -> tuple[Array, float, float]:
 
 
 def _filled(column: Array) -> Array:
-    known = np.flatnonzero(~np.isnan(column))
-    return np.interp(np.arange(len(column)), known, column[known])
+    return straight_over_gaps(np.arange(len(column), dtype=float), column)
 
 
 WIDTH = 0.7
