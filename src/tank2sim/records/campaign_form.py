@@ -380,20 +380,30 @@ def campaign_file(content: dict[str, Any], source: Path) -> tuple[CampaignFile, 
     spelt_columns: dict[str, SpeltColumn] = {}
     averages = content.get("averages")
     if isinstance(averages, dict) and isinstance(averages.get("columns"), dict):
-        columns = {}
-        for key, heading in averages["columns"].items():
-            si_key, factor = to_si(key, 1.0)
-            same = next((known for known in (si_key, _SAME_QUANTITY.get(si_key, "")) if known in columns), None)
-            if same is not None:
-                problem = f"is given twice, also as {spelt_columns[same].key}"
-                raise InputError(source, f"averages.columns.{key}", problem, "give it once")
-            columns[si_key], spelt_columns[si_key] = heading, SpeltColumn(key, factor)
-            spelt[f"averages.columns.{si_key}"] = f"averages.columns.{key}"
+        columns, spelt_columns = _columns_in_si(averages["columns"], source)
+        spelt |= {
+            f"averages.columns.{si_key}": f"averages.columns.{as_given.key}"
+            for si_key, as_given in spelt_columns.items()
+        }
         content["averages"] = {**averages, "columns": columns}
     try:
         return CampaignFile.model_validate(content), spelt_columns
     except ValidationError as error:
         raise form_fault(error, source, spelt, form=CampaignFile, what="a campaign") from None
+
+
+def _columns_in_si(columns: dict[str, Any], source: Path) -> tuple[dict[str, Any], dict[str, SpeltColumn]]:
+    """Headings of the columns of averages by their SI keys, and how these are spelt."""
+    headings: dict[str, Any] = {}
+    spelt: dict[str, SpeltColumn] = {}
+    for key, heading in columns.items():
+        si_key, factor = to_si(key, 1.0)
+        same = next((known for known in (si_key, _SAME_QUANTITY.get(si_key, "")) if known in spelt), None)
+        if same is not None:
+            problem = f"is given twice, also as {spelt[same].key}"
+            raise InputError(source, f"averages.columns.{key}", problem, "give it once")
+        headings[si_key], spelt[si_key] = heading, SpeltColumn(key, factor)
+    return headings, spelt
 
 
 def section_in_si(section: dict[str, Any], place: str, source: Path, spelt: dict[str, str]) -> dict[str, Any]:

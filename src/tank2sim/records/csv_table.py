@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.files import read_all_bytes, read_text
+from tank2sim.records.text_layout import rows_of_text
 from tank2sim.records.workbook import is_workbook, workbook_text
 from tank2sim.units import to_si
 
@@ -32,7 +33,8 @@ _KEY = re.compile(r"([A-Za-z_][\w.-]*)\s*:(?!//)\s*(.*)", re.DOTALL)  # not the 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _OF_NUMBERS = b"0123456789eE+-., \t\n"
 _BLOCK = 1 << 22  # Characters of a file that are read at once: memory then goes with its numbers, not with its text
-_FIRST_ROW = re.compile(r"^[^\S\n]*[^\s#].*$", re.MULTILINE)
+_FIRST_ROW = re.compile(r"^[^\S\n]*[^\s#].*$|\Z", re.MULTILINE)
+_BLANK = re.compile("[ \t]")
 _EMPTY_CELL = re.compile(r"(?<![^,\n])(?=[,\n])", re.ASCII)
 _QUOTED_LENGTH = 30
 
@@ -292,14 +294,14 @@ def read_table(path: Path | str | CsvTable) -> CsvTable:
     if plain is not None:
         return plain
     stripped = [line.strip() for line in text.split("\n")]
-    numbers = [number for number, line in enumerate(stripped, start=1) if line and not line.startswith("#")]
-    if not numbers:
+    rows = rows_of_text(stripped)
+    if not rows:
         raise InputError(path, "", "there is no header", "begin with a line of column names, such as t_s,u_mps")
-    names = _header(path, numbers[0], stripped[numbers[0] - 1])
-    lines = np.array(numbers[1:], dtype=np.int64)
-    rows = [stripped[number - 1] for number in numbers[1:]]
+    names = _header(path, *rows[0])
+    lines = np.array([number for number, _ in rows[1:]], dtype=np.int64)
+    table = table_of_rows(path, names, [row for _, row in rows[1:]], lines)
     comments, remarks = _comments([line for line in stripped if line.startswith("#")])
-    return replace(table_of_rows(path, names, rows, lines), comments=comments, remarks=remarks)
+    return replace(table, comments=comments, remarks=remarks)
 
 
 def _table_text(path: Path) -> str:
@@ -322,19 +324,19 @@ def text_with_commas(path: Path, text: str) -> str:
     InputError
         There are points in numbers, and decimal commas.
     """
-    header = _FIRST_ROW.search(text)
-    separator = next((one for one in ";\t" if header and one in header[0]), None)
-    if header is None or separator is None or "," in header[0]:
+    header = next(_FIRST_ROW.finditer(text))[0]  # empty in a text without rows
+    separator = ";" if ";" in header else "\t"
+    if separator not in header or "," in header:
         return text
     lines = text.split("\n")
-    body = [(n, line) for n, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
-    comma = any("," in line for _, line in body)
-    points = next((n for n, line in body[1:] if "." in line), None)
-    if comma and points is not None:
+    body = rows_of_text(lines)
+    point = next((number for number, line in body[1:] if "." in line), None)
+    if point is not None and any("," in line for _, line in body):
         remedy = "write numbers with one decimal sign and nothing between thousands"
-        raise InputError(path, f"line {points + 1}", "has a point, and other numbers have decimal commas", remedy)
+        raise InputError(path, f"line {point}", "has a point, and other numbers have decimal commas", remedy)
+    written = str.maketrans({",": ".", separator: ","})
     for number, line in body:
-        lines[number] = (line.replace(",", ".") if comma else line).replace(separator, ",")
+        lines[number - 1] = line.translate(written)
     return "\n".join(lines)
 
 
@@ -416,9 +418,9 @@ def _numbers(body: str, width: int) -> Array | None:
         return None
     if not body.endswith("\n"):
         body += "\n"
-    if " " in body or "\t" in body:
+    if _BLANK.search(body):
         body = re.sub(r"[ \t]*([,\n])[ \t]*", r"\1", body).lstrip(" \t")
-    if ",," in body or ",\n" in body or "\n," in body or body.startswith(","):
+    if body.startswith(",") or any(mark in body for mark in (",,", ",\n", "\n,")):
         body = _EMPTY_CELL.sub("nan", body)
     lines = body.splitlines()
     try:

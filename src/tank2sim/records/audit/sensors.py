@@ -90,14 +90,22 @@ def _stuck(trial: Trial, name: str, values: Array) -> list[Finding]:
     if chance > 0.5:  # rests more often than not: no sensor of a motion, or one far too coarse to judge
         return []
     least = np.log(len(values) / FALSE_ALARM) / -np.log(chance)
+    noisy, usual = _noisy(values, moving), float(np.quantile(moving, 0.9))
+    least = max(least, 9)
+    stuck = [run for run in runs if run.stop - run.start > least and (noisy or _jumps(values, run, usual))]
+    return [_stuck_finding(trial, name, stuck, longest)] if stuck else []
+
+
+def _noisy(values: Array, moving: Array) -> bool:
+    """Whether a signal is noise, by its steps that are not zero: of white noise the bends are 1.7 times as large, of a
+    curve less; rounding alone is not noise."""
     bends = np.abs(np.diff(values, n=2))
-    # of white noise the bends are 1.7 times the steps, of a curve less; rounding alone is not noise
-    noisy = np.median(bends[bends > 0]) > np.median(moving) and white_noise(values) > _ROUNDING * np.nanmax(abs(values))
-    usual = float(np.quantile(moving, 0.9))
-    long_enough = [run for run in runs if run.stop - run.start > max(least, 9)]
-    stuck = [run for run in long_enough if noisy or _jumps(values, run, usual)]
-    if not stuck:
-        return []
+    above_rounding = white_noise(values) > _ROUNDING * np.nanmax(abs(values))
+    return bool(np.median(bends[bends > 0]) > np.median(moving) and above_rounding)
+
+
+def _stuck_finding(trial: Trial, name: str, stuck: Sequence[slice], longest: int) -> Finding:
+    """A sensor that was stuck in some runs of rows, `longest` rows at most."""
     seconds = sum(run.stop - run.start for run in stuck) * sampling_step(trial)
     first = stuck[0]
     what = f"does not change for {seconds:.3g} s in all, first at {trial.time_s[first.start]:.6g} s"
@@ -105,7 +113,7 @@ def _stuck(trial: Trial, name: str, values: Array) -> list[Finding]:
     rows = np.concatenate([np.arange(run.start + 1, run.stop + 1) for run in stuck])
     repair = _omitted(name, rows, "where the sensor did not change")
     found = found_in(trial, [name], what, "the sensor was stuck", evidence, repair)
-    return [_of_readings(trial, found, len(rows), stuck)]
+    return _of_readings(trial, found, len(rows), stuck)
 
 
 def _jumps(values: Array, run: slice, usual: float) -> bool:
