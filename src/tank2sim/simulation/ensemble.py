@@ -390,7 +390,7 @@ def ensemble(
     for task, answer in zip(tasks, _in_order(tasks, executor), strict=True):
         rows = slice(task.first, task.first + task.count)
         beyond += answer.beyond.values()
-        unusable.update(trouble for trouble in answer.troubles if trouble)
+        unusable.update(filter(None, answer.troubles))
         bad[rows] = [bool(trouble) for trouble in answer.troubles]
         for name, values in answer.figures.items():
             if name not in figures:

@@ -166,12 +166,17 @@ def _recorded_input(name: str, trial: Trial) -> tuple[Array, bool] | None:
     """Values (n,) of an input of a model in a trial, nan in gaps, and whether they are orders; None if not recorded."""
     if name == "rudder.command":
         return rudder_of(trial), "delta_rad" not in trial.signals
-    signals = [signal for signal, variable in FED.items() if variable == name]
-    for end, forms in _THRUSTERS.items():
-        if name.startswith("thrusters.") and name.endswith(end):
-            signals = [form.format(name.removeprefix("thrusters.").removesuffix(end)) for form in forms]
-    values = next((trial.signals[signal] for signal in signals if signal in trial.signals), None)
+    measured, ordered = _signals_of(name)
+    values = trial.signals.get(measured, trial.signals.get(ordered))
     if values is None:
         return None
-    ordered = len(signals) > 1 and signals[1] in trial.signals
-    return (unwrapped(values) if name.endswith("direction") else values), ordered
+    return (unwrapped(values) if name.endswith("direction") else values), ordered in trial.signals
+
+
+def _signals_of(name: str) -> tuple[str, str]:
+    """Signals of a trial that show an input of a model, as measured and as ordered; empty where there is none."""
+    for end, (measured, ordered) in _THRUSTERS.items():
+        if name.startswith("thrusters.") and name.endswith(end):
+            thruster = name.removeprefix("thrusters.").removesuffix(end)
+            return measured.format(thruster), ordered.format(thruster)
+    return next((signal for signal, variable in FED.items() if variable == name), ""), ""

@@ -142,11 +142,15 @@ def recognise(trial: Trial, model: Model) -> Recorded | str:
         reading["initial_turning_time_s"] = math.hypot(reading["initial_turning_time_s"], late)
     else:
         errors, reading = {}, _turn_reading_errors(track, float(values["ship.length"]), late)
-    rate = first.rate
-    reversals = [angle.rate for angle in held[1:] if angle.rate is not None]
-    if isinstance(manoeuvre, Zigzag) and reversals:  # the first movement is half as long, and its rate half as certain
-        rate = float(np.median(reversals))
+    rate = _usual_rate(held)
     return Recorded(trial, manoeuvre, first.execute_s, steered.end_s, rate, start, inputs, figures, errors, reading)
+
+
+def _usual_rate(held: list[HeldAngle]) -> float | None:
+    """Rate of the rudder at the reversals of a zigzag, rad/s: its first movement is half as long, its rate half as
+    certain; else at the first movement."""
+    reversals = [angle.rate for angle in held[1:] if angle.rate is not None]
+    return float(np.median(reversals)) if reversals else held[0].rate
 
 
 @dataclass(frozen=True, eq=False)

@@ -243,10 +243,9 @@ def _held(rudder: Array) -> list[Places]:
     if not runs:
         return []
     steady = [np.count_nonzero(np.abs(rudder[run] - np.median(rudder[run])) < _STEADY * size) for run in runs]
-    first = next(number for number, count in enumerate(steady) if count >= _HELD * max(steady))
-    kept = runs[first:]
-    turns = [number for number in range(1, len(kept)) if side[kept[number][0]] != side[kept[number - 1][0]]]
-    return [np.concatenate(kept[a:b]) for a, b in pairwise([0, *turns, len(kept)])]
+    kept = runs[int(np.argmax(np.array(steady) >= _HELD * max(steady))) :]
+    turns = np.flatnonzero(np.diff([side[run[0]] for run in kept])) + 1
+    return [np.concatenate(kept[a:b]) for a, b in pairwise([0, *turns.tolist(), len(kept)])]
 
 
 def _last_crossing(time: Array, course: Array, level: float) -> float:
