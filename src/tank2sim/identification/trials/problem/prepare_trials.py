@@ -101,7 +101,7 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unu
         RecordDoubt(Path(name).stem, finding.column, finding.likely_truth)
         for name, findings in audited.items()
         for finding in findings
-        if not _taken_so(finding)
+        if not finding.repaired
     )
     return Measured(tuple(trials), "angle" if all(by_angle) else "order", tuple(notices), doubts=doubts)
 
@@ -115,11 +115,6 @@ def _refuse_faults(trial: Trial, findings: Iterable[Finding]) -> None:
         raise InputError(wrong.source, place, wrong.what, remedy)
     if not set(RUDDERS) & set(trial.signals):
         raise trial.fault("column of the rudder", "has no usable reading", "give the rudder in more rows")
-
-
-def _taken_so(finding: Finding) -> bool:
-    """Whether the trial was repaired as a finding says."""
-    return finding.safe and finding.repair is not None
 
 
 def _of_reading(remarks: Mapping[str, Sequence[Notice]]) -> list[Notice]:
@@ -136,7 +131,7 @@ def _of_audit(audited: Mapping[str, Sequence[Finding]]) -> list[Notice]:
     groups: dict[tuple[Level, str, str, str], list[tuple[str, str]]] = {}
     for name, findings in audited.items():
         for finding in findings:
-            done = "taken so" if _taken_so(finding) else "left as it is"
+            done = "taken so" if finding.repaired else "left as it is"
             level = Level.CAUTION if finding.kind == "fault" else Level.INFO
             key = level, finding.column, finding.what, done
             groups.setdefault(key, []).append((name, finding.likely_truth))
