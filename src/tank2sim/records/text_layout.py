@@ -135,8 +135,7 @@ def cells_of(line: str, separator: str) -> list[str]:
 
 @dataclass(frozen=True)
 class _Cut:
-    """Rows of values cut at a separator: their usual number of cells, and the shares of rows that have it and of cells
-    that are numbers."""
+    """Rows cut at a separator: their usual number of cells, share of rows that have it, and of cells with numbers."""
 
     separator: str
     width: int

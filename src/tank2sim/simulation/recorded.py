@@ -147,8 +147,7 @@ def recognise(trial: Trial, model: Model) -> Recorded | str:
 
 
 def _usual_rate(held: list[HeldAngle]) -> float | None:
-    """Rate of the rudder at the reversals of a zigzag, rad/s: its first movement is half as long, its rate half as
-    certain; else at the first movement."""
+    """Rate of the rudder, rad/s, at the reversals of a zigzag, which are twice as long as its first movement."""
     reversals = [angle.rate for angle in held[1:] if angle.rate is not None]
     return float(np.median(reversals)) if reversals else held[0].rate
 

@@ -97,9 +97,8 @@ def _stuck(trial: Trial, name: str, values: Array) -> list[Finding]:
 
 
 def _noisy(values: Array, moving: Array) -> bool:
-    """Whether a signal is noise, by its steps that are not zero: of white noise the bends are 1.7 times as large, of a
-    curve less; rounding alone is not noise."""
-    bends = np.abs(np.diff(values, n=2))
+    """Whether a signal is noise that is more than rounding, by its steps that are not zero."""
+    bends = np.abs(np.diff(values, n=2))  # of white noise 1.7 times the steps, of a curve less
     above_rounding = white_noise(values) > _ROUNDING * np.nanmax(abs(values))
     return bool(np.median(bends[bends > 0]) > np.median(moving) and above_rounding)
 

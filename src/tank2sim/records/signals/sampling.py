@@ -111,6 +111,7 @@ def even_series(trial: Trial, name: str, max_gap_s: float | None = None) -> Seri
             notices.append("was made continuous through north")
             values = continuous
     step = _usual_step(time)
+    # Half a step more, so that a gap of five steps in times that are rounded is five steps.
     longest = _longest_gap(trial, column, time, (GAP_STEPS + 0.5) * step if max_gap_s is None else max_gap_s)
     held = name in HELD_COLUMNS
     count = round(float(time[-1] - time[0]) / step) + 1
@@ -125,8 +126,7 @@ def even_series(trial: Trial, name: str, max_gap_s: float | None = None) -> Seri
 
 
 def _longest_gap(trial: Trial, column: str, time: Array, limit: float) -> float:
-    """The longest time between two values, s; refused if it is longer than `limit`, which by default has half a step
-    more than five, so that a gap of five steps in times that are rounded is five steps."""
+    """The longest time between two values, s; refused if it is longer than `limit`."""
     gap = int(np.argmax(np.diff(time)))
     longest = float(time[gap + 1] - time[gap])
     if longest > limit:
