@@ -409,10 +409,7 @@ def _columns_in_si(columns: dict[str, Any], source: Path) -> tuple[dict[str, Any
 def section_in_si(section: dict[str, Any], place: str, source: Path, spelt: dict[str, str]) -> dict[str, Any]:
     """A section of parsed TOML with its numbers, and their keys, in SI; `spelt` gets the file's key of each place.
 
-    Raises
-    ------
-    InputError
-        A key is given twice in two units.
+    Raises InputError: A key is given twice in two units.
     """
     converted: dict[str, Any] = {}
     for key, value in section.items():

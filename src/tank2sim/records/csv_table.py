@@ -100,10 +100,7 @@ class CsvTable:
     def column(self, name: str) -> Array:
         """Values of a column, (rows,).
 
-        Raises
-        ------
-        InputError
-            The column does not exist.
+        Raises InputError: The column does not exist.
         """
         if name not in self.columns:
             present = ", ".join(self.heading(other) for other in self.columns)
@@ -113,10 +110,8 @@ class CsvTable:
     def increasing(self, name: str) -> Array:
         """Values of a column, (rows,), that must be there in each row and rise from row to row (a time).
 
-        Raises
-        ------
-        InputError
-            The column does not exist, a cell of it is empty, or it does not rise; the message names the first such row.
+        Raises InputError: The column does not exist, a cell of it is empty, or it does not rise; the message names the
+        first such row.
         """
         values = self.filled_column(name)
         falls = np.flatnonzero(np.diff(values) < SHORTEST_STEP)
@@ -129,10 +124,7 @@ class CsvTable:
     def filled_column(self, name: str, remedy: str = "give each row its value") -> Array:
         """Values of a column without empty cells, (rows,).
 
-        Raises
-        ------
-        InputError
-            The column does not exist, or a cell is empty: the message ends with `remedy`.
+        Raises InputError: The column does not exist, or a cell is empty: the message ends with `remedy`.
         """
         values = self.column(name)
         empty = np.flatnonzero(np.isnan(values))
@@ -143,10 +135,7 @@ class CsvTable:
     def positive_comment(self, key: str) -> float | None:
         """The number in the comment line ``# key: number``; None without such a line.
 
-        Raises
-        ------
-        InputError
-            As :meth:`comment_number`, or it is not positive.
+        Raises InputError: As :meth:`comment_number`, or it is not positive.
         """
         value = self.comment_number(key)
         if value is not None and value <= 0:
@@ -160,10 +149,7 @@ class CsvTable:
     def comment_number(self, key: str) -> float | None:
         """The finite number in the comment line ``# key: number``; None without such a line.
 
-        Raises
-        ------
-        InputError
-            Its text is not a number, or the line is given twice.
+        Raises InputError: Its text is not a number, or the line is given twice.
         """
         if key not in self.comments:
             return None
@@ -180,10 +166,7 @@ class CsvTable:
     def refuse_misspelt_keys(self, known: Sequence[str]) -> None:
         """Refuse a comment line whose key resembles one of the known keys but is none; free text is let through.
 
-        Raises
-        ------
-        InputError
-            There is such a line; the message states the right spelling.
+        Raises InputError: There is such a line; the message states the right spelling.
         """
         keys = [(key, f"# {key}:") for key in self.comments if key not in known]
         matches = (_ALMOST_KEY.match(remark) for remark in self.remarks)
@@ -199,10 +182,7 @@ class CsvTable:
     def si(self) -> CsvTable:
         """The table in SI and radians, its columns renamed by :func:`tank2sim.units.to_si` (psi_deg to psi_rad).
 
-        Raises
-        ------
-        InputError
-            Two columns are one quantity in two units.
+        Raises InputError: Two columns are one quantity in two units.
         """
         columns: dict[str, Array] = {}
         headings: dict[str, str] = {}
@@ -279,12 +259,9 @@ def read_table(path: Path | str | CsvTable) -> CsvTable:
     tabs and no commas shows the separator; decimals may then have commas. The first sheet of a spreadsheet (``.xlsx``)
     is read, whose rows are the lines of messages.
 
-    Raises
-    ------
-    InputError
-        The file is missing or not UTF-8; there is no header, a column has no name or the name of another; there are
-        no rows; a row has too many or too few cells; a cell is not a finite number in digits and a decimal sign; a
-        file has points and decimal commas.
+    Raises InputError: The file is missing or not UTF-8; there is no header, a column has no name or the name of
+    another; there are no rows; a row has too many or too few cells; a cell is not a finite number in digits and a
+    decimal sign; a file has points and decimal commas.
     """
     if isinstance(path, CsvTable):
         return path
@@ -319,10 +296,7 @@ def _table_text(path: Path) -> str:
 def text_with_commas(path: Path, text: str) -> str:
     """The text with commas between cells and points in numbers, if its header has semicolons or tabs instead.
 
-    Raises
-    ------
-    InputError
-        There are points in numbers, and decimal commas.
+    Raises InputError: There are points in numbers, and decimal commas.
     """
     header = next(_FIRST_ROW.finditer(text))[0]  # empty in a text without rows
     separator = ";" if ";" in header else "\t"
@@ -494,10 +468,7 @@ def _quoted(text: str) -> str:
 def read_bytes_as_text(path: Path | str) -> str:
     """Text of a file whose letters beyond ASCII do not matter (read as ISO 8859-1); every line ends in a line feed.
 
-    Raises
-    ------
-    InputError
-        The file is missing or unreadable.
+    Raises InputError: The file is missing or unreadable.
     """
     text = read_all_bytes(Path(path)).decode("latin-1")
     return text.replace("\r\n", "\n").replace("\r", "\n")

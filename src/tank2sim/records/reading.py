@@ -28,10 +28,7 @@ def reader_of(path: Path) -> TrialReader:
 
     The latter says what is wrong with the file. A file with an ending that no format has is taken for a trial CSV.
 
-    Raises
-    ------
-    InputError
-        The file is missing or unreadable, or the reader of a package fails.
+    Raises InputError: The file is missing or unreadable, or the reader of a package fails.
     """
     text = read_bytes_as_text(path)
     if is_workbook(text[:4].encode("latin-1")):

@@ -162,10 +162,7 @@ def order_instants(time_s: Array, share: float | Array = ROWS_TO_SHOW_AN_ORDER) 
 def window(trial: Trial, begin_s: float, end_s: float) -> Trial:
     """The rows from one time to another, both included; times stay as they are.
 
-    Raises
-    ------
-    InputError
-        Fewer than two rows are in it.
+    Raises InputError: Fewer than two rows are in it.
     """
     inside = (trial.time_s >= begin_s) & (trial.time_s <= end_s)
     if np.count_nonzero(inside) < 2:
@@ -198,10 +195,7 @@ def froude_scaled(trial: Trial, length_ratio: float) -> Trial:
     turn and revolutions divided by its root, angles as they are; so the stated noise. ``scale`` describes the model
     that was tested and stays.
 
-    Raises
-    ------
-    ValueError
-        The ratio is not positive.
+    Raises ValueError: The ratio is not positive.
     """
     if not 0 < length_ratio < math.inf:
         raise ValueError(f"the ratio of lengths is {length_ratio:g}; a positive one was expected")

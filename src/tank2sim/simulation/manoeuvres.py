@@ -247,10 +247,7 @@ class Stop(SwitchedManoeuvre):
     def orders(self, model: Model) -> dict[str, float]:
         """Revolutions (rad/s) ordered from the propeller of a ship, or from the thrusters of a craft that push ahead.
 
-        Raises
-        ------
-        InputError
-            The ship has no propulsion.
+        Raises InputError: The ship has no propulsion.
         """
         engines = [command for command in thruster_commands(model) if command.start]
         if not thruster_commands(model):
@@ -323,10 +320,7 @@ def parse_manoeuvre(text: str) -> Manoeuvre:
 
     Angles are in deg, revolutions in rpm, turns positive to starboard.
 
-    Raises
-    ------
-    InputError
-        It is none of them, or an angle or a number of revolutions is out of bounds.
+    Raises InputError: It is none of them, or an angle or a number of revolutions is out of bounds.
     """
     kind, _, argument = text.partition(":")
     if kind == "file" and argument:
@@ -382,10 +376,7 @@ def _parse_thrusters(kind: str, found: re.Match[str] | None, text: str) -> Manoe
 def read_orders(path: Path) -> Orders:
     """Orders from a CSV with ``t_s`` and ``delta_order_deg`` (and ``n_rpm``); ``# rudder_sign: port`` is honoured.
 
-    Raises
-    ------
-    InputError
-        A column is missing or unknown, time does not rise from 0, or a value is missing.
+    Raises InputError: A column is missing or unknown, time does not rise from 0, or a value is missing.
     """
     table = read_table(path)
     found = orders_from_columns(table.si().columns, path)
@@ -401,10 +392,7 @@ def orders_from_columns(columns: Mapping[str, Array], source: Path | str) -> Ord
 
     A craft with thrusters has ``n_<name>_radps`` and ``azimuth_<name>_rad`` in place of these.
 
-    Raises
-    ------
-    InputError
-        A column is missing or unknown, time does not rise from 0, or a value is missing.
+    Raises InputError: A column is missing or unknown, time does not rise from 0, or a value is missing.
     """
     ordered = {name: order for name in columns if (order := _order_of(name))}
     kinds = "orders are t_s, delta_order_deg and n_rpm, or of thrusters n_port_rpm, n_starboard_rpm and so on"

@@ -67,10 +67,7 @@ def file_columns(trial: Trial) -> dict[str, Array]:
 def find_signal(asked: str, trial: Trial) -> str:
     """The name in SI of a signal asked for as ``r_degps``, ``r_radps``, ``r``, or as its file calls it.
 
-    Raises
-    ------
-    InputError
-        The signal is not in the trial.
+    Raises InputError: The signal is not in the trial.
     """
     name = to_si(asked, 1.0)[0]
     for signal in trial.signals:

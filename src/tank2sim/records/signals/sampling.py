@@ -145,10 +145,7 @@ def _usual_step(time: Array) -> float:
 def at_common_times(first: Series, second: Series) -> tuple[Series, Series]:
     """Two signals of one trial at the same times: where both are known, at the shorter of their steps.
 
-    Raises
-    ------
-    InputError
-        They have fewer than 50 samples in common.
+    Raises InputError: They have fewer than 50 samples in common.
     """
     start = max(first.start_s, second.start_s)
     end = min(float(first.time_s[-1]), float(second.time_s[-1]))
