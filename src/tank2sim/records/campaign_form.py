@@ -356,17 +356,9 @@ _SAME_QUANTITY = {"yaw_rate_radps": "yaw_rate_prime", "yaw_rate_prime": "yaw_rat
 def campaign_file(content: dict[str, Any], source: Path) -> tuple[CampaignFile, dict[str, SpeltColumn]]:
     """The checked form of a campaign's parsed TOML, and how it spells the columns of ``[averages]``, by SI key.
 
-    Parameters
-    ----------
-    content : dict
-        The parsed TOML.
-    source : Path
-        For messages.
+    `content`: The parsed TOML. `source`: For messages.
 
-    Raises
-    ------
-    InputError
-        A key is missing, unknown, given twice in two units, or holds what it cannot.
+    Raises InputError: A key is missing, unknown, given twice in two units, or holds what it cannot.
     """
     content, spelt = dict(content), dict[str, str]()
     for section in ("model", "test", "tank", "uncertainty", "full_scale"):

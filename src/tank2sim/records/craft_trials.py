@@ -39,17 +39,10 @@ def read_craft_trial(path: Path | CsvTable, thrusters: Sequence[ThrusterSection]
     column ``azimuth_<name>_deg`` (clockwise from the bow); of a single one ``delta_deg`` or ``delta_order_deg`` and
     ``n_rpm`` do, as ``tank2sim log`` cuts them.
 
-    Parameters
-    ----------
-    path : Path or CsvTable
-        The file, or the table of a data frame.
-    thrusters : sequence of ThrusterSection
-        Thrusters of the card.
+    `path`: The file, or the table of a data frame. `thrusters`: Thrusters of the card.
 
-    Raises
-    ------
-    InputError
-        Revolutions and orders, positions or heading are missing, an order is beyond 1, or the time does not rise.
+    Raises InputError: Revolutions and orders, positions or heading are missing, an order is beyond 1, or the time does
+    not rise.
     """
     table = read_table(path).si()
     path = table.path

@@ -219,17 +219,9 @@ def tables_or_paths(
 def table_of_frame(frame: pd.DataFrame, name: str) -> CsvTable:
     """Return the table of a data frame; its ``attrs`` are the comments of a file, and a named index is a column.
 
-    Parameters
-    ----------
-    frame : DataFrame
-        Numbers; columns are named as in a file.
-    name : str
-        Name in messages and results, where a file has its path.
+    `frame`: Numbers; columns are named as in a file. `name`: Name in messages and results, where a file has its path.
 
-    Raises
-    ------
-    InputError
-        It has no rows, a column is given twice, or holds anything but finite numbers and gaps.
+    Raises InputError: It has no rows, a column is given twice, or holds anything but finite numbers and gaps.
     """
     if frame.index.name and frame.index.name not in frame.columns:
         frame = frame.reset_index()
@@ -335,20 +327,9 @@ def _plain_table(path: Path, text: str) -> CsvTable | None:
 def table_of_rows(path: Path, names: Sequence[str], rows: Sequence[str], lines: NDArray[np.int64]) -> CsvTable:
     """Table of rows with commas between cells and points in numbers.
 
-    Parameters
-    ----------
-    path : Path
-        For messages.
-    names : sequence of str
-        Names of the columns.
-    rows : sequence of str
-    lines : array of int, (rows,)
-        Line of the file of each row.
+    `path`: For messages. `names`: Names of the columns. `rows`: Lines of values. `lines` (rows,): Line of the file of each row.
 
-    Raises
-    ------
-    InputError
-        There are no rows; a row has too many or too few cells; a cell is not a finite number.
+    Raises InputError: There are no rows; a row has too many or too few cells; a cell is not a finite number.
     """
     if not rows:
         raise InputError(path, "", "there are no rows under the header", "add the measured values")

@@ -214,10 +214,7 @@ def has_noise(record: TimedSignals) -> bool:
 def same_readings(first: Array, second: Array) -> bool:
     """True if two columns of one table agree in all rows that both have, to half a unit of the coarser digits.
 
-    Parameters
-    ----------
-    first, second : array (n,)
-        nan where nothing was read.
+    `first`, `second` (n,): nan where nothing was read.
     """
     known = ~np.isnan(first + second)
     size = float(np.nanmax(np.abs(first), initial=0.0))

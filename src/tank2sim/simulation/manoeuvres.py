@@ -463,12 +463,7 @@ def _spiral_rudders(largest: float) -> tuple[float, ...]:
 def is_steady(before: Array, rate: Array, ship_time: Array) -> NDArray[np.bool_]:
     """Whether the yaw rate (rad/s) has not changed since :data:`STEADY_AFTER` before, by :data:`STEADY_CHANGE`.
 
-    Parameters
-    ----------
-    before, rate : arrays (n,)
-        Yaw rate then and now, rad/s.
-    ship_time : array (n,)
-        L/u0, s.
+    `before`, `rate` (n,): Yaw rate then and now, rad/s. `ship_time` (n,): L/u0, s.
     """
     near: NDArray[np.bool_] = np.abs(rate - before) < STEADY_CHANGE * np.maximum(np.abs(rate), 0.01 / ship_time)
     return near

@@ -81,19 +81,10 @@ def even_series(trial: Trial, name: str, max_gap_s: float | None = None) -> Seri
     Short gaps and uneven times are bridged by straight lines (orders are held), and it says so; what is missing at
     the two ends is cut off; a direction is made continuous.
 
-    Parameters
-    ----------
-    trial : Trial
-        Any trial.
-    name : str
-        Key of ``trial.signals``.
-    max_gap_s : float, optional
-        Longest gap to bridge; by default five steps.
+    `trial`: Any trial. `name`: Key of ``trial.signals``. `max_gap_s`, optional: Longest gap to bridge; by default five
+    steps.
 
-    Raises
-    ------
-    InputError
-        There are fewer than 50 values, or a gap is longer.
+    Raises InputError: There are fewer than 50 values, or a gap is longer.
     """
     column = f"column {SignalName(name).file}"
     values = np.asarray(trial.signals[name], dtype=float)
