@@ -21,15 +21,9 @@ _UNIT = {"deg": "deg", "degps": "deg/s", "rpm": "rpm", "mps": "m/s", "m": "m"}
 
 @dataclass(frozen=True)
 class SignalName:
-    """One signal of a trial.
+    """One signal of a trial."""
 
-    Parameters
-    ----------
-    si : str
-        Its name in SI, the key in ``Trial.signals``: ``r_radps``.
-    """
-
-    si: str
+    si: str  # Its name in SI, the key in ``Trial.signals``: ``r_radps``
 
     @property
     def stem(self) -> str:
