@@ -255,7 +255,7 @@ def batch_trials(model: Model, trials: Sequence[Trial], ship_time: float) -> Mea
     problem = Problem(model, (), np.zeros(0), np.zeros(0), runs)
     lengths = np.array([len(run.measured) // fine for run in runs])
     size = int(lengths.max()) * fine
-    averaged = np.array([max(1.0, step / sampling) for sampling in samplings])
+    averaged = np.array([float(rows_in(step, sampling)) for sampling in samplings])
     states, inputs, measured, noise = [], [], [], []
     for run, readings in zip(runs, averaged, strict=True):
         states.append(_padded(_smooth(measured_motion(problem, run).smooth, ship_time / step), size))

@@ -68,12 +68,7 @@ def remarks(result: Identification) -> Iterator[Notice]:
         if new > WORSE * old:
             errors = f"yaw-rate error {100 * old:.3g} % before, {100 * new:.3g} %"
             yield caution(f"WORSE than the card before on the trials {words}: {errors}")
-    missed = [
-        f"{figure.trial} {figure.name}"
-        for figure in (result.holdout.figures if result.holdout else ())
-        if figure.interval and not figure.interval[0] <= figure.measured <= figure.interval[1]
-    ]
-    if missed:
+    if result.holdout and (missed := [f"{each.trial} {each.name}" for each in result.holdout.figures if each.missed]):
         yield Notice(f"measured outside the 95 % interval: {', '.join(missed)}")
     yield from _stops(result.card)
 

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.integrate import cumulative_trapezoid
 
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, runs_of
 from tank2sim.dynamics.build import KEPT_MODELS
 from tank2sim.dynamics.model import Input, Model, same_symbol
 from tank2sim.errors import InputError
@@ -78,19 +78,10 @@ def measured_motion(problem: Problem, run: SampledRun) -> MeasuredMotion:
 
 @lru_cache(maxsize=16)  # the folds of a cross-validation share their runs
 def _measured_motion(model: Model, window: int, run: SampledRun) -> MeasuredMotion:
-    columns = {name: run.column(name) for name in MEASURED_STATES}
+    columns, notices = _measured_often(run, window)
     missing = {name for name, column in columns.items() if np.isnan(column).all()}
-    seldom = _seldom(columns, _LEAST_STRETCH * window)
-    missing |= seldom
-    columns |= {name: np.full(len(run.measured), np.nan) for name in seldom}
     if len(run.measured) <= window:
         raise InputError(run.origin, "", f"has only {len(run.measured)} steps", f"at least {window + 1} are needed")
-    notices = []
-    if seldom:
-        names = ", ".join(name[7:] for name in VELOCITIES if name in seldom)
-        notices.append(
-            Notice(f"{run.name}: the readings of {names} are too far apart, and heading and positions are not")
-        )
     if "motion.r" in missing:
         if "motion.psi" in missing:
             raise InputError(run.origin, "header", "has neither yaw rate nor heading", "give r_degps or psi_deg")
@@ -103,11 +94,22 @@ def _measured_motion(model: Model, window: int, run: SampledRun) -> MeasuredMoti
         columns |= {name: velocities_of_track[name] for name in derived}
         notices.append(Notice(f"{run.name}: {' and '.join(name[7:] for name in sorted(derived))} {source}"))
     _complete_positions(columns, missing, run.step_s)
-    velocities = np.column_stack([_bridged(columns[name]) for name in VELOCITIES])
-    smooth, noise, remaining = zip(*(_smoothed(columns[name], window) for name in VELOCITIES), strict=True)
-    position = [_filled(columns[name]) for name in POSITION]
-    every = np.column_stack([*smooth, *position])
+    measured = [columns[name] for name in VELOCITIES]
+    velocities = np.column_stack(list(map(_bridged, measured)))
+    smooth, noise, remaining = zip(*(_smoothed(column, window) for column in measured), strict=True)
+    every = np.column_stack([*smooth, *(_filled(columns[name]) for name in POSITION)])
     return MeasuredMotion(velocities, every, np.array(noise), np.array(remaining), tuple(notices))
+
+
+def _measured_often(run: SampledRun, window: int) -> tuple[dict[str, Array], list[Notice]]:
+    """Signals of the motion (n,), nan for one whose readings are too far apart, and a notice of these."""
+    columns = {name: run.column(name) for name in MEASURED_STATES}
+    seldom = _seldom(columns, _LEAST_STRETCH * window)
+    if not seldom:
+        return columns, []
+    names = ", ".join(name[7:] for name in VELOCITIES if name in seldom)
+    notice = Notice(f"{run.name}: the readings of {names} are too far apart, and heading and positions are not")
+    return columns | dict.fromkeys(seldom, np.full(len(run.measured), np.nan)), [notice]
 
 
 def _seldom(columns: dict[str, Array], least: float) -> set[str]:
@@ -123,9 +125,8 @@ def _longest(column: Array) -> int:
     """Steps of the longest stretch of a signal without gaps."""
     if np.isnan(column).all():
         return 0
-    known = np.concatenate([[0], (~np.isnan(_bridged(column))).astype(int), [0]])
-    edges = np.flatnonzero(np.diff(known))
-    return int(np.max(edges[1::2] - edges[::2]))
+    lengths = [int(rows.stop - rows.start) for rows in runs_of(~np.isnan(_bridged(column)))]
+    return max(lengths)
 
 
 def sensor_noise(problem: Problem, run: SampledRun) -> Array:

@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, runs_of
 from tank2sim.dynamics.build import KEPT_MODELS
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
@@ -145,10 +145,8 @@ def in_range(run: SampledRun, model: Model, speeds: tuple[float, float], least_s
     p = model.defaults
     width = max(1, round(0.5 * p["ship.length"] / p["ship.speed"] / run.step_s))
     smooth = uniform_filter1d(straight_over_gaps(run.times, speed), width)
-    inside = (smooth >= speeds[0]) & (smooth <= speeds[1])
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
-    pairs = [(begin, end) for begin, end in zip(edges[::2], edges[1::2], strict=True) if end - begin > 1]
-    parts = [run.part(int(begin), int(end)) for begin, end in pairs if (end - begin - 1) * run.step_s >= least_s]
+    inside, least_s = runs_of((smooth >= speeds[0]) & (smooth <= speeds[1])), max(least_s, run.step_s)
+    parts = [run.part(rows.start, rows.stop) for rows in inside if (rows.stop - rows.start - 1) * run.step_s >= least_s]
     if len(parts) == 1 and len(parts[0].measured) == len(run.measured):
         return (run,)
     return tuple(replace(part, name=f"{run.name} at {part.begin_s:.0f} s") for part in parts)
