@@ -263,7 +263,7 @@ def _smoothed_noise(trial: Trial, name: str, ship_time: float) -> float:
     """Standard deviation of a signal's noise after smoothing, SI."""
     from scipy.signal import savgol_coeffs  # slow to import
 
-    window = _window(trial.time_s, ship_time)
+    window = smoothing_window(sampling_step(trial), ship_time)
     gain = float(savgol_coeffs(window, 3)[window // 2]) if window >= 5 else 1.0
     return math.sqrt(gain) * trial.noise.get(name, white_noise(trial.signals[name]))
 
@@ -371,15 +371,15 @@ def _fed(trial: Trial, model: Model) -> dict[str, float]:
     }
 
 
-def _window(time: Array, ship_time: float) -> int:
-    """Odd number of samples of the smoothing window."""
-    return int(SMOOTHING * ship_time / usual_step(time)) // 2 * 2 + 1
+def smoothing_window(step_s: float, ship_time: float) -> int:
+    """Odd number of samples, `step_s` s apart, of the smoothing window of a ship whose L/u0 is `ship_time` s."""
+    return int(SMOOTHING * ship_time / step_s) // 2 * 2 + 1
 
 
 def _smoothed(time: Array, values: Array, ship_time: float) -> Array:
     from scipy.signal import savgol_filter  # slow to import
 
-    window = _window(time, ship_time)
+    window = smoothing_window(usual_step(time), ship_time)
     if window < 5 or window > len(values):
         return values
     smooth: Array = savgol_filter(values, window, 3)
@@ -390,7 +390,7 @@ def _slope(time: Array, values: Array, ship_time: float) -> Array:
     """Time derivative by straight lines through windows: a higher degree would follow noise at a record's ends."""
     from scipy.signal import savgol_filter  # slow to import
 
-    window = _window(time, ship_time)
+    window = smoothing_window(usual_step(time), ship_time)
     if window < 3 or window > len(values):
         return np.asarray(np.gradient(values, time), dtype=np.float64)
     rise, run = (savgol_filter(signal, window, 1, deriv=1) for signal in (values, time))

@@ -33,7 +33,7 @@ from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tank2sim.identification.trials.problem.sampled_runs import LONGEST_GAP, SampledRun, rudder_at_start
 from tank2sim.notices import Notice
 from tank2sim.records.trials import straight_over_gaps
-from tank2sim.simulation.recorded import SMOOTHING, earth_components, velocities_through_water
+from tank2sim.simulation.recorded import earth_components, smoothing_window, velocities_through_water
 from tank2sim.simulation.rows import RowFunction
 from tank2sim.simulation.sensitivity import Sensitivity
 
@@ -137,7 +137,7 @@ def sensor_noise(problem: Problem, run: SampledRun) -> Array:
 
 
 def _window(problem: Problem, run: SampledRun) -> int:
-    return max(5, int(SMOOTHING * problem.ship_time / run.step_s) // 2 * 2 + 1)
+    return max(5, smoothing_window(run.step_s, problem.ship_time))
 
 
 def _velocities(model: Model, run: SampledRun, columns: dict[str, Array], window: int) -> tuple[dict[str, Array], str]:
