@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
 
@@ -274,6 +274,11 @@ class _Pair:
         return float(np.sqrt(np.mean((self.first - self.second) ** 2)))
 
     @property
+    def too_coarse(self) -> bool:
+        """Whether rounding alone could make two runs so alike."""
+        return _FAR * self.spread < self.apart <= _ROUNDED * self.unit / math.sqrt(12)
+
+    @property
     def copied(self) -> bool:
         tolerance = max(PRINTED * self.spread, NOISE * min(self.noises), _ROUNDED * self.unit / math.sqrt(12))
         return self.apart <= min(tolerance, _FAR * self.spread)
@@ -347,17 +352,20 @@ class _Records:
         first, time = self.first, self.second.time_s + shift
         inside = (first.time_s >= time[0]) & (first.time_s <= time[-1])
         common = first.time_s[inside]
-        spans = [float(times[-1] - times[0]) for times in (first.time_s, time)]
-        if len(common) < LEAST_ROWS or common[-1] - common[0] < COMMON * min(spans):
+        if len(common) < LEAST_ROWS or np.ptp(common) < COMMON * min(np.ptp(first.time_s), np.ptp(time)):
             return
         tracks = _TRACK if set(_TRACK) <= set(self.names) else ()
         whole = {name: (first.signals[name], _mirrored(name, self.second, sign)) for name in self.names}
         whole |= _tracks(whole, inside, common, time)
         for name, (values, others) in whole.items():
-            precision = np.max([self.precision(each) for each in (tracks if name in tracks else (name,))], axis=0)
-            pair = _pair(name, values[inside], _at(common, time, others), precision)
-            if pair is not None:
-                yield replace(pair, evidence=name not in tracks[:1])
+            aligned = _aligned(name, values[inside], _at(common, time, others))
+            if aligned is None:
+                continue
+            precisions = [self.precision(each) for each in (tracks if name in tracks else (name,))]
+            *noises, unit = np.max(precisions, axis=0).tolist()
+            pair = _Pair(*aligned, (noises[0], noises[1]), unit, evidence=name not in tracks[:1])
+            if not pair.too_coarse:
+                yield pair
 
 
 def _mirrored(name: str, record: TimedSignals, sign: float) -> Array:
@@ -365,8 +373,8 @@ def _mirrored(name: str, record: TimedSignals, sign: float) -> Array:
     return record.signals[name] * (sign if name in _MIRRORED else 1.0)
 
 
-def _pair(name: str, values: Array, others: Array, precision: Array) -> _Pair | None:
-    """One signal (m,) of two records, less what is arbitrary in it; None where it can say nothing."""
+def _aligned(name: str, values: Array, others: Array) -> tuple[Array, Array] | None:
+    """One signal (m,) of two records where both are known, less its arbitrary zero; None if it does not move."""
     known = ~np.isnan(values + others)
     if np.count_nonzero(known) < 2:
         return None
@@ -376,10 +384,7 @@ def _pair(name: str, values: Array, others: Array, precision: Array) -> _Pair | 
         others = values - np.angle(turned * np.conj(np.mean(turned)))
     elif name in _TRACK:
         others = others + np.mean(values) - np.mean(others)
-    *noises, unit = precision.tolist()
-    pair = _Pair(values, others, (noises[0], noises[1]), unit)
-    too_coarse = _FAR * pair.spread < pair.apart <= _ROUNDED * unit / math.sqrt(12)
-    return pair if pair.spread > 0 and not too_coarse else None
+    return (values, others) if np.std(values) > 0 else None
 
 
 def _tracks(
