@@ -74,7 +74,7 @@ class CsvTable:
         return self.headings.get(name, name)
 
     def place(self, row: int, name: str) -> str:
-        """Where a cell is, for messages: ``line 12, column psi_deg``."""
+        """Where the cell of a `row` is, for messages: ``line 12, column psi_deg``."""
         return f"{self.counts} {self.lines[row]}, column {self.heading(name)}"
 
     def fault(self, place: str, problem: str, remedy: str) -> InputError:

@@ -107,7 +107,10 @@ class MotionRecord:
 
 
 def refuse_without_motion(file: str, measured: Array) -> None:
-    """Refuse a trial without any measurement (n, ny) to compare: InputError."""
+    """Refuse a trial whose signals to be compared, `measured` (n, ny), are all nan.
+
+    Raises InputError: They are; it names the `file`.
+    """
     if np.isnan(measured).all():
         problem = "has none of the signals to be compared"
         raise InputError(file, "header", problem, "give u_mps, r_degps, ...")

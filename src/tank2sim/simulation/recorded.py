@@ -329,7 +329,8 @@ def velocities_through_water(model: Model, inputs: Array, psi: Array, north: Arr
 
 
 def earth_components(forward: Array, starboard: Array, angle: Array) -> tuple[Array, Array]:
-    """Components (n,) each after turning the axes back by `angle` (n,), rad: earth axes from body axes."""
+    """Components to north and east (n,) of a vector with components `forward` and `starboard` (n,) in axes that are
+    turned by `angle` (n,), rad."""
     north, east = earth_velocity(*(ca.DM(values) for values in (forward, starboard, angle)))  # type: ignore[arg-type]
     return np.array(north).ravel(), np.array(east).ravel()
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 from scipy.special import ndtri
 
-from tank2sim.arrays import Array, runs_of
+from tank2sim.arrays import Array, true_runs
 from tank2sim.records.audit.finding import Finding, Repair, SeenPlaces, changed, found_in, noted_in
 from tank2sim.records.audit.noise import DEGREE, WINDOW, record_noise, white_noise
 from tank2sim.records.audit.weak import FALSE_ALARM
@@ -55,7 +55,7 @@ def _missing(trial: Trial, name: str, values: Array) -> list[Finding]:
     missing = np.isnan(values)
     if not missing.any():
         return []
-    runs = runs_of(missing)
+    runs = true_runs(missing)
     longest = max(runs, key=lambda run: run.stop - run.start)
     seconds, begin = (longest.stop - longest.start) * sampling_step(trial), trial.time_s[longest.start]
     what = f"{missing.sum()} values are missing, the longest time {seconds:.3g} s from {begin:.6g} s"
@@ -72,7 +72,7 @@ def _places(trial: Trial, rows: Sequence[slice]) -> SeenPlaces:
 def _stuck(trial: Trial, name: str, values: Array) -> list[Finding]:
     """Runs of one value that chance (n p^k, p the share of others alike) or a smooth rest does not explain."""
     alike = np.append(np.diff(values) == 0, False)
-    runs = runs_of(alike)
+    runs = true_runs(alike)
     if not runs:
         return []
     steps = np.abs(np.diff(values))
@@ -160,7 +160,7 @@ def _spikes(trial: Trial, name: str, values: Array, noise: float, least: float =
 
 def _isolated(values: Array, far: NDArray[np.bool_]) -> list[slice]:
     """The runs of values far away that are as short as a spike, and exceptional."""
-    return [run for run in runs_of(far) if run.stop - run.start <= SPIKE_SAMPLES and _exceptional(values, run, far)]
+    return [run for run in true_runs(far) if run.stop - run.start <= SPIKE_SAMPLES and _exceptional(values, run, far)]
 
 
 def _exceptional(values: Array, run: slice, far: NDArray[np.bool_]) -> bool:

@@ -213,18 +213,17 @@ def _lesser(trial: Trial, track: AuditedTrack, pair: tuple[str, str], given: Com
     windows, ground = track.windows, track.ground
     mean = windows.mean(velocity)
     base = [mean, np.ones(len(mean))]
-    plain = fit(ground, base)
+    best = fit(ground, base)
     lever = fit(ground, [*base, windows.rate(turn)])
     clock = fit(ground, [*base, windows.rate(velocity)])
     # what half a step of the clock would do cannot be distinguished from the stamping of the times
     least = track.speed * windows.step_s / 2
     if lever is not None and any(map(lever.differs, (4, 5))) and np.hypot(*lever.values[4:6]) > least:
-        plain, antenna = lever, [_antenna(trial, lever, clock)]
+        best, antenna = lever, [_antenna(trial, lever, clock)]
     else:
         antenna = []
-    if plain is None:
+    if best is None:
         return antenna
-    best = plain
     found = _scale(trial, pair, best), _offset(trial, best), _current(trial, pair, best, track.speed)
     return [*antenna, *(finding for finding in found if finding is not None)]
 

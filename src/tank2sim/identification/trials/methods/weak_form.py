@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.integrate import cumulative_trapezoid
 
-from tank2sim.arrays import Array, runs_of
+from tank2sim.arrays import Array, true_runs
 from tank2sim.dynamics.build import KEPT_MODELS
 from tank2sim.dynamics.model import Input, Model, same_symbol
 from tank2sim.errors import InputError
@@ -125,7 +125,7 @@ def _longest(column: Array) -> int:
     """Steps of the longest stretch of a signal without gaps."""
     if np.isnan(column).all():
         return 0
-    lengths = [int(rows.stop - rows.start) for rows in runs_of(~np.isnan(_bridged(column)))]
+    lengths = [int(rows.stop - rows.start) for rows in true_runs(~np.isnan(_bridged(column)))]
     return max(lengths)
 
 

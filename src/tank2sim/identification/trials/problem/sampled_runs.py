@@ -15,7 +15,7 @@ import casadi as ca
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from tank2sim.arrays import Array, runs_of
+from tank2sim.arrays import Array, true_runs
 from tank2sim.dynamics.build import KEPT_MODELS
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import InputError
@@ -88,7 +88,8 @@ def prepare(
     (:func:`.estimation_problem.driven_model`).
 
     The step is a whole number of sampling steps near `step_s` (by default 1.5 times the model's own), or a whole part
-    of one where `step_s` is shorter. Otherwise as :func:`on_steps`.
+    of one where `step_s` is shorter. `seen`: Variables to be compared; `orders_before`, `rudder`: As for
+    :func:`on_steps`, which raises.
     """
     sampling = sampling_step(trial)
     step = rows_in(step_s or 1.5 * model.step_s, sampling) * sampling
@@ -145,7 +146,7 @@ def in_range(run: SampledRun, model: Model, speeds: tuple[float, float], least_s
     p = model.defaults
     width = max(1, round(0.5 * p["ship.length"] / p["ship.speed"] / run.step_s))
     smooth = uniform_filter1d(straight_over_gaps(run.times, speed), width)
-    inside, least_s = runs_of((smooth >= speeds[0]) & (smooth <= speeds[1])), max(least_s, run.step_s)
+    inside, least_s = true_runs((smooth >= speeds[0]) & (smooth <= speeds[1])), max(least_s, run.step_s)
     parts = [run.part(rows.start, rows.stop) for rows in inside if (rows.stop - rows.start - 1) * run.step_s >= least_s]
     if len(parts) == 1 and len(parts[0].measured) == len(run.measured):
         return (run,)
