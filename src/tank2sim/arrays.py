@@ -98,3 +98,9 @@ Columns = dict[str, Array]
 
 Mask = Annotated[NDArray[np.bool_], _InJson(np.bool_)]
 """Truth values, of any shape."""
+
+
+def true_runs(true: NDArray[np.bool_]) -> list[slice]:
+    """Slices of the runs of True in a mask (n,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], true.astype(int), [0]]))).tolist()
+    return [slice(begin, end) for begin, end in zip(edges[::2], edges[1::2], strict=True)]

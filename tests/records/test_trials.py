@@ -8,7 +8,16 @@ import pytest
 
 from tank2sim.errors import InputError
 from tank2sim.records.reading import looks_like_a_trial, read_trial_file
-from tank2sim.records.trials import froude_scaled, mean_wind, sampling_step, window, with_signals
+from tank2sim.records.trials import (
+    froude_scaled,
+    held_over_gaps,
+    mean_wind,
+    order_instants,
+    rows_in,
+    sampling_step,
+    window,
+    with_signals,
+)
 from tests.records.motions import motion, trial
 
 GOOD = "t_s,delta_deg,u_mps,r_degps,psi_deg\n0,0,1,0,350\n1,10,2,1,359\n2,-10,3,-1,8\n"
@@ -301,3 +310,19 @@ def test_what_no_format_recognises_is_refused_by_the_format_of_its_ending(write)
         with pytest.raises(InputError) as refusal:
             read_trial_file(path)
         assert refusal.value.source == str(path) and problem in refusal.value.problem
+
+
+def test_an_order_was_given_within_the_interval_before_the_row_that_shows_it():
+    time = np.array([2.0, 3.0, 7.0, 7.5])
+    np.testing.assert_allclose(order_instants(time), [2.0, 2.5, 5.0, 7.25])
+    np.testing.assert_allclose(order_instants(time, np.array([0.0, 0.25, 1.0])), [2.0, 2.0, 4.0, 7.5])
+
+
+def test_an_order_holds_over_gaps_and_the_first_from_the_beginning():
+    order = np.array([np.nan, 0.1, np.nan, np.nan, -0.2, np.nan])
+    np.testing.assert_array_equal(held_over_gaps(order), [0.1, 0.1, 0.1, 0.1, -0.2, -0.2])
+
+
+@pytest.mark.parametrize(("step_s", "rows"), [(0.05, 1), (0.1, 1), (0.3, 3), (3 * 0.1 - 1e-9, 3), (0.29, 2)])
+def test_whole_rows_in_a_step_are_counted_also_by_rounded_steps(step_s, rows):
+    assert rows_in(step_s, 0.1) == rows

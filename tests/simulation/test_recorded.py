@@ -274,6 +274,16 @@ def test_an_order_alone_was_given_between_the_last_row_without_it_and_the_first_
     assert what.reading_errors["time_90_s"] == 0.5
 
 
+def test_an_order_between_rows_that_are_farther_apart_than_usual_was_given_halfway(model):
+    """In rows of 1 s, of which the one at 12 s is missing, an order first seen at 13 s was given at 12 s."""
+    trial = sail(lambda t, turned, before: np.deg2rad(30) * (t >= 12.0), 240.0)
+    rows = np.array([row for row in range(0, len(trial.time_s), 10) if trial.time_s[row] != 12.0])
+    order = np.where(trial.time_s >= 12.0 - 1e-9, np.deg2rad(30), 0.0)[rows]
+    signals = {name: values[rows] for name, values in trial.signals.items() if name != "delta_rad"}
+    what = recorded(replace(trial, time_s=trial.time_s[rows], signals={**signals, "delta_order_rad": order}), model)
+    assert what.begin_s == pytest.approx(12.0)
+
+
 @pytest.mark.parametrize("begin_s", [0.0, 12.0])
 def test_a_turn_by_its_order_alone_is_repeated_from_the_rudder_before_the_order(model, begin_s):
     """Not with the rudder over at once, also where the record begins at the execute: 10 s at 3 deg/s, half of which

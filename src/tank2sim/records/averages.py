@@ -47,15 +47,13 @@ def read_averages(
         _refuse_missing(columns, heading, path, f"averages.columns.{spelt[key].key}")
         _refuse_other_unit(file, heading, key, units.get(heading, ""), spelt[key].factor)
         cells = _numbers(file, heading, lines, columns[heading])
+        _refuse_dead_gauge(file, heading, key, cells)
         values[key] = [cell * spelt[key].factor for cell in cells]
-        if key in ("X", "Y", "N") and max(map(abs, cells)) < LEAST_FORCE:
-            remedy = "give the readings of the gauge"
-            raise InputError(file, f"column {heading}", "is zero in every row: the gauge is dead", remedy)
     if (averages.rudder_sign or form.test.rudder_sign) == "port" and "rudder_rad" in values:
         values["rudder_rad"] = [-angle for angle in values["rudder_rad"]]
     table = np.column_stack(list(values.values())) + 0.0  # + 0.0 turns -0.0 into 0.0
     _, first = np.unique(table, axis=0, return_index=True)
-    distinct = sorted(int(row) for row in first)
+    distinct = sorted(first.tolist())
     runs = [
         _averaged_run(dict(zip(values, table[row].tolist(), strict=True)), (file, lines[row]), form, spelt)
         for row in distinct
@@ -127,6 +125,12 @@ def _refuse_other_unit(file: Path, heading: str, key: str, unit: str, factor: fl
         raise InputError(file, f"column {heading}", problem, "name the key with its unit (drift_deg), forces in N")
 
 
+def _refuse_dead_gauge(file: Path, heading: str, key: str, cells: Sequence[float]) -> None:
+    if key in ("X", "Y", "N") and max(map(abs, cells)) < LEAST_FORCE:
+        remedy = "give the readings of the gauge"
+        raise InputError(file, f"column {heading}", "is zero in every row: the gauge is dead", remedy)
+
+
 def _numbers(file: Path, heading: str, lines: Sequence[int], cells: Sequence[str]) -> list[float]:
     """Numbers of one column."""
     values = []
@@ -148,13 +152,7 @@ def _averaged_run(
     """A row of averages as a run of one reading."""
     averages, (file, line) = form.averages, place
     assert averages is not None
-    for key in ("drift_rad", "rudder_rad", "heel_rad"):
-        if abs(at.get(key, 0.0)) >= math.pi / 2:
-            as_given = spelt[key]
-            problem = f"{as_given.key} is {at[key] / as_given.factor:g}, not within 90 deg"
-            in_degrees = as_given.key != key
-            remedy = "correct the row" if in_degrees else f"name its column {key[:-4]}_deg if it is degrees"
-            raise InputError(file, f"line {line}", problem, remedy)
+    _refuse_far_angles(at, place, spelt)
     speed, drift, rudder = at.get("speed_mps", form.test.speed_mps), at.get("drift_rad", 0.0), at.get("rudder_rad", 0.0)
     if speed <= 0:
         raise InputError(file, f"line {line}", f"the speed is {speed:g} m/s", "a positive one was expected")
@@ -193,6 +191,17 @@ def _averaged_run(
         torque_Nm=scaled("torque", unit * arm),
         heel_rad=at.get("heel_rad", 0.0),
     )
+
+
+def _refuse_far_angles(at: Mapping[str, float], place: tuple[Path, int], spelt: Mapping[str, SpeltColumn]) -> None:
+    """Refuse a row with an angle beyond 90 deg, probably of another unit."""
+    for key in ("drift_rad", "rudder_rad", "heel_rad"):
+        if abs(at.get(key, 0.0)) >= math.pi / 2:
+            as_given = spelt[key]
+            problem = f"{as_given.key} is {at[key] / as_given.factor:g}, not within 90 deg"
+            in_degrees = as_given.key != key
+            remedy = "correct the row" if in_degrees else f"name its column {key[:-4]}_deg if it is degrees"
+            raise InputError(place[0], f"line {place[1]}", problem, remedy)
 
 
 def _unit_of_force(form: CampaignFile, scales: Scales) -> float:

@@ -356,17 +356,9 @@ _SAME_QUANTITY = {"yaw_rate_radps": "yaw_rate_prime", "yaw_rate_prime": "yaw_rat
 def campaign_file(content: dict[str, Any], source: Path) -> tuple[CampaignFile, dict[str, SpeltColumn]]:
     """The checked form of a campaign's parsed TOML, and how it spells the columns of ``[averages]``, by SI key.
 
-    Parameters
-    ----------
-    content : dict
-        The parsed TOML.
-    source : Path
-        For messages.
+    `content`: The parsed TOML. `source`: For messages.
 
-    Raises
-    ------
-    InputError
-        A key is missing, unknown, given twice in two units, or holds what it cannot.
+    Raises InputError: A key is missing, unknown, given twice in two units, or holds what it cannot.
     """
     content, spelt = dict(content), dict[str, str]()
     for section in ("model", "test", "tank", "uncertainty", "full_scale"):
@@ -380,15 +372,11 @@ def campaign_file(content: dict[str, Any], source: Path) -> tuple[CampaignFile, 
     spelt_columns: dict[str, SpeltColumn] = {}
     averages = content.get("averages")
     if isinstance(averages, dict) and isinstance(averages.get("columns"), dict):
-        columns = {}
-        for key, heading in averages["columns"].items():
-            si_key, factor = to_si(key, 1.0)
-            same = next((known for known in (si_key, _SAME_QUANTITY.get(si_key, "")) if known in columns), None)
-            if same is not None:
-                problem = f"is given twice, also as {spelt_columns[same].key}"
-                raise InputError(source, f"averages.columns.{key}", problem, "give it once")
-            columns[si_key], spelt_columns[si_key] = heading, SpeltColumn(key, factor)
-            spelt[f"averages.columns.{si_key}"] = f"averages.columns.{key}"
+        columns, spelt_columns = _columns_in_si(averages["columns"], source)
+        spelt |= {
+            f"averages.columns.{si_key}": f"averages.columns.{as_given.key}"
+            for si_key, as_given in spelt_columns.items()
+        }
         content["averages"] = {**averages, "columns": columns}
     try:
         return CampaignFile.model_validate(content), spelt_columns
@@ -396,13 +384,24 @@ def campaign_file(content: dict[str, Any], source: Path) -> tuple[CampaignFile, 
         raise form_fault(error, source, spelt, form=CampaignFile, what="a campaign") from None
 
 
+def _columns_in_si(columns: dict[str, Any], source: Path) -> tuple[dict[str, Any], dict[str, SpeltColumn]]:
+    """Headings of the columns of averages by their SI keys, and how these are spelt."""
+    headings: dict[str, Any] = {}
+    spelt: dict[str, SpeltColumn] = {}
+    for key, heading in columns.items():
+        si_key, factor = to_si(key, 1.0)
+        same = next((known for known in (si_key, _SAME_QUANTITY.get(si_key, "")) if known in spelt), None)
+        if same is not None:
+            problem = f"is given twice, also as {spelt[same].key}"
+            raise InputError(source, f"averages.columns.{key}", problem, "give it once")
+        headings[si_key], spelt[si_key] = heading, SpeltColumn(key, factor)
+    return headings, spelt
+
+
 def section_in_si(section: dict[str, Any], place: str, source: Path, spelt: dict[str, str]) -> dict[str, Any]:
     """A section of parsed TOML with its numbers, and their keys, in SI; `spelt` gets the file's key of each place.
 
-    Raises
-    ------
-    InputError
-        A key is given twice in two units.
+    Raises InputError: A key is given twice in two units.
     """
     converted: dict[str, Any] = {}
     for key, value in section.items():

@@ -79,23 +79,17 @@ def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
     """
     path = Path(path)
     form, spelt = campaign_file(parsed_toml(read_text(path), path), path)
-    runs: list[CaptiveRun] = []
-    faults: list[InputError] = []
-    remarks: list[Notice] = []
     if (form.averages is None) == (not form.runs):
         problem = "has both [averages] and [[runs]]" if form.runs else "has no run"
         raise InputError(path, "", problem, "give [[runs]] with a file each, or one table in [averages]")
+    remarks: list[Notice] = []
+    faults: list[InputError] = []
     if form.averages is not None:
         with named_in(path, path.parent / form.averages.file):
             runs, remarks = read_averages(form, spelt, path)
-    _refuse_doubled_names(form, path)
-    for sheet in form.runs:
-        try:
-            columns, file = {**form.columns, **sheet.columns}, path.parent / sheet.file
-            with named_in(path, file):
-                runs.append(read_captive_run(file, sheet, form.test, columns, form.files))
-        except InputError as fault:
-            faults.append(fault)
+    else:
+        _refuse_doubled_names(form, path)
+        runs, faults = _read_runs(form, path)
     copies, mirrored = copied_runs(runs)
     runs = [run for run in runs if run.name not in copies]
     faults += copies.values()
@@ -117,6 +111,20 @@ def read_campaign(path: Path | str, *, keep_going: bool = False) -> Campaign:
     )
 
 
+def _read_runs(form: CampaignFile, path: Path) -> tuple[list[CaptiveRun], list[InputError]]:
+    """The runs of a campaign that can be read, and the faults of the others."""
+    runs: list[CaptiveRun] = []
+    faults: list[InputError] = []
+    for sheet in form.runs:
+        try:
+            columns, file = {**form.columns, **sheet.columns}, path.parent / sheet.file
+            with named_in(path, file):
+                runs.append(read_captive_run(file, sheet, form.test, columns, form.files))
+        except InputError as fault:
+            faults.append(fault)
+    return runs, faults
+
+
 def copied_runs(runs: Sequence[CaptiveRun]) -> tuple[dict[str, InputError], list[Notice]]:
     """Runs that repeat the forces of an earlier run, as :func:`tank2sim.records.same_record.likeness` finds: name to
     fault; and remarks on mirror images.
@@ -125,25 +133,32 @@ def copied_runs(runs: Sequence[CaptiveRun]) -> tuple[dict[str, InputError], list
     """
     faults: dict[str, InputError] = {}
     remarks: list[Notice] = []
-    seen: list[tuple[CaptiveRun, Recording, Array]] = []
+    records = [(run.name, record) for run in runs if (record := _moving_forces(run)) is not None]
+    sizes = [_mean_and_scatter(record) for _, record in records]
     looked_for = (Likeness.COPY, Likeness.MIRROR)
-    for run in runs:
-        record = Recording(run.time_s, {column: run.force(force) for force, column in FORCE_COLUMNS.items()})
-        if run.is_average or len(run.time_s) < _FEWEST_READINGS or not all(map(np.ptp, record.signals.values())):
-            continue
-        sizes = np.array([[np.mean(values), np.std(values)] for values in record.signals.values()]).T
-        for other, before, its_sizes in seen:
-            alike = likeness(before, record, looked_for) if _similar(its_sizes, sizes) else None
+    for number, (name, record) in enumerate(records):
+        for (other, before), its_sizes in zip(records[:number], sizes, strict=False):
+            alike = likeness(before, record, looked_for) if _similar(its_sizes, sizes[number]) else None
             if alike is Likeness.COPY:
-                problem = f"has the forces of {other.name}, reading for reading"
+                problem = f"has the forces of {other}, reading for reading"
                 remedy = "one is a copy of the other: take it out, or give the run its own record"
-                faults.setdefault(run.name, InputError(run.name, "", problem, remedy))
+                faults.setdefault(name, InputError(name, "", problem, remedy))
             elif alike is Likeness.MIRROR and has_noise(record):
-                remarks.append(
-                    caution(f"{run.name} is the mirror image of {other.name}, noise included: not a second run.")
-                )
-        seen.append((run, record, sizes))
+                remarks.append(caution(f"{name} is the mirror image of {other}, noise included: not a second run."))
     return faults, remarks
+
+
+def _moving_forces(run: CaptiveRun) -> Recording | None:
+    """The forces of a run; None if they cannot show a copy: averages, few readings, or a gauge that does not move."""
+    forces = {column: run.force(force) for force, column in FORCE_COLUMNS.items()}
+    if run.is_average or len(run.time_s) < _FEWEST_READINGS or not all(map(np.ptp, forces.values())):
+        return None
+    return Recording(run.time_s, forces)
+
+
+def _mean_and_scatter(record: Recording) -> Array:
+    """Means and standard deviations (2, n) of all forces."""
+    return np.array([[np.mean(values), np.std(values)] for values in record.signals.values()]).T
 
 
 def _similar(first: Array, second: Array) -> bool:

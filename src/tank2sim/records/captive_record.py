@@ -91,17 +91,12 @@ def read_captive_run(
     """
     table = read_run_table(path, columns, files)
     time = table.increasing("t_s") - float(table.column("t_s")[0])
-    to_port = test.rudder_sign == "port"
-    if to_port and sheet.rudder_rad is not None:
-        sheet = sheet.model_copy(update={"rudder_rad": -sheet.rudder_rad})
-    rudder, speed, y, psi, recorded = (
-        _optional(table, name) for name in ("delta_rad", "speed_mps", "y_m", "psi_rad", "propeller_radps")
-    )
-    if rudder is None:
-        rudder = np.full(len(time), sheet.rudder_rad or 0.0)
-    elif to_port:
-        rudder = -rudder
-    speed = np.full(len(time), test.speed_mps) if speed is None else speed
+    side = -1.0 if test.rudder_sign == "port" else 1.0
+    if sheet.rudder_rad is not None:
+        sheet = sheet.model_copy(update={"rudder_rad": side * sheet.rudder_rad})
+    y, psi, recorded = (_optional(table, name) for name in ("y_m", "psi_rad", "propeller_radps"))
+    rudder = side * _column_or(table, "delta_rad", side * (sheet.rudder_rad or 0.0))
+    speed = _column_or(table, "speed_mps", test.speed_mps)
     revolutions = sheet.propeller_radps if sheet.propeller_radps is not None else test.propeller_radps
     revolutions = revolutions if recorded is None else float(np.mean(recorded))
     return CaptiveRun(
@@ -141,6 +136,12 @@ def _yaw_rate(table: CsvTable, sheet: RunSheet, psi: Array | None, time: Array) 
 
 def _optional(table: CsvTable, name: str) -> Array | None:
     return table.filled_column(name) if name in table.columns else None
+
+
+def _column_or(table: CsvTable, name: str, constant: float) -> Array:
+    """A column (n,), or a constant where it was not recorded."""
+    column = _optional(table, name)
+    return np.full(len(table.lines), constant) if column is None else column
 
 
 def _sway_velocity(table: CsvTable, sheet: RunSheet, motion: tuple[Array, Array | None, Array]) -> Array:

@@ -39,38 +39,37 @@ def read_craft_trial(path: Path | CsvTable, thrusters: Sequence[ThrusterSection]
     column ``azimuth_<name>_deg`` (clockwise from the bow); of a single one ``delta_deg`` or ``delta_order_deg`` and
     ``n_rpm`` do, as ``tank2sim log`` cuts them.
 
-    Parameters
-    ----------
-    path : Path or CsvTable
-        The file, or the table of a data frame.
-    thrusters : sequence of ThrusterSection
-        Thrusters of the card.
+    `path`: The file, or the table of a data frame. `thrusters`: Thrusters of the card.
 
-    Raises
-    ------
-    InputError
-        Revolutions and orders, positions or heading are missing, an order is beyond 1, or the time does not rise.
+    Raises InputError: Revolutions and orders, positions or heading are missing, an order is beyond 1, or the time does
+    not rise.
     """
     table = read_table(path).si()
     path = table.path
-    columns, time = table.columns, table.increasing("t_s")
+    time = table.increasing("t_s")
     if len(time) < LEAST_CRAFT_ROWS:
         raise InputError(path, "", f"has {len(time)} rows", f"at least {LEAST_CRAFT_ROWS} are needed")
-    shaft = columns.get("n_radps") if len(thrusters) == 1 else None  # of the log, if single
-    driven = {f"n_{thruster.name}_radps": columns.get(f"n_{thruster.name}_radps", shaft) for thruster in thrusters}
-    orders = {f"order_{thruster.name}_radps": _ordered(path, thruster, columns) for thruster in thrusters}
-    needed = () if all(map(_known, orders.values())) else driven
-    present = {name for name, values in {**columns, **driven}.items() if _known(values)}
-    missing = [name for name in (*needed, "x_m", "y_m", "psi_rad") if name not in present]
-    if missing:
-        raise _without_column(table, missing[0], thrusters)
-    driven |= _azimuths(path, thrusters, columns)
-    signals = {name: values for name, values in (driven | orders).items() if values is not None and _known(values)}
-    signals |= {name: columns[name] for name in CRAFT_SIGNALS if name in columns}
+    signals = _driving_signals(table, thrusters)
+    signals |= {name: table.columns[name] for name in CRAFT_SIGNALS if name in table.columns}
     held = _held(signals["x_m"], signals["y_m"])
     signals |= {name: np.where(held, np.nan, signals[name]) for name in ("x_m", "y_m")}
     headings = {name: table.heading(name) for name in CRAFT_SIGNALS if name in signals}
     return Trial(path, time, signals | {"psi_rad": unwrapped(signals["psi_rad"])}, columns=headings)
+
+
+def _driving_signals(table: CsvTable, thrusters: Sequence[ThrusterSection]) -> dict[str, Array]:
+    """Revolutions, orders and directions of the thrusters; refused without them, a position or the heading."""
+    path, columns = table.path, table.columns
+    shaft = columns.get("n_radps") if len(thrusters) == 1 else None  # of the log, if single
+    driven = {f"n_{thruster.name}_radps": columns.get(f"n_{thruster.name}_radps", shaft) for thruster in thrusters}
+    orders = {f"order_{thruster.name}_radps": _ordered(path, thruster, columns) for thruster in thrusters}
+    needed = () if all(map(_known, orders.values())) else driven
+    present = {**columns, **driven}
+    missing = next((name for name in (*needed, "x_m", "y_m", "psi_rad") if not _known(present.get(name))), None)
+    if missing is not None:
+        raise _without_column(table, missing, thrusters)
+    every = driven | _azimuths(path, thrusters, columns) | orders
+    return {name: values for name, values in every.items() if _known(values)}
 
 
 def _without_column(table: CsvTable, name: str, thrusters: Sequence[ThrusterSection]) -> InputError:
@@ -93,20 +92,20 @@ def _azimuths(path: Path, thrusters: Sequence[ThrusterSection], columns: Mapping
     """Directions of the thrusters that turn, or as ordered; a single one may be a rudder; a missing one is refused."""
     found = {}
     turning = [thruster for thruster in thrusters if thruster.max_azimuth_rad is not None]
+    single = len(turning) == 1
     for thruster in turning:
         name, side = thruster.name, 1.0 if thruster.x_m > 0 else -1.0
-        if _known(given := columns.get(f"azimuth_{name}_rad")):
-            found[f"azimuth_{name}_rad"] = given
-        elif len(turning) == 1 and _known(angle := columns.get("delta_rad")):
-            found[f"azimuth_{name}_rad"] = thruster.azimuth_rad + side * angle
-        elif len(turning) == 1 and _known(order := columns.get("delta_order_rad")):
-            found[f"azimuth_order_{name}_rad"] = thruster.azimuth_rad + side * order
-        else:
-            remedy = (
-                f"thruster {name} turns: give azimuth_{name}_deg, in which it pushes the craft, clockwise from the bow"
-            )
-            remedy += ", or delta_deg, positive to starboard" if len(turning) == 1 else ""
+        shown = [(f"azimuth_{name}_rad", f"azimuth_{name}_rad", 0.0, 1.0)]  # signal, column, its zero and its sign
+        if single:
+            shown.append((f"azimuth_{name}_rad", "delta_rad", thruster.azimuth_rad, side))
+            shown.append((f"azimuth_order_{name}_rad", "delta_order_rad", thruster.azimuth_rad, side))
+        known = [way for way in shown if _known(columns.get(way[1]))]
+        if not known:
+            remedy = f"thruster {name} turns: give azimuth_{name}_deg, in which it pushes the craft, clockwise from the"
+            remedy += " bow, or delta_deg, positive to starboard" if single else " bow"
             raise InputError(path, "header", f"lacks azimuth_{name}_deg", remedy)
+        signal, column, zero, sign = known[0]
+        found[signal] = zero + sign * columns[column]
     return found
 
 

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.files import read_all_bytes, read_text
+from tank2sim.records.text_layout import rows_of_text
 from tank2sim.records.workbook import is_workbook, workbook_text
 from tank2sim.units import to_si
 
@@ -32,7 +33,8 @@ _KEY = re.compile(r"([A-Za-z_][\w.-]*)\s*:(?!//)\s*(.*)", re.DOTALL)  # not the 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _OF_NUMBERS = b"0123456789eE+-., \t\n"
 _BLOCK = 1 << 22  # Characters of a file that are read at once: memory then goes with its numbers, not with its text
-_FIRST_ROW = re.compile(r"^[^\S\n]*[^\s#].*$", re.MULTILINE)
+_FIRST_ROW = re.compile(r"^[^\S\n]*[^\s#].*$|\Z", re.MULTILINE)
+_BLANK = re.compile("[ \t]")
 _EMPTY_CELL = re.compile(r"(?<![^,\n])(?=[,\n])", re.ASCII)
 _QUOTED_LENGTH = 30
 
@@ -55,40 +57,24 @@ _ALMOST_KEY = re.compile(r"([A-Za-z_][\w.-]*(?:[ \t]+[A-Za-z_][\w.-]*)?)\s*[:=](
 
 @dataclass(frozen=True, eq=False)
 class CsvTable:
-    """Columns of numbers as in a file.
+    """Columns of numbers as in a file."""
 
-    Parameters
-    ----------
-    path : Path
-        The file, or the name of a data frame.
-    columns : dict
-        Name to values, (rows,), nan where a cell is empty.
-    lines : array of int, (rows,)
-        Line of the file (from 1) of each row; of a data frame its row (from 0).
-    comments : dict
-        Key to text of the lines ``# key: text``; the texts of a repeated key are joined by line breaks.
-    remarks : tuple of str
-        The other comment lines.
-    headings : dict
-        Name of a column to what it is called in the file, where :meth:`si` has renamed it.
-    counts : str
-        Unit of `lines` in messages.
-    """
-
-    path: Path
-    columns: dict[str, Array]
-    lines: NDArray[np.int64]
+    path: Path  # The file, or the name of a data frame
+    columns: dict[str, Array]  # Name to values, (rows,), nan where a cell is empty
+    lines: NDArray[np.int64]  # (rows,): Line of the file (from 1) of each row; of a data frame its row (from 0)
+    # Key to text of the lines ``# key: text``; the texts of a repeated key are joined by line breaks.
     comments: dict[str, str] = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()  # The other comment lines
+    # Name of a column to what it is called in the file, where :meth:`si` has renamed it.
     headings: dict[str, str] = field(default_factory=dict)
-    counts: str = "line"
+    counts: str = "line"  # Unit of `lines` in messages
 
     def heading(self, name: str) -> str:
         """Name of a column in the file."""
         return self.headings.get(name, name)
 
     def place(self, row: int, name: str) -> str:
-        """Where a cell is, for messages: ``line 12, column psi_deg``."""
+        """Where the cell of a `row` is, for messages: ``line 12, column psi_deg``."""
         return f"{self.counts} {self.lines[row]}, column {self.heading(name)}"
 
     def fault(self, place: str, problem: str, remedy: str) -> InputError:
@@ -98,10 +84,7 @@ class CsvTable:
     def column(self, name: str) -> Array:
         """Values of a column, (rows,).
 
-        Raises
-        ------
-        InputError
-            The column does not exist.
+        Raises InputError: The column does not exist.
         """
         if name not in self.columns:
             present = ", ".join(self.heading(other) for other in self.columns)
@@ -111,10 +94,8 @@ class CsvTable:
     def increasing(self, name: str) -> Array:
         """Values of a column, (rows,), that must be there in each row and rise from row to row (a time).
 
-        Raises
-        ------
-        InputError
-            The column does not exist, a cell of it is empty, or it does not rise; the message names the first such row.
+        Raises InputError: The column does not exist, a cell of it is empty, or it does not rise; the message names the
+        first such row.
         """
         values = self.filled_column(name)
         falls = np.flatnonzero(np.diff(values) < SHORTEST_STEP)
@@ -127,10 +108,7 @@ class CsvTable:
     def filled_column(self, name: str, remedy: str = "give each row its value") -> Array:
         """Values of a column without empty cells, (rows,).
 
-        Raises
-        ------
-        InputError
-            The column does not exist, or a cell is empty: the message ends with `remedy`.
+        Raises InputError: The column does not exist, or a cell is empty: the message ends with `remedy`.
         """
         values = self.column(name)
         empty = np.flatnonzero(np.isnan(values))
@@ -141,10 +119,7 @@ class CsvTable:
     def positive_comment(self, key: str) -> float | None:
         """The number in the comment line ``# key: number``; None without such a line.
 
-        Raises
-        ------
-        InputError
-            As :meth:`comment_number`, or it is not positive.
+        Raises InputError: As :meth:`comment_number`, or it is not positive.
         """
         value = self.comment_number(key)
         if value is not None and value <= 0:
@@ -158,10 +133,7 @@ class CsvTable:
     def comment_number(self, key: str) -> float | None:
         """The finite number in the comment line ``# key: number``; None without such a line.
 
-        Raises
-        ------
-        InputError
-            Its text is not a number, or the line is given twice.
+        Raises InputError: Its text is not a number, or the line is given twice.
         """
         if key not in self.comments:
             return None
@@ -178,10 +150,7 @@ class CsvTable:
     def refuse_misspelt_keys(self, known: Sequence[str]) -> None:
         """Refuse a comment line whose key resembles one of the known keys but is none; free text is let through.
 
-        Raises
-        ------
-        InputError
-            There is such a line; the message states the right spelling.
+        Raises InputError: There is such a line; the message states the right spelling.
         """
         keys = [(key, f"# {key}:") for key in self.comments if key not in known]
         matches = (_ALMOST_KEY.match(remark) for remark in self.remarks)
@@ -197,10 +166,7 @@ class CsvTable:
     def si(self) -> CsvTable:
         """The table in SI and radians, its columns renamed by :func:`tank2sim.units.to_si` (psi_deg to psi_rad).
 
-        Raises
-        ------
-        InputError
-            Two columns are one quantity in two units.
+        Raises InputError: Two columns are one quantity in two units.
         """
         columns: dict[str, Array] = {}
         headings: dict[str, str] = {}
@@ -237,17 +203,9 @@ def tables_or_paths(
 def table_of_frame(frame: pd.DataFrame, name: str) -> CsvTable:
     """Return the table of a data frame; its ``attrs`` are the comments of a file, and a named index is a column.
 
-    Parameters
-    ----------
-    frame : DataFrame
-        Numbers; columns are named as in a file.
-    name : str
-        Name in messages and results, where a file has its path.
+    `frame`: Numbers; columns are named as in a file. `name`: Name in messages and results, where a file has its path.
 
-    Raises
-    ------
-    InputError
-        It has no rows, a column is given twice, or holds anything but finite numbers and gaps.
+    Raises InputError: It has no rows, a column is given twice, or holds anything but finite numbers and gaps.
     """
     if frame.index.name and frame.index.name not in frame.columns:
         frame = frame.reset_index()
@@ -277,12 +235,9 @@ def read_table(path: Path | str | CsvTable) -> CsvTable:
     tabs and no commas shows the separator; decimals may then have commas. The first sheet of a spreadsheet (``.xlsx``)
     is read, whose rows are the lines of messages.
 
-    Raises
-    ------
-    InputError
-        The file is missing or not UTF-8; there is no header, a column has no name or the name of another; there are
-        no rows; a row has too many or too few cells; a cell is not a finite number in digits and a decimal sign; a
-        file has points and decimal commas.
+    Raises InputError: The file is missing or not UTF-8; there is no header, a column has no name or the name of
+    another; there are no rows; a row has too many or too few cells; a cell is not a finite number in digits and a
+    decimal sign; a file has points and decimal commas.
     """
     if isinstance(path, CsvTable):
         return path
@@ -292,14 +247,14 @@ def read_table(path: Path | str | CsvTable) -> CsvTable:
     if plain is not None:
         return plain
     stripped = [line.strip() for line in text.split("\n")]
-    numbers = [number for number, line in enumerate(stripped, start=1) if line and not line.startswith("#")]
-    if not numbers:
+    rows = rows_of_text(stripped)
+    if not rows:
         raise InputError(path, "", "there is no header", "begin with a line of column names, such as t_s,u_mps")
-    names = _header(path, numbers[0], stripped[numbers[0] - 1])
-    lines = np.array(numbers[1:], dtype=np.int64)
-    rows = [stripped[number - 1] for number in numbers[1:]]
+    names = _header(path, *rows[0])
+    lines = np.array([number for number, _ in rows[1:]], dtype=np.int64)
+    table = table_of_rows(path, names, [row for _, row in rows[1:]], lines)
     comments, remarks = _comments([line for line in stripped if line.startswith("#")])
-    return replace(table_of_rows(path, names, rows, lines), comments=comments, remarks=remarks)
+    return replace(table, comments=comments, remarks=remarks)
 
 
 def _table_text(path: Path) -> str:
@@ -317,24 +272,21 @@ def _table_text(path: Path) -> str:
 def text_with_commas(path: Path, text: str) -> str:
     """The text with commas between cells and points in numbers, if its header has semicolons or tabs instead.
 
-    Raises
-    ------
-    InputError
-        There are points in numbers, and decimal commas.
+    Raises InputError: There are points in numbers, and decimal commas.
     """
-    header = _FIRST_ROW.search(text)
-    separator = next((one for one in ";\t" if header and one in header[0]), None)
-    if header is None or separator is None or "," in header[0]:
+    header = next(_FIRST_ROW.finditer(text))[0]  # empty in a text without rows
+    separator = ";" if ";" in header else "\t"
+    if separator not in header or "," in header:
         return text
     lines = text.split("\n")
-    body = [(n, line) for n, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
-    comma = any("," in line for _, line in body)
-    points = next((n for n, line in body[1:] if "." in line), None)
-    if comma and points is not None:
+    body = rows_of_text(lines)
+    point = next((number for number, line in body[1:] if "." in line), None)
+    if point is not None and any("," in line for _, line in body):
         remedy = "write numbers with one decimal sign and nothing between thousands"
-        raise InputError(path, f"line {points + 1}", "has a point, and other numbers have decimal commas", remedy)
+        raise InputError(path, f"line {point}", "has a point, and other numbers have decimal commas", remedy)
+    written = str.maketrans({",": ".", separator: ","})
     for number, line in body:
-        lines[number] = (line.replace(",", ".") if comma else line).replace(separator, ",")
+        lines[number - 1] = line.translate(written)
     return "\n".join(lines)
 
 
@@ -359,20 +311,10 @@ def _plain_table(path: Path, text: str) -> CsvTable | None:
 def table_of_rows(path: Path, names: Sequence[str], rows: Sequence[str], lines: NDArray[np.int64]) -> CsvTable:
     """Table of rows with commas between cells and points in numbers.
 
-    Parameters
-    ----------
-    path : Path
-        For messages.
-    names : sequence of str
-        Names of the columns.
-    rows : sequence of str
-    lines : array of int, (rows,)
-        Line of the file of each row.
+    `path`: For messages. `names`: Names of the columns. `rows`: Lines of values. `lines` (rows,): Line of the file of
+    each row.
 
-    Raises
-    ------
-    InputError
-        There are no rows; a row has too many or too few cells; a cell is not a finite number.
+    Raises InputError: There are no rows; a row has too many or too few cells; a cell is not a finite number.
     """
     if not rows:
         raise InputError(path, "", "there are no rows under the header", "add the measured values")
@@ -416,9 +358,9 @@ def _numbers(body: str, width: int) -> Array | None:
         return None
     if not body.endswith("\n"):
         body += "\n"
-    if " " in body or "\t" in body:
+    if _BLANK.search(body):
         body = re.sub(r"[ \t]*([,\n])[ \t]*", r"\1", body).lstrip(" \t")
-    if ",," in body or ",\n" in body or "\n," in body or body.startswith(","):
+    if body.startswith(",") or any(mark in body for mark in (",,", ",\n", "\n,")):
         body = _EMPTY_CELL.sub("nan", body)
     lines = body.splitlines()
     try:
@@ -492,10 +434,7 @@ def _quoted(text: str) -> str:
 def read_bytes_as_text(path: Path | str) -> str:
     """Text of a file whose letters beyond ASCII do not matter (read as ISO 8859-1); every line ends in a line feed.
 
-    Raises
-    ------
-    InputError
-        The file is missing or unreadable.
+    Raises InputError: The file is missing or unreadable.
     """
     text = read_all_bytes(Path(path)).decode("latin-1")
     return text.replace("\r\n", "\n").replace("\r", "\n")

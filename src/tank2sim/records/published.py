@@ -84,16 +84,8 @@ def read_simman(path: Path | str) -> Trial:
         time, notice = _uniform_time(path, rows)
         notices.append(notice)
     known = {name: head for name, head in table.headings.items() if name in signals and name != head}
-    tanker = "KVLCC2" in header
-    return Trial(
-        path,
-        time,
-        signals,
-        scale=KVLCC2_SCALE if tanker else None,
-        notices=tuple(notices),
-        columns=known,
-        length_m=laboratory.KVLCC2_length_m if tanker else None,
-    )
+    scale, length = (KVLCC2_SCALE, laboratory.KVLCC2_length_m) if "KVLCC2" in header else (None, None)
+    return Trial(path, time, signals, scale=scale, notices=tuple(notices), columns=known, length_m=length)
 
 
 def _table(path: Path, names: Sequence[str], rows: _Rows) -> CsvTable:

@@ -28,10 +28,7 @@ def reader_of(path: Path) -> TrialReader:
 
     The latter says what is wrong with the file. A file with an ending that no format has is taken for a trial CSV.
 
-    Raises
-    ------
-    InputError
-        The file is missing or unreadable, or the reader of a package fails.
+    Raises InputError: The file is missing or unreadable, or the reader of a package fails.
     """
     text = read_bytes_as_text(path)
     if is_workbook(text[:4].encode("latin-1")):
@@ -55,17 +52,11 @@ def _recognises(reader: TrialReader, text: str) -> bool:
 def read_trial_file(path: Path | str | CsvTable, *, rising: bool = True) -> Trial:
     """Read a trial of any format of :data:`READERS`; its beginning shows which.
 
-    Parameters
-    ----------
-    path : path or CsvTable
-        The file, or the table of a data frame, which is read as the project's CSV.
-    rising : bool
-        Refuse a time that does not rise from row to row; False lets it through, for the audit to judge.
+    `path`: The file, or the table of a data frame, which is read as the project's CSV. `rising`: Refuse a time that
+    does not rise from row to row; False lets it through, for the audit to judge.
 
-    Raises
-    ------
-    InputError
-        The file is missing or of no known format, or its content is faulty; the message names line and column.
+    Raises InputError: The file is missing or of no known format, or its content is faulty; the message names line and
+    column.
     """
     if isinstance(path, CsvTable):
         reader, trial = TRIAL_CSV, read_trial_csv(path)

@@ -99,20 +99,23 @@ def _table_of_arrays(path: Path, raw: Sequence[RawColumn]) -> CsvTable:
 def _text_table(path: Path, files: FilesSection) -> tuple[CsvTable, dict[str, str]]:
     """Columns by their names in the file, and the units of its row of units."""
     lines = _lines(path, files)
-    separator = ";" if files.widths else _SEPARATORS.get(files.separator or "", files.separator or "")
-    layout = text_layout(path, lines, separator, None if files.decimal is None else files.decimal == ",")
+    layout = text_layout(path, lines, _stated_separator(files), {None: None, ",": True, ".": False}[files.decimal])
     names = list(files.names or layout.names)
     if len(names) != len(layout.names):
         problem = f"are {len(names)}, and {path.name} has {len(layout.names)} columns"
         raise InputError(path, "files.names", problem, "name each column")
-    body = layout.rows(lines)
-    rows = [_canonical(path, number, line, layout) for number, line in body]
-    if all(row.endswith(",") for row in rows) and all(row.count(",") == len(names) for row in rows):
+    numbers, body = zip(*layout.rows(lines), strict=True)
+    rows = [_canonical(path, number, line, layout) for number, line in zip(numbers, body, strict=True)]
+    if all(row.endswith(",") and row.count(",") == len(names) for row in rows):
         rows = [row[:-1] for row in rows]  # a separator after the last column
-    table = table_of_rows(path, names, rows, np.array([number for number, _ in body], dtype=np.int64))
-    empty = [name for name, values in table.columns.items() if np.isnan(values).all()]
-    table = replace(table, columns={name: table.columns[name] for name in names if name not in empty})
-    return table, dict(zip(names, layout.units, strict=False))
+    table = table_of_rows(path, names, rows, np.array(numbers, dtype=np.int64))
+    read = {name: values for name, values in table.columns.items() if not np.isnan(values).all()}
+    return replace(table, columns=read), dict(zip(names, layout.units, strict=False))
+
+
+def _stated_separator(files: FilesSection) -> str:
+    """The separator of :func:`_lines`; empty if it is not known."""
+    return ";" if files.widths else _SEPARATORS.get(files.separator or "", files.separator or "")
 
 
 def _lines(path: Path, files: FilesSection) -> list[str]:
@@ -141,38 +144,58 @@ def _canonical(path: Path, number: int, line: str, layout: TextLayout) -> str:
 
 def _mapped(table: CsvTable, units: Mapping[str, str], columns: Mapping[str, ColumnEntry | str]) -> CsvTable:
     """The table in SI with the quantities of a run alone."""
-    found: dict[str, _MappedColumn] = {}
-    for stated, entry in columns.items():
-        heading = _heading(table, stated)
-        column = _stated(table, heading, units.get(heading, ""), entry)
-        if column.quantity in found:
-            both = f"columns {found[column.quantity].heading} and {heading}"
-            raise table.fault(both, f"are both {column.quantity}", "take one out of [columns]")
-        found[column.quantity] = column
-    mapped = {column.heading for column in found.values()}
-    for heading in table.columns:
-        if heading in mapped:
-            continue
-        named = _by_name(heading, units.get(heading, ""))
-        quantity = named.quantity if named else _without_unit(_last_part(heading))
-        if named is None:
-            if quantity in RUN_QUANTITIES and quantity not in found:
-                remedy = f"give one in [columns]: {quantity} = {{ quantity = '{quantity}', unit = ... }}"
-                raise table.fault(f"column {heading}", f"has no unit of {quantity}", remedy)
-        elif quantity not in found:
-            found[quantity] = named
-        elif not columns:
-            both = f"columns {found[named.quantity].heading} and {heading}"
-            raise table.fault(both, "are one quantity in two units", "delete one of them")
-    if "waveform time" in table.columns and "t" not in found:
-        found["t"] = _MappedColumn("waveform time", "t", 1.0, 0.0)
-    if not found or "t" not in found:
+    found = _with_named_columns(table, units, _stated_columns(table, units, columns))
+    if "waveform time" in table.columns:
+        found.setdefault("t", _MappedColumn("waveform time", "t", 1.0, 0.0))
+    if "t" not in found:
         present = ", ".join(table.columns)
-        problem = "no column is known" if not found else "no column is the time"
+        problem = "no column is the time" if found else "no column is known"
         raise table.fault("header", problem, f"name them in [columns] of the campaign; there are: {present}")
     values = {_si_name(column.quantity): _in_si(table, column) for column in found.values()}
     headings = {_si_name(column.quantity): column.heading for column in found.values()}
     return replace(table, columns=values, headings=headings)
+
+
+def _stated_columns(
+    table: CsvTable, units: Mapping[str, str], columns: Mapping[str, ColumnEntry | str]
+) -> dict[str, _MappedColumn]:
+    """Columns of the map by their quantities."""
+    found: dict[str, _MappedColumn] = {}
+    for name, entry in columns.items():
+        heading = _heading(table, name)
+        as_stated = ColumnEntry(quantity=entry) if isinstance(entry, str) else entry
+        column = _stated(table, heading, units.get(heading, ""), as_stated)
+        if column.quantity in found:
+            both = f"columns {found[column.quantity].heading} and {heading}"
+            raise table.fault(both, f"are both {column.quantity}", "take one out of [columns]")
+        found[column.quantity] = column
+    return found
+
+
+def _with_named_columns(
+    table: CsvTable, units: Mapping[str, str], stated: Mapping[str, _MappedColumn]
+) -> dict[str, _MappedColumn]:
+    """The columns of the map, and the others whose names show what they are."""
+    found = dict(stated)
+    mapped = {column.heading for column in stated.values()}
+    for heading in (heading for heading in table.columns if heading not in mapped):
+        named = _by_name(heading, units.get(heading, ""))
+        if named is None:
+            _refuse_without_unit(table, heading, found)
+        elif named.quantity in found and not stated:
+            both = f"columns {found[named.quantity].heading} and {heading}"
+            raise table.fault(both, "are one quantity in two units", "delete one of them")
+        else:
+            found.setdefault(named.quantity, named)
+    return found
+
+
+def _refuse_without_unit(table: CsvTable, heading: str, found: Mapping[str, _MappedColumn]) -> None:
+    """Refuse a column with the name of a quantity that no other column is, and without a unit."""
+    quantity = _without_unit(_last_part(heading))
+    if quantity in RUN_QUANTITIES and quantity not in found:
+        remedy = f"give one in [columns]: {quantity} = {{ quantity = '{quantity}', unit = ... }}"
+        raise table.fault(f"column {heading}", f"has no unit of {quantity}", remedy)
 
 
 def _in_si(table: CsvTable, column: _MappedColumn) -> Array:
@@ -197,30 +220,40 @@ def _heading(table: CsvTable, stated: str) -> str:
     raise table.fault("header", f"there is no column {stated}", close_name(stated, table.columns))
 
 
-def _stated(table: CsvTable, heading: str, unit_in_file: str, entry: ColumnEntry | str) -> _MappedColumn:
+def _stated(table: CsvTable, heading: str, unit_in_file: str, entry: ColumnEntry) -> _MappedColumn:
     """A column as the map states it."""
+    place, (quantity, by_map) = f"columns.{heading}", _quantity_and_factor(table, heading, entry)
+    if entry.factor is not None:
+        return _MappedColumn(heading, quantity, entry.sign * entry.factor * (by_map or 1.0), entry.offset)
+    spelt, by_file = _unit_in_file(heading, unit_in_file, quantity)
+    factors = [factor for factor in (by_map, by_file) if factor is not None]
+    if not factors:
+        problem = f"has no unit of {quantity}" + (f" ({spelt} is none)" if spelt else "")
+        raise table.fault(place, problem, f"give one in [columns]: unit = '{RUN_QUANTITIES[quantity]}'")
+    if not math.isclose(factors[0], factors[-1], rel_tol=1e-6):
+        problem = f"is in {spelt} by the file, and in another unit by the map"
+        raise table.fault(place, problem, "correct the unit, or give a factor to SI")
+    return _MappedColumn(heading, quantity, entry.sign * factors[0], entry.offset)
+
+
+def _quantity_and_factor(table: CsvTable, heading: str, entry: ColumnEntry) -> tuple[str, float | None]:
+    """Quantity of a column of the map, and the factor of the unit that the map states; None if it states none."""
     place = f"columns.{heading}"
-    if isinstance(entry, str):
-        entry = ColumnEntry(quantity=entry)
     quantity, factor = _quantity(entry.quantity)
     if not quantity:
         raise table.fault(place, f"{entry.quantity} is not a quantity", f"known are: {', '.join(RUN_QUANTITIES)}")
     suffix = RUN_QUANTITIES[quantity]
-    in_file = unit_in_file or _unit_of_heading(heading)
-    known = unit_factor(in_file, suffix) if in_file else None
     if entry.unit is not None:
         factor = unit_factor(entry.unit, suffix)
         if factor is None:
             raise table.fault(place, f"{entry.unit} is not a unit of {quantity}", f"its SI unit is {suffix}")
-    if entry.factor is not None:
-        return _MappedColumn(heading, quantity, entry.sign * entry.factor * (factor or 1.0), entry.offset)
-    if factor is not None and known is not None and not math.isclose(factor, known, rel_tol=1e-6):
-        problem = f"is in {in_file} by the file, and in another unit by the map"
-        raise table.fault(place, problem, "correct the unit, or give a factor to SI")
-    if factor is None and known is None:
-        problem = f"has no unit of {quantity}" + (f" ({in_file} is none)" if in_file else "")
-        raise table.fault(place, problem, f"give one in [columns]: unit = '{suffix}'")
-    return _MappedColumn(heading, quantity, entry.sign * (factor if factor is not None else known or 1.0), entry.offset)
+    return quantity, factor
+
+
+def _unit_in_file(heading: str, unit: str, quantity: str) -> tuple[str, float | None]:
+    """Unit of a column by the file's row of units, else by its heading, and its factor; None if it is none."""
+    spelt = unit or _unit_of_heading(heading)
+    return spelt, unit_factor(spelt, RUN_QUANTITIES[quantity]) if spelt else None
 
 
 def _quantity(name: str) -> tuple[str, float | None]:
@@ -245,8 +278,7 @@ def _by_name(heading: str, unit: str) -> _MappedColumn | None:
         quantity, factor = _quantity(name)
         if not quantity:
             continue
-        spelt = unit or _unit_of_heading(heading)
-        known = unit_factor(spelt, RUN_QUANTITIES[quantity]) if spelt else None
+        _, known = _unit_in_file(heading, unit, quantity)
         if factor is not None and (known is None or math.isclose(known, factor, rel_tol=1e-6)):
             return _MappedColumn(heading, quantity, factor, 0.0)
         if factor is None and known is not None:

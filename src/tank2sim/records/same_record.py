@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import StrEnum
-from functools import cache
 from typing import Protocol
 
 import numpy as np
@@ -137,22 +136,20 @@ def refuse_copies(trials: Sequence[Trial], others: Sequence[Trial] | None = None
     InputError
         Names the second file, and which one it is again.
     """
-    pairs = (
-        ((trial, before) for number, trial in enumerate(trials) for before in trials[:number])
-        if others is None
-        else ((held, trial) for held in others for trial in trials)
-    )
+    if others is None:
+        pairs = [(trial, before) for number, trial in enumerate(trials) for before in trials[:number]]
+        problem, remedy = "is the record of {} again", "give each record once: a copy is not a second run"
+        proves = "it is not a second run"
+    else:
+        pairs = [(held, trial) for held in others for trial in trials]
+        problem, remedy = "is both fitted and held out: it is the record of {}", "hold out what is not fitted"
+        proves = "as a hold-out it proves nothing"
     notices = []
     for trial, before in pairs:
         alike = likeness(trial, before)
         if alike is Likeness.COPY:
-            if others is None:
-                problem = f"is the record of {before.path.name} again"
-                raise trial.fault("", problem, "give each record once: a copy is not a second run")
-            problem = f"is both fitted and held out: it is the record of {before.path.name}"
-            raise trial.fault("", problem, "hold out what is not fitted")
+            raise trial.fault("", problem.format(before.path.name), remedy)
         if alike is not None:
-            proves = "as a hold-out it proves nothing" if others is not None else "it is not a second run"
             notices.append(caution(f"{trial.path.name} {_SAID[alike].format(before.path.name)}: {proves}."))
     return tuple(notices)
 
@@ -179,45 +176,26 @@ def likeness(
     the sensors, also in means over a sixteenth of the record, where a second run shows its own disturbances. Both are
     at the size of one ship. A signal that does not move says nothing. Only what is in `among` is looked for.
     """
-    # At the rows of the coarser one, between which nothing is drawn.
-    if usual_step(first.time_s) < usual_step(second.time_s):
-        first, second = second, first
-    names = [name for name in _COMPARED if name in first.signals and name in second.signals]
-    if len(names) > 1 and sum(name in _TRACK for name in names) == 1:  # turned, it would be another
-        names = [name for name in names if name not in _TRACK]
-
-    @cache
-    def precision(name: str) -> tuple[float, float, float]:
-        """Noise of a signal in each record, and the coarser unit of their digits."""
-        pair = first.signals[name], second.signals[name]
-        return white_noise(pair[0]), white_noise(pair[1]), max(_unit(values) for values in pair)
-
-    def together(shift: float, sign: float = 1.0) -> Iterator[_Pair]:
-        signals = {name: second.signals[name] * (sign if name in _MIRRORED else 1.0) for name in names}
-        return _together(first, second.time_s + shift, signals, precision)
-
-    @cache
-    def shifts_of(sign: float) -> tuple[float, ...]:
-        return tuple(_shifts(first, second, sign))
-
+    records = _Records.of(first, second)
     for alike, sign in ((Likeness.COPY, 1.0), (Likeness.MIRROR, -1.0)):
-        if alike in among and any(_copied(together(shift, sign)) for shift in shifts_of(sign)):
+        if alike in among and any(_copied(records.together(shift, sign)) for shift in records.shifts(sign)):
             return alike
     if Likeness.TWICE not in among:
         return None
-    shifts = list(shifts_of(1.0))
-    shifts.append(_nearest(together, shifts[-1], first.time_s))
-    return Likeness.TWICE if any(_recorded_twice(together(shift)) for shift in shifts) else None
+    shifts = records.shifts(1.0)
+    tried = (*shifts, _nearest(records, shifts[-1]))
+    return Likeness.TWICE if any(_recorded_twice(records.together(shift)) for shift in tried) else None
 
 
-def _nearest(together: Callable[[float], Iterator[_Pair]], shift: float, time: Array) -> float:
+def _nearest(records: _Records, shift: float) -> float:
     """The shift (s) at which all signals together are nearest, in the neighbourhood of one by the timing signal."""
-    if any(pair.apart > pair.spread for pair in together(shift)):
+    if any(pair.apart > pair.spread for pair in records.together(shift)):
         return shift
 
     def apart(tried: float) -> float:
-        return sum(math.log(max(pair.apart / pair.spread, 1e-12)) for pair in together(tried))
+        return sum(math.log(max(pair.apart / pair.spread, 1e-12)) for pair in records.together(tried))
 
+    time = records.first.time_s
     reach = max(usual_step(time), _NEIGHBOURHOOD * float(time[-1] - time[0]))
     bounds, options = (shift - reach, shift + reach), {"xatol": 0.01 * usual_step(time)}
     return float(minimize_scalar(apart, bounds=bounds, method="bounded", options=options).x)
@@ -236,10 +214,7 @@ def has_noise(record: TimedSignals) -> bool:
 def same_readings(first: Array, second: Array) -> bool:
     """True if two columns of one table agree in all rows that both have, to half a unit of the coarser digits.
 
-    Parameters
-    ----------
-    first, second : array (n,)
-        nan where nothing was read.
+    `first`, `second` (n,): nan where nothing was read.
     """
     known = ~np.isnan(first + second)
     size = float(np.nanmax(np.abs(first), initial=0.0))
@@ -255,24 +230,24 @@ def signature(trial: Trial) -> tuple[list[float], dict[str, list[float]]]:
     Of the rows in which all of these are known, evenly spread; times to a thousandth of the step between rows, values
     to 1e-5 of their range. Empty if no signal moves.
     """
-    known = {
-        name: np.isfinite(values)
-        for name in SIGNED
-        if (values := trial.signals.get(name)) is not None and np.nanmax(values) > np.nanmin(values)
-    }
-    names = list(known)[:MOST_SIGNED]
-    rows = np.flatnonzero(np.all([known[name] for name in names], axis=0)) if names else np.array([], dtype=int)
-    if names and len(rows) < LEAST_SIGNED_ROWS:  # signals that are never known at once
+    signals = trial.signals
+    ranges = {name: float(np.nanmax(signals[name]) - np.nanmin(signals[name])) for name in SIGNED if name in signals}
+    names = [name for name, size in ranges.items() if size > 0][:MOST_SIGNED]
+    if not names:
+        return [], {}
+    rows = np.flatnonzero(np.all([np.isfinite(signals[name]) for name in names], axis=0))
+    if len(rows) < LEAST_SIGNED_ROWS:  # signals that are never known at once
         names = names[:1]
-        rows = np.flatnonzero(known[names[0]])
-    unit = next((unit for unit in STRIDES if len(rows) >= unit * LEAST_SIGNED_ROWS), 1)
-    rows = rows[:: unit * max(1, len(rows) // (unit * LEAST_SIGNED_ROWS))]
+        rows = np.flatnonzero(np.isfinite(signals[names[0]]))
+    rows = rows[:: _stride(len(rows))]
     time = _rounded(trial.time_s[rows], 1e-3 * usual_step(trial.time_s))
-    signals = {name: trial.signals[name] for name in names}
-    return time, {
-        name: _rounded(signal[rows], 1e-5 * float(np.nanmax(signal) - np.nanmin(signal)))
-        for name, signal in signals.items()
-    }
+    return time, {name: _rounded(signals[name][rows], 1e-5 * ranges[name]) for name in names}
+
+
+def _stride(rows: int) -> int:
+    """Rows from one of a signature to the next."""
+    unit = next((unit for unit in STRIDES if rows >= unit * LEAST_SIGNED_ROWS), 1)
+    return unit * max(1, rows // (unit * LEAST_SIGNED_ROWS))
 
 
 def _rounded(values: Array, unit: float) -> list[float]:
@@ -297,6 +272,11 @@ class _Pair:
     @property
     def apart(self) -> float:
         return float(np.sqrt(np.mean((self.first - self.second) ** 2)))
+
+    @property
+    def too_coarse(self) -> bool:
+        """Whether rounding alone could make two runs so alike."""
+        return _FAR * self.spread < self.apart <= _ROUNDED * self.unit / math.sqrt(12)
 
     @property
     def copied(self) -> bool:
@@ -335,47 +315,84 @@ def _recorded_twice(pairs: Iterable[_Pair]) -> bool:
     return shown
 
 
-def _together(
-    first: TimedSignals,
-    time: Array,
-    second: Mapping[str, Array],
-    precision: Callable[[str], tuple[float, float, float]],
-) -> Iterator[_Pair]:
-    """The signals of two records at the rows of the first, in one frame; empty if too few are at the same times."""
-    inside = (first.time_s >= time[0]) & (first.time_s <= time[-1])
-    common = first.time_s[inside]
-    spans = [float(times[-1] - times[0]) for times in (first.time_s, time)]
-    if len(common) < LEAST_ROWS or common[-1] - common[0] < COMMON * min(spans):
-        return
-    whole = {name: (first.signals[name], values) for name, values in second.items()}
-    along = ""
-    if all(name in whole for name in _TRACK):
+@dataclass(frozen=True, eq=False)
+class _Records:
+    """Two records in one frame, at the rows of the coarser one, between which nothing is drawn."""
+
+    first: TimedSignals
+    second: TimedSignals
+    names: tuple[str, ...]  # Signals that are compared
+    _precisions: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    _shifts: dict[float, tuple[float, ...]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, first: TimedSignals, second: TimedSignals) -> _Records:
+        if usual_step(first.time_s) < usual_step(second.time_s):
+            first, second = second, first
+        names = [name for name in _COMPARED if name in first.signals and name in second.signals]
+        if len(names) > 1 and sum(name in _TRACK for name in names) == 1:  # turned, it would be another
+            names = [name for name in names if name not in _TRACK]
+        return cls(first, second, tuple(names))
+
+    def precision(self, name: str) -> tuple[float, float, float]:
+        """Noise of a signal in each record, and the coarser unit of their digits."""
+        if name not in self._precisions:
+            pair = self.first.signals[name], self.second.signals[name]
+            self._precisions[name] = white_noise(pair[0]), white_noise(pair[1]), max(map(_unit, pair))
+        return self._precisions[name]
+
+    def shifts(self, sign: float) -> tuple[float, ...]:
+        """Shifts of the second record to try, s, as it is (1) or mirrored (-1)."""
+        if sign not in self._shifts:
+            self._shifts[sign] = tuple(_shifts(self.first, self.second, sign))
+        return self._shifts[sign]
+
+    def together(self, shift: float, sign: float = 1.0) -> Iterator[_Pair]:
+        """The signals of both, the second shifted and mirrored; empty if too few are at the same times."""
+        first, time = self.first, self.second.time_s + shift
+        inside = (first.time_s >= time[0]) & (first.time_s <= time[-1])
+        common = first.time_s[inside]
+        if len(common) < LEAST_ROWS or np.ptp(common) < COMMON * min(np.ptp(first.time_s), np.ptp(time)):
+            return
+        tracks = _TRACK if set(_TRACK) <= set(self.names) else ()
+        whole = {name: (first.signals[name], _mirrored(name, self.second, sign)) for name in self.names}
         whole |= _tracks(whole, inside, common, time)
-        along = _TRACK[0]
-    for name, (a, b) in whole.items():
-        values, others = a[inside], _at(common, time, b)
-        known = ~np.isnan(values + others)
-        if np.count_nonzero(known) < 2:
-            continue
-        values, others = values[known], others[known]
-        if name in _DIRECTIONS:
-            turned = np.exp(1j * (values - others))
-            others = values - np.angle(turned * np.conj(np.mean(turned)))
-        elif name in _TRACK:
-            others = others + np.mean(values) - np.mean(others)
-        if not np.std(values) > 0:
-            continue
-        apart, spread = float(np.sqrt(np.mean((values - others) ** 2))), float(np.std(values))
-        *noises, unit = np.max([precision(each) for each in (_TRACK if along and name in _TRACK else (name,))], axis=0)
-        if _FAR * spread < apart <= _ROUNDED * unit / math.sqrt(12):  # too coarse to say anything
-            continue
-        yield _Pair(values, others, (float(noises[0]), float(noises[1])), float(unit), name != along)
+        for name, (values, others) in whole.items():
+            aligned = _aligned(name, values[inside], _at(common, time, others))
+            if aligned is None:
+                continue
+            precisions = [self.precision(each) for each in (tracks if name in tracks else (name,))]
+            *noises, unit = np.max(precisions, axis=0).tolist()
+            pair = _Pair(*aligned, (noises[0], noises[1]), unit, evidence=name not in tracks[:1])
+            if not pair.too_coarse:
+                yield pair
+
+
+def _mirrored(name: str, record: TimedSignals, sign: float) -> Array:
+    """A signal as it is (1), or of the manoeuvre with port and starboard exchanged (-1)."""
+    return record.signals[name] * (sign if name in _MIRRORED else 1.0)
+
+
+def _aligned(name: str, values: Array, others: Array) -> tuple[Array, Array] | None:
+    """One signal (m,) of two records where both are known, less its arbitrary zero; None if it does not move."""
+    known = ~np.isnan(values + others)
+    if np.count_nonzero(known) < 2:
+        return None
+    values, others = values[known], others[known]
+    if name in _DIRECTIONS:
+        turned = np.exp(1j * (values - others))
+        others = values - np.angle(turned * np.conj(np.mean(turned)))
+    elif name in _TRACK:
+        others = others + np.mean(values) - np.mean(others)
+    return (values, others) if np.std(values) > 0 else None
 
 
 def _tracks(
     whole: Mapping[str, tuple[Array, Array]], inside: NDArray[np.bool_], common: Array, time: Array
 ) -> dict[str, tuple[Array, Array]]:
-    """Both tracks along and across the main direction of the first, the second turned onto it."""
+    """Both tracks along and across the main direction of the first, the second turned onto it; empty without both."""
+    if not set(_TRACK) <= whole.keys():
+        return {}
     (x, other_x), (y, other_y) = (whole[name] for name in _TRACK)
     first, second = x + 1j * y, other_x + 1j * other_y
     there = first[inside], _at(common, time, other_x) + 1j * _at(common, time, other_y)
@@ -391,8 +408,6 @@ def _tracks(
 
 def _shifts(first: TimedSignals, other: TimedSignals, sign: float) -> Iterator[float]:
     """Shifts (s) of the second record's times to try: none, by the first rows, and as the timing signal fits best."""
-    from scipy.signal import correlate  # slow to import
-
     time = other.time_s
     yield from dict.fromkeys((0.0, float(first.time_s[0] - time[0])))
     name = next((name for name in _TIMING if name in first.signals and name in other.signals), None)
@@ -402,20 +417,11 @@ def _shifts(first: TimedSignals, other: TimedSignals, sign: float) -> Iterator[f
     step = max(step, max(float(times[-1] - times[0]) for times in (first.time_s, time)) / _FINEST)
     grids = [np.arange(times[0], times[-1] + step / 2, step) for times in (first.time_s, time)]
     a = _rate(name, grids[0], first.time_s, first.signals[name])
-    b = _rate(name, grids[1], time, other.signals[name] * (sign if name in _MIRRORED else 1.0))
-    if any(len(each) < LEAST_ROWS or not np.ptp(each) > 0 for each in (a, b)):  # short, unknown or without a change
+    b = _rate(name, grids[1], time, _mirrored(name, other, sign))
+    behind = _best_lag(a, b)
+    if behind is None:
         return
-    a, b = a - np.mean(a), b - np.mean(a)
-    behind = np.arange(len(a) + len(b) - 1) - (len(b) - 1)  # rows of the first before the second begins
-    begin, end = np.maximum(behind, 0), np.minimum(behind + len(b), len(a))
-    sums = [np.append(0.0, np.cumsum(each**2)) for each in (a, b)]
-    energy = sums[0][end] - sums[0][begin] + sums[1][end - behind] - sums[1][begin - behind]
-    enough = end - begin >= max(COMMON * min(len(a), len(b)), LEAST_ROWS)
-    match = np.where(enough, 2 * correlate(a, b, method="fft") / np.maximum(energy, 1e-12 * np.max(energy)), -1.0)
-    best = int(np.argmax(match))
-    if match[best] < _IN_STEP:
-        return
-    shift = float(grids[0][0] - grids[1][0]) + (best - (len(b) - 1)) * step
+    shift = float(grids[0][0] - grids[1][0]) + behind * step
 
     def apart(near: float) -> float:
         inside = (grids[0] >= grids[1][0] + near) & (grids[0] <= grids[1][-1] + near)
@@ -424,6 +430,23 @@ def _shifts(first: TimedSignals, other: TimedSignals, sign: float) -> Iterator[f
     near = minimize_scalar(apart, bounds=(shift - step, shift + step), method="bounded", options={"xatol": 1e-4 * step})
     yield shift
     yield float(near.x)
+
+
+def _best_lag(a: Array, b: Array) -> int | None:
+    """Rows of `a` before `b` begins, where both are most alike; None if they are nowhere alike, or do not change."""
+    from scipy.signal import correlate  # slow to import
+
+    if min(len(a), len(b)) < LEAST_ROWS or not min(np.ptp(a), np.ptp(b)) > 0:
+        return None
+    a, b = a - np.mean(a), b - np.mean(a)
+    behind = np.arange(len(a) + len(b) - 1) - (len(b) - 1)
+    begin, end = np.maximum(behind, 0), np.minimum(behind + len(b), len(a))
+    sums = [np.append(0.0, np.cumsum(each**2)) for each in (a, b)]
+    energy = sums[0][end] - sums[0][begin] + sums[1][end - behind] - sums[1][begin - behind]
+    enough = end - begin >= max(COMMON * min(len(a), len(b)), LEAST_ROWS)
+    match = np.where(enough, 2 * correlate(a, b, method="fft") / np.maximum(energy, 1e-12 * np.max(energy)), -1.0)
+    best = int(np.argmax(match))
+    return None if match[best] < _IN_STEP else int(behind[best])
 
 
 def _rate(name: str, grid: Array, time: Array, values: Array) -> Array:

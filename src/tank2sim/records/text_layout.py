@@ -106,11 +106,16 @@ def text_layout(path: object, lines: Sequence[str], separator: str = "", comma: 
         names, units = _head(remarks, separator, width)
     if comma is None:
         comma = _has_decimal_commas([line for _, line in numbered[first:]], separator)
-    names = [*names, *[""] * (width - len(names))]
-    names = [name.strip() or f"column {place}" for place, name in enumerate(names, start=1)]
-    names = [name if names.index(name) == place else f"{name} ({place + 1})" for place, name in enumerate(names)]
+    names = _distinct_names(names, width)
     units = [*units, *[""] * len(names)][: len(names)]
     return TextLayout(separator, comma, tuple(names), tuple(map(unit_of_text, units)), skip)
+
+
+def _distinct_names(names: Sequence[str], width: int) -> list[str]:
+    """A name for each of `width` columns at least, none of them twice."""
+    whole = [*names, *[""] * (width - len(names))]
+    whole = [name.strip() or f"column {place}" for place, name in enumerate(whole, start=1)]
+    return [name if whole.index(name) == place else f"{name} ({place + 1})" for place, name in enumerate(whole)]
 
 
 def _has_decimal_commas(body: Sequence[str], separator: str) -> bool:
@@ -128,23 +133,42 @@ def cells_of(line: str, separator: str) -> list[str]:
     return next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])
 
 
+@dataclass(frozen=True)
+class _Cut:
+    """Rows cut at a separator: their usual number of cells, share of rows that have it, and of cells with numbers."""
+
+    separator: str
+    width: int
+    regular: float
+    numbers: float
+
+    @property
+    def by_marks(self) -> bool:
+        """Whether marks that are in no word and no number separate values."""
+        return self.separator in ";\t|" and self.numbers > _MOSTLY
+
+    @property
+    def sure(self) -> bool:
+        """Whether it is a table without being stated; blanks are within cells of dates, positions or words, too."""
+        return self.regular >= _REGULAR and (self.separator != WHITESPACE or self.numbers >= _REGULAR)
+
+
+def _cut(sample: Sequence[str], separator: str) -> _Cut:
+    rows = [cells_of(line, separator) for line in sample]
+    width, count = Counter(map(len, rows)).most_common(1)[0]
+    filled = [cell for row in rows if len(row) == width for cell in row if cell.strip()]
+    return _Cut(separator, width, count / len(rows), sum(map(_is_number, filled)) / max(len(filled), 1))
+
+
 def _separator(sample: Sequence[str], known: str) -> tuple[str, int]:
     """Separator and number of columns of rows of values."""
-    best, found = -1.0, (",", 1)
-    for separator in known or (";", "\t", "|", ",", WHITESPACE):
-        rows = [cells_of(line, separator) for line in sample]
-        width, count = Counter(map(len, rows)).most_common(1)[0]
-        if width < 2 or (count < _REGULAR * len(rows) and not known):
-            continue
-        if separator == WHITESPACE and found[0] in ";\t|" and best > _MOSTLY:
+    best = _Cut(",", 1, 1.0, -1.0)
+    for cut in (_cut(sample, separator) for separator in known or (";", "\t", "|", ",", WHITESPACE)):
+        if cut.separator == WHITESPACE and best.by_marks:
             break  # blanks would cut a table of tabs as well, and empty cells would shift its columns
-        filled = [cell for row in rows if len(row) == width for cell in row if cell.strip()]
-        numbers = sum(map(_is_number, filled)) / max(len(filled), 1)
-        if separator == WHITESPACE and not known and numbers < _REGULAR:
-            continue  # blanks within cells of dates, positions or words
-        if numbers > best + 1e-9:
-            best, found = numbers, (separator, width)
-    return found
+        if cut.width > 1 and (known or cut.sure) and cut.numbers > best.numbers + 1e-9:
+            best = cut
+    return best.separator, best.width
 
 
 def _first_row(numbered: Sequence[tuple[int, str]], separator: str, width: int) -> int:

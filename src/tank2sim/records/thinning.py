@@ -76,14 +76,8 @@ _DIGITS = 7
 def drawn_columns(columns: Mapping[str, ArrayLike], limit: int = DRAWN_SAMPLES, *, peaks: bool = False) -> Columns:
     """Columns (n,) of one table, thinned to draw, to seven digits; the first lies across.
 
-    Parameters
-    ----------
-    columns : mapping
-        Name to values (n,).
-    limit : int
-        Samples to keep, about.
-    peaks : bool
-        Keep every peak of a record (:func:`thin_line`); else samples are evenly spread (:func:`thin_points`).
+    `columns`: Name to values (n,). `limit`: Samples to keep, about. `peaks`: Keep every peak of a record
+    (:func:`thin_line`); else samples are evenly spread (:func:`thin_points`).
     """
     whole = {name: np.asarray(values, dtype=float) for name, values in columns.items()}
     up = list(whole.values())[1:]

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from tank2sim.arrays import Array
+from tank2sim.errors import InputError
 from tank2sim.notices import Notice
 from tank2sim.records.csv_table import CsvTable, read_table
 from tank2sim.records.signals.columns import SignalName
@@ -36,13 +37,8 @@ def read_trial_csv(path: Path | str | CsvTable) -> Trial:
     table = raw.si()
     time = table.filled_column("t_s", "give each row its time")
     signals = {name: values for name, values in table.columns.items() if name in TRIAL_SIGNALS}
-    omitted = [name for name in table.columns if name != "t_s" and name not in TRIAL_SIGNALS]
-    _refuse_slips(table, omitted)
+    notices = _omitted(table)
     _check_content(table, signals)
-    notices = []
-    if omitted:
-        text = ", ".join(table.heading(name) for name in omitted)
-        notices.append(Notice(f"columns that are not part of the trial format are left out: {text}"))
     if "psi_rad" in signals:
         signals["psi_rad"] = unwrapped(signals["psi_rad"])
     if _rudder_sign(table) == "port":
@@ -51,6 +47,14 @@ def read_trial_csv(path: Path | str | CsvTable) -> Trial:
     scale = table.positive_comment("scale")
     columns = {name: table.heading(name) for name in signals if table.heading(name) != name}
     return Trial(table.path, time, signals, _noise(table), scale, tuple(notices), columns, origin_deg=_origin(table))
+
+
+def _omitted(table: CsvTable) -> list[Notice]:
+    """A notice of the columns that are not part of the format; those that look like slips are refused."""
+    omitted = [name for name in table.columns if name not in ("t_s", *TRIAL_SIGNALS)]
+    _refuse_slips(table, omitted)
+    text = ", ".join(map(table.heading, omitted))
+    return [Notice(f"columns that are not part of the trial format are left out: {text}")] if omitted else []
 
 
 def _origin(table: CsvTable) -> tuple[float, float] | None:
@@ -84,18 +88,22 @@ def _meant(name: str) -> str | None:
     return next(iter(same or difflib.get_close_matches(name, TRIAL_SIGNALS, n=1, cutoff=0.85)), None)
 
 
+def _without_rudder(table: CsvTable) -> InputError:
+    present = ", ".join(map(table.heading, table.columns))
+    remedy = f"add delta_deg (angle) or delta_order_deg (order); the columns are {present}"
+    if any(re.match(r"order_\w|n_\w+_", name) for name in table.columns):
+        remedy += "; trials of a craft with thrusters are taken by identify, validate and gap with its card"
+    return table.fault("header", "there is no rudder", remedy)
+
+
 def _check_content(table: CsvTable, signals: dict[str, Array]) -> None:
-    if not any(name in signals for name in RUDDERS):
-        present = ", ".join(table.heading(name) for name in table.columns)
-        remedy = f"add delta_deg (angle) or delta_order_deg (order); the columns are {present}"
-        if any(re.match(r"order_\w|n_\w+_", name) for name in table.columns):
-            remedy += "; trials of a craft with thrusters are taken by identify, validate and gap with its card"
-        raise table.fault("header", "there is no rudder", remedy)
+    if not signals.keys() & RUDDERS:
+        raise _without_rudder(table)
     for name in ("wind_speed_mps", "current_speed_mps"):
         if name in signals and np.any(signals[name] < 0):
             remedy = "a speed is 0 or more, and its direction says where it goes or comes from"
             raise table.fault(f"column {table.heading(name)}", "has negative values", remedy)
-    if not any(name in signals for name in MEASURED_COLUMNS):
+    if not signals.keys() & MEASURED_COLUMNS:
         remedy = "add at least one measured column, such as r_degps, psi_deg or u_mps"
         raise table.fault("header", "nothing measured is in it", remedy)
     if len(table.lines) < 2:

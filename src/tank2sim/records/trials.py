@@ -116,17 +116,15 @@ def fault_of(trial: Trial) -> str:
     """First violation of what :class:`Trial` demands, "" if none: for readers of other packages."""
     if not isinstance(trial, Trial):
         return f"a {type(trial).__name__} was read, and a Trial was expected"
-    if unknown := [name for name in trial.signals if name not in TRIAL_SIGNALS]:
-        return f"{unknown[0]} is not a signal of a trial; these are {', '.join(TRIAL_SIGNALS)}"
+    if unknown := trial.signals.keys() - set(TRIAL_SIGNALS):
+        return f"{min(unknown)} is not a signal of a trial; these are {', '.join(TRIAL_SIGNALS)}"
     columns = {"time_s": trial.time_s, **trial.signals}
     for name, values in columns.items():
         if not isinstance(values, np.ndarray) or values.dtype != float or values.shape != (len(trial.time_s),):
             return f"{name} is not an array of floats with one value for each of the {len(trial.time_s)} rows"
     if len(trial.time_s) < 2:
         return "there are fewer than two rows"
-    if not any(name in trial.signals for name in RUDDERS) or not any(
-        name in trial.signals for name in MEASURED_COLUMNS
-    ):
+    if not (trial.signals.keys() & RUDDERS and trial.signals.keys() & MEASURED_COLUMNS):
         return f"it needs a rudder ({' or '.join(RUDDERS)}) and at least one measured signal of the motion"
     return ""
 
@@ -146,13 +144,25 @@ def sampling_step(trial: Trial) -> float:
     return usual_step(trial.time_s)
 
 
+def rows_in(step_s: float, sampling_s: float) -> int:
+    """Whole number of rows in a step, 1 or more; a row that misses it by rounding alone is counted."""
+    return max(1, int(step_s / sampling_s + 1e-6))
+
+
+def order_instants(time_s: Array, share: float | Array = ROWS_TO_SHOW_AN_ORDER) -> Array:
+    """Instants (n,), s, at which the orders that rows (n,) show were given.
+
+    `share`: Part of the interval from the row before, one number or (n - 1,); the first row shows its order at once.
+    """
+    given: Array = time_s.copy()
+    given[1:] = time_s[:-1] + share * np.diff(time_s)
+    return given
+
+
 def window(trial: Trial, begin_s: float, end_s: float) -> Trial:
     """The rows from one time to another, both included; times stay as they are.
 
-    Raises
-    ------
-    InputError
-        Fewer than two rows are in it.
+    Raises InputError: Fewer than two rows are in it.
     """
     inside = (trial.time_s >= begin_s) & (trial.time_s <= end_s)
     if np.count_nonzero(inside) < 2:
@@ -185,10 +195,7 @@ def froude_scaled(trial: Trial, length_ratio: float) -> Trial:
     turn and revolutions divided by its root, angles as they are; so the stated noise. ``scale`` describes the model
     that was tested and stays.
 
-    Raises
-    ------
-    ValueError
-        The ratio is not positive.
+    Raises ValueError: The ratio is not positive.
     """
     if not 0 < length_ratio < math.inf:
         raise ValueError(f"the ratio of lengths is {length_ratio:g}; a positive one was expected")
@@ -230,6 +237,22 @@ def unwrapped(angle: Array, period: float = math.tau) -> Array:
     continuous = angle.copy()
     continuous[known] = np.unwrap(angle[known], period=period)
     return continuous
+
+
+def straight_over_gaps(time: Array, values: Array) -> Array:
+    """Return a signal with straight lines in place of what was not measured.
+
+    `time` (n,): s. `values` (n,): nan where nothing was measured.
+    """
+    known = ~np.isnan(values)
+    return np.interp(time, time[known], values[known])
+
+
+def held_over_gaps(values: Array) -> Array:
+    """An order (n,), nan where none was recorded, that holds until the next; the first one holds from the beginning."""
+    known = np.flatnonzero(~np.isnan(values))
+    held: Array = values[known[np.clip(np.searchsorted(known, np.arange(len(values)), side="right") - 1, 0, None)]]
+    return held
 
 
 def _unit(signal: str) -> str:

@@ -160,15 +160,13 @@ class LaneManoeuvres:
         """
         p, model = np.ascontiguousarray(p, dtype=float), self.model
         (starts,) = self._start(p)
-        length, speed = (p[:, model.parameter_names.index(f"ship.{name}")] for name in ("length", "speed"))
+        ship_time = self._parameter(p, "ship.length") / self._parameter(p, "ship.speed")
         if isinstance(manoeuvre, SpiralManoeuvre):
-            ships = p, starts, model.input_values(inputs)
-            hold = SPIRAL_HOLD * (length / speed) if duration_s is None else np.full(len(p), duration_s)
-            return self._spirals(manoeuvre, ships, length / speed, hold, np.asarray(times, dtype=float))
+            ships, hold = (p, starts, model.input_values(inputs)), _lasts(SPIRAL_HOLD, ship_time, duration_s)
+            return self._spirals(manoeuvre, ships, ship_time, hold, np.asarray(times, dtype=float))
         plan = manoeuvre.plan(model, duration_s)
         u = model.input_values({**(inputs or {}), **plan.orders[0]})
-        longest = (self._longest or plan.longest) * (length / speed)
-        ends = longest if duration_s is None else np.full(len(p), duration_s)
+        ends = _lasts(self._longest or plan.longest, ship_time, duration_s)
         keeping = LaneKeeping(*self._watched(manoeuvre, starts), times, pace.step_factor)
         runner = self._single if pace.single else self._runner
         found = runner.runs(plan, p, starts, ends, u, keeping)
@@ -182,9 +180,7 @@ class LaneManoeuvres:
             fine[number], left[number] = self._by_itself((manoeuvre, duration_s, inputs), p[number], figures, number)
         for values in figures.values():
             values[~fine] = np.nan
-        doubtful = np.isfinite(left) | np.any([np.isnan(values) for values in figures.values()], axis=0)
-        if isinstance(manoeuvre, Turn):
-            doubtful |= unsteadiness(kept) >= NEAR_STEADY * STEADY_SHARE
+        doubtful = np.isfinite(left) | np.isnan([*figures.values()]).any(axis=0) | _nearly_steady(manoeuvre, kept)
         result = LaneFigures(figures, found.states, fine, left, doubtful)
         if pace == USUAL_PACE or not doubtful.any():
             return result
@@ -221,6 +217,10 @@ class LaneManoeuvres:
             return [("motion.psi", course), ("motion.r", np.zeros_like(course))], CROSSINGS
         return [], 0
 
+    def _parameter(self, p: Array, name: str) -> Array:
+        values: Array = p[:, self.model.parameter_names.index(name)]
+        return values
+
     def _column(self, rows: Array, name: str) -> Array:
         values: Array = rows[..., self.model.state_names.index(name)]
         return values
@@ -252,7 +252,7 @@ class LaneManoeuvres:
             return Events(times, lambda name: samples.at(name, times))
 
         return KeptRuns(
-            length=p[:, self.model.parameter_names.index("ship.length")],
+            length=self._parameter(p, "ship.length"),
             end=found.end,
             way=found.way,
             speeds=found.speeds,
@@ -334,3 +334,13 @@ def _due(times: Array, since: Array, until: Array) -> tuple[Array, NDArray[np.in
     inside = places < last[:, None]
     due = np.where(inside, times[np.minimum(places, len(times) - 1)] - since[:, None], np.inf) if len(times) else places
     return np.asarray(due, dtype=float), np.where(inside, places, -1)
+
+
+def _lasts(longest: float, ship_time: Array, duration_s: float | None) -> Array:
+    """Durations of runs (n,), s: the stated one, else the longest in L/u0."""
+    return longest * ship_time if duration_s is None else np.full(len(ship_time), duration_s)
+
+
+def _nearly_steady(manoeuvre: LaneManoeuvre, kept: KeptRuns) -> NDArray[np.bool_] | bool:
+    """Whether a turn is near the limit beyond which it counts as steady (n,)."""
+    return isinstance(manoeuvre, Turn) and unsteadiness(kept) >= NEAR_STEADY * STEADY_SHARE

@@ -224,15 +224,10 @@ class SpiralManoeuvre:
 
 @dataclass(frozen=True)
 class Stop(SwitchedManoeuvre):
-    """Crash stop (full astern stopping test), or coasting with the engine stopped, rudder amidships.
+    """Crash stop (full astern stopping test), or coasting with the engine stopped, rudder amidships."""
 
-    Parameters
-    ----------
-    revolutions : float, optional
-        Order, rad/s: negative (astern) or 0; by default :data:`FULL_ASTERN` of the nominal ones. They are reached at
-        once, for a card states no time to reverse the engine.
-    """
-
+    # Order, rad/s: negative (astern) or 0; by default :data:`FULL_ASTERN` of the nominal ones. They are reached at
+    # once, for a card states no time to reverse the engine.
     revolutions: float | None = None
 
     @property
@@ -247,10 +242,7 @@ class Stop(SwitchedManoeuvre):
     def orders(self, model: Model) -> dict[str, float]:
         """Revolutions (rad/s) ordered from the propeller of a ship, or from the thrusters of a craft that push ahead.
 
-        Raises
-        ------
-        InputError
-            The ship has no propulsion.
+        Raises InputError: The ship has no propulsion.
         """
         engines = [command for command in thruster_commands(model) if command.start]
         if not thruster_commands(model):
@@ -272,21 +264,11 @@ class Stop(SwitchedManoeuvre):
 
 @dataclass(frozen=True)
 class Orders:
-    """Orders from a file, each held until the next.
+    """Orders from a file, each held until the next."""
 
-    Parameters
-    ----------
-    times : array (n,)
-        s, rising from 0.
-    inputs : dict
-        Input of the model to its orders (n,), SI, rudder positive to starboard.
-    source : str
-        The file, for messages.
-    """
-
-    times: Array
-    inputs: dict[str, Array]
-    source: str
+    times: Array  # (n,): s, rising from 0
+    inputs: dict[str, Array]  # Input of the model to its orders (n,), SI, rudder positive to starboard
+    source: str  # The file, for messages
 
     @property
     def words(self) -> str:
@@ -323,38 +305,43 @@ def parse_manoeuvre(text: str) -> Manoeuvre:
 
     Angles are in deg, revolutions in rpm, turns positive to starboard.
 
-    Raises
-    ------
-    InputError
-        It is none of them, or an angle or a number of revolutions is out of bounds.
+    Raises InputError: It is none of them, or an angle or a number of revolutions is out of bounds.
     """
     kind, _, argument = text.partition(":")
     if kind == "file" and argument:
         return read_orders(Path(argument))
     if kind == "stop":
         return _parse_stop(text)
-    number = r"([+-]?\d+(?:\.\d+)?)"
     if kind in _BY_THRUSTERS:
-        return _parse_thrusters(kind, re.fullmatch(number, argument), text)
-    makers: dict[str, tuple[str, Callable[[list[float]], Manoeuvre]]] = {
-        "turn": (number, lambda a: Turn(math.radians(a[0]))),
-        "zigzag": (f"{number}/{number}", lambda a: Zigzag(math.radians(a[0]), math.radians(a[1]))),
-        "pullout": (number, lambda a: PullOut(math.radians(a[0]))),
-        "spiral": (f"(?:{number})?", lambda a: SpiralManoeuvre(_spiral_rudders(a[0] if a else SPIRAL_RUDDERS_DEG[0]))),
-    }
-    found = re.fullmatch(makers[kind][0], argument) if kind in makers else None
+        return _parse_thrusters(kind, re.fullmatch(_NUMBER, argument), text)
+    found = re.fullmatch(_BY_ANGLES[kind][0], argument) if kind in _BY_ANGLES else None
     if found is None:
-        close = difflib.get_close_matches(kind, [*makers, *_BY_THRUSTERS, "stop", "file"], n=1)
+        close = difflib.get_close_matches(kind, [*_BY_ANGLES, *_BY_THRUSTERS, "stop", "file"], n=1)
         hint = f"did you mean {close[0]}? " if close and close[0] != kind else ""
         remedy = f"{hint}one of: {MANOEUVRE_FORMS}; with thrusters {THRUSTER_FORMS}"
         raise ArgumentError("manoeuvre", "", f"{text!r} is not a manoeuvre", remedy)
+    return _parse_angles(kind, found, text)
+
+
+_NUMBER = r"([+-]?\d+(?:\.\d+)?)"
+
+_BY_ANGLES: dict[str, tuple[str, Callable[[list[float]], Manoeuvre]]] = {
+    "turn": (_NUMBER, lambda a: Turn(math.radians(a[0]))),
+    "zigzag": (f"{_NUMBER}/{_NUMBER}", lambda a: Zigzag(math.radians(a[0]), math.radians(a[1]))),
+    "pullout": (_NUMBER, lambda a: PullOut(math.radians(a[0]))),
+    "spiral": (f"(?:{_NUMBER})?", lambda a: SpiralManoeuvre(_spiral_rudders(a[0] if a else SPIRAL_RUDDERS_DEG[0]))),
+}
+"""Manoeuvres by angles of rudder and heading, deg: form of the angles, and what makes the manoeuvre of them."""
+
+
+def _parse_angles(kind: str, found: re.Match[str], text: str) -> Manoeuvre:
     angles = [float(group) for group in found.groups() if group is not None]
     if any(not 0 < abs(angle) < 90 for angle in angles) or (kind == "zigzag" and angles[1] < 0):
         remedy = (
             "angles lie between 0 and 90 deg; the heading of a zigzag is positive, its rudder begins to its own side"
         )
         raise ArgumentError("manoeuvre", "", f"{text!r} has an angle out of bounds", remedy)
-    return makers[kind][1](angles)
+    return _BY_ANGLES[kind][1](angles)
 
 
 _BY_THRUSTERS: dict[str, Callable[[float], ThrusterManoeuvre]] = {
@@ -374,10 +361,7 @@ def _parse_thrusters(kind: str, found: re.Match[str] | None, text: str) -> Manoe
 def read_orders(path: Path) -> Orders:
     """Orders from a CSV with ``t_s`` and ``delta_order_deg`` (and ``n_rpm``); ``# rudder_sign: port`` is honoured.
 
-    Raises
-    ------
-    InputError
-        A column is missing or unknown, time does not rise from 0, or a value is missing.
+    Raises InputError: A column is missing or unknown, time does not rise from 0, or a value is missing.
     """
     table = read_table(path)
     found = orders_from_columns(table.si().columns, path)
@@ -393,26 +377,35 @@ def orders_from_columns(columns: Mapping[str, Array], source: Path | str) -> Ord
 
     A craft with thrusters has ``n_<name>_radps`` and ``azimuth_<name>_rad`` in place of these.
 
-    Raises
-    ------
-    InputError
-        A column is missing or unknown, time does not rise from 0, or a value is missing.
+    Raises InputError: A column is missing or unknown, time does not rise from 0, or a value is missing.
     """
-    names = {"delta_order_rad": "rudder.command", "delta_rad": "rudder.command", "n_radps": "propeller.speed"}
-    for name in columns:
-        if found := re.fullmatch(r"(n|azimuth)_([a-z][a-z0-9_]*)_(radps|rad)", name):
-            names[name] = f"thrusters.{found[2]}.{'command' if found[1] == 'n' else 'azimuth_command'}"
+    ordered = {name: order for name in columns if (order := _order_of(name))}
     kinds = "orders are t_s, delta_order_deg and n_rpm, or of thrusters n_port_rpm, n_starboard_rpm and so on"
-    for name in columns:
-        if name not in {"t_s", *names}:
-            raise InputError(source, f"column {name}", "is not an order", kinds)
-    rudders = {"delta_order_rad", "delta_rad"} & set(columns)
-    by_thrusters = any(names.get(name, "").startswith("thrusters.") for name in columns)
-    if "t_s" not in columns or not (rudders or by_thrusters):
+    if unknown := columns.keys() - ordered.keys() - {"t_s"}:
+        raise InputError(source, f"column {min(unknown)}", "is not an order", kinds)
+    if "t_s" not in columns or not set(ordered.values()) - {"propeller.speed"}:
         raise InputError(source, "header", "lacks t_s or delta_order_deg", kinds)
-    if len(rudders) > 1:
+    if {"delta_order_rad", "delta_rad"} <= columns.keys():
         raise InputError(source, "header", "has two rudder columns", "give delta_order_deg alone")
-    times = columns["t_s"]
+    _refuse_times(columns["t_s"], source)
+    for name, values in columns.items():
+        if np.isnan(values).any():
+            raise InputError(source, f"column {name}", "has an empty cell", "give every order")
+    return Orders(columns["t_s"], {order: columns[name] for name, order in ordered.items()}, str(source))
+
+
+_ORDERS = {"delta_order_rad": "rudder.command", "delta_rad": "rudder.command", "n_radps": "propeller.speed"}
+
+
+def _order_of(column: str) -> str:
+    """The input of a model that a column orders; empty if none."""
+    if found := re.fullmatch(r"(n|azimuth)_([a-z][a-z0-9_]*)_(radps|rad)", column):
+        return f"thrusters.{found[2]}.{'command' if found[1] == 'n' else 'azimuth_command'}"
+    return _ORDERS.get(column, "")
+
+
+def _refuse_times(times: Array, source: Path | str) -> None:
+    """Refuse times of orders that do not rise from 0, or end beyond the longest run."""
     if not len(times):
         raise InputError(source, "column t_s", "has no rows", "give one row for each order, the first at 0 s")
     if times[0] != 0 or np.any(np.diff(times) <= 0):
@@ -421,10 +414,6 @@ def orders_from_columns(columns: Mapping[str, Array], source: Path | str) -> Ord
         raise InputError(
             source, "column t_s", f"ends at {times[-1]:g} s", f"at most {LONGEST_RUN_S:g} s can be simulated"
         )
-    for name, values in columns.items():
-        if np.isnan(values).any():
-            raise InputError(source, f"column {name}", "has an empty cell", "give every order")
-    return Orders(times, {names[name]: values for name, values in columns.items() if name in names}, str(source))
 
 
 def _rudder_sign(path: Path, comments: Mapping[str, str]) -> str:
@@ -437,7 +426,7 @@ def _rudder_sign(path: Path, comments: Mapping[str, str]) -> str:
 
 
 def _parse_stop(text: str) -> Stop:
-    found = re.fullmatch(r"stop(?::([+-]?\d+(?:\.\d+)?))?", text)
+    found = re.fullmatch(f"stop(?::{_NUMBER})?", text)
     if found is None:
         raise ArgumentError("manoeuvre", "", f"{text!r} is not a manoeuvre", f"one of: {MANOEUVRE_FORMS}")
     if found[1] is None:
@@ -459,12 +448,7 @@ def _spiral_rudders(largest: float) -> tuple[float, ...]:
 def is_steady(before: Array, rate: Array, ship_time: Array) -> NDArray[np.bool_]:
     """Whether the yaw rate (rad/s) has not changed since :data:`STEADY_AFTER` before, by :data:`STEADY_CHANGE`.
 
-    Parameters
-    ----------
-    before, rate : arrays (n,)
-        Yaw rate then and now, rad/s.
-    ship_time : array (n,)
-        L/u0, s.
+    `before`, `rate` (n,): Yaw rate then and now, rad/s. `ship_time` (n,): L/u0, s.
     """
     near: NDArray[np.bool_] = np.abs(rate - before) < STEADY_CHANGE * np.maximum(np.abs(rate), 0.01 / ship_time)
     return near

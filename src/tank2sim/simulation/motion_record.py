@@ -10,7 +10,17 @@ from numpy.typing import NDArray
 
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
-from tank2sim.records.trials import ROWS_TO_SHOW_AN_ORDER, Trial, sampling_step
+from tank2sim.errors import InputError
+from tank2sim.records.trials import (
+    Trial,
+    held_over_gaps,
+    order_instants,
+    sampling_step,
+    straight_over_gaps,
+    unwrapped,
+    usual_step,
+)
+from tank2sim.simulation.rudder_record import rudder_of
 
 STATES = {
     "u_mps": "motion.u",
@@ -40,6 +50,11 @@ FED = {
 }
 """Signal of a trial to the input of a model, in addition to the rudder."""
 
+_THRUSTERS = {
+    ".azimuth_command": ("azimuth_{}_rad", "azimuth_order_{}_rad"),
+    ".command": ("n_{}_radps", "order_{}_radps"),
+}
+"""End of the name of a thruster's input to the signals of a trial that show it: as measured, else as ordered."""
 
 MOST_INSTANTS_A_ROW = 100
 """Instants of an even time a row of the file: beyond, 99 % of the record is missing, and one bad time (an epoch among
@@ -50,26 +65,30 @@ seconds) would ask for gigabytes. Project choice: records of what a ship does ha
 class MotionRecord:
     """The rows of a trial.
 
-    `name`, `file`: Name of the trial, and its file for messages. `time_s` (n,): s, rising. `inputs` (n, nu): The
-    model's inputs at the rows: an order as the row shows it, other inputs straight between their readings. `orders`
-    (nu,): True for inputs that are orders: each holds until the next. `measured` (n, ny): In the order of `seen`; nan
-    where not measured. `seen`: Names of the model's variables that are measured.
+    `name`, `file`: Name of the trial, and its file for messages. `time_s` (n,): s, rising. `input_names` (nu) and
+    `inputs` (n, nu): The model's inputs at the rows: an order as the row shows it, other inputs straight between their
+    readings. `orders` (nu,): True for inputs that are orders: each holds until the next. `measured` (n, ny): In the
+    order of `seen`; nan where not measured. `seen`: Names of the model's variables that are measured.
     """
 
     name: str
     file: str
     time_s: Array
+    input_names: tuple[str, ...]
     inputs: Array
     orders: NDArray[np.bool_]
     measured: Array
     seen: tuple[str, ...]
 
     @property
+    def sampling_s(self) -> float:
+        """Median of the time between rows, s."""
+        return usual_step(self.time_s)
+
+    @property
     def given_s(self) -> Array:
         """Time (n,), s, at which the order that a row shows was given on average: halfway from the row before."""
-        given: Array = self.time_s.copy()
-        given[1:] -= ROWS_TO_SHOW_AN_ORDER * np.diff(self.time_s)
-        return given
+        return order_instants(self.time_s)
 
     def means(self, column: int, edges: Array, *, given_before: bool = False) -> Array:
         """Means of an input between times, (k - 1,).
@@ -87,6 +106,16 @@ class MotionRecord:
         return means_of_lines(time, values, edges)
 
 
+def refuse_without_motion(file: str, measured: Array) -> None:
+    """Refuse a trial whose signals to be compared, `measured` (n, ny), are all nan.
+
+    Raises InputError: They are; it names the `file`.
+    """
+    if np.isnan(measured).all():
+        problem = "has none of the signals to be compared"
+        raise InputError(file, "header", problem, "give u_mps, r_degps, ...")
+
+
 def motion_record(model: Model, trial: Trial, seen: Sequence[str]) -> MotionRecord:
     """Return the rows of a trial for a model that the trial's rudder drives, by angle or by order.
 
@@ -101,21 +130,17 @@ def motion_record(model: Model, trial: Trial, seen: Sequence[str]) -> MotionReco
         raise trial.fault(f"column {trial.heading('t_s')}", problem, "correct the time, or cut the record")
     inputs = np.tile(model.input_values(), (len(trial.time_s), 1))
     orders = np.zeros(inputs.shape[1], dtype=bool)
-    for name, values in _input_signals(model, trial).items():
-        column = model.input_names.index(name)
-        orders[column] = _is_order(name, trial)
-        known = np.flatnonzero(~np.isnan(values))
-        if orders[column]:
-            last = np.clip(np.searchsorted(known, np.arange(len(values)), side="right") - 1, 0, None)
-            inputs[:, column] = values[known[last]]
-        else:
-            inputs[:, column] = np.interp(trial.time_s, trial.time_s[known], values[known])
+    for column, name in enumerate(model.input_names):
+        if (recorded := _recorded_input(name, trial)) is not None:
+            values, orders[column] = recorded
+            inputs[:, column] = held_over_gaps(values) if orders[column] else straight_over_gaps(trial.time_s, values)
     signals = {variable: signal for signal, variable in OBSERVED_SIGNALS.items()}
     measured = np.full((len(trial.time_s), len(seen)), np.nan)
     for place, name in enumerate(seen):
         if (readings := trial.signals.get(signals[name])) is not None:
             measured[:, place] = readings
-    return MotionRecord(trial.name, str(trial.path), trial.time_s, inputs, orders, measured, tuple(seen))
+    names = tuple(model.input_names)
+    return MotionRecord(trial.name, str(trial.path), trial.time_s, names, inputs, orders, measured, tuple(seen))
 
 
 def means_of_held(time_s: Array, values: Array, edges: Array) -> Array:
@@ -140,44 +165,21 @@ def _means(time: Array, values: Array, areas: Array, edges: Array) -> Array:
     return means
 
 
-def _input_signals(model: Model, trial: Trial) -> dict[str, Array]:
-    given = {variable: trial.signals[name] for name, variable in FED.items() if name in trial.signals}
-    if "rudder.command" in model:
-        angle = trial.signals.get("delta_rad")
-        given["rudder.command"] = trial.signals["delta_order_rad"] if angle is None else angle
-    for name in model.input_names:  # revolutions of a craft's thrusters, as measured, else as ordered
-        ordered = _ordered_signal(name)
-        azimuth = _ordered_azimuth(name)
-        for signal in (ordered, ordered.replace("order_", "n_", 1), azimuth, azimuth.replace("order_", "", 1)):
-            if signal in trial.signals:
-                given[name] = trial.signals[signal]
-    return {
-        name: _continuous(values) if name.endswith("direction") else values
-        for name, values in given.items()
-        if name in model.input_names
-    }
-
-
-def _is_order(name: str, trial: Trial) -> bool:
-    """Whether an input is an order of the trial."""
+def _recorded_input(name: str, trial: Trial) -> tuple[Array, bool] | None:
+    """Values (n,) of an input of a model in a trial, nan in gaps, and whether they are orders; None if not recorded."""
     if name == "rudder.command":
-        return "delta_rad" not in trial.signals
-    return _ordered_signal(name) in trial.signals or _ordered_azimuth(name) in trial.signals
+        return rudder_of(trial), "delta_rad" not in trial.signals
+    measured, ordered = _signals_of(name)
+    values = trial.signals.get(measured, trial.signals.get(ordered))
+    if values is None:
+        return None
+    return (unwrapped(values) if name.endswith("direction") else values), ordered in trial.signals
 
 
-def _ordered_signal(name: str) -> str:
-    """Signal of a trial with the ordered revolutions of an input ``thrusters.<name>.command``; of other inputs none."""
-    return f"order_{name.removeprefix('thrusters.').removesuffix('.command')}_radps"
-
-
-def _ordered_azimuth(name: str) -> str:
-    """Signal of a trial with the order of an input ``thrusters.<name>.azimuth_command``; of other inputs none."""
-    return f"azimuth_order_{name.removeprefix('thrusters.').removesuffix('.azimuth_command')}_rad"
-
-
-def _continuous(direction: Array) -> Array:
-    """A direction without jumps of a full turn, so that it can be averaged."""
-    known = ~np.isnan(direction)
-    whole = direction.copy()
-    whole[known] = np.unwrap(direction[known])
-    return whole
+def _signals_of(name: str) -> tuple[str, str]:
+    """Signals of a trial that show an input of a model, as measured and as ordered; empty where there is none."""
+    for end, (measured, ordered) in _THRUSTERS.items():
+        if name.startswith("thrusters.") and name.endswith(end):
+            thruster = name.removeprefix("thrusters.").removesuffix(end)
+            return measured.format(thruster), ordered.format(thruster)
+    return next((signal for signal, variable in FED.items() if variable == name), ""), ""

@@ -21,12 +21,18 @@ from tank2sim.cards.reading import revised
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model
 from tank2sim.records.audit.noise import white_noise
-from tank2sim.records.trials import ROWS_TO_SHOW_AN_ORDER, Trial, sampling_step
+from tank2sim.records.trials import ROWS_TO_SHOW_AN_ORDER, Trial, sampling_step, straight_over_gaps, usual_step
 from tank2sim.simulation.figures import Figures, figures_of
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Turn, Zigzag
 from tank2sim.simulation.motion_record import FED, STATES
-from tank2sim.simulation.rudder_record import HeldAngle, held_rudders, holds_other_angles, rudder_before
+from tank2sim.simulation.rudder_record import (
+    TURNS_AT_EXECUTE,
+    HeldAngle,
+    held_rudders,
+    holds_other_angles,
+    rudder_before,
+)
 from tank2sim.simulation.run import Run, simulate
 from tank2sim.simulation.trajectory import Trajectory
 from tank2sim.simulation.zigzag_reversals import COURSE_ERROR, FittedZigzag, fitted_zigzag
@@ -82,11 +88,6 @@ class Recorded:
         return f"zigzag {rudder:.3g}/{headings}, reversed {late}"
 
 
-TURNS_AT_EXECUTE = 0.2
-"""Share of the largest yaw rate of a record above which the ship turns at its execute: smoothed, it is 0.07 at most in
-the trials of the 3 m Esso Osaka, 0.04 in those of HSVA and MARIN, and 0.11 in a 10/10 zigzag of a Mariner (project
-choice)."""
-
 _FEWEST = 4
 """Rows before an execute from which its state is by straight lines (project choice)."""
 
@@ -141,11 +142,14 @@ def recognise(trial: Trial, model: Model) -> Recorded | str:
         reading["initial_turning_time_s"] = math.hypot(reading["initial_turning_time_s"], late)
     else:
         errors, reading = {}, _turn_reading_errors(track, float(values["ship.length"]), late)
-    rate = first.rate
-    reversals = [angle.rate for angle in held[1:] if angle.rate is not None]
-    if isinstance(manoeuvre, Zigzag) and reversals:  # the first movement is half as long, and its rate half as certain
-        rate = float(np.median(reversals))
+    rate = _usual_rate(held)
     return Recorded(trial, manoeuvre, first.execute_s, steered.end_s, rate, start, inputs, figures, errors, reading)
+
+
+def _usual_rate(held: list[HeldAngle]) -> float | None:
+    """Rate of the rudder, rad/s, at the reversals of a zigzag, which are twice as long as its first movement."""
+    reversals = [angle.rate for angle in held[1:] if angle.rate is not None]
+    return float(np.median(reversals)) if reversals else held[0].rate
 
 
 @dataclass(frozen=True, eq=False)
@@ -259,7 +263,7 @@ def _smoothed_noise(trial: Trial, name: str, ship_time: float) -> float:
     """Standard deviation of a signal's noise after smoothing, SI."""
     from scipy.signal import savgol_coeffs  # slow to import
 
-    window = _window(trial.time_s, ship_time)
+    window = smoothing_window(sampling_step(trial), ship_time)
     gain = float(savgol_coeffs(window, 3)[window // 2]) if window >= 5 else 1.0
     return math.sqrt(gain) * trial.noise.get(name, white_noise(trial.signals[name]))
 
@@ -314,11 +318,25 @@ def _state_before(trial: Trial, smooth: dict[str, Array], execute_s: float, ship
     return found
 
 
-def drift_over_ground(model: Model, inputs: Array, psi: Array) -> Array:
-    """Velocity over the ground of a ship that rests in the water, north and east (n, 2), m/s: the current's.
+def velocities_through_water(model: Model, inputs: Array, psi: Array, north: Array, east: Array) -> tuple[Array, Array]:
+    """u and v (n,), m/s, of a ship from its velocity over the ground, less the current of the model.
 
-    `model`: With or without a current. `inputs` (n, nu): The model's inputs. `psi` (n,): Heading, rad.
+    `inputs` (n, nu): The model's inputs. `psi` (n,): Heading, rad; nan where it is unknown. `north`, `east` (n,): Over
+    the ground, m/s.
     """
+    drift = _drift_over_ground(model, inputs, psi)
+    return earth_components(north - drift[:, 0], east - drift[:, 1], -psi)
+
+
+def earth_components(forward: Array, starboard: Array, angle: Array) -> tuple[Array, Array]:
+    """Components to north and east (n,) of a vector with components `forward` and `starboard` (n,) in axes that are
+    turned by `angle` (n,), rad."""
+    north, east = earth_velocity(*(ca.DM(values) for values in (forward, starboard, angle)))  # type: ignore[arg-type]
+    return np.array(north).ravel(), np.array(east).ravel()
+
+
+def _drift_over_ground(model: Model, inputs: Array, psi: Array) -> Array:
+    """Velocity over the ground of a ship that rests in the water, north and east (n, 2), m/s: the current's."""
     rates = model.expand(ca.vcat([model.symbol(f"motion.{axis}dot") for axis in "xy"]))
     states = np.zeros((len(psi), len(model.states)))
     states[:, model.state_names.index("motion.psi")] = psi
@@ -339,12 +357,9 @@ def _motion(trial: Trial, model: Model, ship_time: float) -> dict[str, Array] | 
     if not {"u_mps", "v_mps"} <= known:
         fed = {**dict(zip(model.input_names, model.input_values(), strict=True)), **_fed(trial, model)}
         inputs = np.tile([fed[name] for name in model.input_names], (len(time), 1))
-        drift = drift_over_ground(model, inputs, smooth["psi_rad"])
         north, east = (_slope(time, smooth[name], ship_time) for name in ("x_m", "y_m"))
-        ground = (north - drift[:, 0], east - drift[:, 1], -smooth["psi_rad"])
-        u, v = earth_velocity(*(ca.DM(values) for values in ground))  # type: ignore[arg-type]
-        derived = {"u_mps": np.array(u).ravel(), "v_mps": np.array(v).ravel()}
-        smooth |= {name: values for name, values in derived.items() if name not in known}
+        u, v = velocities_through_water(model, inputs, smooth["psi_rad"], north, east)
+        smooth = {"u_mps": u, "v_mps": v, **smooth}
     return smooth
 
 
@@ -357,15 +372,15 @@ def _fed(trial: Trial, model: Model) -> dict[str, float]:
     }
 
 
-def _window(time: Array, ship_time: float) -> int:
-    """Odd number of samples of the smoothing window."""
-    return int(SMOOTHING * ship_time / float(np.median(np.diff(time)))) // 2 * 2 + 1
+def smoothing_window(step_s: float, ship_time: float) -> int:
+    """Odd number of samples, `step_s` s apart, of the smoothing window of a ship whose L/u0 is `ship_time` s."""
+    return int(SMOOTHING * ship_time / step_s) // 2 * 2 + 1
 
 
 def _smoothed(time: Array, values: Array, ship_time: float) -> Array:
     from scipy.signal import savgol_filter  # slow to import
 
-    window = _window(time, ship_time)
+    window = smoothing_window(usual_step(time), ship_time)
     if window < 5 or window > len(values):
         return values
     smooth: Array = savgol_filter(values, window, 3)
@@ -376,17 +391,8 @@ def _slope(time: Array, values: Array, ship_time: float) -> Array:
     """Time derivative by straight lines through windows: a higher degree would follow noise at a record's ends."""
     from scipy.signal import savgol_filter  # slow to import
 
-    window = _window(time, ship_time)
+    window = smoothing_window(usual_step(time), ship_time)
     if window < 3 or window > len(values):
         return np.asarray(np.gradient(values, time), dtype=np.float64)
     rise, run = (savgol_filter(signal, window, 1, deriv=1) for signal in (values, time))
     return np.asarray(rise / run, dtype=np.float64)
-
-
-def straight_over_gaps(time: Array, values: Array) -> Array:
-    """Return a signal with straight lines in place of what was not measured.
-
-    `time` (n,): s. `values` (n,): nan where nothing was measured.
-    """
-    known = ~np.isnan(values)
-    return np.interp(time, time[known], values[known])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -156,9 +156,8 @@ def bracketed_root(function: Callable[[float], float], low: float, high: float, 
     Raises ValueError: The function has the same sign at both ends.
     """
     at_low, at_high = function(low), function(high)
-    for x, value in ((low, at_low), (high, at_high)):
-        if value == 0:
-            return x
+    if at_low == 0 or at_high == 0:
+        return low if at_low == 0 else high
     if at_low * at_high > 0:
         raise ValueError(f"no change of sign between {low:g} and {high:g}")
     best = math.inf
@@ -173,7 +172,12 @@ def bracketed_root(function: Callable[[float], float], low: float, high: float, 
         if value == 0 or abs(best - before) <= tolerance:
             return best
         ends = sorted([(low, at_low), (middle, at_middle), (best, value), (high, at_high)])
-        (low, at_low), (high, at_high) = next(pair for pair in pairwise(ends) if pair[0][1] * pair[1][1] <= 0)
+        (low, at_low), (high, at_high) = _around_zero(ends)
         if abs(high - low) <= tolerance:
             return (low + high) / 2
     return best
+
+
+def _around_zero(points: Sequence[tuple[float, float]]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """The first two points (x, value) in sequence between which the sign changes."""
+    return next(pair for pair in pairwise(points) if pair[0][1] * pair[1][1] <= 0)

@@ -7,6 +7,7 @@ scatter and the error of the course, are estimated for each side.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ from scipy.optimize import least_squares
 from scipy.special import stdtrit
 
 from tank2sim.arrays import Array
+from tank2sim.records.trials import usual_step
 from tank2sim.simulation.figures import Figures
 from tank2sim.simulation.manoeuvres import Zigzag
 from tank2sim.simulation.rudder_record import HeldAngle
@@ -209,10 +211,11 @@ def _usual(reversals: _Reversals, noise: float, rudder_deg: int) -> tuple[_Fit, 
     count = len(reversals.times)
     spare = count - 3
     free = reversals.fit(noise)
+    freedom = math.inf
     if spare > 0:
-        noise = max(noise, math.sqrt(free.squares / spare))
+        noise, freedom = max(noise, math.sqrt(free.squares / spare)), spare
         free = reversals.fit(noise)
-    limit = float(stdtrit(spare if spare > 0 else np.inf, CONFIDENT)) ** 2
+    limit = float(stdtrit(freedom, CONFIDENT)) ** 2
     whole = math.floor(math.degrees(free.nominal))
     choices: tuple[tuple[int, ...], ...] = (
         (rudder_deg,),
@@ -220,16 +223,20 @@ def _usual(reversals: _Reversals, noise: float, rudder_deg: int) -> tuple[_Fit, 
         (whole, whole + 1) if count > 1 else (),
     )
     for angles in choices:
-        agreeing = []
-        for angle in (math.radians(angle) for angle in angles if angle > 0):
-            fitted = reversals.fit(noise, angle)
-            if count == 3:
-                fitted = reversals.fit(max(noise, math.sqrt(fitted.squares)), angle)
-            if fitted.cost - free.cost <= limit and _keeps_to(reversals, fitted):
-                agreeing.append(fitted)
+        agreeing = [fitted for fitted in _nominal_fits(reversals, noise, angles) if fitted.cost - free.cost <= limit]
         if agreeing:
             return free, min(agreeing, key=lambda agreed: agreed.cost)
     return (free, free) if count > 1 and _keeps_to(reversals, free) else None
+
+
+def _nominal_fits(reversals: _Reversals, noise: float, angles: tuple[int, ...]) -> Iterator[_Fit]:
+    """Fits with nominal headings, deg, that make a zigzag; the residual of three reversals is their noise if larger."""
+    for angle in (math.radians(angle) for angle in angles if angle > 0):
+        fitted = reversals.fit(noise, angle)
+        if len(reversals.times) == 3:
+            fitted = reversals.fit(max(noise, math.sqrt(fitted.squares)), angle)
+        if _keeps_to(reversals, fitted):
+            yield fitted
 
 
 def _keeps_to(reversals: _Reversals, fitted: _Fit) -> bool:
@@ -250,7 +257,7 @@ def _approach(time: Array, first: HeldAngle, smooth: dict[str, Array]) -> tuple[
 
 def _dating_noise(time: Array, times: Array, smooth: dict[str, Array]) -> float:
     """Standard deviation of the headings at reversals because of their time resolution of a sample, rad."""
-    return _yaw_rate(time, times, smooth) * float(np.median(np.diff(time))) / math.sqrt(12)
+    return _yaw_rate(time, times, smooth) * usual_step(time) / math.sqrt(12)
 
 
 def _yaw_rate(time: Array, times: Array, smooth: dict[str, Array]) -> float:

@@ -11,8 +11,8 @@ import numpy as np
 
 from tank2sim.apps.trial_office.notes import TrialNotes
 from tank2sim.apps.trial_office.tried import Tried
+from tank2sim.records.trials import straight_over_gaps
 from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag
-from tank2sim.simulation.recorded import straight_over_gaps
 
 DEPTH_OVER_DRAUGHT = 4.0
 BEAUFORT = (0.3, 1.6, 3.4, 5.5, 8.0, 10.8, 13.9, 17.2, 20.8, 24.5, 28.5, 32.7)

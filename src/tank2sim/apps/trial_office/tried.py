@@ -13,11 +13,11 @@ from tank2sim.apps.trial_office.drift import CircleDrift, circle_drift
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.records.audit.noise import record_noise
-from tank2sim.records.trials import Trial
+from tank2sim.records.trials import Trial, straight_over_gaps
 from tank2sim.simulation.card_range import Numbers, single_figures
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag
-from tank2sim.simulation.recorded import POINT_ERROR, Recorded, recognise, repeat, straight_over_gaps
+from tank2sim.simulation.recorded import POINT_ERROR, Recorded, recognise, repeat
 from tank2sim.simulation.run import Run, simulate
 from tank2sim.units import from_si
 

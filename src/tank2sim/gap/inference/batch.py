@@ -21,10 +21,10 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
 from tank2sim.identification.trials.methods.weak_form import MEASURED_STATES, measured_motion, sensor_noise
 from tank2sim.identification.trials.problem.estimation_problem import Problem
-from tank2sim.identification.trials.problem.sampled_runs import SampledRun, prepare, seen_in
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun, on_steps, seen_in
 from tank2sim.records.signals.columns import DIRECTION_COLUMNS
-from tank2sim.records.trials import Trial, sampling_step
-from tank2sim.simulation.motion_record import FED
+from tank2sim.records.trials import Trial, rows_in, sampling_step
+from tank2sim.simulation.motion_record import FED, motion_record
 from tank2sim.simulation.recorded import SMOOTHING
 
 _Truths = NDArray[np.bool_]
@@ -247,16 +247,15 @@ def batch_trials(model: Model, trials: Sequence[Trial], ship_time: float) -> Mea
     """
     seen = seen_in(model, trials)
     samplings = [sampling_step(trial) for trial in trials]
-    step = max(ship_time / FINE_PER_SHIP_TIME, *samplings)
-    runs = tuple(prepare(model, trial, seen, step_s=step * (1 + 1e-6)) for trial in trials)
-    step = max(run.step_s for run in runs)
-    runs = tuple(_at_step(run, step) for run in runs)
+    wanted = max(ship_time / FINE_PER_SHIP_TIME, *samplings)
+    step = max(rows_in(wanted, sampling) * sampling for sampling in samplings)
+    runs = tuple(on_steps(motion_record(model, trial, seen), step) for trial in trials)
     fine = 2 * round(ship_time / BLOCKS_PER_SHIP_TIME / step / 2 - 0.5) + 1
     fine = max(fine, 1)
     problem = Problem(model, (), np.zeros(0), np.zeros(0), runs)
     lengths = np.array([len(run.measured) // fine for run in runs])
     size = int(lengths.max()) * fine
-    averaged = np.array([max(1.0, step / sampling) for sampling in samplings])
+    averaged = np.array([float(rows_in(step, sampling)) for sampling in samplings])
     states, inputs, measured, noise = [], [], [], []
     for run, readings in zip(runs, averaged, strict=True):
         states.append(_padded(_smooth(measured_motion(problem, run).smooth, ship_time / step), size))
@@ -306,23 +305,6 @@ def _recorded(
                 rows.append(_padded(np.interp(middles, trial.time_s[known], whole), size)[:-1])
             found[FED[signal]] = np.array(rows)
     return found
-
-
-def _at_step(run: SampledRun, step: float) -> SampledRun:
-    """Resample a run to a step that may not be a whole number of its samples: trials may differ in sampling."""
-    if abs(run.step_s - step) < 1e-6 * step:
-        return run
-    count = len(run.measured)
-    sample_times = run.step_s * np.arange(count)
-    step_times = np.arange(0.0, sample_times[-1] + 1e-6 * step, step)
-    # The mean over a step is the difference of the integral; the last row repeats the one before, as in every run.
-    whole = np.cumsum(np.vstack([np.zeros(run.inputs.shape[1]), run.inputs[:-1]]), axis=0) * run.step_s
-    measured, at = (
-        np.column_stack([np.interp(step_times, sample_times, column) for column in rows.T])
-        for rows in (run.measured, whole)
-    )
-    inputs = np.diff(at, axis=0) / step
-    return replace(run, step_s=step, measured=measured, inputs=np.vstack([inputs, inputs[-1:]]))
 
 
 def _smooth(states: Array, ship_steps: float) -> Array:

@@ -17,8 +17,8 @@ from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
 from tank2sim.identification.trials.methods.gauss_newton import least_squares_steps
 from tank2sim.identification.trials.problem.estimation_problem import driven_model
-from tank2sim.records.trials import Trial, sampling_step
-from tank2sim.simulation.motion_record import motion_record
+from tank2sim.records.trials import ROWS_TO_SHOW_AN_ORDER, Trial, order_instants, rows_in
+from tank2sim.simulation.motion_record import motion_record, refuse_without_motion
 from tank2sim.simulation.rows import Chain, RowFunction
 from tank2sim.simulation.scheme import step_and_constants
 from tank2sim.simulation.sensitivity import Sensitivity
@@ -83,9 +83,10 @@ class InputRecord:
     @property
     def given_s(self) -> Array:
         """Time (n,), s, from which the order of each row holds; the first order holds from the beginning."""
-        shares = 0.5 if self.instants is None else self.instants[1:]
-        after = self.time_s[:-1] + shares * np.diff(self.time_s) + self.late_s
-        return np.concatenate([[-np.inf], np.maximum.accumulate(after)])
+        shares = ROWS_TO_SHOW_AN_ORDER if self.instants is None else self.instants[1:]
+        given = order_instants(self.time_s, shares) + self.late_s
+        given[0] = -np.inf
+        return np.maximum.accumulate(given)
 
 
 _FEWEST_ROWS = 10
@@ -469,17 +470,16 @@ def input_record(replayer: Replayer, trial: Trial) -> InputRecord:
     model, record = replayer.model, motion_record(replayer.model, trial, replayer.seen)
     if len(record.time_s) < _FEWEST_ROWS:
         raise trial.fault("", f"has only {len(record.time_s)} rows", "leave it out")
-    if np.isnan(record.measured).all():
-        raise trial.fault("header", "has none of the signals to be compared", "give u_mps, r_degps, ...")
-    time, sampling = record.time_s, sampling_step(trial)
+    refuse_without_motion(record.file, record.measured)
+    time, sampling = record.time_s, record.sampling_s
     known = model.defaults
-    step = max(1, int(model.step_s / sampling + 1e-6)) * sampling
+    step = rows_in(model.step_s, sampling) * sampling
     every = max(1, round(known["ship.length"] / known["ship.speed"] / INSTANTS / step)) * step
     wanted = np.arange(time[0], time[-1] + 1e-6 * sampling, every)
     nearest = np.clip(np.searchsorted(time, wanted - 0.5 * sampling), 0, len(time) - 1)
     seen = np.abs(time[nearest] - wanted) <= 0.5 * sampling
     moved = np.flatnonzero((np.diff(record.inputs[:, record.orders], axis=0) != 0).any(axis=1)) + 1
-    longest = max(1, int(COARSEST * model.step_s / sampling + 1e-6)) * sampling
+    longest = rows_in(COARSEST * model.step_s, sampling) * sampling
     bins = np.floor((time - time[0]) / longest + 1e-6)
     kept = np.flatnonzero(np.diff(bins, prepend=-1.0) > 0)
     kept = np.union1d(np.concatenate([kept, moved, moved - 1, nearest[seen]]), len(time) - 1)
@@ -488,14 +488,14 @@ def input_record(replayer: Replayer, trial: Trial) -> InputRecord:
     edges = np.append(instants, 2 * instants[-1] - instants[-2])
     inputs = np.tile(model.input_values(), (len(instants), 1))
     row = np.searchsorted(time, instants, side="right") - 1
-    for column, name in enumerate(model.input_names):
+    for column, name in enumerate(record.input_names):
         if name == _ORDER and record.orders[column]:
             inputs[:, column] = record.inputs[row, column]
         else:
             inputs[:, column] = record.means(column, edges - late.get(name, 0.0))
     compared = np.searchsorted(instants, np.where(seen, time[nearest], wanted))
     readings = np.where(seen[:, None], record.measured[nearest], np.nan)
-    ordered = _ORDER in model.input_names and record.orders[model.input_names.index(_ORDER)]
+    ordered = _ORDER in record.input_names and record.orders[record.input_names.index(_ORDER)]
     delay = late.get(_ORDER, 0.0) if ordered else 0.0
     return InputRecord(trial.name, instants, inputs, compared, readings, delay)
 

@@ -70,7 +70,9 @@ def _worst(campaign: Campaign, runs: Sequence[ReducedRun], force: str) -> tuple[
     if len(rows) < _FEWEST:
         return None
     usual = max(float(np.median([row.misfit for row in rows])), 1e-300)
-    largest = {kind: max(row.size for row in rows if row.type == kind) for kind in {row.type for row in rows}}
+    largest: dict[str, float] = {}
+    for row in rows:
+        largest[row.type] = max(row.size, largest.get(row.type, 0.0))
     judged = [(row, row.misfit / usual, row.gap / max(row.size, _SMALL * largest[row.type], 1e-300)) for row in rows]
     gross = [found for found in judged if found[1] > _TIMES_USUAL and found[2] > _SHARE]
     return max(gross, key=lambda found: found[1], default=None)
@@ -144,21 +146,20 @@ def repeats(campaign: Campaign, runs: Sequence[ReducedRun]) -> Repeats | None:
     groups = [group for group in together.values() if len(group) > 1]
     if not groups:
         return None
-    freedom = sum(len(group) - 1 for group in groups)
-    deviation = {}
-    for force in FORCE_COLUMNS:
-        total = 0.0
-        for group in groups:
-            means = [
-                float(run.fits[force].coefficients[0] / campaign.scales_at(run.motion.mean_speed_mps).unit(force))
-                for run in group
-            ]
-            centre = sum(means) / len(means)
-            total += sum((mean - centre) ** 2 for mean in means)
-        deviation[force] = math.sqrt(total / freedom)
+    freedom = sum(map(len, groups)) - len(groups)
+    squares = {force: sum(_squares(campaign, group, force) for group in groups) for force in FORCE_COLUMNS}
     return Repeats(
-        groups=tuple(tuple(run.run.name for run in group) for group in groups), deviation=deviation, freedom=freedom
+        groups=tuple(tuple(run.run.name for run in group) for group in groups),
+        deviation={force: math.sqrt(total / freedom) for force, total in squares.items()},
+        freedom=freedom,
     )
+
+
+def _squares(campaign: Campaign, group: Sequence[ReducedRun], force: str) -> float:
+    """Sum of squares of the runs' mean forces about their common mean, prime."""
+    units = [campaign.scales_at(run.motion.mean_speed_mps).unit(force) for run in group]
+    means = [float(run.fits[force].coefficients[0] / unit) for run, unit in zip(group, units, strict=True)]
+    return sum((mean - sum(means) / len(means)) ** 2 for mean in means)
 
 
 def _test(campaign: Campaign, run: ReducedRun) -> tuple[object, ...]:

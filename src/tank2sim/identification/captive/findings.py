@@ -13,7 +13,7 @@ from tank2sim.identification.captive.harmonics import ReducedRun
 from tank2sim.identification.captive.oscillation import cubic_findings
 from tank2sim.identification.captive.reduction import ForceResult, Reduction, is_resistance
 from tank2sim.identification.captive.regression import moved_terms
-from tank2sim.identification.captive.systematic import can_show_delay, correct_delay
+from tank2sim.identification.captive.systematic import DelayEstimate, SystematicError, can_show_delay, correct_delay
 from tank2sim.identification.captive.tank_conditions import tank_resonance, tank_size
 from tank2sim.identification.captive.warnings import OscillationMotion, cautions_of_result, cautions_of_test
 from tank2sim.notices import Notice, caution
@@ -47,7 +47,7 @@ def reduction_findings(reduction: Reduction) -> tuple[Notice, ...]:
         *_unchecked(reduction),
     ]
     for force, result in reduction.forces.items():
-        found += _of_force(reduction, force, result)
+        found += [*_of_terms(result), *_of_runs(force, result)]
     found += cubic_findings(reduction.cubics)
     found += _sheet(reduction)
     found += _repeated(reduction)
@@ -163,8 +163,12 @@ def _unchecked(reduction: Reduction) -> Iterator[Notice]:
             "It is not known whether the forces lag the motion, and the standard errors do not include it: that needs "
             f"oscillations at two frequencies or more{effect}."
         )
-    delay = reduction.delay
-    if delay is not None and not delay.alike:
+    if reduction.delay is not None:
+        yield from _doubts_of_delay(reduction.delay, reduction.systematic)
+
+
+def _doubts_of_delay(delay: DelayEstimate, systematic: Sequence[SystematicError]) -> Iterator[Notice]:
+    if not delay.alike:
         channels = ", ".join(
             f"{channel.force} in {channel.motion} {channel.size:.3g} ± {channel.standard_error:.2g} s"
             for channel in delay.channels
@@ -173,7 +177,7 @@ def _unchecked(reduction: Reduction) -> Iterator[Notice]:
             f"The forces lag the motion by times that differ ({channels}): memory of the flow, or a fault of one "
             "channel, not a delay of all; nothing is corrected for it."
         )
-    elif delay is not None and not delay.supported and any(e.source == "force_delay" for e in reduction.systematic):
+    elif not delay.supported and any(error.source == "force_delay" for error in systematic):
         yield Notice("Sway and yaw do not both show the delay: memory of the flow in one of them would look the same.")
 
 
@@ -201,7 +205,7 @@ def _effect_of_delay(reduction: Reduction) -> str:
     return f"; 10 ms would change {', '.join(moved)}" if moved else ""
 
 
-def _of_force(reduction: Reduction, force: str, result: ForceResult) -> Iterator[Notice]:
+def _of_terms(result: ForceResult) -> Iterator[Notice]:
     for difference in result.disagreements:
         yield Notice(
             f"{difference.name} is {difference.together:.4g} by the regression over the whole campaign and "
@@ -217,12 +221,15 @@ def _of_force(reduction: Reduction, force: str, result: ForceResult) -> Iterator
     collinear = [choice.name for choice in result.selection.choices if choice.reason == "collinear"]
     if collinear:
         yield Notice(f"The campaign cannot distinguish {', '.join(collinear)} from other terms: they are left out.")
-    odd = [row for row in result.left_out if row.unlikely]
-    for row in odd:
-        yield Notice(
-            f"{row.run}: {force} does not fit the other runs (chance {row.chance:.1g}); without it {row.moved} would "
-            f"move by {row.influence:.1f} standard errors."
-        )
+
+
+def _of_runs(force: str, result: ForceResult) -> Iterator[Notice]:
+    for row in result.left_out:
+        if row.unlikely:
+            yield Notice(
+                f"{row.run}: {force} does not fit the other runs (chance {row.chance:.1g}); without it {row.moved} "
+                f"would move by {row.influence:.1f} standard errors."
+            )
     noise = result.selection.spread.noise
     if noise > _UNEXPLAINED**2:
         yield Notice(

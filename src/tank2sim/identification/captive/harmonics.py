@@ -143,10 +143,9 @@ def moderated(runs: Sequence[ReducedRun]) -> tuple[ReducedRun, ...]:
             np.concatenate([f.density for f in fits]), np.concatenate([f.freedom for f in fits])
         )
         for place, fit in zip(records, fits, strict=True):
-            density = fit.density
             if math.isinf(weight):
-                density = np.full(len(density), usual)
-            elif weight > 0:
+                density = np.full(len(fit.density), usual)
+            else:
                 density = (weight * usual + fit.freedom * fit.density) / (weight + fit.freedom)
             result[place] = result[place].with_density(force, density)
     return tuple(result)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
 from typing import Literal
 
 import numpy as np
@@ -14,6 +15,7 @@ from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import polynomial
 from tank2sim.identification.captive.equations import rigid_body_force
 from tank2sim.identification.captive.harmonics import ReducedRun
+from tank2sim.identification.captive.oscillation import OscillationDerivatives
 from tank2sim.identification.captive.reduction import ForceResult, Reduction
 from tank2sim.records.thinning import drawn_columns
 
@@ -129,24 +131,19 @@ def reduction_plots(reduction: Reduction) -> dict[str, ReductionPlot]:
 
 def _steady_plot(reduction: Reduction, force: str, kind: str, across_title: tuple[str, str]) -> ForcePlot | None:
     """Force coefficient of the steady runs at the test speed against the one motion that they vary."""
-    runs = [run for run in reduction.runs if run.run.type == kind and not run.motion.heel_rad]
-    if kind == "steady_turn":
-        runs = [run for run in runs if abs(_motion_of(run, "v")) < _ZERO and abs(_motion_of(run, "d")) < _ZERO]
+    runs = [run for run in reduction.runs if _varies(run, kind)]
     straight_runs = [run for run in reduction.runs if _varies_alone(run, kind) and run not in runs]
     if len(runs) < 2:
         return None
     letter = _LETTER[kind]
-    sign = -1.0 if letter == "v" else 1.0
     found = [
-        (sign * _motion_of(run, letter, reduction.campaign.model.length_m), *_coefficient(reduction, force, run))
+        (_motion_of(run, letter, reduction.campaign.model.length_m), *_coefficient(reduction, force, run))
         for run in (*runs, *straight_runs)
     ]
     angle, value, error = (np.array(column) for column in zip(*found, strict=True))
     across = np.linspace(angle.min(), angle.max(), _SAMPLES)
-    still = 0 * across
-    v = -np.sin(across) if letter == "v" else still
-    r, rudder = across if letter == "r" else still, across if letter == "d" else still
-    fit, width = _fitted(reduction.forces[force], _regressors(reduction.forces[force], v, r, rudder))
+    motions = dict.fromkeys("vrd", 0 * across) | {letter: -np.sin(across) if letter == "v" else across}
+    fit, width = _fitted(reduction.forces[force], _regressors(reduction.forces[force], motions))
     series = ForceSeries(
         label=kind.replace("_", " "),
         x=angle,
@@ -165,6 +162,13 @@ def _steady_plot(reduction: Reduction, force: str, kind: str, across_title: tupl
     )
 
 
+def _varies(run: ReducedRun, kind: str) -> bool:
+    """A run of a kind that is upright, a steady turn without drift and rudder."""
+    if run.run.type != kind or run.motion.heel_rad:
+        return False
+    return kind != "steady_turn" or all(abs(_motion_of(run, letter)) < _ZERO for letter in "vd")
+
+
 def _varies_alone(run: ReducedRun, kind: str) -> bool:
     """A static run in which all but the motion of a kind is zero: the straight run belongs to all kinds."""
     others = [letter for letter in "vd" if letter != _LETTER[kind]]
@@ -173,13 +177,13 @@ def _varies_alone(run: ReducedRun, kind: str) -> bool:
 
 
 def _motion_of(run: ReducedRun, letter: str, length_m: float = 1.0) -> float:
-    """asin(v/U), r L/U or the rudder angle of a steady run."""
+    """Drift angle -asin(v/U), r L/U or the rudder angle of a steady run."""
     motion = run.motion
     if letter == "d":
         return float(motion.delta_rad[0])
     if letter == "r":
         return float(motion.r_radps[0]) * length_m / motion.mean_speed_mps
-    return math.asin(float(motion.v_mps[0]) / motion.mean_speed_mps)
+    return -math.asin(float(motion.v_mps[0]) / motion.mean_speed_mps)
 
 
 def _coefficient(reduction: Reduction, force: str, run: ReducedRun) -> tuple[float, float]:
@@ -194,15 +198,15 @@ def _coefficient(reduction: Reduction, force: str, run: ReducedRun) -> tuple[flo
     ) / unit
 
 
-def _regressors(result: ForceResult, v: Array, r: Array, rudder: Array) -> Array:
-    """Force per unit of each term's coefficient, (samples, terms), at the test speed."""
-    columns = []
+def _regressors(result: ForceResult, motions: Mapping[str, Array]) -> Array:
+    """Force per unit of each term's coefficient, (samples, terms), at the test speed, in motions v, r and d."""
+    columns, samples = [], len(motions["v"])
     for name in result.solution.names:
         term = known_term(name.partition(" ")[0])
         acts = not term.acceleration and not term.u and not term.phi and " " not in name
-        value = polynomial([term.name], {term.name: 1.0}, v=v, r=r, d=rudder) if acts else 0.0
-        columns.append(value * np.ones(len(v)))
-    return np.column_stack(columns) if columns else np.zeros((len(v), 0))
+        value = polynomial([term.name], {term.name: 1.0}, **motions) if acts else 0.0
+        columns.append(value * np.ones(samples))
+    return np.column_stack(columns) if columns else np.zeros((samples, 0))
 
 
 def _fitted(result: ForceResult, regressors: Array) -> tuple[Array, Array]:
@@ -228,18 +232,23 @@ def _amplitude_plot(reduction: Reduction, force: str, kind: str, words: str) -> 
     fit, width = _fitted(result, regressors)
     series = [ForceSeries(label="fit", fit_x=amplitude, fit_value=fit, fit_half_width=width)]
     name = force + letter
-    for frequency in sorted({round(row.frequency_radps, 2) for row in rows}):
-        at_frequency = [row for row in rows if round(row.frequency_radps, 2) == frequency]
-        series.append(
-            ForceSeries(
-                label=f"{frequency:g} rad/s",
-                x=np.array([abs(row.amplitude) for row in at_frequency]),
-                value=np.array([row.values[name] for row in at_frequency]),
-                half_width=_NORMAL * np.array([row.standard_errors[name] for row in at_frequency]),
-            )
-        )
+    for _, at_frequency in groupby(sorted(rows, key=_frequency), key=_frequency):
+        series.append(_frequency_series([*at_frequency], name))
     title = f"{name} of single runs against the amplitude"
     return ForcePlot(title=title, across=words, unit="1", up=name, series=tuple(series))
+
+
+def _frequency(row: OscillationDerivatives) -> float:
+    return round(row.frequency_radps, 2)
+
+
+def _frequency_series(rows: Sequence[OscillationDerivatives], name: str) -> ForceSeries:
+    return ForceSeries(
+        label=f"{_frequency(rows[0]):g} rad/s",
+        x=np.array([abs(row.amplitude) for row in rows]),
+        value=np.array([row.values[name] for row in rows]),
+        half_width=_NORMAL * np.array([row.standard_errors[name] for row in rows]),
+    )
 
 
 def _harmonics(reduction: Reduction, force: str) -> HarmonicsPlot | None:

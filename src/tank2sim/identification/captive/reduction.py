@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -113,14 +114,22 @@ class Reduction:
     not_used: Mapping[str, str]  # Name of an omitted run to the reason
     faults: tuple[InputError, ...]  # Faults of runs omitted with `keep_going`
     forces: Mapping[str, ForceResult]  # ``X``, ``Y``, ``N`` to its result
-    derivatives: Mapping[str, Derivative]  # Derivatives by name
     oscillations: tuple[OscillationDerivatives, ...]
     cubics: tuple[CubicByTwoWays, ...]
-    missing: tuple[str, ...]  # Names in :data:`ESSENTIAL` that the campaign does not give
     # Delay of the forces as recorded, less ``[test] force_delay_s``; None without oscillations at two frequencies
     delay: DelayEstimate | None = None
     # The zero of the drift angle by Y0 and N0; None if the campaign does not give them
     alignment: AlignmentEstimate | None = None
+
+    @cached_property
+    def derivatives(self) -> dict[str, Derivative]:
+        """Derivatives by name."""
+        return {name: found for result in self.forces.values() for name, found in _derivatives(result).items()}
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Names in :data:`ESSENTIAL` that the campaign does not give."""
+        return tuple(name for name in ESSENTIAL if name not in self.derivatives)
 
     @property
     def systematic(self) -> tuple[SystematicError, ...]:
@@ -140,44 +149,34 @@ def reduce_campaign(campaign: Campaign, options: ReductionOptions | None = None)
 
 def _reduction(campaign: Campaign, options: ReductionOptions) -> Reduction:
     """Derivatives from a campaign, on one thread."""
-    for key, problem in impossible_body(campaign.model, campaign.test.water_density_kgpm3):
-        raise InputError(campaign.path, f"model.{key}", problem, "correct the unit of one of these numbers")
+    _refuse_impossible_body(campaign)
     runs, faults = _credible_runs(campaign, options)
-    used, not_used = _used_runs(campaign, moderated(runs), options)
-    if not used:
-        raise _without_runs(campaign, [*map(str, faults), *(f"{name}, for {why}" for name, why in not_used.items())])
-    selections = _selections(campaign, used, options)
+    used, not_used, selections = _selections(campaign, runs, faults, options)
     equations = {force: selection.equations for force, selection in selections.items()}
     delay = delay_estimate(equations)
     delays = force_delays(equations, delay)
     if any(error.corrected for error in delays):  # the forces of oscillating runs are taken a time earlier
         runs = [_with_later_forces(run, delays[0].size) for run in runs]
-        used, not_used = _used_runs(campaign, moderated(runs), options)
-        selections = _selections(campaign, used, options)
+        used, not_used, selections = _selections(campaign, runs, faults, options)
     forces = {force: _force_result(campaign, selection, delays, options) for force, selection in selections.items()}
-    alignment = alignment_estimate(
-        campaign,
-        {force: forces[force].selection.equations for force in "YN"},
-        {force: forces[force].solution for force in "YN"},
-    )
+    solved = {force: (result.selection.equations, result.solution) for force, result in forces.items()}
+    alignment = alignment_estimate(campaign, solved)
     forces = _with_common_shifts(campaign, forces, None if delays else delay, alignment)
-    derivatives = {name: found for result in forces.values() for name, found in _derivatives(result).items()}
-    _refuse_thrust(campaign, derivatives)
     alone = oscillations(campaign, runs)
-    return Reduction(
+    reduction = Reduction(
         campaign=campaign,
         options=options,
         runs=tuple(used),
         not_used=not_used,
         faults=(*campaign.faults, *faults),
         forces=forces,
-        derivatives=derivatives,
         oscillations=alone,
         cubics=cubics([row for row in alone if row.run not in not_used]),
-        missing=tuple(name for name in ESSENTIAL if name not in derivatives),
         delay=delay,
         alignment=alignment,
     )
+    _refuse_thrust(reduction)
+    return reduction
 
 
 def _with_common_shifts(
@@ -196,11 +195,6 @@ def _with_common_shifts(
     }
 
 
-def _without_runs(campaign: Campaign, left_out: Sequence[str]) -> InputError:
-    remedy = f"the first was left out: {left_out[0]}" if left_out else "give it runs"
-    return InputError(campaign.path, "runs", "no run can be used", remedy)
-
-
 def _with_later_forces(run: ReducedRun, later_s: float) -> ReducedRun:
     """An oscillating run reduced again with its forces delayed by `later_s` more; any other run as it is."""
     if not run.run.oscillates:
@@ -208,12 +202,27 @@ def _with_later_forces(run: ReducedRun, later_s: float) -> ReducedRun:
     return reduced_run(replace(run.run, force_delay_s=run.run.force_delay_s + later_s))
 
 
-def _selections(campaign: Campaign, used: Sequence[ReducedRun], options: ReductionOptions) -> dict[str, Selection]:
-    return {force: select(campaign, used, force, all_terms=options.all_terms) for force in FORCE_COLUMNS}
+def _selections(
+    campaign: Campaign, runs: Sequence[ReducedRun], faults: Sequence[InputError], options: ReductionOptions
+) -> tuple[list[ReducedRun], dict[str, str], dict[str, Selection]]:
+    """The runs used, the reasons of the others, and the selection of each force; refused without a run."""
+    used, not_used = _used_runs(campaign, moderated(runs), options)
+    if not used:
+        left_out = [*map(str, faults), *(f"{name}, for {why}" for name, why in not_used.items())]
+        remedy = f"the first was left out: {left_out[0]}" if left_out else "give it runs"
+        raise InputError(campaign.path, "runs", "no run can be used", remedy)
+    all_terms = options.all_terms
+    return used, not_used, {force: select(campaign, used, force, all_terms=all_terms) for force in FORCE_COLUMNS}
 
 
-def _refuse_thrust(campaign: Campaign, derivatives: Mapping[str, Derivative]) -> None:
+def _refuse_impossible_body(campaign: Campaign) -> None:
+    for key, problem in impossible_body(campaign.model, campaign.test.water_density_kgpm3):
+        raise InputError(campaign.path, f"model.{key}", problem, "correct the unit of one of these numbers")
+
+
+def _refuse_thrust(reduction: Reduction) -> None:
     """Refuse a towed model that the water pushes ahead: its X gauge is reversed."""
+    campaign, derivatives = reduction.campaign, reduction.derivatives
     found = derivatives.get("X0")
     reversed_forces = "Yvdot" in derivatives and derivatives["Yvdot"].value > 0
     if found is None or not is_resistance(campaign) or reversed_forces:
@@ -260,25 +269,25 @@ def _sound_runs(campaign: Campaign) -> tuple[list[ReducedRun], list[InputError]]
 def _used_runs(
     campaign: Campaign, runs: Sequence[ReducedRun], options: ReductionOptions
 ) -> tuple[list[ReducedRun], dict[str, str]]:
-    used: list[ReducedRun] = []
-    not_used: dict[str, str] = {}
     # Most runs have these revolutions: the polynomial has no term in them, and load-variation tests have others.
     usual = float(np.median([run.propeller_radps or 0.0 for run in campaign.runs]))
-    for run in runs:
-        turning = run.run.propeller_radps or 0.0
-        speed, fast = run.motion.mean_speed_mps, run_frequency_parameter(campaign, run)
-        if fast >= LARGEST_FREQUENCY_PARAMETER and not options.keep_fast:
-            not_used[run.run.name] = (
-                f"omega U/g is {fast:.3g}, and coefficients fall steeply from {LARGEST_FREQUENCY_PARAMETER:g} on"
-            )
-        elif abs(speed / campaign.test.speed_mps - 1) > SPEED_RANGE and not options.off_speed:
-            not_used[run.run.name] = f"its speed is {speed:.4g} m/s, and the test speed {campaign.test.speed_mps:.4g}"
-        elif abs(turning - usual) > SPEED_RANGE * usual and not options.off_speed:
-            found, nominal = (f"{radps * 60 / (2 * np.pi):.4g}" for radps in (turning, usual))
-            not_used[run.run.name] = f"its rate of revolution is {found} rpm, and most others have {nominal} rpm"
-        else:
-            used.append(run)
-    return used, not_used
+    reasons = {run.run.name: _why_not_used(campaign, run, usual, options) for run in runs}
+    not_used = {name: reason for name, reason in reasons.items() if reason}
+    return [run for run in runs if run.run.name not in not_used], not_used
+
+
+def _why_not_used(campaign: Campaign, run: ReducedRun, usual_radps: float, options: ReductionOptions) -> str:
+    """Why a run is of another kind than the campaign; empty if it is used."""
+    turning = run.run.propeller_radps or 0.0
+    speed, fast = run.motion.mean_speed_mps, run_frequency_parameter(campaign, run)
+    if fast >= LARGEST_FREQUENCY_PARAMETER and not options.keep_fast:
+        return f"omega U/g is {fast:.3g}, and coefficients fall steeply from {LARGEST_FREQUENCY_PARAMETER:g} on"
+    if abs(speed / campaign.test.speed_mps - 1) > SPEED_RANGE and not options.off_speed:
+        return f"its speed is {speed:.4g} m/s, and the test speed {campaign.test.speed_mps:.4g}"
+    if abs(turning - usual_radps) > SPEED_RANGE * usual_radps and not options.off_speed:
+        found, nominal = (f"{radps * 60 / (2 * np.pi):.4g}" for radps in (turning, usual_radps))
+        return f"its rate of revolution is {found} rpm, and most others have {nominal} rpm"
+    return ""
 
 
 def _force_result(

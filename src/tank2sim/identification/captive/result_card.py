@@ -50,14 +50,7 @@ def card_contents(reduction: Reduction, fill: str | None = None) -> Contents:
         for name, derivative in reduction.derivatives.items()
         if not (name == "X0" and is_resistance(campaign))
     }
-    estimates = {}
-    if fill is not None:
-        lacking = [name for name in ESSENTIAL if name not in found and name in ESTIMATED]
-        estimates = {
-            name: DerivativeEntry(number.value, number.standard_error, f"ESTIMATED: {number.source}")
-            for name, number in estimate(_particulars(campaign), lacking).items()
-        }
-        estimates |= _constant_thrust(reduction, found)
+    estimates = {} if fill is None else _estimates(reduction, found)
     entries = {  # in the card's figures, so that card and JSON agree exactly
         name: DerivativeEntry(float(f"{entry.value:.7g}"), float(f"{entry.standard_error:.3g}"), entry.how)
         for name, entry in (found | estimates).items()
@@ -72,6 +65,16 @@ def card_contents(reduction: Reduction, fill: str | None = None) -> Contents:
         x_G=model.x_G_m / model.length_m,
         inertia_source=source,
     )
+
+
+def _estimates(reduction: Reduction, found: Mapping[str, DerivativeEntry]) -> dict[str, DerivativeEntry]:
+    """Estimates of the essential derivatives that were not found."""
+    lacking = [name for name in ESSENTIAL if name not in found and name in ESTIMATED]
+    estimates = {
+        name: DerivativeEntry(number.value, number.standard_error, f"ESTIMATED: {number.source}")
+        for name, number in estimate(_particulars(reduction.campaign), lacking).items()
+    }
+    return estimates | _constant_thrust(reduction, found)
 
 
 def _how(reduction: Reduction, name: str) -> str:
@@ -138,25 +141,15 @@ def reduced_card_text(reduction: Reduction, card: Contents, scale: float = 1.0) 
     """
     campaign = reduction.campaign
     model, test = campaign.model, campaign.test
-    water = campaign.full_scale or FullScaleSection()
-    density = water.water_density_kgpm3 if scale != 1.0 else test.water_density_kgpm3
-    ratio = FroudeScaling(scale, density / test.water_density_kgpm3)
-    sizes = {"length_m": model.length_m * scale}
-    for key in ("beam_m", "draught_m", "propeller_diameter_m"):
-        if (size := getattr(model, key)) is not None:
-            sizes[key] = size * scale
-    sizes["displacement_kg"] = model.mass_kg * ratio.force
-    if model.block_coefficient is not None:
-        sizes["block_coefficient"] = model.block_coefficient
-    if model.rudder_area_m2 is not None:
-        sizes["rudder_area_m2"] = model.rudder_area_m2 * scale**2
-    environment = {
-        "water_density_kgpm3": density,
-        "gravity_mps2": water.gravity_mps2 if scale != 1.0 else test.gravity_mps2,
-    }
-    viscosity = water.kinematic_viscosity_m2ps if scale != 1.0 else test.kinematic_viscosity_m2ps
-    if viscosity is not None:
-        environment["kinematic_viscosity_m2ps"] = viscosity
+    water = (campaign.full_scale or FullScaleSection()) if scale != 1.0 else test
+    ratio = FroudeScaling(scale, water.water_density_kgpm3 / test.water_density_kgpm3)
+    factors = dict.fromkeys(("length_m", "beam_m", "draught_m", "propeller_diameter_m"), scale)
+    factors |= {"displacement_kg": ratio.force, "block_coefficient": 1.0, "rudder_area_m2": scale**2}
+    of_model = {**model.model_dump(exclude_none=True), "displacement_kg": model.mass_kg}
+    sizes = {key: of_model[key] * factor for key, factor in factors.items() if key in of_model}
+    environment = {"water_density_kgpm3": water.water_density_kgpm3, "gravity_mps2": water.gravity_mps2}
+    if water.kinematic_viscosity_m2ps is not None:
+        environment["kinematic_viscosity_m2ps"] = water.kinematic_viscosity_m2ps
     speed = test.speed_mps * math.sqrt(scale * environment["gravity_mps2"] / test.gravity_mps2)
     return manoeuvring_card_text(
         ManoeuvringResult(

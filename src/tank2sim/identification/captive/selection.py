@@ -180,7 +180,7 @@ def _keep_distinguishable(full: CampaignEquations, choices: dict[str, Choice]) -
             f"{condition:.3g} with it, above the limit of {COLLINEAR:g}"
         )
         choices[name] = Choice(name, False, "collinear", text, inflation)
-    return [name for name in full.names if name in kept]
+    return sorted(kept, key=full.names.index)
 
 
 def _conditions(full: CampaignEquations) -> int:
@@ -230,13 +230,7 @@ def trends(campaign: Campaign, selection: Selection) -> tuple[Selection, tuple[T
     frequency; static tests, which are at zero frequency, take part.
     """
     used = selection.equations
-    candidates = [
-        name
-        for motion, kind in (("v", "pure_sway"), ("r", "pure_yaw"))
-        if distinct([run.motion.frequency_radps for run in used.runs if run.run.type == kind]) >= _FEWEST_FREQUENCIES
-        for name in (f"{used.force}{motion}", f"{used.force}{motion}dot")
-        if name in used.names
-    ]
+    candidates = [*_terms_at_frequencies(used, "v", "pure_sway"), *_terms_at_frequencies(used, "r", "pure_yaw")]
     if not candidates:
         return selection, ()
     full = campaign_equations(campaign, used.runs, used.force, [*used.names, *map(_slope, candidates)]).held(used.prior)
@@ -252,6 +246,14 @@ def trends(campaign: Campaign, selection: Selection) -> tuple[Selection, tuple[T
     result = replace(selection, equations=widened, spread=fitted_spread(widened), choices=(*selection.choices, *chosen))
     kept = [_trend(full, [term for term in names if term != _slope(name)], name, result) for name in shown]
     return result, (*(replace(trend, used=True) for trend in kept if trend is not None), *others)
+
+
+def _terms_at_frequencies(used: CampaignEquations, motion: str, kind: str) -> list[str]:
+    """Damping and added mass of a motion, if runs of a kind were made at enough frequencies."""
+    frequencies = [run.motion.frequency_radps for run in used.runs if run.run.type == kind]
+    if distinct(frequencies) < _FEWEST_FREQUENCIES:
+        return []
+    return [name for name in (f"{used.force}{motion}", f"{used.force}{motion}dot") if name in used.names]
 
 
 def _significant_trends(

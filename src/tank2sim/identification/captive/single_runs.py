@@ -10,7 +10,7 @@ but by n times its angle. Standard errors include coloured noise within the run
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -127,6 +127,13 @@ class RepeatedCoefficient:
         """Whether the runs differ by more than the noise within them."""
         return self.chance < REPEATS_DIFFER
 
+    @property
+    def notice(self) -> Notice:
+        """The difference in words."""
+        part = f"{self.signal} {self.part} {self.order or ''}".rstrip()
+        expected = f"their noise explains {self.expected:.2g} (chance {self.chance:.1g})"
+        return Notice(f"Repeats differ in {part} by {self.deviation:.3g} {self.unit}; {expected}.")
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CaptiveRunStudy:
@@ -150,8 +157,8 @@ def study_runs(
     Raises InputError: As of :func:`single_run`.
     """
     single, reduced = zip(*(single_run(run, campaign) for run in runs), strict=True)
-    alike = len(runs) > 1 and same_test(single)
-    repeats = repeated_coefficients(single) if alike else ()
+    alike = same_test(single)
+    repeats = repeated_coefficients(single) if alike and len(runs) > 1 else ()
     notices = [*remarks, *(caution(fault) for run in single for fault in run.faults)]
     if campaign is None:
         notices.append(
@@ -160,16 +167,9 @@ def study_runs(
                 "derivatives are given: --campaign campaign.toml."
             )
         )
-    if len(runs) > 1 and not alike:
+    if not alike:
         notices.append(Notice("The runs are of different tests (angles, frequency, amplitude or speed): not compared."))
-    notices += [
-        Notice(
-            f"Repeats differ in {row.signal} {row.part} {row.order or ''}".rstrip()
-            + f" by {row.deviation:.3g} {row.unit}; their noise explains {row.expected:.2g} (chance {row.chance:.1g})."
-        )
-        for row in repeats
-        if row.differs
-    ]
+    notices += [row.notice for row in repeats if row.differs]
     study = CaptiveRunStudy(runs=single, repeats=repeats, inertia_removed=campaign is not None, notices=tuple(notices))
     return study, reduced
 
@@ -185,15 +185,9 @@ def single_run(run: CaptiveRun, campaign: Campaign | None) -> tuple[SingleRun, R
         raise fault
     reduced = reduced_run(run)
     faults = [*(record_faults(campaign, run) if campaign else ()), *reduced_faults(reduced)]
-    coefficients = [*_motion_coefficients(reduced)]
-    inertial = {} if campaign is None else rigid_body_force(campaign, reduced.motion)
-    for part, water in (("", False), ("_water", True))[: 1 if campaign is None else 2]:
-        for force in FORCE_COLUMNS:
-            fit = reduced.fits[force]
-            values, errors = fit.coefficients.copy(), np.sqrt(np.diag(fit.covariance))
-            if water:
-                values[: reduced.regressed] += reduced.projected(inertial[force][:, None])[:, 0]
-            coefficients += _pairs(f"{force}{part}", FORCE_UNITS_SI[force], values, errors)
+    coefficients = [*_motion_coefficients(reduced), *_force_coefficients(reduced)]
+    if campaign is not None:
+        coefficients += _force_coefficients(reduced, rigid_body_force(campaign, reduced.motion))
     motion = reduced.motion
     return SingleRun(
         name=run.name,
@@ -255,22 +249,21 @@ def averaged_cycle(run: ReducedRun, force: str) -> AveragedCycle:
 
 def same_test(runs: Sequence[SingleRun]) -> bool:
     """True for repeats of one test: motions whose Fourier coefficients are the same within :data:`SAME_MOTION`."""
-    first, *others = runs
-    for other in others:
-        if other.type != first.type:
+    return all(_same_motion(runs[0], other) for other in runs[1:])
+
+
+def _same_motion(first: SingleRun, other: SingleRun) -> bool:
+    frequency = first.frequency_radps
+    if other.type != first.type or abs(other.frequency_radps - frequency) > SAME_MOTION * frequency:
+        return False
+    for signal, order, scale in (("v", 0, 0.1), ("v", 1, 0.1), ("r", 0, 0.1), ("r", 1, 0.1), ("speed", 0, 0.0)):
+        if order > 0 and not frequency:
+            continue
+        a, b = (run.coefficient(signal, order).amplitude for run in (first, other))
+        if abs(b - a) > SAME_MOTION * max(a, scale * first.speed_mps):
             return False
-        frequencies = [run.frequency_radps for run in (first, other)]
-        if abs(frequencies[1] - frequencies[0]) > SAME_MOTION * frequencies[0]:
-            return False
-        for signal, order, scale in (("v", 0, 0.1), ("v", 1, 0.1), ("r", 0, 0.1), ("r", 1, 0.1), ("speed", 0, 0.0)):
-            if order > 0 and not frequencies[0]:
-                continue
-            a, b = (run.coefficient(signal, order).amplitude for run in (first, other))
-            if abs(b - a) > SAME_MOTION * max(a, scale * first.speed_mps):
-                return False
-        if abs(first.coefficient("delta", 0).cosine - other.coefficient("delta", 0).cosine) > math.radians(0.2):
-            return False
-    return True
+    rudders = first.coefficient("delta", 0).cosine, other.coefficient("delta", 0).cosine
+    return abs(rudders[0] - rudders[1]) <= math.radians(0.2)
 
 
 def repeated_coefficients(runs: Sequence[SingleRun]) -> tuple[RepeatedCoefficient, ...]:
@@ -313,6 +306,18 @@ def _motion_coefficients(run: ReducedRun) -> list[FourierCoefficient]:
     ):
         coefficients = run.projected(values[:, None])[:, 0]
         found += _pairs(signal, unit, coefficients, np.zeros(len(coefficients)))
+    return found
+
+
+def _force_coefficients(run: ReducedRun, inertial: Mapping[str, Array] | None = None) -> list[FourierCoefficient]:
+    """Coefficients of the forces as recorded; with the force of the carried body (n,), the water's."""
+    found = []
+    for force, fit in run.fits.items():
+        values, errors, part = fit.coefficients.copy(), np.sqrt(np.diag(fit.covariance)), ""
+        if inertial is not None:
+            values[: run.regressed] += run.projected(inertial[force][:, None])[:, 0]
+            part = "_water"
+        found += _pairs(f"{force}{part}", FORCE_UNITS_SI[force], values, errors)
     return found
 
 

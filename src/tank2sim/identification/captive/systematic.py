@@ -18,9 +18,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from tank2sim.arrays import Array
@@ -158,11 +159,8 @@ def delay_estimate(forces: Mapping[str, CampaignEquations]) -> DelayEstimate | N
     )
     if not channels:
         return None
-    mean = _mean_delay([(channel.size, channel.standard_error) for channel in channels])
-    by_motion = [
-        _mean_delay([(channel.size, channel.standard_error) for channel in channels if channel.motion == motion])
-        for motion in dict.fromkeys(channel.motion for channel in channels)
-    ]
+    mean = _mean_delay(channels)
+    by_motion = [_mean_delay(group) for group in _grouped(channels, "motion").values()]
     sign = math.copysign(1.0, mean.size)
     return DelayEstimate(
         size=mean.size,
@@ -184,33 +182,32 @@ def force_delays(
     if estimate is None:
         return ()
     fastest = max((run.motion.frequency_radps for used in forces.values() for run in used.runs), default=0.0)
+    least_s, found = LEAST_PHASE_RAD / max(fastest, 1e-12), _grouped(estimate.channels, "force")
+    shown = {force: mean for force, delays in found.items() if (mean := _mean_delay(delays)).significant(least_s)}
+    of_all = _mean_delay(estimate.channels)
+    if not of_all.significant(least_s) and len(shown) > 1:
+        of_all = _mean_delay([*shown.values()])
+    if of_all.significant(least_s) and len(found) > 1:
+        return (_force_delay("XYN", of_all, corrected=estimate.supported),)
+    return tuple(_force_delay(force, mean) for force, mean in shown.items() if len(found[force]) > 1)
 
-    def common(delays: Sequence[tuple[float, float]]) -> tuple[float, float] | None:
-        """The common value of delays and its standard error, s; None if it is not significant."""
-        if not delays:
-            return None
-        mean = _mean_delay(delays)
-        least = max(_SHOWN * mean.standard_error, LEAST_PHASE_RAD / max(fastest, 1e-12))
-        return (mean.size, mean.standard_error) if abs(mean.size) >= least and mean.alike else None
 
-    found = {
-        force: [(channel.size, channel.standard_error) for channel in estimate.channels if channel.force == force]
-        for force in "YN"
-    }
-    shown = {force: delay for force, delays in found.items() if (delay := common(delays)) is not None}
-    of_all = common([delay for delays in found.values() for delay in delays])
-    if of_all is None and len(shown) > 1:
-        of_all = common([*shown.values()])
-    supported = False
-    if of_all is not None and all(found.values()):
-        shown, supported = {"XYN": of_all}, estimate.supported
-    return tuple(
-        SystematicError(
-            source="force_delay", force=force, runs="", size=size, standard_error=error, corrected=supported
-        )
-        for force, (size, error) in shown.items()
-        if force == "XYN" or len(found[force]) > 1
+def _force_delay(force: str, mean: _MeanDelay, *, corrected: bool = False) -> SystematicError:
+    return SystematicError(
+        source="force_delay",
+        force=force,
+        runs="",
+        size=mean.size,
+        standard_error=mean.standard_error,
+        corrected=corrected,
     )
+
+
+def _grouped(channels: Sequence[ChannelDelay], by: Literal["force", "motion"]) -> dict[str, list[ChannelDelay]]:
+    groups: dict[str, list[ChannelDelay]] = {}
+    for channel in channels:
+        groups.setdefault(getattr(channel, by), []).append(channel)
+    return groups
 
 
 def can_show_delay(runs: Sequence[ReducedRun]) -> bool:
@@ -229,17 +226,11 @@ def gauge_gains(
     """
     # The gauge's coefficients as predicted by the derivatives, without noise.
     predicted = equations.gauge - (equations.values - equations.design @ solve(equations, spread).values)
-    kinds = np.array([run.run.type for run in equations.runs])[equations.run_of_row]
+    kinds = _kind_of_row(equations)
     gains: dict[str, tuple[float, float]] = {}
     unknown = []
     for kind in dict.fromkeys(kinds.tolist()):
-        joined = _with_unknowns(equations, {"gain": np.where(kinds == kind, predicted, 0.0)})
-        solution = solve(joined, spread)
-        if solution.condition < SINGULAR_CONDITION and abs(solution.value("gain")) > max(
-            _LEAST_GAIN, _SUSPECT * solution.error("gain")
-        ):
-            # The scatter within kinds still includes the effect of the gauge: estimate it together with the gain.
-            solution = solve(joined, fitted_spread(joined, by_type=False))
+        solution = _with_gain(equations, np.where(kinds == kind, predicted, 0.0), spread)
         size, error = solution.value("gain"), solution.error("gain")
         if solution.condition > SINGULAR_CONDITION or _SHOWN * error > VISIBLE_GAIN:
             unknown.append(kind)
@@ -247,7 +238,7 @@ def gauge_gains(
             gains[kind] = size, error
     if not gains:
         return (), tuple(unknown)
-    ratios = {kind: abs(size) / error for kind, (size, error) in gains.items()}
+    ratios = {kind: abs(size) / error for kind, (size, error) in gains.items()}  # in standard errors
     worst = max(ratios, key=lambda kind: ratios[kind])
     found = SystematicError(
         source=f"gain of {equations.force} in {worst}",
@@ -258,6 +249,16 @@ def gauge_gains(
         or_runs=tuple(kind for kind in gains if kind != worst and ratios[worst] - ratios[kind] < _AS_WELL),
     )
     return (found,), tuple(unknown)
+
+
+def _with_gain(equations: CampaignEquations, predicted: Array, spread: Spread) -> Solution:
+    """The solution with an unknown gain of the forces (rows,) that are predicted for a kind of run."""
+    joined = _with_unknowns(equations, {"gain": predicted})
+    solution = solve(joined, spread)
+    suspect = abs(solution.value("gain")) > max(_LEAST_GAIN, _SUSPECT * solution.error("gain"))
+    # The scatter within kinds still includes the effect of the gauge: estimate it together with the gain.
+    again = suspect and solution.condition < SINGULAR_CONDITION
+    return solve(joined, fitted_spread(joined, by_type=False)) if again else solution
 
 
 def correct_delay(
@@ -273,9 +274,12 @@ def correct_delay(
 
 def _correct_gain(equations: CampaignEquations, kind: str, gain: float) -> CampaignEquations:
     """The equations with the gauge's gain corrected in one kind of run."""
-    affected = np.array([run.run.type == kind for run in equations.runs])[equations.run_of_row]
-    change = np.where(affected, -gain / (1.0 + gain) * equations.gauge, 0.0)
+    change = np.where(_kind_of_row(equations) == kind, -gain / (1.0 + gain) * equations.gauge, 0.0)
     return replace(equations, values=equations.values + change, gauge=equations.gauge + change)
+
+
+def _kind_of_row(equations: CampaignEquations) -> NDArray[np.str_]:
+    return np.array([run.run.type for run in equations.runs])[equations.run_of_row]
 
 
 class _MeanDelay(NamedTuple):
@@ -286,11 +290,14 @@ class _MeanDelay(NamedTuple):
     chance: float
     alike: bool
 
+    def significant(self, least_s: float) -> bool:
+        """Whether it is one delay, not zero, and of `least_s` at least."""
+        return self.alike and abs(self.size) >= max(_SHOWN * self.standard_error, least_s)
 
-def _mean_delay(delays: Sequence[tuple[float, float]]) -> _MeanDelay:
-    """Weighted mean of delays (value, standard error)."""
-    values, errors = (np.array(column) for column in zip(*delays, strict=True))
-    weights = np.array([error**-2.0 for _, error in delays])
+
+def _mean_delay(delays: Sequence[ChannelDelay] | Sequence[_MeanDelay]) -> _MeanDelay:
+    values, errors = (np.array([getattr(delay, key) for delay in delays]) for key in ("size", "standard_error"))
+    weights = np.array([error**-2.0 for error in errors.tolist()])
     mean, error = float(weights @ values / weights.sum()), float(weights.sum() ** -0.5)
     chance = float(chdtrc(len(values) - 1, weights @ (values - mean) ** 2)) if len(values) > 1 else 1.0
     apart = np.abs(values - mean) > np.maximum(_SHOWN * errors, _NEARLY * abs(mean))
@@ -304,21 +311,27 @@ def _delays(equations: CampaignEquations) -> dict[str, tuple[float, float]]:
         return {}
     # Without the prior: it scales with the linear terms, which a long delay reduces to zero.
     free = equations.held({})
-    found, spread = dict.fromkeys(motions, 0.0), None
-    for last in (False, True):
-        for _ in range(_ITERATIONS):
-            joined = _with_slopes(free, motions, found)
-            spread = spread or fitted_spread(joined, by_type=False)
-            solution = solve(joined, spread)
-            steps = {motion: solution.value(motion) for motion in motions}
-            found = {motion: delay + steps[motion] for motion, delay in found.items()}
-            if all(abs(step) < 0.1 * solution.error(motion) for motion, step in steps.items()):
-                break
-        shown = any(abs(delay) > _SHOWN * solution.error(motion) for motion, delay in found.items())
-        if last or not shown:
+    found, errors = _iterated_delays(free, motions, dict.fromkeys(motions, 0.0))
+    if any(abs(delay) > _SHOWN * errors[motion] for motion, delay in found.items()):
+        # The spread of the uncorrected forces includes the delay.
+        found, errors = _iterated_delays(free, motions, found)
+    return {motion: (found[motion], errors[motion]) for motion in motions}
+
+
+def _iterated_delays(
+    free: CampaignEquations, motions: Mapping[str, Sequence[str]], found: Mapping[str, float]
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Delays of motions and their standard errors, s, from first ones, with the spread that these leave."""
+    found, spread = dict(found), None
+    for _ in range(_ITERATIONS):
+        joined = _with_slopes(free, motions, found)
+        spread = spread or fitted_spread(joined, by_type=False)
+        solution = solve(joined, spread)
+        steps = {motion: solution.value(motion) for motion in motions}
+        found = {motion: delay + steps[motion] for motion, delay in found.items()}
+        if all(abs(step) < 0.1 * solution.error(motion) for motion, step in steps.items()):
             break
-        spread = None  # the spread of the uncorrected forces includes the delay
-    return {motion: (found[motion], solution.error(motion)) for motion in motions}
+    return found, {motion: solution.error(motion) for motion in motions}
 
 
 def _several_frequencies(runs: Sequence[ReducedRun], kinds: Sequence[str]) -> bool:
@@ -443,7 +456,7 @@ class AlignmentEstimate:
 
 
 def alignment_estimate(
-    campaign: Campaign, equations: Mapping[str, CampaignEquations], solutions: Mapping[str, Solution]
+    campaign: Campaign, solved: Mapping[str, tuple[CampaignEquations, Solution]]
 ) -> AlignmentEstimate | None:
     """The zero of the drift angle by the side force and moment at zero drift; None without Y0, Yv, N0 or Nv.
 
@@ -452,14 +465,14 @@ def alignment_estimate(
     recorded drift and solving again. Y0 and N0 then give the same angle. A single screw or a bent hull has another
     ratio of Y0 and N0, except by chance.
 
-    `equations`, `solutions`: ``Y`` and ``N`` to the equations of that force and their solution.
+    `solved`: ``Y`` and ``N`` to the equations of that force and their solution.
     """
     found: dict[str, tuple[float, float]] = {}
     for force in "YN":
-        solution, zero = solutions[force], f"{force}0"
+        (equations, solution), zero = solved[force], f"{force}0"
         if not {zero, f"{force}v"} <= set(solution.names):
             return None
-        turned = with_common_error(campaign, equations[force], "alignment_rad", _SMALL_RAD)
+        turned = with_common_error(campaign, equations, "alignment_rad", _SMALL_RAD)
         slope = moved_terms(turned, solution)[zero] / _SMALL_RAD
         if not slope:
             return None

@@ -233,13 +233,15 @@ def tank_size(tank: TankSection) -> Iterator[Caution]:
 
 def blockage(beam_m: float | None, draught_m: float | None, tank: TankSection) -> Iterator[Caution]:
     """A tank too small in section or depth for the model to behave as in open water."""
-    known = {"[model] beam_m": beam_m, "[model] draught_m": draught_m}
-    known |= {"[tank] breadth_m": tank.breadth_m, "[tank] depth_m": tank.depth_m}
-    missing = [key for key, value in known.items() if value is None]
-    if missing:
-        yield lacking("blockage", "the share of the tank's section that the model blocks", ", ".join(missing))
-    if beam_m is not None and draught_m is not None and tank.breadth_m is not None and tank.depth_m is not None:
-        share = beam_m * draught_m / (tank.breadth_m * tank.depth_m)
+    sizes = {"[model] beam_m": beam_m, "[model] draught_m": draught_m}
+    sizes |= {"[tank] breadth_m": tank.breadth_m, "[tank] depth_m": tank.depth_m}
+    known = {key: size for key, size in sizes.items() if size is not None}
+    if len(known) < len(sizes):
+        missing = ", ".join(key for key in sizes if key not in known)
+        yield lacking("blockage", "the share of the tank's section that the model blocks", missing)
+    else:
+        beam, draught, breadth, depth = known.values()
+        share = beam * draught / (breadth * depth)
         if share > LARGEST_BLOCKAGE:
             yield Caution(
                 "blockage",

@@ -147,20 +147,21 @@ def foreign_units(
         candidates = {"N m": 1.0, **MOMENT_UNITS} if force else MOMENT_UNITS
         moment = _nearest(candidates, lambda tried: hull.moments(tried, factor))
         moment = "" if moment == "N m" else moment
-    said = []
-    if force:
-        shares = ", ".join(f"{name} {value:.2g}" for name, value in hull.forces(factor).items())
-        said.append(
-            f"X and Y are in {force}, 1 {force} = {factor:.4g} N (then {shares} times the values of usual hulls)"
-        )
-    if moment:
-        said.append(f"N is in {moment}, 1 {moment} = {MOMENT_UNITS[moment]:.4g} N m")
-    if said:
+    if force or moment:
         yield Caution(
             "unit",
             "the derivatives are of no ship if forces are in N and moments in N m, and of one if "
-            f"{' and '.join(said)}; convert the columns.",
+            f"{' and '.join(_units_in_words(hull, force, moment))}; convert the columns.",
         )
+
+
+def _units_in_words(hull: _HullShares, force: str, moment: str) -> Iterator[str]:
+    if force:
+        factor = FORCE_UNITS[force]
+        shares = ", ".join(f"{name} {value:.2g}" for name, value in hull.forces(factor).items())
+        yield f"X and Y are in {force}, 1 {force} = {factor:.4g} N (then {shares} times the values of usual hulls)"
+    if moment:
+        yield f"N is in {moment}, 1 {moment} = {MOMENT_UNITS[moment]:.4g} N m"
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from tank2sim.errors import InputError
 from tank2sim.escaping import one_line
 from tank2sim.identification.captive.result_card import model_particulars, model_yaw_inertia
 from tank2sim.identification.captive_mmg.steady_tests import SteadyTests, place_of_column
+from tank2sim.records.campaign_form import CampaignFile
 
 _CAUSES = {
     "derivatives.Y": ("Y", "drift"),
@@ -75,30 +76,39 @@ def _coefficients(
     tests: SteadyTests, values: Mapping[str, float], errors: Mapping[str, float]
 ) -> dict[str, dict[str, object]]:
     """Tables of derivatives, propeller, rudder and standard errors."""
-    form, rudder = tests.form, tests.form.rudder
-    assert rudder is not None
+    form = tests.form
     derivatives: dict[str, object] = {}
+    propeller, rudder = _equipment(form)
     uncertainty: dict[str, object] = {}
-    for name in (name for names in HULL_TERMS.values() for name in names if name in values):
-        key, sign = ("R0", -1.0) if name == "X0" else (name, 1.0)
-        derivatives[key] = _rounded(sign * values[name])
+
+    def enter(name: str, table: dict[str, object], key: str, sign: float = 1.0) -> None:
+        table[key] = _rounded(sign * values[name])
         if name in errors:
             uncertainty[key] = _rounded(errors[name], 3)
+
+    for name in (name for names in HULL_TERMS.values() for name in names if name in values):
+        enter(name, derivatives, *(("R0", -1.0) if name == "X0" else (name, 1.0)))
     for name, (value, error) in estimated_masses(tests).items():
         number = tomlkit.item(_rounded(-values.get(name, value)))
         derivatives[MASS_KEYS[name]] = number.comment("ESTIMATED, not from steady tests")
         uncertainty[MASS_KEYS[name]] = _rounded(errors.get(name, error), 3)
-    propeller: dict[str, object] = {"x_P": form.propeller.x_P}
+    tables = {**dict.fromkeys(PROPELLER_COEFFICIENTS, propeller), **dict.fromkeys(RUDDER_COEFFICIENTS, rudder)}
+    for name in (name for name in values if name in tables):
+        enter(name, tables[name], name)
+    return {"derivatives": derivatives, "propeller": propeller, "rudder": rudder, "uncertainty": uncertainty}
+
+
+def _equipment(form: CampaignFile) -> tuple[dict[str, object], dict[str, object]]:
+    """Tables of propeller and rudder as the campaign states them."""
+    rudder = form.rudder
+    assert rudder is not None
     f_alpha = rudder.f_alpha or _rounded(fujii(rudder.aspect_ratio or 0.0))
+    of_propeller: dict[str, object] = {"x_P": form.propeller.x_P}
     of_rudder: dict[str, object] = {"height_m": rudder.height_m, "f_alpha": f_alpha, "x_R": rudder.x_R}
     if form.propeller.number == 2:
-        propeller |= {"number": 2, "y_P": form.propeller.y_P}
+        of_propeller |= {"number": 2, "y_P": form.propeller.y_P}
         of_rudder |= {"number": 2, "y_R": rudder.y_R}
-    for name in (name for name in values if name in PROPELLER_COEFFICIENTS or name in RUDDER_COEFFICIENTS):
-        (propeller if name in PROPELLER_COEFFICIENTS else of_rudder)[name] = _rounded(values[name])
-        if name in errors:
-            uncertainty[name] = _rounded(errors[name], 3)
-    return {"derivatives": derivatives, "propeller": propeller, "rudder": of_rudder, "uncertainty": uncertainty}
+    return of_propeller, of_rudder
 
 
 def tested_card(tests: SteadyTests, values: Mapping[str, float], errors: Mapping[str, float], note: str) -> MmgCard:

@@ -164,9 +164,7 @@ def read_steady_tests(path: Path) -> SteadyTests:
     if faults := [fault for run in steady for fault in islice(_faults(campaign, run), 1)]:
         raise together(faults, can_leave_out=False)
     with_torque = _have_torque(steady, path)
-    if heeled := next((run.name for run in steady if run.heel_rad), ""):
-        problem = f"{heeled} has a heel; the method is of an upright hull"
-        raise InputError(path, "averages.columns.heel_rad", problem, "reduce such tests to a polynomial, without --mmg")
+    _refuse_heel(steady, path)
     tests = SteadyTests(
         path=path,
         form=form,
@@ -176,14 +174,18 @@ def read_steady_tests(path: Path) -> SteadyTests:
         open_water=_open_water(form, path, with_torque=with_torque),
         remarks=(*campaign.remarks, *_oscillating(campaign)),
     )
-    thrusts = {"T": "thrust", "T_left": "thrust_left"}
+    readings = dict(zip(tests.channels, tests.readings.T, strict=True))
+    thrusts = {"thrust": "T", "thrust_left": "T_left"}
     refuse_astern(
-        form,
-        path,
-        tests.motion[:, 4],
-        {thrusts[name]: tests.readings[:, i] for i, name in enumerate(tests.channels) if name in thrusts},
+        form, path, tests.motion[:, 4], {key: readings[name] for key, name in thrusts.items() if name in readings}
     )
     return tests
+
+
+def _refuse_heel(runs: Sequence[CaptiveRun], path: Path) -> None:
+    if heeled := next((run.name for run in runs if run.heel_rad), ""):
+        problem = f"{heeled} has a heel; the method is of an upright hull"
+        raise InputError(path, "averages.columns.heel_rad", problem, "reduce such tests to a polynomial, without --mmg")
 
 
 def _have_torque(runs: Sequence[CaptiveRun], path: Path) -> bool:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -126,7 +127,11 @@ def study_mmg(fit: MmgFit) -> MmgStudy:
         },
         conditions=tuple(tests.names),
         not_excited=tuple(fit.not_excited),
-        notices=(*_checks(fit, coefficients), *_notices(fit, coefficients)),
+        notices=(
+            *(caution(f"{text}.") for text in _checks(fit, coefficients)),
+            *tests.remarks,
+            *(Notice(f"{text}.") for text in _remarks(fit, coefficients)),
+        ),
     )
 
 
@@ -156,33 +161,40 @@ def _significant(fit: MmgFit, name: str, sign: int) -> bool:
     return sign * fit.value(name) > _SIGNIFICANT * float(fit.errors[fit.names.index(name)])
 
 
-def _checks(fit: MmgFit, coefficients: Mapping[str, MmgCoefficient]) -> list[Notice]:
+def _checks(fit: MmgFit, coefficients: Mapping[str, MmgCoefficient]) -> Iterator[str]:
     """Marks of a result that contradicts itself, or that no ship has."""
-    found: list[str] = []
     for name, share in fit.curves_unexplained.items():
         if share > _CURVE_DOUBTFUL:
-            found.append(
+            yield (
                 f"{name} of the open-water points is {100 * share:.2g} % off the curve that the tests behind the "
                 "model agree with; check open_water, model.propeller_diameter_m and the unit of the gauge"
             )
     if fit.at_limit:
         values = ", ".join(f"{name} = {fit.value(name):.3g}" for name in fit.at_limit)
-        found.append(f"{values} at the limit of the search; no ship gives such tests")
+        yield f"{values} at the limit of the search; no ship gives such tests"
+    yield from _extraordinary(coefficients, _TOO_FAR, math.inf)
+    yield from _unusual_hull(fit)
+
+
+def _extraordinary(coefficients: Mapping[str, MmgCoefficient], above: float, most: float) -> Iterator[str]:
+    """Coefficients that differ from ordinary ships' by so many standard deviations."""
     for name, (mean, deviation) in ORDINARY.items():
         value = coefficients[name].value
-        if abs(value - mean) > _TOO_FAR * deviation:
-            found.append(f"{name} is {value:.3g}; ordinary ships have {mean:g} ± {deviation:g}")
+        if above * deviation < abs(value - mean) <= most * deviation:
+            yield f"{name} is {value:.3g}; ordinary ships have {mean:g} ± {deviation:g}"
+
+
+def _unusual_hull(fit: MmgFit) -> Iterator[str]:
     model = fit.tests.form.model
     assert model.draught_m is not None
     ratio = model.draught_m / model.length_m
     hull: list[str] = [name for name in ("Yv", "Nv", "Nr") if name in fit.names]
     prime = {name: ratio * fit.value(name) for name in hull}
     errors = {name: ratio * float(fit.errors[fit.names.index(name)]) for name in hull}
-    cautions = (*unusual_signs(prime, errors), *yaw_damping(prime, errors, ratio))
-    found += [f"by 1/2 rho L² U², {caution.message.rstrip('.')}" for caution in cautions]
+    for unusual in (*unusual_signs(prime, errors), *yaw_damping(prime, errors, ratio)):
+        yield f"by 1/2 rho L² U², {unusual.message.rstrip('.')}"
     if "l_R" in fit.names and _significant(fit, "l_R", +1):
-        found.append(f"l_R is {fit.value('l_R'):+.3g}; it is negative of every ship: check the sign of the yaw rate")
-    return [caution(f"{text}.") for text in found]
+        yield f"l_R is {fit.value('l_R'):+.3g}; it is negative of every ship: check the sign of the yaw rate"
 
 
 def mmg_coefficients(fit: MmgFit) -> dict[str, MmgCoefficient]:
@@ -215,7 +227,7 @@ def mmg_card(fit: MmgFit) -> Card:
     values = {name: mean for name, (mean, _) in ORDINARY.items()} | dict(
         zip(fit.names, map(float, fit.values), strict=True)
     )
-    values = {name: 0.0 for name in fit.not_excited if name not in ("Y0", "N0")} | values
+    values = dict.fromkeys(_zero_on_card(fit), 0.0) | values
     errors = {name: deviation for name, (_, deviation) in ORDINARY.items()} | dict(
         zip(fit.names, map(float, fit.errors), strict=True)
     )
@@ -230,49 +242,39 @@ def mmg_card(fit: MmgFit) -> Card:
     return replace(card, covariance=Covariance(tuple(_place(key) for key, _ in keys), matrix))
 
 
-def _notices(fit: MmgFit, coefficients: Mapping[str, MmgCoefficient]) -> list[Notice]:
-    found = list(fit.tests.remarks)
+def _remarks(fit: MmgFit, coefficients: Mapping[str, MmgCoefficient]) -> Iterator[str]:
     if opened := [name for name, entry in coefficients.items() if entry.origin == "open"]:
-        found.append(
-            Notice(f"The tests leave open, and the card has the values of ordinary ships: {', '.join(opened)}.")
+        yield f"The tests leave open, and the card has the values of ordinary ships: {', '.join(opened)}"
+    if missing := _zero_on_card(fit):
+        yield (
+            f"No condition shows {', '.join(missing)}: they are zero on the card, and a turn simulated with it is as "
+            "wrong as that"
         )
-    if missing := [name for name in fit.not_excited if name not in ("Y0", "N0")]:
-        found.append(
-            Notice(
-                f"No condition shows {', '.join(missing)}: they are zero on the card, and a turn simulated "
-                "with it is as wrong as that."
-            )
-        )
-    for name, (mean, deviation) in ORDINARY.items():
-        entry = coefficients[name]
-        if _FAR * deviation < abs(entry.value - mean) <= _TOO_FAR * deviation:
-            found.append(Notice(f"{name} is {entry.value:.3g}; ordinary ships have {mean:g} ± {deviation:g}."))
+    yield from _extraordinary(coefficients, _FAR, _TOO_FAR)
     if "rudder_offset" in fit.names:
         angle = -np.degrees(fit.value("rudder_offset"))
-        found.append(
-            Notice(
-                f"Straight ahead the rudder has no force at {angle:.2f} deg (positive to starboard), by the swirl of "
-                "the propeller or the zero of the gear; the card does not have it."
-            )
+        yield (
+            f"Straight ahead the rudder has no force at {angle:.2f} deg (positive to starboard), by the swirl of the "
+            "propeller or the zero of the gear; the card does not have it"
         )
     if not fit.common:
-        found.append(
-            Notice(
-                "The standard errors are of the scatter alone: errors of calibration, alignment and speed, common to "
-                "all conditions, are in them where [uncertainty] of the campaign states them."
-            )
+        yield (
+            "The standard errors are of the scatter alone: errors of calibration, alignment and speed, common to all "
+            "conditions, are in them where [uncertainty] of the campaign states them"
         )
     form = fit.tests.form
     raised = blockage_speed(form.model, form.tank, form.test)
     if raised and not form.uncertainty.blockage_relative:
-        found.append(
-            Notice(
-                f"By Schuster's formula the walls raise the speed past the model by {100 * raised:.2g} %, neither "
-                "corrected nor in the standard errors: [uncertainty] blockage_relative takes it in."
-            )
+        yield (
+            f"By Schuster's formula the walls raise the speed past the model by {100 * raised:.2g} %, neither "
+            "corrected nor in the standard errors: [uncertainty] blockage_relative takes it in"
         )
-    found.append(Notice("f_alpha and eps² are one product: the error of eps is that for f_alpha as stated."))
-    return found
+    yield "f_alpha and eps² are one product: the error of eps is that for f_alpha as stated"
+
+
+def _zero_on_card(fit: MmgFit) -> list[str]:
+    """Terms that no condition shows, and that the card has as zero."""
+    return [name for name in fit.not_excited if name not in ("Y0", "N0")]
 
 
 def _card_key(name: str) -> tuple[str, float]:

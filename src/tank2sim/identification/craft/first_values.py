@@ -22,7 +22,7 @@ from tank2sim.identification.trials.methods.kalman_pass import velocities_of
 from tank2sim.identification.trials.methods.output_error import SENSED_BY, Shooting, Shot, cut
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem
 from tank2sim.identification.trials.problem.sampled_runs import SampledRun
-from tank2sim.simulation.recorded import straight_over_gaps
+from tank2sim.records.trials import straight_over_gaps
 
 PREDICTED_S = 30.0
 """Length of a free-running prediction, s, as in the published comparisons on small craft."""

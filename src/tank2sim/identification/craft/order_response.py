@@ -18,7 +18,7 @@ from scipy.optimize import minimize_scalar
 from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredCard
 from tank2sim.identification.craft.problem import twins
-from tank2sim.records.trials import Trial
+from tank2sim.records.trials import Trial, sampling_step
 
 LARGEST_BAND = 0.3
 """Largest dead band that is looked for, over the largest order (project choice: thrusters have up to a tenth)."""
@@ -94,7 +94,7 @@ def _run(trial: Trial, name: str) -> _Run | None:
     if not known.any() or not np.isfinite(speed).all():
         return None
     place = np.maximum.accumulate(np.where(known, np.arange(len(order)), np.flatnonzero(known)[0]))
-    return float(np.median(np.diff(trial.time_s))), order[place], speed
+    return sampling_step(trial), order[place], speed
 
 
 def _response(runs: Sequence[_Run], largest: float) -> OrderResponse | None:

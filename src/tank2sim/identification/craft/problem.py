@@ -21,6 +21,7 @@ import numpy as np
 from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.craft_terms import CRAFT_ADDED_MASSES, VELOCITY_TERMS
+from tank2sim.cards.form import ThrusterSection
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model, Parameter, Quantity, State, same_symbol
@@ -103,19 +104,7 @@ def craft_fit_model(card: SteeredCard, driven_by: str = "revolutions", *, turned
     revolutions; ``orders``: they are in, except a lag shorter than a step. `turned`: The directions of thrusters that
     turn were measured: their lag is left out.
     """
-    if driven_by == "revolutions":
-        thrusters = without_order_response(card).thrusters
-    else:
-        thrusters = tuple(
-            thruster.model_copy(
-                update={
-                    "time_constant_s": _felt(thruster.time_constant_s),
-                    "order_exponent": thruster.order_exponent or 1.0,
-                }
-            )
-            for thruster in card.thrusters
-        )
-    driven = replace(card, thrusters=thrusters)
+    driven = without_order_response(card) if driven_by == "revolutions" else _with_felt_response(card)
     model = build(without_turning_lag(driven) if turned else driven)
     # Added masses are symmetric in theory (Fossen 2021, 6.3).
     if card.derivatives.get("Yrdot", 0.0) == card.derivatives.get("Nvdot", 0.0):
@@ -181,6 +170,16 @@ def _compass(model: Model) -> list[Parameter | Quantity]:
     ]
 
 
+def _with_felt_response(card: SteeredCard) -> SteeredCard:
+    """The card with the response to orders that the steps of the fit show; its exponent is one of the unknowns."""
+    responses = [
+        {"time_constant_s": _felt(thruster.time_constant_s), "order_exponent": thruster.order_exponent or 1.0}
+        for thruster in card.thrusters
+    ]
+    thrusters = zip(card.thrusters, responses, strict=True)
+    return replace(card, thrusters=tuple(thruster.model_copy(update=changes) for thruster, changes in thrusters))
+
+
 def _felt(lag_s: float | None) -> float | None:
     """A lag that the steps of the fit show, s; None for a shorter one."""
     return lag_s if lag_s is not None and lag_s >= OBSERVED_STEP_S else None
@@ -225,20 +224,26 @@ def craft_prior(card: SteeredCard, model: Model) -> dict[str, tuple[float, float
         spread = max(DAMPING_SPREAD * abs(value), CROSS_FLOW_SPREAD * usual)
         found[f"derivatives.{term.name}"] = value, card.uncertainty.get(term.name, spread)
     for thruster in card.thrusters:
-        prefix = f"thrusters.{thruster.name}"
-        spreads = {
-            "ahead": ("ahead_Ns2", THRUST_SPREAD * thruster.ahead_Ns2),
-            "astern": ("astern_Ns2", THRUST_SPREAD * max(thruster.astern_Ns2, 0.5 * thruster.ahead_Ns2)),
-            "speed_loss": ("speed_loss_kg", LOSS_SPREAD * 0.5 * thruster.ahead_Ns2 * thruster.max_radps / speed),
-        }
-        spreads["order_exponent"] = "order_exponent", EXPONENT_SPREAD
-        if lag := _felt(thruster.time_constant_s):
-            spreads["time_constant"] = "time_constant_s", LAG_SPREAD * lag
-        for part, (key, spread) in spreads.items():
-            if f"{prefix}.{part}" in model:
-                stated = getattr(thruster, key)
-                found[f"{prefix}.{part}"] = 1.0 if stated is None else stated, thruster.uncertainty.get(key, spread)
+        found |= _thruster_prior(thruster, speed, model)
     return found | {name: (0.0, spread) for name, spread in COMPASS_SPREADS.items()}
+
+
+def _thruster_prior(thruster: ThrusterSection, speed: float, model: Model) -> dict[str, tuple[float, float]]:
+    """Parameter of a thruster that a model has to its value and standard error before the trials, SI."""
+    spreads = {
+        "ahead": ("ahead_Ns2", THRUST_SPREAD * thruster.ahead_Ns2),
+        "astern": ("astern_Ns2", THRUST_SPREAD * max(thruster.astern_Ns2, 0.5 * thruster.ahead_Ns2)),
+        "speed_loss": ("speed_loss_kg", LOSS_SPREAD * 0.5 * thruster.ahead_Ns2 * thruster.max_radps / speed),
+        "order_exponent": ("order_exponent", EXPONENT_SPREAD),
+    }
+    if lag := _felt(thruster.time_constant_s):
+        spreads["time_constant"] = "time_constant_s", LAG_SPREAD * lag
+    found = {}
+    for part, (key, spread) in spreads.items():
+        if (name := f"thrusters.{thruster.name}.{part}") in model:
+            stated = getattr(thruster, key)
+            found[name] = 1.0 if stated is None else stated, thruster.uncertainty.get(key, spread)
+    return found
 
 
 _SEEN = {"psi_rad": "motion.psi", "x_m": "motion.x", "y_m": "motion.y", "u_mps": "motion.u", "v_mps": "motion.v"}

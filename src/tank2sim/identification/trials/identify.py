@@ -77,6 +77,7 @@ from tank2sim.identification.trials.problem.water_current import (
     without_current,
 )
 from tank2sim.notices import Notice, caution
+from tank2sim.records.trials import Trial
 from tank2sim.simulation.recorded import recorded
 
 LEAST_PIECE = 0.5
@@ -173,25 +174,17 @@ def _identified(
     _refuse_options(card, trials, options)
     given, card = card, polynomial_over_trials(card, trials.trials)
     asked = replace(asked, drifts=of_unknown_current(card, trials.trials))
-    if asked.drifts:  # by the card's own coefficients first; what they do not explain counts as random accelerations
-        problem = current_alone(problem_from_card(card, trials.trials, trials.driven_by))
-        still = kalman(problem, settings=KalmanSettings(scale_prior=False))
-        card = card_in(card, without_current(still, card)[1])
+    if asked.drifts:
+        card = _in_first_current(card, trials)
     structure, structures, weights, chosen = _choose_structure(card, asked, held, executor)
     fit, evidence = _fitted_to_own_trials(card, structure, asked)
     card = card if fit.current is None else card_in(card, fit.current)
-    samples = None
-    if options.posterior:
-        samples = sample_posterior(fit.problem, fit.estimate, options.posterior, options.draws)
-        fit = _with_samples(fit, samples)
+    fit, samples = _with_samples(fit, options)
     silently = replace(asked, progress=silent)
     average = [
         (fit if name == structure else _fitted(card, name, silently), weight) for name, weight in weights.items()
     ]
-    disturbances = fit.disturbances() if options.bootstrap else None  # unknown without velocities
-    again = fit.problem, fit.estimate, partial(_in_pieces, options=options)
     every = [*trials.trials, *(held.trials if held else ())]
-    recognised = ((trial.name, recorded(trial, build(fit.card))) for trial in every)
     return Identification(
         **vars(fit),
         identifiability=identifiability(fit.problem, fit.estimate),
@@ -205,9 +198,9 @@ def _identified(
         weights=weights,
         criteria=or_none(criteria, fit.problem, fit.estimate),
         posterior=samples,
-        bootstrap=bootstrap(*again, disturbances, generators(options.bootstrap), executor) if disturbances else None,
+        bootstrap=_bootstrapped(fit, options, executor),
         forced=evidence,
-        manoeuvres={name: manoeuvre.words for name, manoeuvre in recognised if manoeuvre is not None},
+        manoeuvres=_manoeuvres(fit.card, every),
         notices=(
             *dict.fromkeys((*doubts(given), *doubts(fit.card))),
             *trials.notices,
@@ -218,6 +211,28 @@ def _identified(
             *fit.estimate.notices,
         ),
     )
+
+
+def _in_first_current(card: ManoeuvringCard, trials: Measured) -> ManoeuvringCard:
+    """The card in the current by its own coefficients; what these do not explain counts as random accelerations."""
+    problem = current_alone(problem_from_card(card, trials.trials, trials.driven_by))
+    still = kalman(problem, settings=KalmanSettings(scale_prior=False))
+    return card_in(card, without_current(still, card)[1])
+
+
+def _bootstrapped(fit: Fit, options: IdentificationOptions, executor: Executor | None) -> Array | None:
+    """Estimates from simulated trials; None if they were not asked for, or without velocities."""
+    disturbances = fit.disturbances() if options.bootstrap else None
+    if disturbances is None:
+        return None
+    again = partial(_in_pieces, options=options)
+    return bootstrap(fit.problem, fit.estimate, again, disturbances, generators(options.bootstrap), executor)
+
+
+def _manoeuvres(card: ManoeuvringCard, trials: Sequence[Trial]) -> dict[str, str]:
+    """Trial to its recognised manoeuvre in words."""
+    recognised = ((trial.name, recorded(trial, build(card))) for trial in trials)
+    return {name: manoeuvre.words for name, manoeuvre in recognised if manoeuvre is not None}
 
 
 def _fitted_to_own_trials(card: ManoeuvringCard, structure: str, asked: _Asked) -> tuple[Fit, tuple[str, ...]]:
@@ -345,10 +360,14 @@ def _fitted(card: ManoeuvringCard, structure: str, asked: _Asked) -> Fit:
     return Fit(started, unseen, problem, estimate, improved, current, choice)
 
 
-def _with_samples(fit: Fit, samples: PosteriorSamples) -> Fit:
-    """The fit with means, covariance and samples of the posterior in place of the estimate and its covariance."""
+def _with_samples(fit: Fit, options: IdentificationOptions) -> tuple[Fit, PosteriorSamples | None]:
+    """The fit with the posterior, if asked for, in place of the estimate and its covariance; and its samples."""
+    if not options.posterior:
+        return fit, None
+    samples = sample_posterior(fit.problem, fit.estimate, options.posterior, options.draws)
     estimate = replace(fit.estimate, values=samples.mean, covariance=samples.covariance, samples=samples.flat)
-    return replace(fit, estimate=estimate, card=with_range(card_with_estimate(fit.started, estimate), fit.problem))
+    card = with_range(card_with_estimate(fit.started, estimate), fit.problem)
+    return replace(fit, estimate=estimate, card=card), samples
 
 
 def _in_pieces(problem: Problem, options: IdentificationOptions) -> Estimate:

@@ -58,7 +58,7 @@ def repair_trial(trial: Trial) -> tuple[Trial, tuple[Finding, ...]]:
     those returned: biases, scales and clocks stay as measured.
     """
     repaired, findings = audit_and_repair(trial)
-    return repaired, tuple(finding for finding in findings if finding.safe and finding.repair is not None)
+    return repaired, tuple(finding for finding in findings if finding.repaired)
 
 
 def audit_and_repair(trial: Trial) -> tuple[Trial, tuple[Finding, ...]]:
@@ -68,8 +68,8 @@ def audit_and_repair(trial: Trial) -> tuple[Trial, tuple[Finding, ...]]:
     and are reported only if they concern other columns. After a fault of the time nothing else can be judged.
     """
     findings: list[Finding] = []
+    doubtful: set[str] = set()
     for check in CHECKS:
-        doubtful = {column for finding in findings if finding.open for column in finding.columns}
         if trial.heading("t_s") in doubtful:
             break
         found = [finding for finding in check(trial) if not doubtful.intersection(finding.columns)]
@@ -77,8 +77,10 @@ def audit_and_repair(trial: Trial) -> tuple[Trial, tuple[Finding, ...]]:
             found = [replace(finding, safe=False) for finding in found]
         findings += found
         for finding in found:
-            if finding.safe and finding.repair is not None:
-                trial = _without_empty(finding.repair(trial))
+            if finding.open:
+                doubtful.update(finding.columns)
+            if (repair := finding.safe_repair) is not None:
+                trial = _without_empty(repair(trial))
     return trial, tuple(findings)
 
 

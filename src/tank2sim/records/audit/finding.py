@@ -65,7 +65,17 @@ class Finding:
     def open(self) -> bool:
         """Whether it is a fault that :func:`tank2sim.records.audit.repair_trial` leaves: the trial is then not to be
         used."""
-        return self.kind == "fault" and not (self.safe and self.repair is not None)
+        return self.kind == "fault" and not self.repaired
+
+    @property
+    def repaired(self) -> bool:
+        """Whether :func:`tank2sim.records.audit.repair_trial` corrects the trial as it says."""
+        return self.safe_repair is not None
+
+    @property
+    def safe_repair(self) -> Repair | None:
+        """The repair if it is safe."""
+        return self.repair if self.safe else None
 
     @property
     def entries(self) -> tuple[ColumnFinding, ...]:
@@ -77,7 +87,7 @@ class Finding:
                 what=self.what,
                 likely_truth=self.likely_truth,
                 kind=self.kind,
-                repaired=self.safe and self.repair is not None,
+                repaired=self.repaired,
                 evidence=dict(self.evidence),
                 places_s=self.places_s,
             )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,15 @@ from scipy.integrate import cumulative_trapezoid
 from tank2sim.arrays import Array
 from tank2sim.records.audit.finding import Finding, changed, found_in, negated, noted_in
 from tank2sim.records.audit.noise import record_noise
-from tank2sim.records.audit.weak import FEWEST_WINDOWS, fit, known_rms, on_uniform_time, windows_for, windows_of
+from tank2sim.records.audit.weak import (
+    FEWEST_WINDOWS,
+    AuditWindows,
+    fit,
+    known_rms,
+    on_uniform_time,
+    windows_for,
+    windows_of,
+)
 from tank2sim.records.trials import RUDDERS, Trial
 
 SIDEWAYS = np.pi / 2
@@ -31,7 +40,7 @@ MOVES = 0.3
 def rudder_unit_findings(trial: Trial) -> list[Finding]:
     """Unit of the rudder angle and of the order."""
     findings = []
-    for name in (name for name in RUDDERS if name in trial.signals):
+    for name in _rudders_in(trial.signals):
         largest = float(np.nanmax(np.abs(trial.signals[name])))
         degrees, in_degrees = float(np.rad2deg(largest)), "deg" in trial.heading(name)
         if largest > SIDEWAYS:
@@ -66,8 +75,7 @@ def _turns_too_far(trial: Trial, largest: float) -> bool:
 
 def rudder_findings(trial: Trial) -> list[Finding]:
     """Sign of the rudder angle and of the order, in their right unit, and where one does not follow the other."""
-    present = [name for name in RUDDERS if name in trial.signals]
-    responses = {name: rudder_response(trial, name) for name in present}
+    responses = {name: rudder_response(trial, name) for name in _rudders_in(trial.signals)}
     findings = [_wrong_sign(trial, name, response) for name, response in responses.items() if response < 0]
     return findings or _saturation(trial)
 
@@ -85,29 +93,42 @@ def rudder_response(trial: Trial, name: str | None = None) -> float:
     does not know that the equation is none of a ship that loses speed.
     """
     step, signals = on_uniform_time(trial)
-    present = [rudder for rudder in ((name,) if name else RUDDERS) if rudder in signals]
-    if not present or not {"r_radps", "psi_rad"} & set(signals):
+    present = _rudders_in(signals, (name,) if name else RUDDERS)
+    if not present or not signals.keys() & {"r_radps", "psi_rad"}:
         return 0.0
-    ahead = np.ones(len(signals[present[0]]), dtype=bool)
-    for sign in ("n_radps", "u_mps"):
-        if sign in signals:
-            ahead &= ~(signals[sign] <= 0)
-    rudder = np.where(ahead, signals[present[0]], np.nan)
-    yaw = signals.get("r_radps", signals.get("psi_rad"))
-    assert yaw is not None
-    noise = record_noise(trial)
-    if "r_radps" in signals:
-        windows = windows_for(noise["r_radps"], known_rms(yaw) / 10, step, len(yaw))
-        r, change = windows.mean(yaw), windows.rate(yaw)
-    else:
-        windows = windows_of(yaw, noise["psi_rad"], step)
-        r, change = windows.rate(yaw), windows.acceleration(yaw)
+    windows, r, change = _turning(signals, record_noise(trial), step)
+    rudder = np.where(_ahead(signals, len(signals[present[0]])), signals[present[0]], np.nan)
     mean = windows.mean(rudder)
     steady = _steady_turn(r, mean)
     found = fit(change, [r, mean, np.ones(len(r))])
     if found is not None and found.differs(1) and not (steady and np.nanstd(mean) < MOVES * known_rms(mean)):
         return float(found.values[1] / found.errors[1])
     return steady
+
+
+def _rudders_in(signals: Mapping[str, Array], among: Sequence[str] = RUDDERS) -> list[str]:
+    return [name for name in among if name in signals]
+
+
+def _ahead(signals: Mapping[str, Array], rows: int) -> NDArray[np.bool_]:
+    """Rows (n,) in which neither the propeller nor the ship goes astern or is stopped."""
+    ahead = np.ones(rows, dtype=bool)
+    for name in {"n_radps", "u_mps"} & signals.keys():
+        ahead &= ~(signals[name] <= 0)
+    return ahead
+
+
+def _turning(
+    signals: Mapping[str, Array], noise: Mapping[str, float], step: float
+) -> tuple[AuditWindows, Array, Array]:
+    """Windows, and the rate of turn and its change in them (windows,), by the yaw rate, else by the heading."""
+    if "r_radps" in signals:
+        rate = signals["r_radps"]
+        windows = windows_for(noise["r_radps"], known_rms(rate) / 10, step, len(rate))
+        return windows, windows.mean(rate), windows.rate(rate)
+    heading = signals["psi_rad"]
+    windows = windows_of(heading, noise["psi_rad"], step)
+    return windows, windows.rate(heading), windows.acceleration(heading)
 
 
 def _steady_turn(rate: Array, rudder: Array) -> float:

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import find_objects, label, median_filter
+from scipy.ndimage import median_filter
 from scipy.special import ndtri
 
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, true_runs
 from tank2sim.records.audit.finding import Finding, Repair, SeenPlaces, changed, found_in, noted_in
 from tank2sim.records.audit.noise import DEGREE, WINDOW, record_noise, white_noise
 from tank2sim.records.audit.weak import FALSE_ALARM
@@ -55,7 +55,7 @@ def _missing(trial: Trial, name: str, values: Array) -> list[Finding]:
     missing = np.isnan(values)
     if not missing.any():
         return []
-    runs = _runs(missing)
+    runs = true_runs(missing)
     longest = max(runs, key=lambda run: run.stop - run.start)
     seconds, begin = (longest.stop - longest.start) * sampling_step(trial), trial.time_s[longest.start]
     what = f"{missing.sum()} values are missing, the longest time {seconds:.3g} s from {begin:.6g} s"
@@ -69,15 +69,10 @@ def _places(trial: Trial, rows: Sequence[slice]) -> SeenPlaces:
     return tuple((float(trial.time_s[run.start]), float(trial.time_s[run.stop - 1])) for run in rows)
 
 
-def _runs(true: NDArray[np.bool_]) -> list[slice]:
-    """Slices of the runs of True."""
-    return [found[0] for found in find_objects(label(true)[0]) if found is not None]
-
-
 def _stuck(trial: Trial, name: str, values: Array) -> list[Finding]:
     """Runs of one value that chance (n p^k, p the share of others alike) or a smooth rest does not explain."""
     alike = np.append(np.diff(values) == 0, False)
-    runs = _runs(alike)
+    runs = true_runs(alike)
     if not runs:
         return []
     steps = np.abs(np.diff(values))
@@ -90,14 +85,21 @@ def _stuck(trial: Trial, name: str, values: Array) -> list[Finding]:
     if chance > 0.5:  # rests more often than not: no sensor of a motion, or one far too coarse to judge
         return []
     least = np.log(len(values) / FALSE_ALARM) / -np.log(chance)
-    bends = np.abs(np.diff(values, n=2))
-    # of white noise the bends are 1.7 times the steps, of a curve less; rounding alone is not noise
-    noisy = np.median(bends[bends > 0]) > np.median(moving) and white_noise(values) > _ROUNDING * np.nanmax(abs(values))
-    usual = float(np.quantile(moving, 0.9))
-    long_enough = [run for run in runs if run.stop - run.start > max(least, 9)]
-    stuck = [run for run in long_enough if noisy or _jumps(values, run, usual)]
-    if not stuck:
-        return []
+    noisy, usual = _noisy(values, moving), float(np.quantile(moving, 0.9))
+    least = max(least, 9)
+    stuck = [run for run in runs if run.stop - run.start > least and (noisy or _jumps(values, run, usual))]
+    return [_stuck_finding(trial, name, stuck, longest)] if stuck else []
+
+
+def _noisy(values: Array, moving: Array) -> bool:
+    """Whether a signal is noise that is more than rounding, by its steps that are not zero."""
+    bends = np.abs(np.diff(values, n=2))  # of white noise 1.7 times the steps, of a curve less
+    above_rounding = white_noise(values) > _ROUNDING * np.nanmax(abs(values))
+    return bool(np.median(bends[bends > 0]) > np.median(moving) and above_rounding)
+
+
+def _stuck_finding(trial: Trial, name: str, stuck: Sequence[slice], longest: int) -> Finding:
+    """A sensor that was stuck in some runs of rows, `longest` rows at most."""
     seconds = sum(run.stop - run.start for run in stuck) * sampling_step(trial)
     first = stuck[0]
     what = f"does not change for {seconds:.3g} s in all, first at {trial.time_s[first.start]:.6g} s"
@@ -105,7 +107,7 @@ def _stuck(trial: Trial, name: str, values: Array) -> list[Finding]:
     rows = np.concatenate([np.arange(run.start + 1, run.stop + 1) for run in stuck])
     repair = _omitted(name, rows, "where the sensor did not change")
     found = found_in(trial, [name], what, "the sensor was stuck", evidence, repair)
-    return [_of_readings(trial, found, len(rows), stuck)]
+    return _of_readings(trial, found, len(rows), stuck)
 
 
 def _jumps(values: Array, run: slice, usual: float) -> bool:
@@ -158,7 +160,7 @@ def _spikes(trial: Trial, name: str, values: Array, noise: float, least: float =
 
 def _isolated(values: Array, far: NDArray[np.bool_]) -> list[slice]:
     """The runs of values far away that are as short as a spike, and exceptional."""
-    return [run for run in _runs(far) if run.stop - run.start <= SPIKE_SAMPLES and _exceptional(values, run, far)]
+    return [run for run in true_runs(far) if run.stop - run.start <= SPIKE_SAMPLES and _exceptional(values, run, far)]
 
 
 def _exceptional(values: Array, run: slice, far: NDArray[np.bool_]) -> bool:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -212,32 +213,28 @@ def _lesser(trial: Trial, track: AuditedTrack, pair: tuple[str, str], given: Com
     windows, ground = track.windows, track.ground
     mean = windows.mean(velocity)
     base = [mean, np.ones(len(mean))]
-    plain = fit(ground, base)
+    best = fit(ground, base)
     lever = fit(ground, [*base, windows.rate(turn)])
     clock = fit(ground, [*base, windows.rate(velocity)])
-    findings = []
-    best = plain
     # what half a step of the clock would do cannot be distinguished from the stamping of the times
     least = track.speed * windows.step_s / 2
-    if lever is not None and (lever.differs(4) or lever.differs(5)) and np.hypot(*lever.values[4:6]) > least:
-        best = lever
-        findings.append(_antenna(trial, lever, clock))
+    if lever is not None and any(map(lever.differs, (4, 5))) and np.hypot(*lever.values[4:6]) > least:
+        best, antenna = lever, [_antenna(trial, lever, clock)]
+    else:
+        antenna = []
     if best is None:
-        return findings
-    if best.differs(0, 1.0) and abs(best.values[0] - 1) > SCALE:
-        findings.append(_scale(trial, pair, best))
-    if best.differs(1) and abs(best.values[1]) > OFFSET:
-        findings.append(_offset(trial, best))
-    c = complex(best.values[2], best.values[3])
-    if (best.differs(2) or best.differs(3)) and abs(c) > CURRENT * track.speed:
-        findings.append(_current(trial, pair, c, float(best.errors[2]), track.speed))
-    return findings
+        return antenna
+    found = _scale(trial, pair, best), _offset(trial, best), _current(trial, pair, best, track.speed)
+    return [*antenna, *(finding for finding in found if finding is not None)]
 
 
-def _current(trial: Trial, pair: tuple[str, str], current: complex, error: float, speed: float) -> Finding:
+def _current(trial: Trial, pair: tuple[str, str], found: WeakFit, speed: float) -> Finding | None:
     """A constant difference, m/s, in earth axes of the velocity over ground and the velocities."""
+    current = complex(found.values[2], found.values[3])
     size, towards = abs(current), float(np.rad2deg(np.angle(current)) % 360)
-    evidence = {"speed_mps": size, "direction_deg": towards, "standard_error_mps": error}
+    if not any(map(found.differs, (2, 3))) or size <= CURRENT * speed:
+        return None
+    evidence = {"speed_mps": size, "direction_deg": towards, "standard_error_mps": float(found.errors[2])}
     what = "velocity over ground and the velocities differ by a constant in earth axes"
     if size > FASTEST * speed:
         truth = "x, y or the velocities are not what their names say: no current is as fast"
@@ -268,8 +265,10 @@ def _antenna(trial: Trial, lever: WeakFit, clock: WeakFit | None) -> Finding:
     return noted_in(trial, _PLACES, what, truth, evidence)
 
 
-def _scale(trial: Trial, pair: tuple[str, str], found: WeakFit) -> Finding:
+def _scale(trial: Trial, pair: tuple[str, str], found: WeakFit) -> Finding | None:
     factor = float(found.values[0])
+    if not found.differs(0, 1.0) or abs(factor - 1) <= SCALE:
+        return None
     evidence = {"factor": factor, "standard_error": float(found.errors[0])}
     what = f"velocity over ground is {factor:.4g} times the velocities"
     notice = f"{', '.join(pair)} multiplied by {factor:.4g}, by the track"
@@ -281,8 +280,10 @@ def _scale(trial: Trial, pair: tuple[str, str], found: WeakFit) -> Finding:
     return noted_in(trial, pair, what, f"the log reads {100 * (1 / factor - 1):+.2g} %", evidence, scaled)
 
 
-def _offset(trial: Trial, found: WeakFit) -> Finding:
+def _offset(trial: Trial, found: WeakFit) -> Finding | None:
     """The track is turned against heading and velocities: psi + offset is the heading in the axes of x and y."""
+    if not found.differs(1) or abs(found.values[1]) <= OFFSET:
+        return None
     offset = float(np.arctan2(found.values[1], found.values[0]))
     evidence = {"angle_deg": float(np.rad2deg(-offset)), "standard_error_deg": float(np.rad2deg(found.errors[1]))}
     size = f"{np.rad2deg(abs(offset)):.3g} deg too {'much' if offset < 0 else 'little'}"
@@ -318,8 +319,14 @@ class _Scale:
     def known(self) -> bool:
         return self.error < KNOWN * self.factor
 
-    def is_of(self, unit: float) -> bool:
-        return bool(abs(np.log(self.factor / unit)) < CERTAIN) and self.unexplained < MISCALIBRATED
+    def unit_among(self, units: Iterable[float]) -> float | None:
+        """The unit that has this factor, if any."""
+        near = (unit for unit in units if abs(np.log(self.factor / unit)) < CERTAIN)
+        return next(near, None) if self.unexplained < MISCALIBRATED else None
+
+    @property
+    def evidence(self) -> dict[str, float]:
+        return {"factor": self.factor} | ({"standard_error": self.error} if self.known else {})
 
     @property
     def usual(self) -> bool:
@@ -333,11 +340,11 @@ def speed_unit_findings(trial: Trial) -> list[Finding]:
     """
     if not {"x_m", "y_m", "psi_rad"} <= set(trial.signals):
         return []
-    present = [pair for pair in PAIRS if set(pair) <= set(trial.signals)]
-    alone = [(name,) for name in ("u_mps", "sog_mps") if name in trial.signals]
+    present = [names for names in (*PAIRS, ("u_mps",), ("sog_mps",)) if set(names) <= set(trial.signals)]
     findings: list[Finding] = []
-    for names in [*present, *(names for names in alone if not any(names[0] in pair for pair in present))]:
-        found = _of(trial, names)
+    for names in present:
+        part_of_pair = any(set(names) < set(pair) for pair in present)
+        found = None if part_of_pair else _of(trial, names)
         if found is None:
             continue
         findings.append(found)
@@ -355,29 +362,36 @@ def _of(trial: Trial, names: tuple[str, ...]) -> Finding | None:
     scale = _scale_by_windows(track, given, names)
     if scale is None or scale.usual:
         return None
-    factor = scale.factor
-    evidence = {"factor": factor} | ({"standard_error": scale.error} if scale.known else {})
-    what = f"speed over ground is {factor:.3g} times the speed given"
-    for unit, name in _UNITS.items():
-        if scale.is_of(unit):
-            wrong = names[:1] if len(names) > 1 and _sway_is_right(track, given, unit) else names
-            truth = f"{'they are' if len(wrong) > 1 else 'it is'} in {name}"
-            in_si = changed(wrong, lambda values: values * unit, f"{', '.join(wrong)}: {truth}")  # noqa: B023
-            return found_in(trial, wrong, what, truth, evidence, in_si)
-    for unit, name in LENGTHS.items():
-        if scale.is_of(unit):
-            if name == "kilometres" and "r_radps" not in trial.signals:
-                truth = f"x and y are in {name}, or time is in milliseconds"
-                return found_in(trial, (*_PLACES, "t_s"), what, truth, evidence)
-            truth = f"they are in {name}"
-            in_metres = changed(_PLACES, lambda values: values / unit, f"x_m, y_m: {truth}")  # noqa: B023
-            return found_in(trial, _PLACES, what, truth, evidence, in_metres)
+    evidence = scale.evidence
+    what = f"speed over ground is {scale.factor:.3g} times the speed given"
+    if (unit := scale.unit_among(_UNITS)) is not None:
+        wrong = names[:1] if _sway_is_right(track, given, unit) else names
+        truth = f"{'they are' if len(wrong) > 1 else 'it is'} in {_UNITS[unit]}"
+        in_si = changed(wrong, partial(np.multiply, unit), f"{', '.join(wrong)}: {truth}")
+        return found_in(trial, wrong, what, truth, evidence, in_si)
+    if (unit := scale.unit_among(LENGTHS)) is not None:
+        return _length_unit(trial, unit, what, evidence)
     if not scale.known and scale.unexplained < MISCALIBRATED:  # a current may be as fast
         return None
-    nearest, truth = min(_UNITS, key=lambda unit: abs(np.log(factor / unit))), _NO_UNIT
-    if abs(np.log(factor / nearest)) < np.log(1 + MISCALIBRATED):
-        truth += f" ({_UNITS[nearest]} with an error of {100 * (nearest / factor - 1):+.2g} %, or another clock)"
-    return found_in(trial, (*names, *_PLACES), what, truth, evidence)
+    return found_in(trial, (*names, *_PLACES), what, _no_unit(scale.factor), evidence)
+
+
+def _length_unit(trial: Trial, unit: float, what: str, evidence: Mapping[str, float]) -> Finding:
+    """Positions in another unit of length; without a rate of turn the clock may be wrong in place of kilometres."""
+    if LENGTHS[unit] == "kilometres" and "r_radps" not in trial.signals:
+        truth = "x and y are in kilometres, or time is in milliseconds"
+        return found_in(trial, (*_PLACES, "t_s"), what, truth, evidence)
+    truth = f"they are in {LENGTHS[unit]}"
+    in_metres = changed(_PLACES, lambda values: values / unit, f"x_m, y_m: {truth}")
+    return found_in(trial, _PLACES, what, truth, evidence, in_metres)
+
+
+def _no_unit(factor: float) -> str:
+    """What a factor of no unit may be."""
+    nearest = min(_UNITS, key=lambda unit: abs(np.log(factor / unit)))
+    if abs(np.log(factor / nearest)) >= np.log(1 + MISCALIBRATED):
+        return _NO_UNIT
+    return f"{_NO_UNIT} ({_UNITS[nearest]} with an error of {100 * (nearest / factor - 1):+.2g} %, or another clock)"
 
 
 def _scale_by_windows(track: AuditedTrack, given: Complex, names: tuple[str, ...]) -> _Scale | None:
@@ -393,9 +407,7 @@ def _scale_by_windows(track: AuditedTrack, given: Complex, names: tuple[str, ...
         return _Scale(ratio, 0.0)
     turn = np.exp(1j * track.signals["psi_rad"])
     if len(names) == 1:
-        along = track.windows.mean(turn)
-        found = fit((track.ground * along.conj()).real, [mean, along.real, along.imag])
-        fits = [] if found is None else [(found.residual, float(found.values[0]), float(found.errors[0]))]
+        fits = [_fitted_ahead(track, mean, track.windows.mean(turn))]
     else:
         fits = [_fitted(track, reading.velocity(given, turn), reading.mirrored) for reading in TRACK_READINGS]
     fits = [candidate for candidate in fits if candidate[1] > 0]
@@ -406,7 +418,16 @@ def _scale_by_windows(track: AuditedTrack, given: Complex, names: tuple[str, ...
     return _Scale(ratio, np.inf)
 
 
+def _fitted_ahead(track: AuditedTrack, mean: Array, along: Complex) -> tuple[float, float, float]:
+    """As :func:`_fitted`, of a speed ahead alone."""
+    found: WeakFit | None = fit((track.ground * along.conj()).real, [mean, along.real, along.imag])
+    if found is None:
+        return np.inf, 0.0, np.inf
+    return found.residual, float(found.values[0]), float(found.errors[0])
+
+
 def _fitted(track: AuditedTrack, velocity: Complex, mirrored: bool) -> tuple[float, float, float]:
+    """Misfit, factor and its standard error of velocities as a reading has them; a factor of 0 if they fit none."""
     ground = track.ground.conj() if mirrored else track.ground
     mean = track.windows.mean(velocity)
     found: WeakFit | None = fit(ground, [mean, np.ones(len(mean))])
@@ -416,7 +437,9 @@ def _fitted(track: AuditedTrack, velocity: Complex, mirrored: bool) -> tuple[flo
 
 
 def _sway_is_right(track: AuditedTrack, given: Complex, factor: float) -> bool:
-    """Whether v alone is in m/s, by the velocity across the heading."""
+    """Whether v, if it is given, is in m/s in spite of u, by the velocity across the heading."""
+    if not given.imag.any():
+        return False
     turn = track.windows.mean(np.exp(1j * track.signals["psi_rad"]))
     sway = track.windows.mean(given.imag)
     found = fit((track.ground * turn.conj()).imag, [sway, np.ones(len(sway))])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from tank2sim.arrays import Array
-from tank2sim.records.trials import Trial, sampling_step
+from tank2sim.records.trials import Trial, sampling_step, usual_step
 
 Complex = NDArray[np.complex128]
 AuditNumber = TypeVar("AuditNumber", np.float64, np.complex128)
@@ -216,8 +216,7 @@ def _on_grid(name: str, trial: Trial, grid: Array, step: float) -> Array:
     if len(time) < 2:
         return np.full(len(grid), np.nan)
     after = np.clip(np.searchsorted(time, grid), 1, len(time) - 1)
-    usual_step = float(np.median(np.diff(time)))
-    missing = (time[after] - time[after - 1]) > max(2 * step, 1.5 * usual_step)
+    missing = (time[after] - time[after - 1]) > max(2 * step, 1.5 * usual_step(time))
     missing |= (grid < time[0] - step / 2) | (grid > time[-1] + step / 2)
     if name in ORDERS:
         return np.where(missing, np.nan, values[np.clip(np.searchsorted(time, grid, side="right") - 1, 0, None)])

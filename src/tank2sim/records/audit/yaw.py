@@ -259,28 +259,42 @@ def _factor(trial: Trial, found: _Comparison) -> Finding:
 
 def _unit(trial: Trial, found: _Comparison) -> Finding | None:
     """The unit that a factor between dpsi/dt and r indicates, and whose unit it is, if that can be determined."""
+    factor, nearest = abs(found.factor), _nearest_unit(found)
+    if nearest is None:
+        return None
+    what = f"dpsi/dt is {factor:.4g} times r"
+    slope = _course_slope(trial)
+    psi_right = slope is not None and abs(np.log(abs(slope))) < 1.0  # the course turns as it does
+    wrong = {
+        name: truth
+        for unit, name, in_degrees, truth in _UNIT_READINGS
+        if unit == nearest and in_degrees == ("deg" in trial.heading(name)) and (name, psi_right) != ("psi_rad", True)
+    }
+    if len(wrong) != 1:
+        truth = ", or ".join(wrong.values()) or "one of them is not in the unit of its name"
+        return found_in(trial, _YAW, what, truth, {"factor": factor})
+    ((name, truth),) = wrong.items()
+    scale = nearest if name == "r_radps" else 1 / nearest
+    return found_in(trial, [name], what, truth, {"factor": factor}, _scaled(name, scale, truth))
+
+
+_UNIT_READINGS = (
+    (1 / 60, "r_radps", True, "r is in deg/min"),
+    (1 / _DEGREE, "r_radps", True, "r is in rad/s"),
+    (1 / _DEGREE, "psi_rad", False, "psi is in degrees"),
+    (_DEGREE, "r_radps", False, "r is in deg/s"),
+    (_DEGREE, "psi_rad", True, "psi is in radians"),
+)
+"""Factor between dpsi/dt and r, the signal that may have another unit, whether its name says degrees, and the unit."""
+
+
+def _nearest_unit(found: _Comparison) -> float | None:
+    """Factor between two units of angle or time that a factor agrees with; None if with none, or with 1."""
     factor = abs(found.factor)
     nearest = min((1.0, 1 / _DEGREE, _DEGREE, 1 / 60), key=lambda unit: abs(np.log(factor / unit)))
     # few or noisy windows determine a factor less well
     tolerance = max(UNIT_TOLERANCE, min(0.1, 4.5 * float(found.fit.errors[0]) / factor))
-    if nearest == 1.0 or abs(np.log(factor / nearest)) > tolerance:
-        return None
-    r, psi = trial.heading("r_radps"), trial.heading("psi_rad")
-    what = f"dpsi/dt is {factor:.4g} times r"
-    small, slope = nearest == 1 / _DEGREE, _course_slope(trial)
-    psi_right = slope is not None and abs(np.log(abs(slope))) < 1.0  # the course turns as it does
-    readings = []
-    if nearest == 1 / 60 and "deg" in r:
-        readings.append(("r_radps", 1 / 60, "r is in deg/min"))
-    if nearest != 1 / 60 and ("deg" in r) == small:
-        readings.append(("r_radps", nearest, "r is in rad/s" if small else "r is in deg/s"))
-    if nearest != 1 / 60 and ("deg" in psi) != small and not psi_right:
-        readings.append(("psi_rad", 1 / nearest, "psi is in degrees" if small else "psi is in radians"))
-    if len(readings) != 1:
-        truth = ", or ".join(truth for *_, truth in readings) or "one of them is not in the unit of its name"
-        return found_in(trial, _YAW, what, truth, {"factor": factor})
-    ((name, scale, truth),) = readings
-    return found_in(trial, [name], what, truth, {"factor": factor}, _scaled(name, scale, truth))
+    return None if nearest == 1.0 or abs(np.log(factor / nearest)) > tolerance else nearest
 
 
 def _scaled(name: str, factor: float, notice: str) -> Repair:

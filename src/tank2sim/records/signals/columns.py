@@ -21,15 +21,9 @@ _UNIT = {"deg": "deg", "degps": "deg/s", "rpm": "rpm", "mps": "m/s", "m": "m"}
 
 @dataclass(frozen=True)
 class SignalName:
-    """One signal of a trial.
+    """One signal of a trial."""
 
-    Parameters
-    ----------
-    si : str
-        Its name in SI, the key in ``Trial.signals``: ``r_radps``.
-    """
-
-    si: str
+    si: str  # Its name in SI, the key in ``Trial.signals``: ``r_radps``
 
     @property
     def stem(self) -> str:
@@ -67,10 +61,7 @@ def file_columns(trial: Trial) -> dict[str, Array]:
 def find_signal(asked: str, trial: Trial) -> str:
     """The name in SI of a signal asked for as ``r_degps``, ``r_radps``, ``r``, or as its file calls it.
 
-    Raises
-    ------
-    InputError
-        The signal is not in the trial.
+    Raises InputError: The signal is not in the trial.
     """
     name = to_si(asked, 1.0)[0]
     for signal in trial.signals:

@@ -52,24 +52,21 @@ def butterworth(
     sections = signal.butter(
         order, edges if kind is FilterType.BAND else edges[0], kind.value, fs=series.rate_hz, output="sos"
     )
-    settling = _settling(sections, series)
+    settling, grid = _settling(sections, series), effect_frequencies(series)
+    response = _sections_response(sections, grid, series)
     if causal:
         first = signal.sosfilt_zi(sections) * series.values[0]
         values = signal.sosfilt(sections, series.values, zi=first)[0]
-    else:
-        # Reflected as far as the filter remembers, the record's ends are least disturbed.
-        reach = min(len(series.values) - 1, max(1, round(settling / series.step_s)))
-        values = signal.sosfiltfilt(sections, series.values, padlen=reach)
-    grid = effect_frequencies(series)
-    response = _sections_response(sections, grid, series)
-    if not causal:
-        response = np.abs(response) ** 2 + 0j
-    delay = _sections_delay(sections, grid, series) if causal else np.zeros(len(grid))
-    effect = FilterEffect(grid, response, delay, (settling, 0.0 if causal else settling), "")
+        effect = FilterEffect(grid, response, _sections_delay(sections, grid, series), (settling, 0.0), "")
+        return Filtered(series.with_values(values), replace(effect, explanation=_causal_sentence(effect, kind, edges)))
+    # Reflected as far as the filter remembers, the record's ends are least disturbed.
+    reach = min(len(series.values) - 1, max(1, round(settling / series.step_s)))
+    values = signal.sosfiltfilt(sections, series.values, padlen=reach)
     where = " and ".join(f"{edge:.3g}" for edge in edges)
     sentence = f"no phase shift, {decibel(0.5)} at {where} Hz, ends distorted over {settling:.3g} s"
-    sentence = _causal_sentence(effect, kind, edges) if causal else sentence
-    return Filtered(series.with_values(values), replace(effect, explanation=sentence))
+    response = np.abs(response) ** 2 + 0j
+    effect = FilterEffect(grid, response, np.zeros(len(grid)), (settling, settling), sentence)
+    return Filtered(series.with_values(values), effect)
 
 
 def savitzky_golay(series: Series, samples: int, degree: int, *, derivative: int = 0) -> Filtered:

@@ -27,28 +27,15 @@ error of phase of 4.5 deg, and of times written with two digits at 10 Hz it is t
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Evenly sampled values of one signal, without gaps.
+    """Evenly sampled values of one signal, without gaps."""
 
-    Parameters
-    ----------
-    source : Path
-        File of the trial.
-    name : str
-        Name of the signal in SI, as in ``Trial.signals``.
-    start_s, step_s : float
-        Time of the first sample, and from one to the next.
-    values : array (n,)
-        In SI.
-    notices : tuple of Notice
-        What was done to get here.
-    """
-
-    source: Path
-    name: str
+    source: Path  # File of the trial
+    name: str  # Name of the signal in SI, as in ``Trial.signals``
+    # `start_s`, `step_s`: Time of the first sample, and from one to the next.
     start_s: float
     step_s: float
-    values: Array
-    notices: tuple[Notice, ...] = ()
+    values: Array  # (n,): In SI
+    notices: tuple[Notice, ...] = ()  # What was done to get here
 
     @property
     def time_s(self) -> Array:
@@ -81,19 +68,10 @@ def even_series(trial: Trial, name: str, max_gap_s: float | None = None) -> Seri
     Short gaps and uneven times are bridged by straight lines (orders are held), and it says so; what is missing at
     the two ends is cut off; a direction is made continuous.
 
-    Parameters
-    ----------
-    trial : Trial
-        Any trial.
-    name : str
-        Key of ``trial.signals``.
-    max_gap_s : float, optional
-        Longest gap to bridge; by default five steps.
+    `trial`: Any trial. `name`: Key of ``trial.signals``. `max_gap_s`, optional: Longest gap to bridge; by default five
+    steps.
 
-    Raises
-    ------
-    InputError
-        There are fewer than 50 values, or a gap is longer.
+    Raises InputError: There are fewer than 50 values, or a gap is longer.
     """
     column = f"column {SignalName(name).file}"
     values = np.asarray(trial.signals[name], dtype=float)
@@ -103,28 +81,36 @@ def even_series(trial: Trial, name: str, max_gap_s: float | None = None) -> Seri
         raise trial.fault(column, problem, "give a longer record or leave the column out")
     time, values = trial.time_s[known], values[known]
     notices = []
-    if known[0] > 0 or known[-1] < len(trial.time_s) - 1:
+    if known[-1] - known[0] < len(trial.time_s) - 1:
         notices.append(f"is known from {time[0]:.6g} to {time[-1]:.6g} s only")
     if name in DIRECTION_COLUMNS:
         continuous: Array = np.unwrap(values)
         if not np.array_equal(continuous, values):
             notices.append("was made continuous through north")
             values = continuous
-    step, gap = _usual_step(time), int(np.argmax(np.diff(time)))
+    step = _usual_step(time)
     # Half a step more, so that a gap of five steps in times that are rounded is five steps.
-    limit = (GAP_STEPS + 0.5) * step if max_gap_s is None else max_gap_s
-    if (longest := float(time[gap + 1] - time[gap])) > limit:
-        problem = f"has no value from {time[gap]:.6g} to {time[gap + 1]:.6g} s, longer than {limit:.3g} s"
-        raise trial.fault(column, problem, "cut the record there, or allow it with --max-gap SECONDS")
+    longest = _longest_gap(trial, column, time, (GAP_STEPS + 0.5) * step if max_gap_s is None else max_gap_s)
+    held = name in HELD_COLUMNS
     count = round(float(time[-1] - time[0]) / step) + 1
     step = float(time[-1] - time[0]) / (count - 1)
     grid = time[0] + step * np.arange(count, dtype=np.float64)
     if count != time.size or np.max(np.abs(time - grid)) > _JITTER * step:
-        values = at_grid(time, values, grid, held=name in HELD_COLUMNS)
-        way = "held" if name in HELD_COLUMNS else "interpolated by straight lines"
+        values = at_grid(time, values, grid, held=held)
+        way = "held" if held else "interpolated by straight lines"
         notices.append(f"is unevenly sampled or has gaps of up to {longest:.4g} s; it was {way} at {step:.4g} s")
     messages = tuple(Notice(f"{column.removeprefix('column ')} {notice}") for notice in notices)
     return Series(trial.path, name, float(time[0]), step, values, messages)
+
+
+def _longest_gap(trial: Trial, column: str, time: Array, limit: float) -> float:
+    """The longest time between two values, s; refused if it is longer than `limit`."""
+    gap = int(np.argmax(np.diff(time)))
+    longest = float(time[gap + 1] - time[gap])
+    if longest > limit:
+        problem = f"has no value from {time[gap]:.6g} to {time[gap + 1]:.6g} s, longer than {limit:.3g} s"
+        raise trial.fault(column, problem, "cut the record there, or allow it with --max-gap SECONDS")
+    return longest
 
 
 def _usual_step(time: Array) -> float:
@@ -137,10 +123,7 @@ def _usual_step(time: Array) -> float:
 def at_common_times(first: Series, second: Series) -> tuple[Series, Series]:
     """Two signals of one trial at the same times: where both are known, at the shorter of their steps.
 
-    Raises
-    ------
-    InputError
-        They have fewer than 50 samples in common.
+    Raises InputError: They have fewer than 50 samples in common.
     """
     start = max(first.start_s, second.start_s)
     end = min(float(first.time_s[-1]), float(second.time_s[-1]))

@@ -43,10 +43,7 @@ def thinned(trial: Trial, filtered: Sequence[Filtered], notice: str) -> Trial:
 
     `notice` is added to the trial's notices.
 
-    Raises
-    ------
-    InputError
-        The signals do not have the same times.
+    Raises InputError: The signals do not have the same times.
     """
     time = filtered[0].series.time_s
     signals: dict[str, Array] = {}

@@ -115,6 +115,11 @@ class FigureComparison:
         difference = self.predicted - self.measured
         return difference / self.measured if self.name.endswith("_m") else difference
 
+    @property
+    def missed(self) -> bool:
+        """Whether the measured figure is outside its prediction interval."""
+        return self.interval is not None and not self.interval[0] <= self.measured <= self.interval[1]
+
 
 def or_none(function: Callable[_Given, _Found], *given: _Given.args, **named: _Given.kwargs) -> _Found | None:
     """The result of a `function`; None where the records do not allow it, or a motion leaves all bounds."""

@@ -45,30 +45,15 @@ STILL = {"motion.u": 0.002, "motion.v": 0.002, "motion.r": 0.002, "rudder": 0.00
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class IdentifiabilityStudy:
-    """How well the trials determine the parameters (k), in units of the prior's standard errors.
-
-    Parameters
-    ----------
-    parameters : tuple of str
-    condition : float
-        Largest over smallest singular value.
-    singular_values : array (k,)
-        Of the weighted sensitivities, falling; below 1 the prior has more information than the trials.
-    correlation : array (k, k)
-        By the trials alone.
-    correlated_pairs : tuple of (str, str, float)
-        The closest first.
-    unseen : tuple of tuple of str
-        Combinations of parameters that the trials do not determine.
-    notices : tuple of Notice
-    """
+    """How well the trials determine the parameters (k), in units of the prior's standard errors."""
 
     parameters: tuple[str, ...]
-    condition: Unbounded
+    condition: Unbounded  # Largest over smallest singular value
+    # (k,): Of the weighted sensitivities, falling; below 1 the prior has more information than the trials.
     singular_values: Array
-    correlation: Array
-    correlated_pairs: tuple[tuple[str, str, float], ...]
-    unseen: tuple[tuple[str, ...], ...]
+    correlation: Array  # (k, k): By the trials alone
+    correlated_pairs: tuple[tuple[str, str, float], ...]  # The closest first
+    unseen: tuple[tuple[str, ...], ...]  # Combinations of parameters that the trials do not determine
     notices: tuple[Notice, ...]
 
 
@@ -123,20 +108,22 @@ def refuse_unseen(problem: Problem) -> tuple[str, ...]:
     size = _large(problem, estimate.values)
     missing = []
     for place, name in enumerate(problem.free):
-        column = jacobian[:, :, place]
-        term = parse_term(_short(name))
-        if term is not None and (term.v or term.r or term.d or term.u):
+        term, column = parse_term(_short(name)), jacobian[:, :, place]
+        if _needs_motion(term):
             column = column - column.mean(axis=0)
         shown = size[place] * inverse @ column.T
-        least = LEAST_OF_LINEAR if term is not None and _linear(term) else 1.0
-        if form.seen[place] and np.sum(shown**2) < least:
+        if form.seen[place] and np.sum(shown**2) < (LEAST_OF_LINEAR if _linear(term) else 1.0):
             missing.append(name)
     refused = [name for name in missing if _needed(parse_term(_short(name)))]
     if refused:
         runs = ", ".join(dict.fromkeys(run.origin for run in problem.runs))
-        text = ", ".join(_short(name) for name in refused)
-        raise InputError(runs, "", f"shows nothing of {text}", _remedy(refused))
+        raise InputError(runs, "", f"shows nothing of {', '.join(map(_short, refused))}", _remedy(refused))
     return tuple(missing)
+
+
+def _needs_motion(term: Term | None) -> bool:
+    """True for a derivative of a force that is zero straight ahead at the card's speed."""
+    return term is not None and any((term.v, term.r, term.d, term.u))
 
 
 def _needed(term: Term | None) -> bool:
@@ -158,8 +145,8 @@ def _large(problem: Problem, values: Array) -> Array:
     return size
 
 
-def _linear(term: Term) -> bool:
-    return not term.acceleration and term.v + term.r + term.d + term.u == 1
+def _linear(term: Term | None) -> bool:
+    return term is not None and not term.acceleration and term.v + term.r + term.d + term.u == 1
 
 
 def _quietened(form: WeakForm, place: int) -> SampledRun:

@@ -271,23 +271,16 @@ def structure_by_evidence(
     """
     if card.model.kind != "abkowitz":
         return "card", ()
-    found: list[tuple[Criteria, ManoeuvringCard, Problem]] = []
     try:
-        for name in ("card", "cross_flow"):
-            started = STRUCTURES[name].start(card)
-            posed = posed_in(card, started, trials, options)
-            posed = posed.without(refuse_unseen(posed))
-            estimate = equation_error(posed)
-            criterion = criteria(posed, estimate, found[0][0].samples if found else None)
-            found.append((criterion, card_with_estimate(started, estimate), posed))
+        of_card, given, problem = _by_equation_error("card", card, trials, options)
+        drag, with_drag, problem_of_drag = _by_equation_error("cross_flow", card, trials, options, of_card.samples)
     except (InputError, np.linalg.LinAlgError):  # no velocities to compare by, or a card that cannot have the structure
         return "card", ()
-    (of_card, drag), cards, problems = zip(*found, strict=True)
     difference = (of_card.bic - drag.bic) / of_card.samples
     if difference < -STRONGLY:
         return "card", ()
     undecided = abs(difference) < STRONGLY
-    taken = "card" if undecided and _predicts_better(*problems) else "cross_flow"
+    taken = "card" if undecided and _predicts_better(problem, problem_of_drag) else "cross_flow"
     by = f"(BIC {difference:+.2g} for each independent sample, strong below -{STRONGLY:g})"
     chosen = (
         "structure: the card's own third-order terms, which predict trials that were left out better than cross-flow "
@@ -296,11 +289,26 @@ def structure_by_evidence(
         else "structure: cross-flow drag in place of the card's own third-order terms, which the trials do not prefer "
         f"strongly {by}; structure card keeps them"
     )
-    others = holdout.trials if holdout else ()
+    in_doubt = undecided and _hardest_rudder(holdout) < NEARLY_HARD * HARD_RUDDER
+    return taken, (Notice(chosen), *(_turns_in_doubt(given, with_drag, taken) if in_doubt else ()))
+
+
+def _by_equation_error(
+    name: str, card: ManoeuvringCard, trials: Measured, options: IdentificationOptions, samples: float | None = None
+) -> tuple[Criteria, ManoeuvringCard, Problem]:
+    """Criteria, card and problem of a structure that is fitted by equation error."""
+    started = STRUCTURES[name].start(card)
+    posed = posed_in(card, started, trials, options)
+    posed = posed.without(refuse_unseen(posed))
+    estimate = equation_error(posed)
+    return criteria(posed, estimate, samples), card_with_estimate(started, estimate), posed
+
+
+def _hardest_rudder(trials: Measured | None) -> float:
+    """Largest angle or order of the rudder in trials, rad; 0 without any."""
+    others = trials.trials if trials else ()
     rudders = [trial.signals[name] for trial in others for name in RUDDERS if name in trial.signals]
-    hardest = max((float(np.nanmax(np.abs(angles))) for angles in rudders), default=0.0)
-    in_doubt = undecided and hardest < NEARLY_HARD * HARD_RUDDER
-    return taken, (Notice(chosen), *(_turns_in_doubt(cards[0], cards[1], taken) if in_doubt else ()))
+    return max((float(np.nanmax(np.abs(angles))) for angles in rudders), default=0.0)
 
 
 def _predicts_better(of_card: Problem, drag: Problem) -> bool:

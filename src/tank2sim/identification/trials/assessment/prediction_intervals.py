@@ -21,6 +21,7 @@ from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import nullcontext, suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import chain
 
 import casadi as ca
 import numpy as np
@@ -339,7 +340,7 @@ def bands(
             values |= draw_disturbances(disturbances, fastest_rate(model), rng)
         tasks.append((ship, manoeuvre, values))
     results = list((map if executor is None else executor.map)(_figures, tasks))
-    names = dict.fromkeys(name for figures in results for name in figures)
+    names = dict.fromkeys(chain.from_iterable(results))
     if not names:
         raise model.fault("", "the motion leaves all bounds in every member", "check the estimates")
     members = {name: np.array([figures.get(name, np.nan) for figures in results]) for name in names}

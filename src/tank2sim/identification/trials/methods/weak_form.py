@@ -25,15 +25,15 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.integrate import cumulative_trapezoid
 
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, true_runs
 from tank2sim.dynamics.build import KEPT_MODELS
-from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Input, Model, same_symbol
 from tank2sim.errors import InputError
 from tank2sim.identification.trials.problem.estimation_problem import Problem
 from tank2sim.identification.trials.problem.sampled_runs import LONGEST_GAP, SampledRun, rudder_at_start
 from tank2sim.notices import Notice
-from tank2sim.simulation.recorded import SMOOTHING, drift_over_ground
+from tank2sim.records.trials import straight_over_gaps
+from tank2sim.simulation.recorded import earth_components, smoothing_window, velocities_through_water
 from tank2sim.simulation.rows import RowFunction
 from tank2sim.simulation.sensitivity import Sensitivity
 
@@ -78,19 +78,10 @@ def measured_motion(problem: Problem, run: SampledRun) -> MeasuredMotion:
 
 @lru_cache(maxsize=16)  # the folds of a cross-validation share their runs
 def _measured_motion(model: Model, window: int, run: SampledRun) -> MeasuredMotion:
-    columns = {name: run.column(name) for name in MEASURED_STATES}
+    columns, notices = _measured_often(run, window)
     missing = {name for name, column in columns.items() if np.isnan(column).all()}
-    seldom = _seldom(columns, _LEAST_STRETCH * window)
-    missing |= seldom
-    columns |= {name: np.full(len(run.measured), np.nan) for name in seldom}
     if len(run.measured) <= window:
         raise InputError(run.origin, "", f"has only {len(run.measured)} steps", f"at least {window + 1} are needed")
-    notices = []
-    if seldom:
-        names = ", ".join(name[7:] for name in VELOCITIES if name in seldom)
-        notices.append(
-            Notice(f"{run.name}: the readings of {names} are too far apart, and heading and positions are not")
-        )
     if "motion.r" in missing:
         if "motion.psi" in missing:
             raise InputError(run.origin, "header", "has neither yaw rate nor heading", "give r_degps or psi_deg")
@@ -103,11 +94,22 @@ def _measured_motion(model: Model, window: int, run: SampledRun) -> MeasuredMoti
         columns |= {name: velocities_of_track[name] for name in derived}
         notices.append(Notice(f"{run.name}: {' and '.join(name[7:] for name in sorted(derived))} {source}"))
     _complete_positions(columns, missing, run.step_s)
-    velocities = np.column_stack([_bridged(columns[name]) for name in VELOCITIES])
-    smooth, noise, remaining = zip(*(_smoothed(columns[name], window) for name in VELOCITIES), strict=True)
-    position = [_filled(columns[name]) for name in POSITION]
-    every = np.column_stack([*smooth, *position])
+    measured = [columns[name] for name in VELOCITIES]
+    velocities = np.column_stack(list(map(_bridged, measured)))
+    smooth, noise, remaining = zip(*(_smoothed(column, window) for column in measured), strict=True)
+    every = np.column_stack([*smooth, *(_filled(columns[name]) for name in POSITION)])
     return MeasuredMotion(velocities, every, np.array(noise), np.array(remaining), tuple(notices))
+
+
+def _measured_often(run: SampledRun, window: int) -> tuple[dict[str, Array], list[Notice]]:
+    """Signals of the motion (n,), nan for one whose readings are too far apart, and a notice of these."""
+    columns = {name: run.column(name) for name in MEASURED_STATES}
+    seldom = _seldom(columns, _LEAST_STRETCH * window)
+    if not seldom:
+        return columns, []
+    names = ", ".join(name[7:] for name in VELOCITIES if name in seldom)
+    notice = Notice(f"{run.name}: the readings of {names} are too far apart, and heading and positions are not")
+    return columns | dict.fromkeys(seldom, np.full(len(run.measured), np.nan)), [notice]
 
 
 def _seldom(columns: dict[str, Array], least: float) -> set[str]:
@@ -123,9 +125,8 @@ def _longest(column: Array) -> int:
     """Steps of the longest stretch of a signal without gaps."""
     if np.isnan(column).all():
         return 0
-    known = np.concatenate([[0], (~np.isnan(_bridged(column))).astype(int), [0]])
-    edges = np.flatnonzero(np.diff(known))
-    return int(np.max(edges[1::2] - edges[::2]))
+    lengths = [int(rows.stop - rows.start) for rows in true_runs(~np.isnan(_bridged(column)))]
+    return max(lengths)
 
 
 def sensor_noise(problem: Problem, run: SampledRun) -> Array:
@@ -136,7 +137,7 @@ def sensor_noise(problem: Problem, run: SampledRun) -> Array:
 
 
 def _window(problem: Problem, run: SampledRun) -> int:
-    return max(5, int(SMOOTHING * problem.ship_time / run.step_s) // 2 * 2 + 1)
+    return max(5, smoothing_window(run.step_s, problem.ship_time))
 
 
 def _velocities(model: Model, run: SampledRun, columns: dict[str, Array], window: int) -> tuple[dict[str, Array], str]:
@@ -150,25 +151,18 @@ def _velocities(model: Model, run: SampledRun, columns: dict[str, Array], window
         north, east = (_slope(columns[name], window, run.step_s) for name in ("motion.x", "motion.y"))
         source = "from the slope of the smoothed positions"
     else:
-        north, east = _turned(*ground, psi)
+        north, east = earth_components(*ground, psi)
         source = "from the velocities over the ground"
-    drift = drift_over_ground(model, run.inputs, _filled(psi))
-    u, v = _turned(north - drift[:, 0], east - drift[:, 1], -psi)
+    u, v = velocities_through_water(model, run.inputs, psi, north, east)
     return {"motion.u": u, "motion.v": v}, source
 
 
 def _complete_positions(columns: dict[str, Array], missing: set[str], step: float) -> None:
     """Add unmeasured positions from the velocities: wind and banks need only their rough course."""
     if missing & {"motion.x", "motion.y"}:
-        rates = _turned(*(_filled(columns[name]) for name in ("motion.u", "motion.v", "motion.psi")))
+        rates = earth_components(*(_filled(columns[name]) for name in ("motion.u", "motion.v", "motion.psi")))
         for name in missing & {"motion.x", "motion.y"}:
             columns[name] = cumulative_trapezoid(rates[name == "motion.y"], dx=step, initial=0.0)
-
-
-def _turned(forward: Array, starboard: Array, angle: Array) -> tuple[Array, Array]:
-    """Components (n,) each after turning the axes back by `angle` (n,): earth axes from body axes."""
-    north, east = earth_velocity(*(ca.DM(values) for values in (forward, starboard, angle)))  # type: ignore[arg-type]
-    return np.array(north).ravel(), np.array(east).ravel()
 
 
 def _slope(column: Array, window: int, step: float) -> Array:
@@ -223,8 +217,7 @@ def _smoothed(column: Array, window: int) -> tuple[Array, float, float]:
 
 
 def _filled(column: Array) -> Array:
-    known = np.flatnonzero(~np.isnan(column))
-    return np.interp(np.arange(len(column)), known, column[known])
+    return straight_over_gaps(np.arange(len(column), dtype=float), column)
 
 
 WIDTH = 0.7

@@ -86,24 +86,33 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unu
         if factor != 1:
             notices.append(Notice(f"{name}: scaled by Froude's law to a ship {factor:.4g} times as long"))
         trials.append(scaled)
-    names = [trial.name for trial in trials]
-    for trial in trials:
-        if names.count(trial.name) > 1:
-            raise trial.fault("", "has the name of another trial", "give each file once, under its own name")
+    _refuse_shared_names(trials)
     alike = refuse_copies(trials)
-    by_angle = ["delta_rad" in trial.signals for trial in trials]
-    if any(by_angle) and not all(by_angle):
-        odd = trials[by_angle.index(False)]
-        remedy = "give trials that all have delta_deg, or all only delta_order_deg"
-        raise odd.fault("header", "has no delta_deg, but other trials have", remedy)
+    driven_by = _driven_by(trials)
     notices = [*alike, *_of_audit(audited), *_of_reading(remarks), *dict.fromkeys(notices)]
     doubts = tuple(
         RecordDoubt(Path(name).stem, finding.column, finding.likely_truth)
         for name, findings in audited.items()
         for finding in findings
-        if not _taken_so(finding)
+        if not finding.repaired
     )
-    return Measured(tuple(trials), "angle" if all(by_angle) else "order", tuple(notices), doubts=doubts)
+    return Measured(tuple(trials), driven_by, tuple(notices), doubts=doubts)
+
+
+def _refuse_shared_names(trials: Sequence[Trial]) -> None:
+    names = [trial.name for trial in trials]
+    for trial in trials:
+        if names.count(trial.name) > 1:
+            raise trial.fault("", "has the name of another trial", "give each file once, under its own name")
+
+
+def _driven_by(trials: Sequence[Trial]) -> str:
+    """``angle`` or ``order``; trials that do not have the same are refused."""
+    by_order = [trial for trial in trials if "delta_rad" not in trial.signals]
+    if 0 < len(by_order) < len(trials):
+        remedy = "give trials that all have delta_deg, or all only delta_order_deg"
+        raise by_order[0].fault("header", "has no delta_deg, but other trials have", remedy)
+    return "order" if by_order else "angle"
 
 
 def _refuse_faults(trial: Trial, findings: Iterable[Finding]) -> None:
@@ -115,11 +124,6 @@ def _refuse_faults(trial: Trial, findings: Iterable[Finding]) -> None:
         raise InputError(wrong.source, place, wrong.what, remedy)
     if not set(RUDDERS) & set(trial.signals):
         raise trial.fault("column of the rudder", "has no usable reading", "give the rudder in more rows")
-
-
-def _taken_so(finding: Finding) -> bool:
-    """Whether the trial was repaired as a finding says."""
-    return finding.safe and finding.repair is not None
 
 
 def _of_reading(remarks: Mapping[str, Sequence[Notice]]) -> list[Notice]:
@@ -136,7 +140,7 @@ def _of_audit(audited: Mapping[str, Sequence[Finding]]) -> list[Notice]:
     groups: dict[tuple[Level, str, str, str], list[tuple[str, str]]] = {}
     for name, findings in audited.items():
         for finding in findings:
-            done = "taken so" if _taken_so(finding) else "left as it is"
+            done = "taken so" if finding.repaired else "left as it is"
             level = Level.CAUTION if finding.kind == "fault" else Level.INFO
             key = level, finding.column, finding.what, done
             groups.setdefault(key, []).append((name, finding.likely_truth))
@@ -182,23 +186,27 @@ def at_size_of(trial: Trial, card: ManoeuvringCard) -> tuple[Trial, float]:
     """
     speed, scale = approach_speed(trial), trial.scale or 1.0
     if trial.length_m is not None:
-        ratio = card.ship.length_m / trial.length_m
-    elif speed is None:
+        factor, off = _nearest_scale(card.ship.length_m / trial.length_m, scale)
+        if off > SAME_LENGTH:
+            problem = f"is of a ship or model of {trial.length_m:g} m, and the card of one of {card.ship.length_m:g} m"
+            raise trial.fault("", problem, f"neither is the other at 1:{scale:g}; give the card of that ship")
+        return (trial if factor == 1 else froude_scaled(trial, factor)), factor
+    if speed is None:
         return trial, 1.0
-    elif speed == 0:
+    if speed == 0:
         raise trial.fault("", "the ship does not move in it", "leave it out: it holds no motion")
-    else:
-        ratio = (card.model.speed_mps / speed) ** 2
-    factor = min((1.0, scale, 1 / scale), key=lambda candidate: abs(math.log(ratio / candidate)))
-    off = abs(math.log(ratio / factor))
-    if trial.length_m is not None and off > SAME_LENGTH:
-        problem = f"is of a ship or model of {trial.length_m:g} m, and the card of one of {card.ship.length_m:g} m"
-        raise trial.fault("", problem, f"neither is the other at 1:{scale:g}; give the card of that ship")
-    if trial.length_m is None and trial.scale is None and off > 2 * math.log(FARTHEST_FROUDE):
+    factor, off = _nearest_scale((card.model.speed_mps / speed) ** 2, scale)
+    if trial.scale is None and off > 2 * math.log(FARTHEST_FROUDE):
         problem = f"reaches {speed:.3g} m/s, and the card is of {card.model.speed_mps:.3g} m/s"
         remedy = "if one of the two is a model, add the comment '# scale: LAMBDA' (ship length over model length)"
         raise trial.fault("", problem, remedy)
     return (trial if factor == 1 else froude_scaled(trial, factor)), factor
+
+
+def _nearest_scale(ratio: float, scale: float) -> tuple[float, float]:
+    """The factor that brings a ratio of lengths nearest to 1, and the logarithm of what remains."""
+    factor = min((1.0, scale, 1 / scale), key=lambda candidate: abs(math.log(ratio / candidate)))
+    return factor, abs(math.log(ratio / factor))
 
 
 def approach_speed(trial: Trial) -> float | None:

@@ -20,6 +20,7 @@ from tank2sim.dynamics.card_parameters import card_parameters, joint_errors, stu
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.effects.effect import EffectParameter
 from tank2sim.dynamics.mmg.hull import MMG_TERMS
+from tank2sim.dynamics.model import Model
 from tank2sim.dynamics.roll import roll_terms
 from tank2sim.errors import ArgumentError
 from tank2sim.identification.trials.problem.estimation_problem import (
@@ -29,7 +30,7 @@ from tank2sim.identification.trials.problem.estimation_problem import (
     driven_model,
 )
 from tank2sim.identification.trials.problem.prepare_trials import Measured
-from tank2sim.identification.trials.problem.sampled_runs import in_range, ordered_rudder, prepare, seen_in
+from tank2sim.identification.trials.problem.sampled_runs import SampledRun, in_range, ordered_rudder, prepare, seen_in
 from tank2sim.notices import Notice
 from tank2sim.records.trials import Trial, window
 from tank2sim.units import from_si
@@ -189,24 +190,23 @@ def free_parameters(card: ManoeuvringCard, *, inertia: bool = False) -> dict[str
     not an input. Every coefficient of an MMG propeller or rudder whose standard error the card states, except for those
     of the torque alone.
     """
-    free = {}
+    return {name: (value, error) for name, value, error in _parameters(card, inertia) if error > 0}  # 0: certain
+
+
+def _parameters(card: ManoeuvringCard, inertia: bool) -> Iterator[tuple[str, float, float]]:
+    """Parameters that may be free, with value and standard error."""
     for name in {**card.derivatives, **card.uncertainty}:
-        if known_term(name).acceleration and not inertia:
-            continue
-        error = card.standard_error(name)
-        if error > 0 and name in _used(card):
-            free[f"derivatives.{name}"] = card.derivatives.get(name, 0.0), error
+        if name in _used(card) and (inertia or not known_term(name).acceleration):
+            yield f"derivatives.{name}", card.derivatives.get(name, 0.0), card.standard_error(name)
     if isinstance(card, MmgCard):
         for key, error in card.interaction_errors.items():
-            if error > 0 and key not in TORQUE_COEFFICIENTS:
-                free[f"mmg.{key}"] = card.interaction(key), error
+            if key not in TORQUE_COEFFICIENTS:
+                yield f"mmg.{key}", card.interaction(key), error
     for entry in card.effects:
         for parameter in _parts_present(entry):
-            span = parameter.maximum - parameter.lowest(card)
-            error = entry.uncertainty.get(parameter.name, ASSUMED_EFFECT_ERROR * span)
-            if error > 0:  # 0: stated as certain
-                free[f"{entry.name}.{parameter.stem}"] = parameter.value(entry.parameters, card), error
-    return free
+            assumed = ASSUMED_EFFECT_ERROR * (parameter.maximum - parameter.lowest(card))
+            error = entry.uncertainty.get(parameter.name, assumed)
+            yield f"{entry.name}.{parameter.stem}", parameter.value(entry.parameters, card), error
 
 
 def _parts_present(entry: EffectEntry) -> Iterator[EffectParameter]:
@@ -244,22 +244,33 @@ def problem_from_card(
         del free[_estimated_name(name, free)]
     if not free:
         raise card.fault("derivatives", "nothing is left to estimate", "give derivatives with a value")
+    rudders = [gear.angle(trial) if gear else None for trial in trials]
+    values = np.array(list(free.values()))
+    runs = _runs(card, model, trials, rudders, None if whole else card.model.valid_speed_mps)
+    return Problem(model, tuple(free), values[:, 0], values[:, 1], runs, ship=ship)
+
+
+def _runs(
+    card: ManoeuvringCard,
+    model: Model,
+    trials: Sequence[Trial],
+    rudders: Sequence[tuple[Array, Array] | None],
+    speeds: tuple[float, float] | None,
+) -> tuple[SampledRun, ...]:
+    """The trials on equal steps, their parts at speeds (m/s) alone if these are given; refused if there are none."""
     seen = seen_in(model, trials)
     if not seen:
         raise trials[0].fault("header", "none of its signals can be compared", "give u_mps, r_degps, ...")
-    prepared = [
-        prepare(model, trial, seen, orders_before=True, rudder=gear.angle(trial) if gear else None) for trial in trials
-    ]
-    runs, speeds = tuple(prepared), card.model.valid_speed_mps
-    if speeds is not None and not whole:
+    pairs = zip(trials, rudders, strict=True)
+    runs = tuple(prepare(model, trial, seen, orders_before=True, rudder=rudder) for trial, rudder in pairs)
+    if speeds is not None:
         least_s = LEAST_PART * card.ship.length_m / card.model.speed_mps
         runs = tuple(part for run in runs for part in in_range(run, model, speeds, least_s))
     if not runs:
         low, high = card.model.speed_range_mps
         problem = f"never goes for long at {low:g} to {high:g} m/s, where the card holds"
         raise trials[0].fault("", problem, "change model.valid_speed_mps of the card, or leave it out")
-    values = np.array(list(free.values()))
-    return Problem(model, tuple(free), values[:, 0], values[:, 1], runs, ship=ship)
+    return runs
 
 
 def _spread_of_revolutions(trials: Sequence[Trial]) -> float:
@@ -322,30 +333,29 @@ def card_with_estimate(
     card: ManoeuvringCard, estimate: Estimate, comment: str = "identified from trials"
 ) -> ManoeuvringCard:
     """The card with the estimates in place of its values, and their standard errors; `comment` is next to each."""
-    found = dict(zip(estimate.free, zip(estimate.values, estimate.standard_errors, strict=True), strict=True))
+    pairs = zip(estimate.values, estimate.standard_errors, strict=True)
+    printed = [(rounded(value, error), float(f"{error:.3g}")) for value, error in pairs]
+    found = dict(zip(estimate.free, printed, strict=True))
     derivatives = {
-        name.partition(".")[2]: (rounded(value, error), float(f"{error:.3g}"))
-        for name, (value, error) in found.items()
-        if name.startswith("derivatives.")
+        name.partition(".")[2]: figures for name, figures in found.items() if name.startswith("derivatives.")
     }
-    changes: dict[str, object] = {}
-    for number, entry in enumerate(card.effects):
-        effect = EFFECTS[entry.name]
-        for parameter in effect.parameters:
-            if (name := f"{effect.name}.{parameter.stem}") in found:
-                value, error = found[name]
-                for section, figure in (("parameters", rounded(value, error)), ("uncertainty", float(f"{error:.3g}"))):
-                    key, shown = card.in_file(f"effects.{number}.{section}.{parameter.name}", figure)
-                    changes[key] = shown
+    changes: dict[str, object] = dict(_changed_effects(card, found))
     if isinstance(card, MmgCard):
         for key, place in card.interaction_places().items():
             if f"mmg.{key}" in found:
-                value, error = found[f"mmg.{key}"]
-                changes |= {place: rounded(value, error), f"uncertainty.{key}": float(f"{error:.3g}")}
+                changes[place], changes[f"uncertainty.{key}"] = found[f"mmg.{key}"]
     if REVOLUTIONS in found:
-        scale = float(card.file_scales.force) if card.file_scales else 1.0
-        changes[REVOLUTIONS] = rounded(*found[REVOLUTIONS]) * scale
+        changes[REVOLUTIONS] = found[REVOLUTIONS][0] * (float(card.file_scales.force) if card.file_scales else 1.0)
     return revised(card, derivatives, changes, comment=comment)
+
+
+def _changed_effects(card: ManoeuvringCard, found: Mapping[str, tuple[float, float]]) -> Iterator[tuple[str, object]]:
+    """Keys and values, as the file has them, of the effects' parameters in an estimate and their standard errors."""
+    for number, entry in enumerate(card.effects):
+        for parameter in EFFECTS[entry.name].parameters:
+            figures = found.get(f"{entry.name}.{parameter.stem}", ())
+            for section, figure in zip(("parameters", "uncertainty"), figures, strict=False):
+                yield card.in_file(f"effects.{number}.{section}.{parameter.name}", figure)
 
 
 def with_range(card: ManoeuvringCard, problem: Problem) -> ManoeuvringCard:
@@ -355,24 +365,26 @@ def with_range(card: ManoeuvringCard, problem: Problem) -> ManoeuvringCard:
     where the runs exceed the card's. The lower speed limit of the polynomial does not change: no trial shows where it
     breaks down.
     """
-    changes: dict[str, object] = {}
     columns = {name: np.concatenate([run.column(f"motion.{name}") for run in problem.runs]) for name in "uvr"}
-    speeds = columns["u"][~np.isnan(columns["u"])]
-    if card.model.valid_speed_mps is None and len(speeds) and speeds.min() > 0:
-        changes["model.valid_speed_mps"] = [float(f"{speed:.3g}") for speed in (speeds.min(), speeds.max())]
-        if card.model.low_speed_below_mps is None:
-            changes["model.low_speed_below_mps"] = card.model.low_speed_bound_mps
-    reached = _reached(card, problem, columns)
-    stated = {
-        "valid_drift_rad": card.model.valid_drift_rad,
-        "valid_yaw_rate_prime": card.model.valid_yaw_rate_prime,
-        "valid_rudder_rad": np.inf if card.model.valid_rudder_rad is None else card.model.valid_rudder_rad,
-    }
-    for name, largest in reached.items():
-        if largest > stated[name]:
+    changes = _speed_range(card, columns["u"][~np.isnan(columns["u"])])
+    for name, largest in _reached(card, problem, columns).items():
+        stated = getattr(card.model, name)
+        if stated is not None and largest > stated:  # every rudder angle is in a range that states none
             key = card.spelt.get(f"model.{name}", f"model.{name.replace('_rad', '_deg')}")
             changes[key] = float(f"{from_si(key, largest):.3g}")
     return revised(card, {}, changes, comment="range of the trials") if changes else card
+
+
+def _speed_range(card: ManoeuvringCard, speeds: Array) -> dict[str, object]:
+    """The range of speeds (n,), m/s, for a card that states none; empty if it does, or if they are not known."""
+    if card.model.valid_speed_mps is not None or not len(speeds) or speeds.min() <= 0:
+        return {}
+    found: dict[str, object] = {
+        "model.valid_speed_mps": [float(f"{speed:.3g}") for speed in (speeds.min(), speeds.max())]
+    }
+    if card.model.low_speed_below_mps is None:
+        found["model.low_speed_below_mps"] = card.model.low_speed_bound_mps
+    return found
 
 
 def _reached(card: ManoeuvringCard, problem: Problem, columns: Mapping[str, Array]) -> dict[str, float]:

@@ -10,32 +10,30 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import pairwise
 
 import casadi as ca
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, true_runs
 from tank2sim.dynamics.build import KEPT_MODELS
 from tank2sim.dynamics.model import Model
-from tank2sim.records.audit.noise import white_noise
-from tank2sim.records.trials import Trial, sampling_step
-from tank2sim.simulation.motion_record import OBSERVED_SIGNALS, means_of_lines, motion_record
-from tank2sim.simulation.recorded import TURNS_AT_EXECUTE, straight_over_gaps
+from tank2sim.errors import InputError
+from tank2sim.records.trials import Trial, order_instants, rows_in, sampling_step, straight_over_gaps, usual_step
+from tank2sim.simulation.motion_record import (
+    OBSERVED_SIGNALS,
+    MotionRecord,
+    means_of_lines,
+    motion_record,
+    refuse_without_motion,
+)
 from tank2sim.simulation.rows import Chain
-from tank2sim.simulation.rudder_record import is_over, rudder_of
+from tank2sim.simulation.rudder_record import first_rudder, rudder_of
 from tank2sim.simulation.scheme import runge_kutta_step
 
 _SLOWER = 1.5
 """Step of a signal over the grid's step, from which it counts as slower than the grid (project choice: below, most
 instants have a sample of their own)."""
-
-_BEGINNING = 5
-"""Instants of a run whose straight line gives the first yaw rate (project choice)."""
-
-_ABOVE_NOISE = 5.0
-"""Noises from which a mean yaw rate is a turn (project choice)."""
 
 LONGEST_GAP = 3
 """Gaps of up to this many samples are bridged; longer ones count as unmeasured (project choice)."""
@@ -90,50 +88,50 @@ def prepare(
     (:func:`.estimation_problem.driven_model`).
 
     The step is a whole number of sampling steps near `step_s` (by default 1.5 times the model's own), or a whole part
-    of one where `step_s` is shorter. Signals are averaged over a step, so that no measurement is lost. A rudder order
-    holds until the next and enters with its mean over the step; a measured angle is taken as straight between samples.
-    With `orders_before` an order was given before the first row that shows it (:attr:`.MotionRecord.given_s`).
-    `rudder` are times and angles of the rudder that take the place of the trial's (:class:`.sampled_runs`).
-
-    Raises InputError: The trial has fewer than ten steps, or none of the signals in `seen`.
+    of one where `step_s` is shorter. `seen`: Variables to be compared; `orders_before`, `rudder`: As for
+    :func:`on_steps`, which raises.
     """
-    record = motion_record(model, trial, seen)
-    sampling = float(np.median(np.diff(trial.time_s)))
-    stride = max(1, int((step_s or 1.5 * model.step_s) / sampling + 1e-6))
-    step = stride * sampling if step_s is None else stride * sampling / max(1, int(sampling / step_s + 1e-6))
-    count = int((trial.time_s[-1] - trial.time_s[0]) / step + 1e-6)
-    begin = float(trial.time_s[0]) + 0.5 * (stride - 1) * sampling
+    sampling = sampling_step(trial)
+    step = rows_in(step_s or 1.5 * model.step_s, sampling) * sampling
+    if step_s is not None:
+        step /= rows_in(sampling, step_s)
+    return on_steps(motion_record(model, trial, seen), step, orders_before=orders_before, rudder=rudder)
+
+
+def on_steps(
+    record: MotionRecord, step: float, *, orders_before: bool = False, rudder: tuple[Array, Array] | None = None
+) -> SampledRun:
+    """A record on equal steps of `step` s, which need not be a whole number of its rows.
+
+    Signals are averaged over a step, so that no measurement is lost. A rudder order holds until the next and enters
+    with its mean over the step; a measured angle is taken as straight between samples. With `orders_before` an order
+    was given before the first row that shows it (:attr:`.MotionRecord.given_s`). `rudder` are times and angles of the
+    rudder that take the place of the trial's (:class:`.sampled_runs`).
+
+    Raises InputError: The record has fewer than ten steps, or none of its signals.
+    """
+    time, sampling = record.time_s, record.sampling_s
+    stride, lasts = rows_in(step, sampling), float(time[-1] - time[0])
+    count, begin = int(lasts / step + 1e-6), float(time[0]) + 0.5 * (stride - 1) * sampling
     grid: Array = begin + step * np.arange(count, dtype=float)
     if count < 10:
-        raise trial.fault("", f"is only {trial.time_s[-1] - trial.time_s[0]:g} s long", "leave it out")
+        raise InputError(record.file, "", f"is only {lasts:g} s long", "leave it out")
     edges = np.append(grid, grid[-1] + step)
-    columns = [record.means(column, edges, given_before=orders_before) for column in range(record.inputs.shape[1])]
-    if rudder is not None:
-        columns[model.input_names.index("rudder.command")] = means_of_lines(*rudder, edges)
-    inputs = np.column_stack(columns) if columns else np.zeros((count, 0))
+    inputs = np.zeros((count, len(record.input_names)))
+    for column, name in enumerate(record.input_names):
+        if name == "rudder.command" and rudder is not None:
+            inputs[:, column] = means_of_lines(*rudder, edges)
+        else:
+            inputs[:, column] = record.means(column, edges, given_before=orders_before)
     inputs[-1] = inputs[-2]
-    measured = [_averaged(trial.time_s, signal, grid, step, stride) for signal in record.measured.T]
-    if np.isnan(measured).all():
-        raise trial.fault("header", "has none of the signals to be compared", "give u_mps, r_degps, ...")
-    return SampledRun(trial.name, begin, step, inputs, np.column_stack(measured), tuple(seen), str(trial.path))
+    measured = np.column_stack([_averaged(time, signal, grid, step, stride) for signal in record.measured.T])
+    refuse_without_motion(record.file, measured)
+    return SampledRun(record.name, begin, step, inputs, measured, record.seen, record.file)
 
 
 def rudder_at_start(run: SampledRun, order: Array, ship_time: float) -> float:
-    """Angle of the rudder (rad) at the first instant of a run where only its order (n,) is known.
-
-    It is the first order; amidships where the run begins at its execute: the order is to put the rudder over, and the
-    ship turns to that side later, and not yet.
-    """
-    rates = run.column("motion.r")
-    if np.isnan(rates).all() and not np.isnan(run.column("motion.psi")).all():
-        rates = np.gradient(straight_over_gaps(run.times, run.column("motion.psi")), run.step_s)
-    if np.isnan(rates).all() or not is_over(float(order[0]), order):
-        return float(order[0])
-    rates = np.sign(order[0]) * straight_over_gaps(run.times, rates)
-    largest = float(np.max(uniform_filter1d(rates, max(1, round(ship_time / run.step_s)))))
-    _, first = np.polyfit(np.arange(_BEGINNING), rates[:_BEGINNING], 1)
-    turns_later = largest > _ABOVE_NOISE * white_noise(rates)
-    return 0.0 if turns_later and first < TURNS_AT_EXECUTE * largest else float(order[0])
+    """Angle of the rudder, rad, at the first instant of a run with its order (n,) alone: :func:`.first_rudder`."""
+    return first_rudder(run.times, order, run.column("motion.r"), run.column("motion.psi"), ship_time)
 
 
 def in_range(run: SampledRun, model: Model, speeds: tuple[float, float], least_s: float) -> tuple[SampledRun, ...]:
@@ -148,10 +146,8 @@ def in_range(run: SampledRun, model: Model, speeds: tuple[float, float], least_s
     p = model.defaults
     width = max(1, round(0.5 * p["ship.length"] / p["ship.speed"] / run.step_s))
     smooth = uniform_filter1d(straight_over_gaps(run.times, speed), width)
-    inside = (smooth >= speeds[0]) & (smooth <= speeds[1])
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
-    pairs = [(begin, end) for begin, end in zip(edges[::2], edges[1::2], strict=True) if end - begin > 1]
-    parts = [run.part(int(begin), int(end)) for begin, end in pairs if (end - begin - 1) * run.step_s >= least_s]
+    inside, least_s = true_runs((smooth >= speeds[0]) & (smooth <= speeds[1])), max(least_s, run.step_s)
+    parts = [run.part(rows.start, rows.stop) for rows in inside if (rows.stop - rows.start - 1) * run.step_s >= least_s]
     if len(parts) == 1 and len(parts[0].measured) == len(run.measured):
         return (run,)
     return tuple(replace(part, name=f"{run.name} at {part.begin_s:.0f} s") for part in parts)
@@ -168,8 +164,8 @@ def _averaged(time: Array, values: Array, grid: Array, step: float, stride: int)
     known = np.flatnonzero(~np.isnan(values))
     if len(known) < 2:
         return np.full(len(grid), np.nan)
-    sampling = float(np.median(np.diff(time)))
-    signal_step = max(sampling, float(np.median(np.diff(time[known]))))
+    sampling = usual_step(time)
+    signal_step = max(sampling, usual_step(time[known]))
     places = (np.arange(stride) - 0.5 * (stride - 1)) * sampling
     fine = (grid[:, None] + places).ravel()
     interpolated = np.interp(fine, time[known], values[known], left=np.nan, right=np.nan)
@@ -201,24 +197,19 @@ class OrderedRudder:
     def angle(self, trial: Trial) -> tuple[Array, Array]:
         """Times (m,), s, and angle (m,), rad, of a trial's rudder by its orders.
 
-        An order holds from half a row before the first one that shows it (:data:`.ROWS_TO_SHOW_AN_ORDER`).
+        An order holds from before the first row that shows it (:func:`.order_instants`).
         """
-        time, order = trial.time_s, rudder_of(trial)
-        longest = min(float(np.max(np.diff(time))), _LONGEST_GAP * sampling_step(trial))
-        half = math.ceil(0.5 * longest * _PARTS_OF_LAG / self.lag_s)
-        lengths = np.repeat(np.diff(time) / (2 * half), 2 * half)
-        orders = np.concatenate([np.repeat(pair, half) for pair in pairwise(order)])
-        chain = self.chain.run(np.array([self._first(trial, order)]), np.column_stack([orders, lengths]))
+        time, order, spans = trial.time_s, rudder_of(trial), np.diff(trial.time_s)
+        longest = min(float(np.max(spans)), _LONGEST_GAP * sampling_step(trial))
+        parts = math.ceil(0.5 * longest * _PARTS_OF_LAG / self.lag_s)  # before an order, and as many after it
+        before = order_instants(time)[1:] - time[:-1]
+        lengths = np.repeat(np.column_stack([before, spans - before]).ravel() / parts, parts)
+        orders = np.repeat(order, 2 * parts)[parts:-parts]
+        unknown = np.full(len(time), np.nan)
+        rates, headings = (trial.signals.get(name, unknown) for name in ("r_radps", "psi_rad"))
+        first = first_rudder(time, order, rates, headings, self.ship_time)
+        chain = self.chain.run(np.array([first]), np.column_stack([orders, lengths]))
         return np.concatenate([time[:1], time[0] + np.cumsum(lengths)]), chain[:, 0]
-
-    def _first(self, trial: Trial, order: Array) -> float:
-        signals = {"motion.r": trial.signals.get("r_radps"), "motion.psi": trial.signals.get("psi_rad")}
-        known = {name: values for name, values in signals.items() if values is not None}
-        if not known:
-            return float(order[0])
-        measured = np.column_stack(list(known.values()))
-        run = SampledRun(trial.name, trial.time_s[0], sampling_step(trial), order[:, None], measured, tuple(known))
-        return rudder_at_start(run, order, self.ship_time)
 
 
 @lru_cache(maxsize=KEPT_MODELS)
