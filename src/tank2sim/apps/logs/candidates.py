@@ -12,7 +12,7 @@ from tank2sim.apps.logs.channels import USED_FROM, ChannelSet, LogChannel
 from tank2sim.apps.logs.content import AGREES, DIFFERS, ContentEvidence, angle_unit, rate_delay
 from tank2sim.apps.logs.quantities import QUANTITIES
 from tank2sim.apps.logs.recorded import PulseScale, pulses_of, rest_of
-from tank2sim.apps.logs.reference import ReferenceMotion, interpolated, thinned_series
+from tank2sim.apps.logs.reference import ReferenceMotion, held, interpolated, thinned_series
 from tank2sim.apps.logs.streams import LogFinding, LogStream, fault, note
 from tank2sim.arrays import Array
 from tank2sim.records.trials import usual_step
@@ -73,6 +73,7 @@ class ChannelSearch:
         self.findings: list[LogFinding] = []
         self.motion = ReferenceMotion(empty, empty, empty, empty, empty)
         self.rate: tuple[Array, Array] = (empty, empty)
+        self.way: tuple[Array, Array] = (empty, empty)  # 1 ahead, -1 astern; empty of a vessel that goes ahead
         self.pulse_scales: dict[str, PulseScale] = {}
         # Pulses are searched as shares of full order; streams that hold their rest are no orders.
         rests = {stream.name: rest for stream in self.streams if (rest := rest_of(stream)) is not None}
@@ -124,6 +125,11 @@ class ChannelSearch:
         """Heading (n,), rad; nan where it is not known."""
         return interpolated(at, self.motion.heading_time_s, self.motion.heading_rad, 10.0)
 
+    def way_at(self, at: Array) -> Array:
+        """Sign of the speed ahead (n,) at other times: 1, or -1 where a vessel was found to go astern."""
+        time, way = self.way
+        return np.nan_to_num(held(at, time, way), nan=way[0]) if len(way) else np.ones(len(at))
+
     # What is found ----------------------------------------------------------------------------------------------
 
     def rename(self, stream: LogStream, quantity: str) -> None:
@@ -147,7 +153,7 @@ class ChannelSearch:
             confidence, why = REFUTED, f"{why}, but {evidence.text}"
         else:
             confidence, why = STATED[by] - 0.1, f"{why}; {evidence.text}, which is weak"
-        return Judgement(stream, confidence, why, stream.unit)
+        return Judgement(stream, confidence, why, stream.unit or evidence.unit)
 
     def take(self, found: Judgement, quantity: str = "") -> None:
         """Add a judged stream; one that is contradicted is a fault."""
@@ -173,6 +179,19 @@ class ChannelSearch:
                 use=False,
             )
         )
+
+    def add_unnamed(
+        self,
+        stream: LogStream,
+        quantity: str,
+        confidence: float,
+        evidence: ContentEvidence,
+        more: str = "",
+        unit: str = "",
+    ) -> None:
+        """Add a stream whose name says nothing, by its content; `more` is said of it, and a `unit` by its size."""
+        why = f"by content alone: {evidence.text}{more}"
+        self.add(Judgement(stream, confidence, why, unit or stream.unit or evidence.unit, evidence.sign), quantity)
 
     def doubt(self, why: str, *streams: str) -> None:
         """Let no channel of these streams be used."""

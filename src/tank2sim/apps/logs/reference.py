@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -56,6 +56,11 @@ class ReferenceMotion:
         if not len(speed):
             return np.zeros(0, dtype=bool)
         return np.asarray(speed > max(LEAST_SPEED_MPS, MOVING_SHARE * float(np.percentile(speed, 95))))
+
+    def going(self, way: Array) -> ReferenceMotion:
+        """The motion with its course turned about where the sign of a `way` (n,) is negative: where the bow points."""
+        sign = np.where(way < 0, -1.0, 1.0)
+        return replace(self, v_north_mps=sign * self.v_north_mps, v_east_mps=sign * self.v_east_mps)
 
 
 def local_metres(latitude_deg: Array, longitude_deg: Array, origin_deg: tuple[float, float]) -> tuple[Array, Array]:

@@ -156,7 +156,8 @@ def _zero(search: ChannelSearch, stream: LogStream, evidence: ContentEvidence) -
 
 
 def _judge_rudder(search: ChannelSearch, stream: LogStream) -> None:
-    evidence = _evidence(search, *search.thin(stream))
+    time, values = search.thin(stream)
+    evidence = _evidence(search, time, values * search.way_at(time))  # astern, a rudder turns the bow the other way
     zero = _zero(search, stream, evidence)
     found = search.judged(stream, evidence, agrees=_SHOWN)
     found.unit, found.offset = stream.unit or rudder_unit(stream.values - zero), zero

@@ -209,7 +209,10 @@ def _why_no_trial(voyage: Voyage, stretches: Sequence[Stretch]) -> Notice:
 
 
 def _channel(channel: LogChannel) -> ChannelStudy:
-    unit = channel.unit if channel.scale == 1 else f"{channel.scale:.4g} {channel.unit}"
+    unit = channel.unit
+    if channel.scale != 1:
+        words = {"1": "of full order per recorded unit", "": "of an unknown unit"}.get(unit, unit)
+        unit = f"{channel.scale:.4g} {words}"
     same = {name: getattr(channel, name) for name in ("quantity", "stream", "sign", "confidence", "use", "why")}
     return ChannelStudy(unit=unit, **same)
 
