@@ -262,8 +262,7 @@ class ChannelSearch:
         late, other = (rate, heading) if found.delay_s > 0 else (heading, rate)
         delay = round(abs(found.delay_s), 2)
         words = f"{delay:g} ± {found.standard_error_s:.1g} s behind {other.stream}"
-        why = f"{late.why}; {words}, and set back by it"
-        channels[used[late.quantity]] = replace(late, delay_s=delay, why=why)
+        channels[used[late.quantity]] = replace(late.because(f"{words}, and set back by it"), delay_s=delay)
         text = f"{late.stream} is {words} and is set back by it (delay_s in channels.toml)"
         self.findings.append(note(text, late.stream, delay_s=delay))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -72,6 +72,11 @@ class LogChannel:
     confidence: float = 1.0
     why: str = ""
     use: bool = True
+
+    def because(self, why: str, *, least: float = 0.0, most: float = 1.0) -> LogChannel:
+        """The channel with a further reason, and its confidence between two bounds."""
+        reasons = "; ".join(filter(None, (self.why, why)))
+        return replace(self, confidence=min(max(self.confidence, least), most), why=reasons)
 
     def si(self, values: Array) -> Array:
         """Recorded values (n,) in SI: rad, m/s, rad/s; degrees for latitude and longitude, shares for orders."""

@@ -135,26 +135,36 @@ def _opposed(search: ChannelSearch, found: Judgement) -> Judgement:
 
 
 def _witnesses(search: ChannelSearch, time: Array, angle: Array) -> Iterator[_Witness]:
-    """Propulsion, speed ahead and rudder of the log, as far as it has them, for a heading (n,), rad."""
-    at = search.motion.time_s
+    """Propulsion, speed ahead and rudders of the log, as far as it has them, for a heading (n,), rad."""
     for quantities in (_PROPULSION, ("u_water", "u_ground")):
         streams = [stream for stream in search.named(*quantities) if np.any(stream.values)]
         if streams:
-            shares = [stream.values / np.nanmax(np.abs(stream.values)) for stream in streams]
-            parts = [interpolated(at, s.time_s, share, 10.0) for s, share in zip(streams, shares, strict=True)]
-            way = np.nansum(parts, axis=0)
-            verb = "are" if len(streams) > 1 else "is"
-            state = "negative" if np.mean(way < 0) > DIFFERS else "positive"
-            yield _Witness(f"{', '.join(stream.name for stream in streams)} {verb} {state}", way)
+            yield _signed_witness(search, streams)
     rate = differenced(time, np.unwrap(angle), HEADING_WINDOW_S)
     for stream in search.named("rudder_angle", "rudder_order"):
         evidence = steering_evidence(*search.thin(stream), *rate)
         if evidence.known >= _STEERS:
-            stated = sign_of_name(stream.name)
-            sign = evidence.sign * (stated or 1)
-            words = f"the bow turns {'to' if sign > 0 else 'against'} the side of {stream.name}"
-            sure = bool(stated) or stream.stated_by == "format"
-            yield _Witness(words if sure else f"{words} if it is positive to starboard", np.full(len(at), sign), sure)
+            yield _rudder_witness(search, stream, evidence.sign)
+
+
+def _signed_witness(search: ChannelSearch, streams: list[LogStream]) -> _Witness:
+    """Streams that are negative astern: the sum of their shares."""
+    at, way = search.motion.time_s, np.zeros(len(search.motion.time_s))
+    for stream in streams:
+        shares = stream.values / np.nanmax(np.abs(stream.values))
+        way += np.nan_to_num(interpolated(at, stream.time_s, shares, 10.0))
+    verb, state = "are" if len(streams) > 1 else "is", "negative" if np.mean(way < 0) > DIFFERS else "positive"
+    return _Witness(f"{', '.join(stream.name for stream in streams)} {verb} {state}", way)
+
+
+def _rudder_witness(search: ChannelSearch, stream: LogStream, turn: int) -> _Witness:
+    """A rudder that the `turn` follows, or opposes (-1); sure if its positive side is stated."""
+    stated = sign_of_name(stream.name)
+    sign = turn * (stated or 1)
+    words = f"the bow turns {'to' if sign > 0 else 'against'} the side of {stream.name}"
+    sure = bool(stated) or stream.stated_by == "format"
+    way = np.full(len(search.motion.time_s), float(sign))
+    return _Witness(words if sure else f"{words} if it is positive to starboard", way, sure)
 
 
 # Streams whose names say nothing --------------------------------------------------------------------------------
@@ -163,12 +173,8 @@ def _witnesses(search: ChannelSearch, time: Array, angle: Array) -> Iterator[_Wi
 def find_unnamed_directions(search: ChannelSearch, streams: list[LogStream]) -> None:
     """Find a course and a heading by content: both follow the track, and the course more closely."""
     known = [channel for channel in (search.best("heading"), search.best("cog")) if channel is not None]
-    followers = []
-    for stream in [*filter(_circular, streams), *(search.stream(channel.stream) for channel in known)]:
-        evidence = direction_evidence(*search.angle(stream), search.motion)
-        if evidence.known > AGREES and evidence.sign > 0 and abs(evidence.offset_rad) < LARGEST_OFFSET_RAD:
-            followers.append((stream, evidence))
-    followers.sort(key=lambda entry: entry[1].spread_rad)
+    tried = [*filter(_circular, streams), *(search.stream(channel.stream) for channel in known)]
+    followers = _followers(search, tried)
     spreads = [evidence.spread_rad for _, evidence in followers]
     distinct = len(spreads) == 2 and spreads[1] > _CLOSER * spreads[0]
     if not distinct and (known or len(followers) != 1):
@@ -180,6 +186,17 @@ def find_unnamed_directions(search: ChannelSearch, streams: list[LogStream]) -> 
         if not taken & {stream.name, quantity}:
             search.add_unnamed(stream, quantity, confidence, evidence, more, angle_unit(stream.values, stream.unit))
     _take_heading(search)
+
+
+def _followers(search: ChannelSearch, streams: list[LogStream]) -> list[tuple[LogStream, ContentEvidence]]:
+    """Streams that follow the course of the positions as they are, the closest first."""
+    tested = [(stream, direction_evidence(*search.angle(stream), search.motion)) for stream in streams]
+    following = [
+        (stream, evidence)
+        for stream, evidence in tested
+        if evidence.known > AGREES and evidence.sign > 0 and abs(evidence.offset_rad) < LARGEST_OFFSET_RAD
+    ]
+    return sorted(following, key=lambda entry: entry[1].spread_rad)
 
 
 def could_be_direction(stream: LogStream) -> bool:

@@ -68,14 +68,8 @@ class _Track:
 
 def find_positions(search: ChannelSearch) -> None:
     """Find the tracks of a log, the longest one first, which gives the motion of the search."""
-    tracks = []
-    for pair in _named_pairs(search) or _unnamed_pair(search):
-        if (motion := _motion_of(*pair)) is not None:
-            tracks.append(_Track(pair, motion))
-            continue
-        for stream in pair:
-            search.add(Judgement(stream, REFUTED, "its values are no position, or leap", stream.unit or "deg"))
-        search.fault(pair[0].name, "holds no position, or leaps")
+    pairs = _named_pairs(search) or _unnamed_pair(search)
+    tracks = [track for pair in pairs if (track := _track(search, pair)) is not None]
     if not tracks:
         return
     tracks.sort(key=lambda track: (track.pair[0].quantity != "latitude", -search.coverage(track.pair[0].name)))
@@ -88,6 +82,16 @@ def find_positions(search: ChannelSearch) -> None:
         first, second = tracks[0].pair
         search.fault(first.name, f"with {second.name}, its track {wrong}, by headings and courses")
         search.motion = corrected
+
+
+def _track(search: ChannelSearch, pair: _Pair) -> _Track | None:
+    """The track of two streams; None, and a fault, where they hold no position."""
+    if (motion := _motion_of(*pair)) is not None:
+        return _Track(pair, motion)
+    for stream in pair:
+        search.add(Judgement(stream, REFUTED, "its values are no position, or leap", stream.unit or "deg"))
+    search.fault(pair[0].name, "holds no position, or leaps")
+    return None
 
 
 def _take_track(search: ChannelSearch, track: _Track, less: float, wrong: str) -> None:
@@ -137,8 +141,7 @@ def _unnamed_pair(search: ChannelSearch) -> list[_Pair]:
     found = []
     for first, second in itertools.permutations(slow[:_MOST_TRIED], 2):
         pair = _paired(replace(first, quantity="latitude"), replace(second, quantity="longitude"))
-        motion = _motion_of(*pair) if pair else None
-        if pair and motion and _is_followed(search, motion, [a for a in angles if a not in (first, second)]):
+        if pair and _is_followed(search, pair, [angle for angle in angles if angle not in (first, second)]):
             found.append(pair)
     if len(found) != 1:
         return []
@@ -147,8 +150,10 @@ def _unnamed_pair(search: ChannelSearch) -> list[_Pair]:
     return found
 
 
-def _is_followed(search: ChannelSearch, motion: ReferenceMotion, angles: Iterable[LogStream]) -> bool:
-    """Whether one of the angles follows a motion as a heading or a course does."""
+def _is_followed(search: ChannelSearch, pair: _Pair, angles: Iterable[LogStream]) -> bool:
+    """Whether one of the angles follows the motion of two streams as a heading or a course does."""
+    if (motion := _motion_of(*pair)) is None:
+        return False
     followed = [direction_evidence(*search.angle(angle), motion) for angle in angles]
     return any(evidence.known > AGREES and evidence.sign > 0 for evidence in followed)
 
