@@ -16,6 +16,7 @@ from tank2sim.apps.logs.reference import (
     ReferenceMotion,
     differenced,
     interpolated,
+    interpolated_angle,
     thinned_series,
 )
 from tank2sim.apps.logs.streams import wrapped_angle
@@ -103,13 +104,13 @@ def direction_evidence(time_s: Array, angle_rad: Array, motion: ReferenceMotion)
     All four right angles between them and both senses of rotation are tried; the agreement is the share of samples
     that differ by less than :data:`NEAR_RAD`.
     """
-    moving, longest = motion.moving, 5 * max(usual_step(time_s), 1.0)
+    moving = motion.moving
     at, north, east = (part[moving] for part in (motion.time_s, motion.v_north_mps, motion.v_east_mps))
-    cosine, sine = (interpolated(at, time_s, part, longest) for part in (np.cos(angle_rad), np.sin(angle_rad)))
-    good = np.isfinite(cosine)
+    angle = interpolated_angle(at, time_s, angle_rad, _longest_gap_s(time_s))
+    good = np.isfinite(angle)
     if good.sum() < FEW_SAMPLES:
         return UNTESTED
-    angle, north, east = np.arctan2(sine, cosine)[good], north[good], east[good]
+    angle, north, east = angle[good], north[good], east[good]
     course = np.arctan2(east, north)
     differences = {
         (sign, quarter): wrapped_angle(sign * angle + quarter * math.pi / 2 - course)
@@ -117,13 +118,11 @@ def direction_evidence(time_s: Array, angle_rad: Array, motion: ReferenceMotion)
         for quarter in range(4)
     }
     shares = {key: float((np.abs(each) < NEAR_RAD).mean()) for key, each in differences.items()}
-    agreement = shares[1, 0]
-    best = max(shares, key=lambda key: shares[key] + (0.02 if key == (1, 0) else 0.0))
-    turned = np.ptp(np.unwrap(course)) > LEAST_TURNED_RAD
-    difference, (sign, quarter) = differences[best], best
-    middle = float(np.median(difference))
+    sign, quarter = max(shares, key=lambda key: shares[key] + (0.02 if key == (1, 0) else 0.0))
+    agreement, turned = shares[1, 0], np.ptp(np.unwrap(course)) > LEAST_TURNED_RAD
+    middle = float(np.median(differences[sign, quarter]))
     offset = float(wrapped_angle(np.array([middle - quarter * math.pi / 2]))[0])
-    if best != (1, 0) and turned:
+    if (sign, quarter) != (1, 0) and turned:
         mirrored = "mirrored and " if sign < 0 else ""
         words = f"is {mirrored}off by {math.degrees(offset):.0f} deg against the course of the positions"
         return ContentEvidence(agreement, sign, offset_rad=offset, text=words)
@@ -131,8 +130,13 @@ def direction_evidence(time_s: Array, angle_rad: Array, motion: ReferenceMotion)
     if turned and DIFFERS <= agreement < AGREES and (share := _sideways_share(angle, north, east)) < _SIDEWAYS:
         agreement = AGREES
         text += f", and moves sideways by {100 * share:.0f} % of its speed in a steady current"
-    spread = float(np.median(np.abs(difference - middle)))
+    spread = float(np.median(np.abs(differences[sign, quarter] - middle)))
     return ContentEvidence(agreement, 1 if turned else 0, offset_rad=offset, spread_rad=spread, text=text)
+
+
+def _longest_gap_s(time_s: Array) -> float:
+    """Longest gap of a stream that a comparison bridges, s."""
+    return 5 * max(usual_step(time_s), 1.0)
 
 
 def _sideways_share(heading: Array, north: Array, east: Array) -> float:
@@ -176,7 +180,7 @@ def rate_evidence(
 def speed_evidence(time_s: Array, values: Array, motion: ReferenceMotion, quantity: str) -> ContentEvidence:
     """Compare a speed (n,), in an unknown unit, with the speed of the positions: its unit, and whether it follows."""
     speed = motion.speed_mps
-    other = interpolated(motion.time_s, time_s, values, 5 * max(usual_step(time_s), 1.0))
+    other = interpolated(motion.time_s, time_s, values, _longest_gap_s(time_s))
     good = np.isfinite(other) & motion.moving
     if good.sum() < FEW_SAMPLES:
         return UNTESTED
@@ -197,7 +201,7 @@ def speed_evidence(time_s: Array, values: Array, motion: ReferenceMotion, quanti
 
 def component_evidence(time_s: Array, values: Array, reference: Array, motion: ReferenceMotion) -> ContentEvidence:
     """Compare a velocity (n,), m/s, with one of the positions at the times of the motion, without their means."""
-    other = interpolated(motion.time_s, time_s, values, 5 * max(usual_step(time_s), 1.0))
+    other = interpolated(motion.time_s, time_s, values, _longest_gap_s(time_s))
     if np.count_nonzero(np.isfinite(other) & np.isfinite(reference)) < FEW_SAMPLES:
         return UNTESTED
     found = _correlation(other, reference)

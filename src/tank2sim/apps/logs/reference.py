@@ -110,6 +110,12 @@ def interpolated(at_s: Array, time_s: Array, values: Array, longest_s: float) ->
     return np.where(inside, np.interp(at_s, time_s, values), np.nan)
 
 
+def interpolated_angle(at_s: Array, time_s: Array, angle_rad: Array, longest_s: float) -> Array:
+    """Angles (n,), rad, at other times, by their cosines and sines; nan as in :func:`interpolated`."""
+    sine, cosine = (interpolated(at_s, time_s, part, longest_s) for part in (np.sin(angle_rad), np.cos(angle_rad)))
+    return np.asarray(np.arctan2(sine, cosine))
+
+
 def held(at_s: Array, time_s: Array, values: Array) -> Array:
     """Values (n,) at other times, each held until the next; nan before the first."""
     place = np.searchsorted(time_s, at_s, side="right") - 1

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +19,7 @@ from scipy.ndimage import median_filter
 
 from tank2sim.apps.logs.content import steering_evidence
 from tank2sim.apps.logs.reference import differenced, held, interpolated
-from tank2sim.apps.logs.voyage import QuantitySeries, Voyage
+from tank2sim.apps.logs.voyage import QuantitySeries, Voyage, ground_velocity
 from tank2sim.arrays import Array
 from tank2sim.records.trials import usual_step
 
@@ -182,10 +183,34 @@ def find_stretches(voyage: Voyage) -> tuple[Stretch, ...]:
     signals = _signals(voyage)
     if signals is None:
         return ()
-    pieces = _merged(signals, [_piece(signals, begin, end) for begin, end in _cuts(signals)])
+    pieces = [_piece(signals, begin, end) for begin, end in _cuts(signals)]
+    pieces = _folded(pieces, partial(_with_movement, signals))
+    groups = _grouped(pieces, partial(_belongs, signals))
+    pieces = _steps(signals, [piece for group in groups for piece in _manoeuvres(signals, group)])
+    pieces = _folded(pieces, partial(_continued, signals))
     if not signals.ship:
-        pieces = _without_splinters(signals, pieces)
+        pieces = _folded(pieces, partial(_with_splinter, signals))
     return tuple(_stretch(signals, piece) for piece in pieces)
+
+
+def _folded(pieces: Iterable[_Piece], join: Callable[[_Piece, _Piece], _Piece | None]) -> list[_Piece]:
+    """Pieces, each joined with the one before where `join` gives their whole."""
+    out: list[_Piece] = []
+    for piece in pieces:
+        whole = join(out[-1], piece) if out else None
+        out[-1:] = [*out[-1:], piece] if whole is None else [whole]
+    return out
+
+
+def _grouped(pieces: Iterable[_Piece], belongs: Callable[[_Piece, _Piece], bool]) -> list[list[_Piece]]:
+    """Pieces in groups; each `belongs` to the piece before it."""
+    groups: list[list[_Piece]] = []
+    for piece in pieces:
+        if groups and belongs(groups[-1][-1], piece):
+            groups[-1].append(piece)
+        else:
+            groups.append([piece])
+    return groups
 
 
 def _signals(voyage: Voyage) -> _Signals | None:
@@ -201,16 +226,12 @@ def _signals(voyage: Voyage) -> _Signals | None:
     steer = median_filter(_on_grid(time, entry), size=3, mode="nearest")
     propulsion = _propulsion(series, time)
     full = max(float(np.nanpercentile(np.abs(propulsion), 99)), 1e-9) if np.isfinite(propulsion).any() else 1.0
-    heading = series.get("heading", series.get("magnetic_heading"))
-    rate = series.get("yaw_rate")
-    if rate is None and heading is not None:
-        slopes = QuantitySeries(*differenced(heading.time_s, heading.values, 2.0))
-        rate = slopes if len(slopes.time_s) else None
-    at_heading, at_rate = (
-        np.full(len(time), np.nan) if entry is None else np.interp(time, entry.time_s, entry.values)
-        for entry in (heading, rate)
-    )
-    lag = steering_evidence(time, steer, *((rate.time_s, rate.values) if rate else (time, at_rate))).lag_s
+    unknown = QuantitySeries(time, np.full(len(time), np.nan))
+    heading = series.get("heading", series.get("magnetic_heading", unknown))
+    rate = series.get("yaw_rate", QuantitySeries(*differenced(heading.time_s, heading.values, 2.0)))
+    rate = rate if len(rate.time_s) else unknown
+    lag = steering_evidence(time, steer, rate.time_s, rate.values).lag_s
+    at_heading, at_rate = (np.interp(time, entry.time_s, entry.values) for entry in (heading, rate))
     rest = float(np.clip(2 * lag, 2.0, 30.0))
     return _Signals(time, steer, threshold, propulsion, full, _speed(series, time), at_heading, at_rate, rest)
 
@@ -254,42 +275,49 @@ def _on_grid(time: Array, entry: QuantitySeries) -> Array:
 
 
 def _speed(series: Mapping[str, QuantitySeries], time: Array) -> Array:
+    """Speed (n,), through the water where it is known, m/s; nan without."""
     entry = next((series[name] for name in ("u_water", "sog", "u_ground") if name in series), None)
     if entry is not None:
         return np.abs(interpolated(time, entry.time_s, entry.values, 30.0))
-    if "x" in series:
-        at, north = differenced(series["x"].time_s, series["x"].values, 4.0)
-        _, east = differenced(series["y"].time_s, series["y"].values, 4.0)
-        return interpolated(time, at, np.hypot(north, east), 30.0)
-    return np.full(len(time), np.nan)
+    if (ground := ground_velocity(series)) is None:
+        return np.full(len(time), np.nan)
+    return interpolated(time, ground[0], np.hypot(*ground[1:]), 30.0)
 
 
 def _cuts(signals: _Signals) -> list[tuple[int, int]]:
     """Begin and end of pieces between jumps of the orders; a piece begins where its jump does."""
-    step, count = signals.step, len(signals.time)
-    reach, settling = max(1, round(JUMP_S / step)), round(signals.rest_s / step)
-    jumping = np.zeros(count, dtype=bool)
-    for values, least in (
-        (signals.steering, 0.75 * signals.threshold),
-        (signals.propulsion, PROPULSION_STEP * signals.full),
-    ):
-        moved = np.abs(values[reach:] - values[:-reach]) > least
-        for place in np.flatnonzero(moved & ~np.concatenate([[False], moved[:-1]])):
-            window = np.abs(np.diff(values[place : place + reach + 1]))
-            jumping[place + int(np.argmax(window > 0.2 * least)) + 1] = True
-        # Within a long movement there may be another order: a reversal of the movement itself.
-        slope = np.sign(values[reach:] - values[:-reach]) * moved
-        jumping[np.flatnonzero(slope[1:] * slope[:-1] < 0) + reach // 2 + 1] = True
-    inactive = np.abs(signals.steering) < signals.threshold
-    turns = [0, *(np.flatnonzero(np.diff(inactive.astype(int))) + 1), count]
-    for begin, end in pairwise(turns):
-        rests = inactive[begin] and begin > settling and end - begin >= settling
-        if rests and not jumping[begin - settling : begin].any():
-            jumping[begin] = True  # a rudder that was brought back slowly
-    least = max(2, round(1.5 / step))
+    count, jumping = len(signals.time), np.zeros(len(signals.time), dtype=bool)
+    jumping[_jumps(signals, signals.steering, 0.75 * signals.threshold)] = True
+    jumping[_jumps(signals, signals.propulsion, PROPULSION_STEP * signals.full)] = True
+    _mark_slow_returns(signals, jumping)
+    least = max(2, round(1.5 / signals.step))
     kept = [0]
     kept += [int(edge) for edge in np.flatnonzero(jumping) if edge - kept[-1] >= least and count - edge >= least]
     return list(pairwise([*kept, count]))
+
+
+def _jumps(signals: _Signals, values: Array, least: float) -> list[int]:
+    """Samples at which an order begins to change by more than `least` within :data:`JUMP_S`."""
+    reach = max(1, round(JUMP_S / signals.step))
+    change = values[reach:] - values[:-reach]
+    moved = np.abs(change) > least
+    begins = np.flatnonzero(moved & ~np.concatenate([[False], moved[:-1]]))
+    steps = [np.abs(np.diff(values[place : place + reach + 1])) > 0.2 * least for place in begins]
+    jumps = [int(place + np.argmax(step)) + 1 for place, step in zip(begins, steps, strict=True)]
+    # Within a long movement there may be another order: a reversal of the movement itself.
+    slope = np.sign(change) * moved
+    return [*jumps, *(np.flatnonzero(slope[1:] * slope[:-1] < 0) + reach // 2 + 1)]
+
+
+def _mark_slow_returns(signals: _Signals, jumping: np.ndarray) -> None:
+    """Mark where a rudder rests after it was brought back slowly, without a jump."""
+    settling = round(signals.rest_s / signals.step)
+    inactive = np.abs(signals.steering) < signals.threshold
+    turns = [0, *(np.flatnonzero(np.diff(inactive.astype(int))) + 1), len(inactive)]
+    for begin, end in pairwise(turns):
+        rests = inactive[begin] and begin > settling and end - begin >= settling
+        if rests and not jumping[begin - settling : begin].any():
+            jumping[begin] = True
 
 
 def _piece(signals: _Signals, begin: int, end: int) -> _Piece:
@@ -304,23 +332,52 @@ def _piece(signals: _Signals, begin: int, end: int) -> _Piece:
     return replace(piece, kind=_kind(signals, piece))
 
 
-def _kind(signals: _Signals, piece: _Piece) -> StretchKind:
-    """Kind of a piece by its orders and the speed."""
-    speed = signals.speed[piece.begin : piece.end]
+@dataclass(frozen=True)
+class _PieceSpeed:
+    """Speed at the begin and at the end of a piece, its median and its largest, m/s; nan where none is known."""
+
+    first: float
+    last: float
+    median: float
+    largest: float
+
+    @property
+    def moved(self) -> bool:
+        """Whether the vessel was more than at rest."""
+        return self.largest > RESTING_MPS
+
+    @property
+    def changes(self) -> bool:
+        """Whether it is an acceleration, to either side."""
+        return self.moved and abs(self.last - self.first) / max(self.first, self.last, 1e-9) > SPEED_CHANGE
+
+    @property
+    def slows(self) -> bool:
+        """Whether the vessel has way on and loses it."""
+        return self.first > 2 * RESTING_MPS and self.last < self.first
+
+
+def _piece_speed(speed: Array) -> _PieceSpeed:
+    """Figures of the speed (n,) of a piece."""
     known = speed[np.isfinite(speed)]
+    if not len(known):
+        return _PieceSpeed(*[math.nan] * 4)
     tenth = max(1, len(known) // 10)
-    first, last = (float(np.median(part)) if len(part) else math.nan for part in (known[:tenth], known[-tenth:]))
-    turning, share = signals.steered(piece), piece.propulsion / signals.full
-    moved = len(known) > 0 and float(np.max(known)) > RESTING_MPS
-    changes = moved and abs(last - first) / max(first, last, 1e-9) > SPEED_CHANGE
+    parts = known[:tenth], known[-tenth:], known
+    return _PieceSpeed(*(float(np.median(part)) for part in parts), float(np.max(known)))
+
+
+def _kind(signals: _Signals, piece: _Piece) -> StretchKind:
+    """Kind of a piece by its orders and the speed: the first that applies."""
+    speed, share = _piece_speed(signals.speed[piece.begin : piece.end]), piece.propulsion / signals.full
+    stopped, unknown = abs(share) <= STOPPED_SHARE, math.isnan(speed.median)
     if share < -STOPPED_SHARE:
-        return StretchKind.STOP if first > 2 * RESTING_MPS and last < first else StretchKind.ASTERN
-    stopped = abs(share) <= STOPPED_SHARE
-    if turning:
+        return StretchKind.STOP if speed.slows else StretchKind.ASTERN
+    if signals.steered(piece):
         return StretchKind.PIVOT if stopped and not signals.ship else StretchKind.TURN
-    if changes:
+    if speed.changes:
         return StretchKind.COAST if stopped else StretchKind.ACCELERATE
-    steady = float(np.median(known)) > UNDER_WAY_MPS if stopped and len(known) else moved or not (stopped or len(known))
+    steady = speed.median > UNDER_WAY_MPS if stopped else speed.moved or unknown
     return StretchKind.STEADY if steady else StretchKind.REST
 
 
@@ -356,51 +413,28 @@ _STEPS_LONGEST = 2.5
 """Longest of them, as a multiple of the time that the vessel needs to settle. Project choice."""
 
 
-def _merged(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
-    """Pieces that belong together as one: zigzags, steps, slow changes of propulsion, short corrections between."""
-    joined: list[_Piece] = []
-    for piece in pieces:
-        last = joined[-1] if joined else None
-        if last is not None and last.kind in _UNSTEERED and _is_movement(signals, last, piece):
-            joined[-1] = _piece(signals, last.begin, piece.end)
-        else:
-            joined.append(piece)
-    groups: list[list[_Piece]] = []
-    for piece in joined:
-        if groups and _belongs(signals, groups[-1][-1], piece):
-            groups[-1].append(piece)
-        else:
-            groups.append([piece])
-    out: list[_Piece] = []
-    for piece in _steps(signals, [piece for group in groups for piece in _manoeuvres(signals, group)]):
-        same = out and out[-1].kind == piece.kind and piece.kind in _JOINABLE
-        settled = out and out[-1].kind is StretchKind.ACCELERATE and piece.kind is StretchKind.STEADY
-        if same or (settled and signals.lasted(piece) < 2 * signals.rest_s):
-            out[-1] = replace(out[-1], end=piece.end)
-        else:
-            out.append(piece)
-    return out
-
-
-def _is_movement(signals: _Signals, last: _Piece, piece: _Piece) -> bool:
-    """Whether a piece is the way to the order of the next: it is short, or the propulsion changes throughout."""
+def _with_movement(signals: _Signals, last: _Piece, piece: _Piece) -> _Piece | None:
+    """A piece with the one before, if that is the way to its order: it is short, or its propulsion changes throughout."""
     lasted, power = signals.lasted(last), signals.propulsion[last.begin : last.end]
     changes = lasted < signals.rest_s and bool(np.ptp(power) > PROPULSION_STEP * signals.full)
     straight = piece.kind in (*_UNSTEERED, StretchKind.STOP) and abs(piece.level) < signals.threshold
-    return lasted < JUMP_S or (changes and straight)
+    way = last.kind in _UNSTEERED and (lasted < JUMP_S or (changes and straight))
+    return _piece(signals, last.begin, piece.end) if way else None
 
 
-def _without_splinters(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
-    """Pieces of a craft; a short one next to another that excites the craft joins it: both are steps."""
-    out: list[_Piece] = []
-    for piece in pieces:
-        last = out[-1] if out else None
-        both = last is not None and last.kind.excites and piece.kind.excites
-        if last is not None and both and min(map(signals.lasted, (last, piece))) < SPLINTER_S:
-            out[-1] = replace(last, end=piece.end, kind=StretchKind.STEPS)
-        else:
-            out.append(piece)
-    return out
+def _continued(signals: _Signals, last: _Piece, piece: _Piece) -> _Piece | None:
+    """A piece that is the same as the one before, or the end of its acceleration, with it."""
+    same = last.kind == piece.kind and piece.kind in _JOINABLE
+    settled = (last.kind, piece.kind) == (StretchKind.ACCELERATE, StretchKind.STEADY)
+    brief = signals.lasted(piece) < 2 * signals.rest_s
+    return replace(last, end=piece.end) if same or (settled and brief) else None
+
+
+def _with_splinter(signals: _Signals, last: _Piece, piece: _Piece) -> _Piece | None:
+    """Two pieces of a craft that excite it, of which one is short: steps."""
+    if not (last.kind.excites and piece.kind.excites) or min(map(signals.lasted, (last, piece))) >= SPLINTER_S:
+        return None
+    return replace(last, end=piece.end, kind=StretchKind.STEPS)
 
 
 def _steps(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
@@ -515,15 +549,18 @@ def _movement_begin(signals: _Signals, leg: _Piece, least: int) -> int:
 def _zigzag_length(signals: _Signals, legs: Sequence[_Piece]) -> int:
     """How many of the first legs are a zigzag: opposite orders of one size that each turn the vessel; 0 for none."""
     count = 0
-    for place, leg in enumerate(legs):
-        sizes = [abs(each.level) for each in legs[: place + 1]]
-        alike = max(sizes) - min(sizes) < _ALIKE * max(sizes)
-        other = place == 0 or leg.level * legs[place - 1].level < 0
-        if not (alike and other and signals.same_power(legs[0], leg, 2.0)) or _turns_far(signals, leg):
-            break
-        count = place + 1
+    while count < len(legs) and _is_next_leg(signals, legs[:count], legs[count]):
+        count += 1
     following = sum(signals.turned(leg) * leg.level >= 0 for leg in legs[:count])
     return count if count > 2 and following > _FOLLOWING * count else 0
+
+
+def _is_next_leg(signals: _Signals, legs: Sequence[_Piece], leg: _Piece) -> bool:
+    """Whether a leg continues the legs of a zigzag: to the other side, of one size, with one power, and not far."""
+    if legs and (leg.level * legs[-1].level >= 0 or not signals.same_power(legs[0], leg, 2.0)):
+        return False
+    sizes = [abs(each.level) for each in (*legs, leg)]
+    return max(sizes) - min(sizes) < _ALIKE * max(sizes) and not _turns_far(signals, leg)
 
 
 def _turns_far(signals: _Signals, leg: _Piece) -> bool:

@@ -20,6 +20,7 @@ from tank2sim.apps.logs.reference import (
     POSITION_WINDOW_S,
     differenced,
     interpolated,
+    interpolated_angle,
     local_metres,
     rounded_origin,
     thinned_series,
@@ -358,54 +359,58 @@ def drift_current(voyage: Voyage, begin_s: float, end_s: float) -> DriftCurrent 
     water. With the speed ahead alone the difference of the speeds ahead is fitted by the current's component on the
     heading, for which the heading must have changed. A scale error of the log through the water is part of it.
     """
-    series = voyage.series
-    ground = _ground(voyage)
+    series, ground = voyage.series, ground_velocity(voyage.series)
     if "heading" not in series or "u_water" not in series or ground is None:
         return None
     inside = (ground[0] >= begin_s) & (ground[0] <= end_s)
     time, north, east = (part[inside] for part in ground)
-    if len(time) < _FEWEST:
-        return None
     heading, ahead, side = (
-        interpolated(time, series[name].time_s, series[name].values, 5.0) if name in series else np.zeros(0)
+        interpolated(time, series[name].time_s, series[name].values, 5.0)
+        if name in series
+        else np.full(len(time), np.nan)
         for name in ("heading", "u_water", "v_water")
     )
-    cosine, sine = np.cos(heading), np.sin(heading)
+    toward = np.column_stack([np.cos(heading), np.sin(heading)])
     if "v_water" in series:
-        x, y = north - (ahead * cosine - side * sine), east - (ahead * sine + side * cosine)
-        good = np.isfinite(x) & np.isfinite(y)
-        if good.sum() < _FEWEST:
-            return None
-        time, x, y = time[good], x[good], y[good]
-        spread = math.hypot(*(float(np.std(thinned_series(time, part, AVERAGED_S)[1])) for part in (x, y)))
-        return _current(float(x.mean()), float(y.mean()), spread, "velocities over the ground and through the water")
-    difference = north * cosine + east * sine - ahead
-    good = np.isfinite(difference)
-    matrix = np.column_stack([cosine[good], sine[good]])
-    if good.sum() < _FEWEST or np.linalg.eigvalsh(matrix.T @ matrix / good.sum())[0] < _LEAST_TURN:
+        water = ahead[:, None] * toward + side[:, None] * np.column_stack([-toward[:, 1], toward[:, 0]])
+        return _mean_difference(time, np.column_stack([north, east]) - water)
+    return _fitted_ahead(toward, np.sum(np.column_stack([north, east]) * toward, axis=1) - ahead)
+
+
+def _mean_difference(time: Array, difference: Array) -> DriftCurrent | None:
+    """Current by the velocities over the ground less those through the water (n, 2), to north and east."""
+    good = np.isfinite(difference).all(axis=1)
+    if good.sum() < _FEWEST:
         return None
-    mean, *_ = np.linalg.lstsq(matrix, difference[good], rcond=None)
-    spread = float(np.std(difference[good] - matrix @ mean))
-    return _current(float(mean[0]), float(mean[1]), spread, "speeds ahead over the ground and through the water")
+    averages = [thinned_series(time[good], part, AVERAGED_S)[1] for part in difference[good].T]
+    spread = math.hypot(*(float(np.std(part)) for part in averages))
+    return _current(difference[good].mean(axis=0), spread, "velocities over the ground and through the water")
 
 
-def _current(north: float, east: float, spread: float, by: str) -> DriftCurrent:
+def _fitted_ahead(toward: Array, difference: Array) -> DriftCurrent | None:
+    """Current by the speed ahead over the ground less the one through the water (n,), for headings as vectors (n, 2)."""
+    good = np.isfinite(difference)
+    matrix, known = toward[good], difference[good]
+    if len(known) < _FEWEST or np.linalg.eigvalsh(matrix.T @ matrix / len(known))[0] < _LEAST_TURN:
+        return None
+    mean = np.linalg.lstsq(matrix, known, rcond=None)[0]
+    spread = float(np.std(known - matrix @ mean))
+    return _current(mean, spread, "speeds ahead over the ground and through the water")
+
+
+def _current(mean: Array, spread: float, by: str) -> DriftCurrent:
+    north, east = mean.tolist()
     return DriftCurrent(math.hypot(north, east), math.degrees(math.atan2(east, north)) % 360, spread, by)
 
 
-def _ground(voyage: Voyage) -> tuple[Array, Array, Array] | None:
-    """Times and velocity to north and east over the ground."""
-    series = voyage.series
+def ground_velocity(series: Mapping[str, QuantitySeries]) -> tuple[Array, Array, Array] | None:
+    """Times and velocity to north and east over the ground (n,), m/s; None where it is not known."""
     if "v_north" in series and "v_east" in series:
         north, east = series["v_north"], series["v_east"]
         return north.time_s, north.values, np.interp(north.time_s, east.time_s, east.values)
     if "sog" in series and "cog" in series:
         sog, cog = series["sog"], series["cog"]
-        longest = 3 * max(usual_step(cog.time_s), 1.0)
-        cosine, sine = (
-            interpolated(sog.time_s, cog.time_s, part, longest) for part in (np.cos(cog.values), np.sin(cog.values))
-        )
-        course = np.arctan2(sine, cosine)
+        course = interpolated_angle(sog.time_s, cog.time_s, cog.values, 3 * max(usual_step(cog.time_s), 1.0))
         return sog.time_s, sog.values * np.cos(course), sog.values * np.sin(course)
     if "x" in series and "y" in series:
         time, v_north = differenced(series["x"].time_s, series["x"].values, POSITION_WINDOW_S)
