@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -37,6 +38,10 @@ DIFFERS = 0.5
 _SIDEWAYS = 0.35
 """Sideways speed (rms) as a share of the speed below which a heading is one. Project choice: half of the 0.71 of an
 angle that has nothing to do with the motion; small craft in turns reach 0.3."""
+
+# Senses of rotation and quarters of a turn by which a compass may be mounted; the first is as it should be
+_ORIENTATIONS = tuple(itertools.product((1, -1), range(4)))
+_UPRIGHT, _LIKELIER = _ORIENTATIONS[0], 0.02
 
 UNIT_SLACK = 0.2
 """Relative difference of a scale from the unit that is taken for it. Project choice: units are factors of 1.85
@@ -112,17 +117,14 @@ def direction_evidence(time_s: Array, angle_rad: Array, motion: ReferenceMotion)
         return UNTESTED
     angle, north, east = angle[good], north[good], east[good]
     course = np.arctan2(east, north)
-    differences = {
-        (sign, quarter): wrapped_angle(sign * angle + quarter * math.pi / 2 - course)
-        for sign in (1, -1)
-        for quarter in range(4)
-    }
+    differences = {key: wrapped_angle(key[0] * angle + key[1] * math.pi / 2 - course) for key in _ORIENTATIONS}
     shares = {key: float((np.abs(each) < NEAR_RAD).mean()) for key, each in differences.items()}
-    sign, quarter = max(shares, key=lambda key: shares[key] + (0.02 if key == (1, 0) else 0.0))
-    agreement, turned = shares[1, 0], np.ptp(np.unwrap(course)) > LEAST_TURNED_RAD
-    middle = float(np.median(differences[sign, quarter]))
+    best = max(shares, key=lambda key: shares[key] + _LIKELIER * (key == _UPRIGHT))
+    (sign, quarter), agreement = best, shares[_UPRIGHT]
+    turned = np.ptp(np.unwrap(course)) > LEAST_TURNED_RAD
+    middle = float(np.median(differences[best]))
     offset = float(wrapped_angle(np.array([middle - quarter * math.pi / 2]))[0])
-    if (sign, quarter) != (1, 0) and turned:
+    if best != _UPRIGHT and turned:
         mirrored = "mirrored and " if sign < 0 else ""
         words = f"is {mirrored}off by {math.degrees(offset):.0f} deg against the course of the positions"
         return ContentEvidence(agreement, sign, offset_rad=offset, text=words)
@@ -130,8 +132,8 @@ def direction_evidence(time_s: Array, angle_rad: Array, motion: ReferenceMotion)
     if turned and DIFFERS <= agreement < AGREES and (share := _sideways_share(angle, north, east)) < _SIDEWAYS:
         agreement = AGREES
         text += f", and moves sideways by {100 * share:.0f} % of its speed in a steady current"
-    spread = float(np.median(np.abs(differences[sign, quarter] - middle)))
-    return ContentEvidence(agreement, 1 if turned else 0, offset_rad=offset, spread_rad=spread, text=text)
+    spread = float(np.median(np.abs(differences[best] - middle)))
+    return ContentEvidence(agreement, int(turned), offset_rad=offset, spread_rad=spread, text=text)
 
 
 def _longest_gap_s(time_s: Array) -> float:
@@ -270,6 +272,7 @@ LEAST_DELAY_S, SURE_ERRORS = 0.1, 5.0
 ship turns by 0.2 deg at most in it)."""
 
 _LARGEST_DELAY_S, _STEPS = 3.0, 6
+_LEAST_ROWS = 10  # Samples that a segment has more than
 
 
 @dataclass(frozen=True)
@@ -305,29 +308,34 @@ def rate_delay(heading_time_s: Array, heading_rad: Array, rate_time_s: Array, ra
     delay, error = 0.0, np.inf
     for _ in range(_STEPS):
         columns = [interpolated(at + delay, rate_at, values, longest) for values in (area, rate)]
-        parts = [
-            _without_line(at[rows], np.column_stack([heading[rows], *(column[rows] for column in columns)]))
-            for number in np.unique(segment)
-            if (rows := np.flatnonzero((segment == number) & np.isfinite(columns[0]))).size > 10
-        ]
-        if len(parts) < LEAST_SEGMENTS:
+        rows = [np.flatnonzero((segment == number) & np.isfinite(columns[0])) for number in np.unique(segment)]
+        table = np.column_stack([heading, *columns])
+        found = _scale_and_step([_without_line(at[part], table[part]) for part in rows if len(part) > _LEAST_ROWS])
+        if found is None:
             return None
-        table = np.concatenate(parts)
-        X, y = table[:, 1:], table[:, 0]
-        normal = X.T @ X
-        if np.linalg.cond(normal / np.sqrt(np.outer(np.diag(normal), np.diag(normal)))) > 1e8:
-            return None
-        (scale, step), *_ = np.linalg.lstsq(X, y, rcond=None)
-        scores = np.array([part[:, 1:].T @ (part[:, 0] - part[:, 1:] @ [scale, step]) for part in parts])
-        inverse = np.linalg.inv(normal)
-        spread = np.sqrt((inverse @ (scores.T @ scores) @ inverse)[1, 1] * len(parts) / (len(parts) - 1))
-        change, error = step / scale, float(spread / abs(scale))
-        delay += float(change)
+        scale, step, step_error = found
+        change, error = step / scale, step_error / abs(scale)
+        delay += change
         if abs(delay) > _LARGEST_DELAY_S:
             return None
         if abs(change) < 0.01:
             break
     return RateDelay(delay, error)
+
+
+def _scale_and_step(parts: Sequence[Array]) -> tuple[float, float, float] | None:
+    """Scale, delay and its standard error by segments of heading, area and rate (k, 3); None where undetermined."""
+    if len(parts) < LEAST_SEGMENTS:
+        return None
+    table = np.concatenate(parts)
+    normal = table[:, 1:].T @ table[:, 1:]
+    if np.linalg.cond(normal / np.sqrt(np.outer(np.diag(normal), np.diag(normal)))) > 1e8:
+        return None
+    found = np.linalg.lstsq(table[:, 1:], table[:, 0], rcond=None)[0]
+    scores = np.array([part[:, 1:].T @ (part[:, 0] - part[:, 1:] @ found) for part in parts])
+    inverse = np.linalg.inv(normal)
+    spread = np.sqrt((inverse @ (scores.T @ scores) @ inverse)[1, 1] * len(parts) / (len(parts) - 1))
+    return float(found[0]), float(found[1]), float(spread)
 
 
 def _without_line(time_s: Array, columns: Array) -> Array:

@@ -414,7 +414,7 @@ _STEPS_LONGEST = 2.5
 
 
 def _with_movement(signals: _Signals, last: _Piece, piece: _Piece) -> _Piece | None:
-    """A piece with the one before, if that is the way to its order: it is short, or its propulsion changes throughout."""
+    """A piece with the one before, if that is the way to its order: short, or a change of propulsion throughout."""
     lasted, power = signals.lasted(last), signals.propulsion[last.begin : last.end]
     changes = lasted < signals.rest_s and bool(np.ptp(power) > PROPULSION_STEP * signals.full)
     straight = piece.kind in (*_UNSTEERED, StretchKind.STOP) and abs(piece.level) < signals.threshold

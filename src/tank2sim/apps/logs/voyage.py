@@ -143,24 +143,28 @@ def _tidied_streams(
     streams: list[LogStream] = []
     findings = [finding for log in parts for finding in log.findings]
     for log in parts:
-        repeated = 0
+        prefix = "" if len(parts) == 1 else f"{log.path.stem}: "
+        counts[log.path.name]["repeated_samples"] = 0
         for stream in log.streams:
             known, missing = without_missing(stream)
-            tidy, doubled, found_in_time = tidied(known)
-            repeated += doubled
+            tidy, repeated, found_in_time = tidied(known)
+            counts[log.path.name]["repeated_samples"] += repeated
             findings += [*missing, *found_in_time]
             tidy, _ = pulses_of(tidy)
             if len(tidy.values):
-                name = stream.name if len(parts) == 1 else f"{log.path.stem}: {stream.name}"
-                streams.append(replace(tidy, name=name))
+                streams.append(replace(tidy, name=prefix + stream.name))
             elif stream.quantity and len(stream.values):
                 findings.append(note(f"{stream.name}: holds no valid value", stream.name))
-        counts[log.path.name]["repeated_samples"] = repeated
+    return streams, _merged_findings(findings)
+
+
+def _merged_findings(findings: Iterable[LogFinding]) -> list[LogFinding]:
+    """Findings; several streams with the same one are counted in a single finding."""
     groups: dict[str, list[LogFinding]] = {}
     for finding in findings:
         key = finding.text.removeprefix(f"{finding.stream}: ") if finding.stream else finding.text
         groups.setdefault(key, []).append(finding)
-    return streams, [
+    return [
         group[0] if len(group) == 1 else replace(group[0], text=f"{len(group)} streams: {key}", stream="")
         for key, group in groups.items()
     ]
@@ -204,19 +208,20 @@ def _clock_findings(names: list[str], found: ChannelSet, streams: list[LogStream
     """Differences of the clocks of several logs, by rates of turn or headings that two of them hold."""
     named = {stream.name: stream for stream in streams}
     rates: dict[str, tuple[Array, Array]] = {}
-    for quantity in ("yaw_rate", "heading"):
-        for channel in found.channels:
-            name = next((name for name in names if channel.stream.startswith(f"{name}: ")), "")
-            if channel.quantity == quantity and channel.confidence >= SURE_FROM and name not in rates:
-                time, values = named[channel.stream].time_s, channel.si(named[channel.stream].values)
-                turned = quantity == "heading"
-                rates[name] = differenced(time, np.unwrap(values), HEADING_WINDOW_S) if turned else (time, values)
-    findings = []
+    sure = [channel for channel in found.channels if channel.confidence >= SURE_FROM]
+    for channel in sorted(sure, key=lambda channel: channel.quantity != "yaw_rate"):
+        name = next((name for name in names if channel.stream.startswith(f"{name}: ")), "")
+        series = named[channel.stream].time_s, channel.si(named[channel.stream].values)
+        if channel.quantity == "yaw_rate":
+            rates.setdefault(name, series)
+        elif channel.quantity == "heading":
+            rates.setdefault(name, differenced(series[0], np.unwrap(series[1]), HEADING_WINDOW_S))
+    findings, first = [], names[0]
     for name in names[1:]:
-        shift = _shift(rates[names[0]], rates[name]) if names[0] in rates and name in rates else None
+        shift = _shift(rates[first], rates[name]) if {first, name} <= rates.keys() else None
         if shift is not None and abs(shift) > _CLOCKS_AGREE_S:
             side = "ahead of" if shift > 0 else "behind"
-            text = f"the clock of {name} is {abs(shift):.3g} s {side} the clock of {names[0]} by the rate of turn"
+            text = f"the clock of {name} is {abs(shift):.3g} s {side} the clock of {first} by the rate of turn"
             findings.append(fault(f"{text}: give its channels delay_s = {shift:.3g}", shift_s=shift))
     return findings
 
@@ -250,21 +255,24 @@ def _not_understood(found: ChannelSet, streams: list[LogStream]) -> list[LogFind
 # Quantities without which no manoeuvre is understood
 _ESSENTIAL = ("rudder_angle", "rudder_order", "heading", "yaw_rate")
 
+_MAGNETIC_ALONE = (
+    "{} is a magnetic heading, and there is no true one: the trials have no heading; make it one in channels.toml "
+    '(quantity = "heading", offset = less the variation in deg, + east, and the deviation)'
+)
+
 
 def _to_confirm(found: ChannelSet) -> list[LogFinding]:
     """Findings of channels in use that are not sure, and of quantities whose only streams are not used."""
-    findings = _unsure([channel for channel in found.channels if channel.use and channel.confidence < SURE_FROM])
-    used = {channel.quantity: channel.stream for channel in found.channels if channel.use}
+    used = {channel.quantity: channel for channel in found.channels if channel.use}
+    findings = _unsure([channel for channel in used.values() if channel.confidence < SURE_FROM])
     for quantity in _ESSENTIAL:
         best = next((channel for channel in found.channels if channel.quantity == quantity), None)
         if best and quantity not in used and best.confidence >= 0.5:
             text = f"{QUANTITIES[quantity].words} may be {best.stream} ({best.why}), and is not used"
             findings.append(fault(text, best.stream))
     if "magnetic_heading" in used and "heading" not in used:
-        name = used["magnetic_heading"]
-        text = f"{name} is a magnetic heading, and there is no true one: the trials have no heading; make it one in "
-        text += 'channels.toml (quantity = "heading", offset = less the variation in deg, + east, and the deviation)'
-        findings.append(fault(text, name))
+        name = used["magnetic_heading"].stream
+        findings.append(fault(_MAGNETIC_ALONE.format(name), name))
     return findings
 
 
@@ -311,20 +319,20 @@ def _derived(series: dict[str, QuantitySeries]) -> tuple[dict[str, QuantitySerie
 
 def _gap_findings(series: Mapping[str, QuantitySeries]) -> list[LogFinding]:
     """A note of the gaps of each set of channels that share them."""
+    words = {name: "position" if name == "x" else QUANTITIES[name].words for name in series if name != "y"}
     groups: dict[tuple[str, ...], tuple[list[tuple[float, float]], list[str]]] = {}
-    for name, entry in series.items():
-        gaps = gaps_of(entry.time_s, max(_GAP_LEAST_S, GAP_STEPS * usual_step(entry.time_s)))
-        if name != "y" and len(entry.time_s) > 2 and gaps:
-            words = "position" if name == "x" else QUANTITIES[name].words
-            key = tuple(utc_text(begin)[:19] for begin, _ in gaps)
-            groups.setdefault(key, (gaps, []))[1].append(words)
-    findings = []
-    for gaps, names in groups.values():
-        shown = ", ".join(f"{end - begin:.3g} s from {utc_text(begin)[11:19]}" for begin, end in gaps[:_GAPS_LISTED])
-        more = f" and {len(gaps) - _GAPS_LISTED} more" if len(gaps) > _GAPS_LISTED else ""
-        text = f"nothing for {shown}{more}: {'; '.join(names)}"
-        findings.append(note(text, total_s=sum(end - begin for begin, end in gaps)))
-    return findings
+    for name, word in words.items():
+        time = series[name].time_s
+        gaps = gaps_of(time, max(_GAP_LEAST_S, GAP_STEPS * usual_step(time))) if len(time) > 2 else []
+        groups.setdefault(tuple(utc_text(begin)[:19] for begin, _ in gaps), (gaps, []))[1].append(word)
+    return [_gap_note(gaps, names) for gaps, names in groups.values() if gaps]
+
+
+def _gap_note(gaps: list[tuple[float, float]], names: list[str]) -> LogFinding:
+    shown = ", ".join(f"{end - begin:.3g} s from {utc_text(begin)[11:19]}" for begin, end in gaps[:_GAPS_LISTED])
+    more = f" and {len(gaps) - _GAPS_LISTED} more" if len(gaps) > _GAPS_LISTED else ""
+    text = f"nothing for {shown}{more}: {'; '.join(names)}"
+    return note(text, total_s=sum(end - begin for begin, end in gaps))
 
 
 AVERAGED_S = 60.0
@@ -364,17 +372,13 @@ def drift_current(voyage: Voyage, begin_s: float, end_s: float) -> DriftCurrent 
         return None
     inside = (ground[0] >= begin_s) & (ground[0] <= end_s)
     time, north, east = (part[inside] for part in ground)
-    heading, ahead, side = (
-        interpolated(time, series[name].time_s, series[name].values, 5.0)
-        if name in series
-        else np.full(len(time), np.nan)
-        for name in ("heading", "u_water", "v_water")
-    )
-    toward = np.column_stack([np.cos(heading), np.sin(heading)])
-    if "v_water" in series:
-        water = ahead[:, None] * toward + side[:, None] * np.column_stack([-toward[:, 1], toward[:, 0]])
+    names = [name for name in ("heading", "u_water", "v_water") if name in series]
+    heading, ahead, *side = (interpolated(time, series[name].time_s, series[name].values, 5.0) for name in names)
+    cosine, sine = np.cos(heading), np.sin(heading)
+    if side:
+        water = np.column_stack([ahead * cosine - side[0] * sine, ahead * sine + side[0] * cosine])
         return _mean_difference(time, np.column_stack([north, east]) - water)
-    return _fitted_ahead(toward, np.sum(np.column_stack([north, east]) * toward, axis=1) - ahead)
+    return _fitted_ahead(np.column_stack([cosine, sine]), north * cosine + east * sine - ahead)
 
 
 def _mean_difference(time: Array, difference: Array) -> DriftCurrent | None:
@@ -388,7 +392,7 @@ def _mean_difference(time: Array, difference: Array) -> DriftCurrent | None:
 
 
 def _fitted_ahead(toward: Array, difference: Array) -> DriftCurrent | None:
-    """Current by the speed ahead over the ground less the one through the water (n,), for headings as vectors (n, 2)."""
+    """Current by the speed ahead over the ground less the speed through the water (n,), for heading vectors (n, 2)."""
     good = np.isfinite(difference)
     matrix, known = toward[good], difference[good]
     if len(known) < _FEWEST or np.linalg.eigvalsh(matrix.T @ matrix / len(known))[0] < _LEAST_TURN:
