@@ -218,7 +218,7 @@ class _Reader:
         return counts
 
     def _recorded_times(self, ticks: Samples, clock: Array, findings: list[LogFinding]) -> tuple[list[Array], bool]:
-        """Times of all columns by their stamps, set by the system times (m,) where the log has them; if they are UTC."""
+        """Times of all columns by their stamps, set by the system times (m,) if there are any; whether they are UTC."""
         columns = [*self.columns.values(), ticks]
         stamps = [np.array(column.stamps) for column in columns]
         dated = float(np.nanmedian(stamps[0])) > _FIRST_EPOCH_S
