@@ -38,16 +38,12 @@ def without_missing(stream: LogStream) -> tuple[LogStream, list[LogFinding]]:
     if stream.stated_by == "format":
         return stream, []
     values = np.array(stream.values, dtype=float)
-    bound = _BOUNDS.get(stream.quantity)
-    if bound is not None and stream.unit in ("", "deg") and np.isfinite(values).any():
-        inside = np.nanmedian(np.abs(values)) <= bound
-        values[inside & (np.abs(values) > bound)] = np.nan
+    if stream.unit in ("", "deg"):
+        values[_beyond(values, _BOUNDS.get(stream.quantity, np.inf))] = np.nan
     while (mark := _lone_mark(values, _NO_PLACE.get(stream.quantity, ()))) is not None:
         values[values == mark] = np.nan
     if stream.quantity in _NOT_AVAILABLE:
-        extremes = {float(known(values)) for known in (np.nanmin, np.nanmax) if np.isfinite(values).any()}
-        marks = [extreme for extreme in extremes if _MARK.fullmatch(f"{extreme:.10g}")]
-        for number in (*_NOT_AVAILABLE[stream.quantity], *marks):
+        for number in (*_NOT_AVAILABLE[stream.quantity], *filter(_is_mark, _extremes(values))):
             values[_jumps(values, number, stream.quantity in _CIRCULAR)] = np.nan
     lost = np.isnan(values) & np.isfinite(stream.values)
     if not lost.any():
@@ -57,13 +53,31 @@ def without_missing(stream: LogStream) -> tuple[LogStream, list[LogFinding]]:
     return replace(stream, values=values), [note(text, stream.name, values=float(lost.sum()))]
 
 
+def _beyond(values: Array, bound: float) -> np.ndarray:
+    """Which values (n,) are beyond a bound of which most keep within."""
+    sizes = np.abs(values)
+    usual = np.isfinite(sizes).any() and np.nanmedian(sizes) <= bound
+    return np.asarray((sizes > bound) & usual)
+
+
+def _extremes(values: Array) -> list[float]:
+    """The least and the largest of the known values (n,)."""
+    known = values[np.isfinite(values)]
+    return [float(known.min()), float(known.max())] if len(known) else []
+
+
+def _is_mark(number: float) -> bool:
+    """Whether recorders write this number for no value."""
+    return bool(_MARK.fullmatch(f"{number:.10g}"))
+
+
 def _lone_mark(values: Array, more: tuple[float, ...]) -> float | None:
     """The least or largest value, if it is a mark that is far from all others; None if neither is."""
     known = values[np.isfinite(values)]
-    for extreme in (float(known.min()), float(known.max())) if len(known) else ():
+    for extreme in _extremes(values):
         others = known[known != extreme]
-        is_mark = _MARK.fullmatch(f"{extreme:.10g}") or extreme in more
-        if is_mark and len(others) >= FEW_SAMPLES and np.abs(others - extreme).min() > np.ptp(others):
+        far = len(others) >= FEW_SAMPLES and np.abs(others - extreme).min() > np.ptp(others)
+        if far and (_is_mark(extreme) or extreme in more):
             return extreme
     return None
 
@@ -148,10 +162,7 @@ def pulses_of(stream: LogStream) -> tuple[LogStream, PulseScale | None]:
     >>> scale.share(pulses.values).tolist()
     [0.0, 0.0, 0.5, -1.0]
     """
-    unit = stream.unit.lower()
-    other = unit not in ("", *_PULSE_UNITS) or (stream.quantity and stream.quantity not in _ORDERS)
-    said = unit or stream.quantity or _PULSE_WORDS.search(plain_words(stream.name))
-    if other or stream.stated_by == "format" or not said:
+    if not _may_be_pulses(stream):
         return stream, None
     values = np.where(stream.values > 0, stream.values, np.nan)
     known = values[np.isfinite(values)]
@@ -163,3 +174,12 @@ def pulses_of(stream: LogStream) -> tuple[LogStream, PulseScale | None]:
     one_way = levels[0] <= _IDLE_US and counts[0] == counts.max() and not stream.quantity.startswith("rudder")
     rest = float(levels[0]) if one_way else MIDDLE_US
     return replace(stream, values=values), PulseScale(rest, full - rest)
+
+
+def _may_be_pulses(stream: LogStream) -> bool:
+    """Whether the unit, the quantity or the name of a stream says pulses or an order, and none of them another."""
+    if stream.stated_by == "format" or (stream.quantity and stream.quantity not in _ORDERS):
+        return False
+    if stream.unit:
+        return stream.unit.lower() in _PULSE_UNITS
+    return bool(stream.quantity or _PULSE_WORDS.search(plain_words(stream.name)))
