@@ -82,21 +82,24 @@ def continued_clock(time_s: Array, name: str) -> tuple[Array, list[LogFinding]]:
     leaps: list[int] = []
     for place in np.flatnonzero((steps < -FALL_STEPS * usual) | (steps > GAP_STEPS * usual)):
         step = float(steps[place])
-        if step > 0 and shift > 0 and abs(step - usual - shift) < 2 * usual:
-            times[place + 1 :] -= shift
-            shift = 0.0
-        elif step > 0:
-            leaps.append(int(place))
-        elif not (same := [leap for leap in leaps if abs(steps[leap] + step - 2 * usual) < 2 * usual]):
+        if step > 0:
+            if shift > 0 and abs(step - usual - shift) < 2 * usual:
+                times[place + 1 :] -= shift
+                shift = 0.0
+            else:
+                leaps.append(int(place))
+            continue
+        undone = [leap for leap in leaps if abs(steps[leap] + step - 2 * usual) < 2 * usual]
+        if undone:
+            leaps.remove(ahead := undone[-1])
+            times[ahead + 1 : place + 1] -= float(steps[ahead]) - usual
+            text = f"{name}: the clock is {-step + usual:.4g} s ahead from {utc_text(time_s[ahead])} on for a while"
+            findings.append(fault(f"{text}; that is taken back", name, leap_s=-step + usual))
+        else:
             shift += usual - step
             times[place + 1 :] += usual - step
             text = f"{name}: the clock falls by {-step:.4g} s at {utc_text(time_s[place])}; it is taken to run on"
             findings.append(fault(text, name, fall_s=-step))
-        else:
-            leaps.remove(ahead := same[-1])
-            times[ahead + 1 : place + 1] -= float(steps[ahead]) - usual
-            text = f"{name}: the clock is {-step + usual:.4g} s ahead from {utc_text(time_s[ahead])} on for a while"
-            findings.append(fault(f"{text}; that is taken back", name, leap_s=-step + usual))
     return times, findings
 
 
