@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tank2sim.apps.logs.channels import USED_FROM, ChannelSet, LogChannel
-from tank2sim.apps.logs.content import AGREES, DIFFERS, ContentEvidence, angle_unit, rate_delay
-from tank2sim.apps.logs.quantities import QUANTITIES
+from tank2sim.apps.logs.content import AGREES, DIFFERS, ContentEvidence, rate_delay
+from tank2sim.apps.logs.quantities import QUANTITIES, unit_by_size
 from tank2sim.apps.logs.recorded import PulseScale, pulses_of, rest_of
 from tank2sim.apps.logs.reference import ReferenceMotion, held, interpolated, thinned_series
 from tank2sim.apps.logs.streams import LogFinding, LogStream, fault, note
@@ -113,7 +113,7 @@ class ChannelSearch:
     def angle(self, stream: LogStream) -> tuple[Array, Array]:
         """Time and angle of a direction, rad, thinned by picking."""
         stride = max(1, round(_TESTED_STEP_S / usual_step(stream.time_s)))
-        unit = angle_unit(stream.values, stream.unit)
+        unit = stream.unit or unit_by_size("heading", stream.values)
         return stream.time_s[::stride], stream.values[::stride] * QUANTITIES["heading"].units[unit]
 
     def series(self, channel: LogChannel) -> tuple[Array, Array]:
@@ -139,6 +139,10 @@ class ChannelSearch:
     def fault(self, stream: str, text: str) -> None:
         """Say what is wrong with a stream."""
         self.findings.append(fault(f"{stream}: {text}", stream))
+
+    def note(self, stream: str, text: str, **evidence: float) -> None:
+        """Say what is found of a stream."""
+        self.findings.append(note(f"{stream} {text}", stream, **evidence))
 
     def judged(self, stream: LogStream, evidence: ContentEvidence, agrees: float = AGREES) -> Judgement:
         """Confidence of a stream in its quantity by content, and why."""
@@ -221,8 +225,8 @@ class ChannelSearch:
             scale = scale.two_way
         if channel.use:
             full = scale.rest_us + scale.span_us
-            text = f"{channel.stream} holds pulses: {scale.rest_us:g} us is taken as rest and {full:g} us as full order"
-            self.findings.append(note(text, channel.stream))
+            text = f"holds pulses: {scale.rest_us:g} us is taken as rest and {full:g} us as full order"
+            self.note(channel.stream, text)
         offset = scale.rest_us + channel.offset * scale.span_us
         return replace(channel, scale=channel.scale / scale.span_us, offset=offset)
 
@@ -263,8 +267,7 @@ class ChannelSearch:
         delay = round(abs(found.delay_s), 2)
         words = f"{delay:g} ± {found.standard_error_s:.1g} s behind {other.stream}"
         channels[used[late.quantity]] = replace(late.because(f"{words}, and set back by it"), delay_s=delay)
-        text = f"{late.stream} is {words} and is set back by it (delay_s in channels.toml)"
-        self.findings.append(note(text, late.stream, delay_s=delay))
+        self.note(late.stream, f"is {words} and is set back by it (delay_s in channels.toml)", delay_s=delay)
 
 
 def _seconds(channels: Sequence[LogChannel], *quantities: str) -> list[tuple[LogChannel, LogChannel]]:

@@ -24,7 +24,7 @@ from tank2sim.apps.logs.position_channels import find_positions
 from tank2sim.apps.logs.quantities import QUANTITIES, names_another
 from tank2sim.apps.logs.reference import differenced, interpolated
 from tank2sim.apps.logs.steering_channels import find_steering
-from tank2sim.apps.logs.streams import LogStream, note
+from tank2sim.apps.logs.streams import LogStream
 from tank2sim.arrays import Array
 
 _MUCH_LESS = 0.7
@@ -65,7 +65,7 @@ def _find_rates(search: ChannelSearch) -> None:
             if evidence.sign < 0:
                 found.turn(min(found.confidence, 0.9), "its sign is the other one")
             if found.sign < 0:
-                search.findings.append(note(f"{stream.name} is positive to port", stream.name))
+                search.note(stream.name, "is positive to port")
         search.take(found)
     best = search.best("yaw_rate")
     if best is not None:

@@ -96,13 +96,6 @@ class ContentEvidence:
 UNTESTED = ContentEvidence(text="not to be tested in this log")
 
 
-def angle_unit(values: Array, stated: str) -> str:
-    """Unit of an angle of the full circle: ``deg`` or ``rad``, by its size where nothing states it."""
-    if stated in ("deg", "rad"):
-        return stated
-    return "deg" if np.nanmax(np.abs(values)) > 2 * math.pi + 0.1 else "rad"
-
-
 def direction_evidence(time_s: Array, angle_rad: Array, motion: ReferenceMotion) -> ContentEvidence:
     """Compare a heading or a course (n,), rad, with the course of the positions, where the vessel moves.
 
@@ -231,17 +224,6 @@ def steering_evidence(time_s: Array, values: Array, rate_time_s: Array, rate: Ar
     best = max(found, key=lambda constant: abs(found[constant]))
     text = f"the rate of turn follows it by {found[best]:.2f} with a lag of {best:g} s"
     return ContentEvidence(abs(found[best]), 1 if found[best] > 0 else -1, lag_s=best, text=text)
-
-
-def rudder_unit(values: Array) -> str:
-    """Unit of a rudder by its size: ``rad`` to 0.75, ``1`` to 1.05, ``deg`` from 1.6 to 75, ``%`` to 105; else empty.
-
-    Rudders go to 35 deg (0.61 rad), some to 45 (SOLAS II-1, 29; flap and Schilling rudders to 70). Between, and from
-    70 to 105, nothing is certain, and the confidence says so.
-    """
-    most = float(np.nanpercentile(np.abs(values), 99.9))
-    limits = ((0.75, "rad"), (1.05, "1"), (1.6, ""), (75.0, "deg"), (105.0, "%"))
-    return next((unit for limit, unit in limits if most <= limit), "")
 
 
 def _nearest_unit(scale: float, quantity: str) -> str:

@@ -14,14 +14,13 @@ from tank2sim.apps.logs.content import (
     DIFFERS,
     NEAR_RAD,
     ContentEvidence,
-    angle_unit,
     direction_evidence,
     rate_evidence,
     steering_evidence,
 )
-from tank2sim.apps.logs.quantities import sign_of_name
+from tank2sim.apps.logs.quantities import sign_of_name, unit_by_size
 from tank2sim.apps.logs.reference import HEADING_WINDOW_S, differenced, interpolated
-from tank2sim.apps.logs.streams import LogStream, note
+from tank2sim.apps.logs.streams import LogStream
 from tank2sim.arrays import Array
 
 LARGEST_OFFSET_RAD = math.radians(30.0)
@@ -51,7 +50,7 @@ def find_directions(search: ChannelSearch) -> None:
     for stream in search.named("heading", "cog", "magnetic_heading"):
         evidence = direction_evidence(*search.angle(stream), search.motion)
         found = search.judged(stream, evidence)
-        found.unit = angle_unit(stream.values, stream.unit)
+        found.unit = found.unit or unit_by_size("heading", stream.values)
         astray = abs(evidence.offset_rad) > LARGEST_OFFSET_RAD or evidence.sign < 0
         if stream.quantity != "cog" and _is_opposed(evidence):
             found = _opposed(search, found)
@@ -124,8 +123,7 @@ def _opposed(search: ChannelSearch, found: Judgement) -> Judgement:
         taken = replace(search.judged(stream, evidence), unit=found.unit)
         if witness.sure:
             taken.why += f" astern, as {witness.words}"
-            text = f"{stream.name} points against the course, and {witness.words}: the vessel goes astern"
-            search.findings.append(note(text, stream.name))
+            search.note(stream.name, f"points against the course, and {witness.words}: the vessel goes astern")
         else:
             taken.doubt(_TO_CONFIRM, f" astern, but {witness.words}: {_EITHER_WAY}, which is taken")
         return taken
@@ -184,7 +182,8 @@ def find_unnamed_directions(search: ChannelSearch, streams: list[LogStream]) -> 
     taken = {part for channel in known for part in (channel.stream, channel.quantity)}
     for (stream, evidence), quantity in zip(followers, quantities, strict=True):
         if not taken & {stream.name, quantity}:
-            search.add_unnamed(stream, quantity, confidence, evidence, more, angle_unit(stream.values, stream.unit))
+            unit = stream.unit or unit_by_size("heading", stream.values)
+            search.add_unnamed(stream, quantity, confidence, evidence, more, unit)
     _take_heading(search)
 
 

@@ -13,6 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from tank2sim.arrays import Array
 from tank2sim.units import KNOT_MPS
 
 _UNITS = {
@@ -63,6 +66,8 @@ def _compiled(words: str) -> re.Pattern[str]:
     return re.compile(words.format(**_WORDS) or r"(?!)")
 
 
+_SIZES = {quantity: entry["limits"] for entry in _DECLARED["sizes"] for quantity in entry["quantities"]}
+
 _NAMES = [
     (entry["quantity"], _compiled(entry["words"]), _compiled(entry.get("barred", ""))) for entry in _DECLARED["names"]
 ]
@@ -89,6 +94,19 @@ def unit_of_signal_k(name: str, quantity: str) -> str:
     if not quantity or not _SIGNAL_K.match(name):
         return ""
     return "1/s" if name.endswith(".revolutions") else next(iter(QUANTITIES[quantity].units))
+
+
+def unit_by_size(quantity: str, values: Array) -> str:
+    """Unit of a quantity by the size of its values (n,), outliers excepted; empty where that is not certain.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> unit_by_size("rudder_angle", np.array([-20.0, 20.0])), unit_by_size("rudder_angle", np.array([1.2]))
+    ('deg', '')
+    """
+    most = float(np.nanpercentile(np.abs(values), 99.9))
+    return next((unit for limit, unit in _SIZES.get(quantity, ()) if most <= limit), "")
 
 
 def plain_words(name: str, *, numbered: bool = True) -> str:

@@ -220,7 +220,11 @@ class _Topic:
         if self.kind in _POSES:
             return _pose(columns, prefix)
         words = set(plain_words(self.name).split())
-        measured = self.kind in _PREFIXES and f"{prefix}linear.x" in columns and words.isdisjoint(_ORDER_WORDS)
+        measured = (
+            self.kind in _PREFIXES
+            and {f"{prefix}linear.x", f"{prefix}linear.y"} <= columns.keys()
+            and words.isdisjoint(_ORDER_WORDS)
+        )
         of_world = not words.isdisjoint(_GROUND_WORDS) or self.frame in _WORLD_FRAMES
         return _velocity(columns, prefix, of_world) if measured else []
 

@@ -17,13 +17,18 @@ from tank2sim.apps.logs.content import (
     UNIT_SLACK,
     UNTESTED,
     ContentEvidence,
-    angle_unit,
-    rudder_unit,
     steering_evidence,
 )
-from tank2sim.apps.logs.quantities import QUANTITIES, names_another, names_thrust, plain_words, sign_of_name
+from tank2sim.apps.logs.quantities import (
+    QUANTITIES,
+    names_another,
+    names_thrust,
+    plain_words,
+    sign_of_name,
+    unit_by_size,
+)
 from tank2sim.apps.logs.reference import LEAST_SPEED_MPS, interpolated
-from tank2sim.apps.logs.streams import LogStream, note
+from tank2sim.apps.logs.streams import LogStream
 from tank2sim.arrays import Array
 from tank2sim.records.trials import usual_step
 
@@ -55,9 +60,8 @@ _ASTERN_SHARE, _ASTERN_S = 0.15, 8.0
 """Shares of the usual speed and of the usual revolutions, and a time, s, from which a vessel goes astern against them.
 Project choice: beyond what a current or a coasting propeller does."""
 
-_FASTEST_SHAFT_HZ, _LARGEST_HEEL_RAD = 100.0, 0.8
-"""Revolutions beyond which a record without a unit is in rpm, 1/s (small thrusters reach 80), and heel beyond which it
-is in deg: 46 deg in rad (project choices)."""
+_FASTEST_SHAFT_HZ = 100.0
+"""Revolutions beyond which a record without a unit is in rpm, 1/s: small thrusters reach 80 (project choice)."""
 
 _LEAST_ZERO, _LEAST_ZERO_SHARE = 10.0, 0.4
 """Rudder on straight legs, deg or %, from which a zero of the record is taken out, and the same of a rudder of unknown
@@ -97,7 +101,7 @@ def find_steering(search: ChannelSearch) -> None:
         for port, starboard in zip(ports, starboards, strict=False):
             _judge_pair(search, names, (port, starboard))
         for stream in ports[len(starboards) :] + starboards[len(ports) :]:
-            search.add(Judgement(stream, 0.6, "the other side is missing", _share_unit(stream, stream.quantity)))
+            search.add(Judgement(stream, 0.6, "the other side is missing", _unit(stream, stream.quantity)))
     _take_others(search)
     _scale_engine_shares(search)
     _report_lost_signs(search)
@@ -147,9 +151,8 @@ def _zero(search: ChannelSearch, stream: LogStream, evidence: ContentEvidence) -
     zero, span = float(np.median(values[straight])), float(np.nanmax(values) - np.nanmin(values))
     size = abs(zero) * math.degrees(QUANTITIES["rudder_angle"].units.get(stream.unit or "deg", 1.0))
     if size >= _LEAST_ZERO if stream.unit else abs(zero) > _LEAST_ZERO_SHARE * span:
-        words = f"{stream.name} is at {zero:.4g} {stream.unit}".strip() + " on straight legs"
-        text = f"{words}, which is taken as its zero (offset in channels.toml)"
-        search.findings.append(note(text, stream.name, zero=zero))
+        words = f"is at {zero:.4g} {stream.unit}".strip() + " on straight legs"
+        search.note(stream.name, f"{words}, which is taken as its zero (offset in channels.toml)", zero=zero)
         return zero
     if size > _LEAST_HELM:
         text = f"at {zero:.3g} {stream.unit or 'deg'} on straight legs: helm against wind, or its zero"
@@ -162,7 +165,7 @@ def _judge_rudder(search: ChannelSearch, stream: LogStream) -> None:
     evidence = _evidence(search, time, values * search.way_at(time))  # astern, a rudder turns the bow the other way
     zero = _zero(search, stream, evidence)
     found = search.judged(stream, evidence, agrees=_SHOWN)
-    found.unit, found.offset = stream.unit or rudder_unit(stream.values - zero), zero
+    found.unit, found.offset = stream.unit or unit_by_size("rudder_angle", stream.values - zero), zero
     stated, shown = sign_of_name(stream.name), evidence.known >= _SHOWN
     if stated:
         found.sign = stated
@@ -171,7 +174,7 @@ def _judge_rudder(search: ChannelSearch, stream: LogStream) -> None:
     elif shown and evidence.sign < 0:
         found.turn(0.9, "it is positive to port, against its format")
         if found.sign < 0:
-            search.findings.append(note(f"{stream.name} is positive to port", stream.name))
+            search.note(stream.name, "is positive to port")
     if found.confidence < DIFFERS:
         search.fault(stream.name, found.why)
     _doubt_rudder(found, zero)
@@ -208,8 +211,7 @@ def _find_unnamed_rudder(search: ChannelSearch) -> None:
             others = ", ".join(other.name for _, other in candidates if other is not stream)
             confidence, more = 0.7 if place == 0 else 0.5, f"; the same is true of {others}"
         quantity = "rudder_order" if _held_share(stream) > _HOLDS else "rudder_angle"
-        unit = stream.unit or rudder_unit(stream.values)
-        search.add_unnamed(stream, quantity, confidence, evidence, more, unit)
+        search.add_unnamed(stream, quantity, confidence, evidence, more, _unit(stream, quantity))
 
 
 def _leading_the_turn(search: ChannelSearch) -> list[tuple[ContentEvidence, LogStream]]:
@@ -225,7 +227,7 @@ def _could_be_rudder(stream: LogStream) -> bool:
     """Whether a stream of no known quantity moves within the angles or shares of rudders."""
     if stream.quantity or names_another(stream.name) or np.ptp(stream.values) == 0:
         return False
-    return bool(stream.unit or rudder_unit(stream.values))
+    return bool(_unit(stream, "rudder_angle"))
 
 
 def _alike(first: LogStream, second: LogStream) -> bool:
@@ -349,7 +351,7 @@ def _judge_way(search: ChannelSearch, found: Judgement, way: _PairSigns, sides_s
 def _take_share_unit(found: Judgement, quantity: str) -> None:
     """Unit of an order or of revolutions; rpm by their size is doubted unless the name or the size is clear."""
     stream = found.stream
-    found.unit = _share_unit(stream, quantity)
+    found.unit = _unit(stream, quantity)
     clear = "rpm" in plain_words(stream.name).split() or np.abs(stream.values).max() > _FASTEST_SHAFT_HZ
     if found.unit == "rpm" != stream.unit and not clear:
         found.doubt(_DOUBTED, "; rpm by their size")
@@ -397,15 +399,9 @@ def _reversed(search: ChannelSearch, port: LogStream, starboard: LogStream) -> _
     return _PairSigns()
 
 
-def _share_unit(stream: LogStream, quantity: str) -> str:
-    """Unit of an order or of revolutions by size, where nothing states it."""
-    units = QUANTITIES[quantity].units
-    if stream.unit in units:
-        return stream.unit
-    most = float(np.nanpercentile(np.abs(stream.values), 99.9))
-    # Slower shafts turn at 60 rpm and more at full ahead; above 30 per second none do.
-    fitting = {"1": most <= 1.05, "%": most <= 105, "rpm": most > 30}
-    return next((unit for unit, fits in fitting.items() if fits and unit in units), "")
+def _unit(stream: LogStream, quantity: str) -> str:
+    """Stated unit of a stream, or its unit as a quantity by its size."""
+    return stream.unit or unit_by_size(quantity, stream.values)
 
 
 # The others -----------------------------------------------------------------------------------------------------
@@ -417,20 +413,8 @@ def _take_others(search: ChannelSearch) -> None:
     for stream in search.streams:
         if stream.quantity and stream.name not in done:
             found = search.judged(stream, UNTESTED)
-            found.unit = _stated_or_by_size(stream)
+            found.unit = _unit(stream, stream.quantity)
             search.add(found)
-
-
-def _stated_or_by_size(stream: LogStream) -> str:
-    """Unit of a stream, of revolutions, winds or heel by its size where it is not stated; empty where unknown."""
-    if stream.quantity in ("rpm", "rpm_order"):
-        return _share_unit(stream, stream.quantity)
-    if stream.unit:
-        return stream.unit
-    if stream.quantity in ("wind_direction", "wind_rel_direction", "wind_theoretical_direction"):
-        return angle_unit(stream.values, "")
-    is_degrees = stream.quantity == "heel" and np.percentile(np.abs(stream.values), 99.9) > _LARGEST_HEEL_RAD
-    return "deg" if is_degrees else ""
 
 
 def _scale_engine_shares(search: ChannelSearch) -> None:

@@ -332,53 +332,29 @@ def _piece(signals: _Signals, begin: int, end: int) -> _Piece:
     return replace(piece, kind=_kind(signals, piece))
 
 
-@dataclass(frozen=True)
-class _PieceSpeed:
-    """Speed at the begin and at the end of a piece, its median and its largest, m/s; nan where none is known."""
-
-    first: float
-    last: float
-    median: float
-    largest: float
-
-    @property
-    def moved(self) -> bool:
-        """Whether the vessel was more than at rest."""
-        return self.largest > RESTING_MPS
-
-    @property
-    def changes(self) -> bool:
-        """Whether it is an acceleration, to either side."""
-        return self.moved and abs(self.last - self.first) / max(self.first, self.last, 1e-9) > SPEED_CHANGE
-
-    @property
-    def slows(self) -> bool:
-        """Whether the vessel has way on and loses it."""
-        return self.first > 2 * RESTING_MPS and self.last < self.first
-
-
-def _piece_speed(speed: Array) -> _PieceSpeed:
-    """Figures of the speed (n,) of a piece."""
-    known = speed[np.isfinite(speed)]
-    if not len(known):
-        return _PieceSpeed(*[math.nan] * 4)
-    tenth = max(1, len(known) // 10)
-    parts = known[:tenth], known[-tenth:], known
-    return _PieceSpeed(*(float(np.median(part)) for part in parts), float(np.max(known)))
-
-
 def _kind(signals: _Signals, piece: _Piece) -> StretchKind:
     """Kind of a piece by its orders and the speed: the first that applies."""
-    speed, share = _piece_speed(signals.speed[piece.begin : piece.end]), piece.propulsion / signals.full
-    stopped, unknown = abs(share) <= STOPPED_SHARE, math.isnan(speed.median)
+    first, last, usual, most = _speeds(signals.speed[piece.begin : piece.end])
+    share = piece.propulsion / signals.full
+    stopped, moved, unknown = abs(share) <= STOPPED_SHARE, most > RESTING_MPS, math.isnan(most)
     if share < -STOPPED_SHARE:
-        return StretchKind.STOP if speed.slows else StretchKind.ASTERN
+        return StretchKind.STOP if first > 2 * RESTING_MPS and last < first else StretchKind.ASTERN
     if signals.steered(piece):
         return StretchKind.PIVOT if stopped and not signals.ship else StretchKind.TURN
-    if speed.changes:
+    if moved and abs(last - first) / max(first, last, 1e-9) > SPEED_CHANGE:
         return StretchKind.COAST if stopped else StretchKind.ACCELERATE
-    steady = speed.median > UNDER_WAY_MPS if stopped else speed.moved or unknown
+    steady = usual > UNDER_WAY_MPS if stopped else moved or unknown
     return StretchKind.STEADY if steady else StretchKind.REST
+
+
+def _speeds(speed: Array) -> tuple[float, float, float, float]:
+    """Speed at the begin and at the end of a piece, its median and its largest, m/s; nan where none is known."""
+    known = speed[np.isfinite(speed)]
+    if not len(known):
+        return (math.nan,) * 4
+    tenth = max(1, len(known) // 10)
+    first, last, usual = (float(np.median(part)) for part in (known[:tenth], known[-tenth:], known))
+    return first, last, usual, float(np.max(known))
 
 
 _UNSTEERED = (StretchKind.STEADY, StretchKind.ACCELERATE, StretchKind.COAST, StretchKind.REST, StretchKind.ASTERN)
