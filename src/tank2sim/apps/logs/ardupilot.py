@@ -41,14 +41,7 @@ _FIRST_BOARD_WEEK = 1500
 
 _MAGIC = b"\xa3\x95"
 
-# SERVOn_FUNCTION of ArduPilot Rover: GroundSteering, Throttle, ThrottleLeft, ThrottleRight
-_SERVO_FUNCTIONS = {
-    26: "rudder_order",
-    70: "rpm_order",
-    73: "thrust_order_port",
-    74: "thrust_order_starboard",
-}
-
+_SERVO_FUNCTIONS = FIELDS["ardupilot"]["servo_functions"]
 _FIELDS, _TELEMETRY = FIELDS["dataflash"], FIELDS["mavlink"]
 _FORMAL = ("FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG")  # Messages about the log itself
 
@@ -207,7 +200,7 @@ def _servo_orders(time: Array, pulses: Mapping[int, Array | None], params: Mappi
     for number, width in pulses.items():
         if width is None:
             continue
-        quantity = _SERVO_FUNCTIONS.get(int(params.get(f"SERVO{number}_FUNCTION", 0)))
+        quantity = _SERVO_FUNCTIONS.get(f"{params.get(f'SERVO{number}_FUNCTION', 0):.0f}")
         values, meaning = width, ("us", "", "")
         if quantity is not None:
             usual = {"MIN": 1100.0, "TRIM": 1500.0, "MAX": 1900.0}

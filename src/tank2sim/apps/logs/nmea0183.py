@@ -71,14 +71,7 @@ _NEIGHBOURS = 10
 _FIELDS = FIELDS["nmea0183"]
 # Headings that repeat another instrument's, or rest on a compass: a gyro's goes first
 _LAST = ("HDG.true_heading", "HDM.true_heading", "VHW.heading")
-# Cells of a speed in km/h that some instruments fill in place of the one in knots
-_KMH = {("VTG", 4): 6, ("VHW", 4): 6}
-_STATUS = {"RMC": 1, "ROT": 1, "GLL": 5, "MWV": 4}  # Cells of the status of a sentence, A where it is valid
-# Cells of the mode of the receiver, N where it has no fix (NMEA 0183, 2.3)
-_MODE = {"RMC": 11, "VTG": 8, "GLL": 6, "GNS": 5}
-# Cells of the latitude and of the time of day of sentences with a position
-_PLACES = {"RMC": (2, 0), "GGA": (1, 0), "GLL": (0, 4), "GNS": (1, 0)}
-
+_CELLS = FIELDS["nmea0183_cells"]
 _STAMPS = "the recorder's time stamps"
 _FIRST_DAY = dt.date(1970, 1, 1)
 _TIME_OF_DAY = "time of day of "  # Beginning of the name of a clock without a date, before the kind of its sentences
@@ -211,15 +204,14 @@ class _Reader:
         self.stated[name] = unit, quantity, by
 
     def _plain(self, kind: str, cells: list[str]) -> None:
-        for name, (place, unit, quantity) in _FIELDS[kind].items():
-            status = {"RSA": place + 1, "ROR": place + 1, "VBW": 2 if place < 2 else 5}.get(kind)
-            if status is not None and _cell(cells, status) != "A":
+        for label, (place, unit, quantity, *shown) in _FIELDS[kind].items():
+            name = f"{kind}.{label}"
+            if shown and _cell(cells, shown[0]) != shown[1]:
                 continue
-            kilometres = _cell(cells, _KMH.get((kind, place), len(cells)))
             if text := _cell(cells, place):
-                self._add(f"{kind}.{name}", float(text), unit, quantity)
-            elif kilometres:
-                self._add(f"{kind}.{name}", float(kilometres) / 3.6 / KNOT_MPS, unit, quantity)
+                self._add(name, float(text), unit, quantity)
+            elif kilometres := _cell(cells, _CELLS["kmh"].get(name)):
+                self._add(name, float(kilometres) / 3.6 / KNOT_MPS, unit, quantity)
 
     def _rmc(self, kind: str, cells: list[str]) -> None:
         time, date = cells[0], cells[8]
@@ -243,7 +235,7 @@ class _Reader:
         self.clocks[kind].add(seconds, self.line, self.talkers.index(self.talker))
 
     def _position(self, kind: str, cells: list[str]) -> None:
-        place, time = _PLACES[kind]
+        place, time = _CELLS["latitude"][kind], _CELLS["time"][kind]
         if len(cells) > time and cells[time]:
             self._tick(f"{_TIME_OF_DAY}{kind}", _FIRST_DAY, cells[time])
         if not _valid(kind, cells) or (kind == "GGA" and cells[5] in ("", "0")):
@@ -271,10 +263,6 @@ class _Reader:
         # Numbered from the centreline: 0 single or on it, odd starboard, even port (NMEA 0183, RPM).
         quantity = "rpm" if shaft == 0 else "rpm_starboard" if shaft % 2 else "rpm_port"
         self._add(f"RPM.{cells[0]}{shaft}", float(cells[2]), "rpm", quantity)
-
-    def _ths(self, kind: str, cells: list[str]) -> None:
-        if cells[0] and cells[1][:1] in ("A", "E"):  # by a compass, or estimated; not by hand, simulated, or not valid
-            self._add("THS.heading", float(cells[0]), "deg", "heading")
 
     def _mwv(self, kind: str, cells: list[str]) -> None:
         if _valid(kind, cells):
@@ -473,7 +461,6 @@ _SPECIAL: dict[str, Callable[[_Reader, str, list[str]], None]] = {
     "MWV": _Reader._mwv,
     "XDR": _Reader._xdr,
     "ZDA": _Reader._zda,
-    "THS": _Reader._ths,
 }
 
 
@@ -497,15 +484,16 @@ def _most_of(part: Counter[str], total: Counter[str]) -> list[tuple[str, int]]:
     return [(kind, n) for kind, n in part.items() if n >= _FEW and n > _MOST * total[kind]]
 
 
-def _cell(cells: list[str], place: int) -> str:
-    """A cell; empty where a sentence is shorter."""
-    return cells[place] if place < len(cells) else ""
+def _cell(cells: list[str], place: int | None) -> str:
+    """A cell; empty where a sentence is shorter, or does not have it."""
+    return cells[place] if place is not None and place < len(cells) else ""
 
 
 def _valid(kind: str, cells: list[str]) -> bool:
     """Whether status and mode say that a sentence holds values."""
-    mode = _cell(cells, _MODE.get(kind, len(cells)))
-    return (kind not in _STATUS or cells[_STATUS[kind]] == "A") and (not mode.strip() or mode.strip().strip("N") != "")
+    mode = _cell(cells, _CELLS["mode"].get(kind)).strip()
+    place, letters = _CELLS["status"].get(kind, (None, ""))
+    return (place is None or cells[place][:1] in tuple(letters)) and (not mode or mode.strip("N") != "")
 
 
 def _kind(label: bytes) -> str:

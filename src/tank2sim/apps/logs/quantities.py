@@ -9,6 +9,7 @@ import math
 import re
 import tomllib
 import unicodedata
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -36,26 +37,29 @@ CLOCK_WORDS: dict[str, Any] = _DECLARED["clock"]
 _WORDS = {group: rf"\b({'|'.join(words)})\b" for group, words in _DECLARED["words"].items()}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class LogQuantity:
     """A quantity that a channel of a log may hold.
 
     - `words`: For people.
     - `units`: Unit to the factor that gives SI (rad, m/s, rad/s; degrees for latitude and longitude); the first is SI.
     - `column`: Signal of the trial format that it becomes; empty if it becomes none.
+    - `line`: Words on the time line of a page; empty if it is not drawn.
+    - `largest_deg`: Largest size of a value in deg.
+    - `unknown`, `nowhere`: Numbers that are sent for no value: if the values around are others; before the first fix.
     """
 
     words: str
     units: dict[str, float]
     column: str = ""
+    line: str = ""
+    largest_deg: float = math.inf
+    unknown: Sequence[float] = ()
+    nowhere: Sequence[float] = ()
 
 
 QUANTITIES: dict[str, LogQuantity] = {
-    name: LogQuantity(
-        entry["words"],
-        {unit: factor for kind in entry["units"].split() for unit, factor in _UNITS[kind].items()},
-        entry.get("column", ""),
-    )
+    name: LogQuantity(**entry | {"units": {u: f for kind in entry["units"].split() for u, f in _UNITS[kind].items()}})
     for name, entry in _DECLARED["quantities"].items()
 }
 """Every quantity of a channel. Signs follow the trial format: starboard, ahead and clockwise are positive."""

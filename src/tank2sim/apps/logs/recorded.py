@@ -3,26 +3,19 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tank2sim.apps.logs.content import FEW_SAMPLES
-from tank2sim.apps.logs.quantities import names_rest, plain_words
+from tank2sim.apps.logs.quantities import QUANTITIES, names_rest, plain_words
 from tank2sim.apps.logs.streams import LogFinding, LogStream, note, wrapped_angle
 from tank2sim.arrays import Array
 
 # Numbers that recorders write for no value: nines, and the bounds of their integers
 _MARK = re.compile(r"-?(9{2,}(\.9+)?|32767|32768|65535|2147483647|2147483648|1023|4095)")
-# Numbers that AIS sends for no value (ITU-R M.1371-5, table 47), if the values around are others
-_NOT_AVAILABLE = {"sog": (102.3,), "cog": (360.0,), "heading": (511.0,), "yaw_rate": (128.0, -128.0)}
-# The same of a position (AIS), and what receivers send before the first fix
-_NO_PLACE = {"latitude": (0.0, 91.0), "longitude": (0.0, 181.0)}
-
 _CIRCULAR = ("cog", "heading")
-
-# Largest size of a quantity in deg
-_BOUNDS = {"heading": 361.0, "magnetic_heading": 361.0, "cog": 361.0, "latitude": 90.0, "longitude": 360.0}
 
 _JUMP, _LEAST_JUMP = 10.0, 0.05
 """Jump to such a number, as a multiple of the 90th percentile of the steps of the others, and as a share of their range
@@ -38,12 +31,13 @@ def without_missing(stream: LogStream) -> tuple[LogStream, list[LogFinding]]:
     if stream.stated_by == "format":
         return stream, []
     values = np.array(stream.values, dtype=float)
+    quantity = QUANTITIES.get(stream.quantity, QUANTITIES["ignore"])
     if stream.unit in ("", "deg"):
-        values[_beyond(values, _BOUNDS.get(stream.quantity, np.inf))] = np.nan
-    while (mark := _lone_mark(values, _NO_PLACE.get(stream.quantity, ()))) is not None:
+        values[_beyond(values, quantity.largest_deg)] = np.nan
+    while (mark := _lone_mark(values, quantity.nowhere)) is not None:
         values[values == mark] = np.nan
-    if stream.quantity in _NOT_AVAILABLE:
-        for number in (*_NOT_AVAILABLE[stream.quantity], *filter(_is_mark, _extremes(values))):
+    if quantity.unknown:
+        for number in (*quantity.unknown, *filter(_is_mark, _extremes(values))):
             values[_jumps(values, number, stream.quantity in _CIRCULAR)] = np.nan
     lost = np.isnan(values) & np.isfinite(stream.values)
     if not lost.any():
@@ -71,7 +65,7 @@ def _is_mark(number: float) -> bool:
     return bool(_MARK.fullmatch(f"{number:.10g}"))
 
 
-def _lone_mark(values: Array, more: tuple[float, ...]) -> float | None:
+def _lone_mark(values: Array, more: Sequence[float]) -> float | None:
     """The least or largest value, if it is a mark that is far from all others; None if neither is."""
     known = values[np.isfinite(values)]
     for extreme in _extremes(values):
