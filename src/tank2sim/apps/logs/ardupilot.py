@@ -107,24 +107,29 @@ def _dataflash(path: Path) -> _Dataflash:
 
 def _dataflash_streams(log: _Dataflash, boot: float, *, by_receiver: bool) -> Iterator[LogStream]:
     """Streams in UTC; the fixes of a GPS have the time of the receiver if `by_receiver`."""
-    instances = Counter(kind for kind, _ in log.tables)
     for (kind, instance), table in log.tables.items():
         time = table["TimeUS"] * 1e-6 - boot
         label = kind if instance in (0, None) and (kind, 1) not in log.tables else f"{kind}[{instance:.0f}]"
         fixes = kind in ("GPS", "GPS2") and _has_clock(table)
         stamps = _utc(table) if fixes and by_receiver else time
         valid = _status(table) >= _FIX if fixes else np.True_
-        known = {} if kind == "XKF1" and instance else _FIELDS.get(kind, {})
-        for field, (unit, quantity) in known.items():
-            if field not in table:
-                continue
-            stated, meaning = unit_of_text(log.units.get((kind, field), "")) or unit, (quantity, "format")
-            if kind in ("RPM", "ESC"):  # whose they are is a guess, which the turn confirms or not
-                meaning = _shaft(field, instance, table, instances[kind])
-            yield LogStream(f"{label}.{field}", stamps, np.where(valid, table[field], np.nan), stated, *meaning)
+        for field, *meaning in _fields(log, kind, instance):
+            yield LogStream(f"{label}.{field}", stamps, np.where(valid, table[field], np.nan), *meaning)
         if kind == "RCOU":
             pulses = {number: table.get(f"C{number}", table.get(f"Ch{number}")) for number in range(1, 17)}
             yield from _servo_orders(time, pulses, log.params)
+
+
+def _fields(log: _Dataflash, kind: str, instance: Any) -> Iterator[tuple[str, str, str, str]]:
+    """Fields of a message that are quantities: name, unit, quantity, and what states it."""
+    table, alike = log.tables[kind, instance], sum(other == kind for other, _ in log.tables)
+    for field, (unit, quantity) in _FIELDS.get(kind, {}).items():
+        if field not in table or (kind == "XKF1" and instance):
+            continue
+        meaning = quantity, "format"
+        if kind in ("RPM", "ESC"):  # whose they are is a guess, which the turn confirms or not
+            meaning = _shaft(field, instance, table, alike)
+        yield field, unit_of_text(log.units.get((kind, field), "")) or unit, *meaning
 
 
 def _has_clock(table: _Table) -> bool:

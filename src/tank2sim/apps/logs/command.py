@@ -68,7 +68,6 @@ def log(
     'zigzag'
     """
     from tank2sim.api.trial import TrialRecord
-    from tank2sim.apps.logs.channels import CHANNELS_FILE, read_channels
     from tank2sim.apps.logs.result import LogResult
     from tank2sim.apps.logs.stretches import find_stretches
     from tank2sim.apps.logs.study import study_log
@@ -77,10 +76,8 @@ def log(
 
     named = _named(files)
     folder = None if output is None else Path(output)
-    if channels is None and folder is not None and (folder / CHANNELS_FILE).is_file():
-        channels = folder / CHANNELS_FILE
     with nullcontext() if folder is None else folder_made(folder):
-        stated = read_channels(Path(channels)) if isinstance(channels, str | Path) else channels
+        stated = _stated(channels, folder)
         craft = None if card is None else _craft(card)
         voyage = make_voyage([_read(name, file) for name, file in named.items()], stated)
         found = find_stretches(voyage)
@@ -90,6 +87,15 @@ def log(
         trials = tuple(TrialRecord(cut.trial) for cut in cuts if cut.steered)
         result = LogResult(study, voyage, found, tuple(cuts), trials, identified)
         return result if folder is None else result.written_to(folder)
+
+
+def _stated(channels: str | Path | ChannelSet | None, folder: Path | None) -> ChannelSet | None:
+    """Channels that are given, or in the file of an earlier run; None without either."""
+    from tank2sim.apps.logs.channels import CHANNELS_FILE, read_channels
+
+    if channels is None and folder is not None and (folder / CHANNELS_FILE).is_file():
+        channels = folder / CHANNELS_FILE
+    return read_channels(Path(channels)) if isinstance(channels, str | Path) else channels
 
 
 def _named(files: str | Path | pd.DataFrame | Sequence[str | Path | pd.DataFrame]) -> dict[str, Any]:

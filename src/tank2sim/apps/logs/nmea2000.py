@@ -256,21 +256,24 @@ class _Reader:
     def _stream(self, key: _Key, time: Array) -> LogStream:
         """A column under a name of its own; engines by their instance; a single one has no side."""
         alike = [other for other in self.columns if other._replace(source=key.source) == key]
-        instances = {other.instance for other in self.columns if (other.pgn, other.field) == (key.pgn, key.field)}
         usual = ["rad" if key.field == _TRUE else "", key.quantity]
         unit, usual_quantity = _FIELDS.get(key.pgn, {}).get(key.field, usual)
-        quantity = key.quantity
-        label = f"{key.pgn}.{key.field}" + (f" ({quantity})" if quantity != usual_quantity else "")
-        if len(instances) > 1:
-            # Of engines the port one is the first (canboat, ENGINE_INSTANCE).
-            places = sorted(instances, key=lambda other: ("Starboard" in other and "Port" not in other, other))
-            place, sides = places.index(key.instance), ("port", "starboard") if key.pgn == _ENGINE else ()
-            side = "".join(sides[place : place + 1])
-            label += f" of {side or place}"
-            if sides:
-                quantity = f"rpm_{side}" if side else ""
-        label += f" from {key.source}" if len(alike) > 1 else ""
+        side, quantity = self._side(key)
+        label = f"{key.pgn}.{key.field}" + (f" ({key.quantity})" if key.quantity != usual_quantity else "")
+        label += (f" of {side}" if side else "") + (f" from {key.source}" if len(alike) > 1 else "")
         return LogStream(label, time, np.array(self.columns[key].values), unit, quantity, "format" if quantity else "")
+
+    def _side(self, key: _Key) -> tuple[str, str]:
+        """Side or number of one of several rudders or engines, and its quantity; empty, and its own, if it is alone."""
+        instances = {other.instance for other in self.columns if (other.pgn, other.field) == (key.pgn, key.field)}
+        if len(instances) < 2:
+            return "", key.quantity
+        # Of engines the port one is the first (canboat, ENGINE_INSTANCE).
+        order = sorted(instances, key=lambda other: ("Starboard" in other and "Port" not in other, other))
+        place = order.index(key.instance)
+        if key.pgn != _ENGINE:
+            return str(place), key.quantity
+        return [("port", "rpm_port"), ("starboard", "rpm_starboard")][place] if place < 2 else (str(place), "")
 
 
 def _is_value(name: str) -> bool:

@@ -201,17 +201,21 @@ def _doubt_rudder(found: Judgement, zero: float) -> None:
 def _find_unnamed_rudder(search: ChannelSearch) -> None:
     """The stream without a name that leads the turn as a rudder does; none where no rate of turn is known."""
     rates = [best.confidence for name in ("yaw_rate", "heading") if (best := search.best(name)) is not None]
-    candidates = _leading_the_turn(search) if rates else []
-    rivals = [evidence.known for evidence, stream in candidates if not _alike(candidates[0][1], stream)]
-    clear = not rivals or candidates[0][0].known > rivals[0] + _CLEARLY
-    for place, (evidence, stream) in enumerate(candidates):
-        if clear and (place == 0 or not rivals):
-            confidence, more = 0.75 if max(rates) > 0.8 else 0.7, ""
-        else:
-            others = ", ".join(other.name for _, other in candidates if other is not stream)
-            confidence, more = 0.7 if place == 0 else 0.5, f"; the same is true of {others}"
+    leading = _leading_the_turn(search) if rates else []
+    for place, (evidence, stream) in enumerate(leading):
+        confidence, more = _among_rivals(leading, place, 0.75 if max(rates) > 0.8 else 0.7)
         quantity = "rudder_order" if _held_share(stream) > _HOLDS else "rudder_angle"
         search.add_unnamed(stream, quantity, confidence, evidence, more, _unit(stream, quantity))
+
+
+def _among_rivals(leading: list[tuple[ContentEvidence, LogStream]], place: int, confidence: float) -> tuple[float, str]:
+    """Confidence in one of the streams that lead the turn; less, and the others, where more than one rudder does."""
+    (clearest, first), (_, stream) = leading[0], leading[place]
+    rivals = [evidence.known for evidence, other in leading if not _alike(first, other)]
+    if not rivals or (place == 0 and clearest.known > rivals[0] + _CLEARLY):
+        return confidence, ""
+    others = ", ".join(other.name for _, other in leading if other is not stream)
+    return 0.7 if place == 0 else 0.5, f"; the same is true of {others}"
 
 
 def _leading_the_turn(search: ChannelSearch) -> list[tuple[ContentEvidence, LogStream]]:

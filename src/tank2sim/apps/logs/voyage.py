@@ -206,16 +206,7 @@ do not overlap."""
 
 def _clock_findings(names: list[str], found: ChannelSet, streams: list[LogStream]) -> list[LogFinding]:
     """Differences of the clocks of several logs, by rates of turn or headings that two of them hold."""
-    named = {stream.name: stream for stream in streams}
-    rates: dict[str, tuple[Array, Array]] = {}
-    sure = [channel for channel in found.channels if channel.confidence >= SURE_FROM]
-    for channel in sorted(sure, key=lambda channel: channel.quantity != "yaw_rate"):
-        name = next((name for name in names if channel.stream.startswith(f"{name}: ")), "")
-        series = named[channel.stream].time_s, channel.si(named[channel.stream].values)
-        if channel.quantity == "yaw_rate":
-            rates.setdefault(name, series)
-        elif channel.quantity == "heading":
-            rates.setdefault(name, differenced(series[0], np.unwrap(series[1]), HEADING_WINDOW_S))
+    rates = {name: rate for name in names if (rate := _rate_of_turn(name, found, streams)) is not None}
     findings, first = [], names[0]
     for name in names[1:]:
         shift = _shift(rates[first], rates[name]) if {first, name} <= rates.keys() else None
@@ -224,6 +215,19 @@ def _clock_findings(names: list[str], found: ChannelSet, streams: list[LogStream
             text = f"the clock of {name} is {abs(shift):.3g} s {side} the clock of {first} by the rate of turn"
             findings.append(fault(f"{text}: give its channels delay_s = {shift:.3g}", shift_s=shift))
     return findings
+
+
+def _rate_of_turn(name: str, found: ChannelSet, streams: list[LogStream]) -> tuple[Array, Array] | None:
+    """Times and values of the rate of turn of a log, or of the slope of its heading; None where neither is sure."""
+    named = {stream.name: stream for stream in streams if stream.name.startswith(f"{name}: ")}
+    sure = [each for each in found.channels if each.stream in named and each.confidence >= SURE_FROM]
+    for channel in sorted(sure, key=lambda each: each.quantity != "yaw_rate"):
+        time, values = named[channel.stream].time_s, channel.si(named[channel.stream].values)
+        if channel.quantity == "yaw_rate":
+            return time, values
+        if channel.quantity == "heading":
+            return differenced(time, np.unwrap(values), HEADING_WINDOW_S)
+    return None
 
 
 def _shift(first: tuple[Array, Array], second: tuple[Array, Array]) -> float | None:
@@ -397,7 +401,7 @@ def _fitted_ahead(toward: Array, difference: Array) -> DriftCurrent | None:
     matrix, known = toward[good], difference[good]
     if len(known) < _FEWEST or np.linalg.eigvalsh(matrix.T @ matrix / len(known))[0] < _LEAST_TURN:
         return None
-    mean = np.linalg.lstsq(matrix, known, rcond=None)[0]
+    mean = np.asarray(np.linalg.lstsq(matrix, known, rcond=None)[0], dtype=np.float64)
     spread = float(np.std(known - matrix @ mean))
     return _current(mean, spread, "speeds ahead over the ground and through the water")
 
