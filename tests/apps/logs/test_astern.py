@@ -61,6 +61,20 @@ def test_a_heading_against_the_course_that_nothing_explains_is_to_be_confirmed(s
     assert "back to front" in said and "astern" in said
 
 
+def test_a_second_heading_that_follows_the_course_shows_that_the_first_is_back_to_front(saved) -> None:
+    made = opposed().assign(gyro_heading_deg=frame().heading_deg, rudder_deg=frame().rudder_deg)
+    found = log(saved(made, "two.csv"))
+    assert used(found)["heading"] == "gyro_heading_deg"
+    assert used(found)["rudder_angle"] == "rudder_deg"
+    assert all(each.sign == 1 for each in found.voyage.channels.channels if each.use)
+    assert "gyro_heading_deg follows it" in texts(found.voyage, "fault")
+
+
+def test_revolutions_ahead_outweigh_a_rudder_whose_sign_is_not_stated(saved) -> None:
+    made = opposed().assign(shaft_rpm=frame().shaft_rpm, rudder_deg=-frame().rudder_deg)
+    assert "heading" not in used(log(saved(made, "port.csv")))
+
+
 def test_a_heading_against_a_straight_course_needs_revolutions_to_be_one(saved) -> None:
     """On one course, turn rates show nothing."""
     straight = opposed().iloc[:200]

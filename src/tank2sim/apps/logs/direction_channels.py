@@ -109,12 +109,12 @@ def _is_opposed(evidence: ContentEvidence) -> bool:
 def _opposed(search: ChannelSearch, found: Judgement) -> Judgement:
     """Judge a heading against the course: the vessel goes astern, or its compass is mounted back to front.
 
-    Course and heading turn alike in both cases, so that others decide: propulsion, speed ahead, rudder.
+    Course and heading turn alike in both cases, so that others decide: a second heading, propulsion, speed, rudder.
     """
     stream, (time, angle) = found.stream, search.angle(found.stream)
     nothing = _Witness("nothing shows its way", -np.ones(len(search.motion.time_s)), sure=False)
     witnesses = list(_witnesses(search, time, angle)) or [nothing]
-    for witness in witnesses:
+    for witness in [witness for witness in witnesses if witness.sure] or witnesses:
         evidence = direction_evidence(time, angle, search.motion.going(witness.way))
         turns_alike = evidence.sign > 0
         if evidence.known < AGREES or not (witness.sure or turns_alike):
@@ -133,7 +133,11 @@ def _opposed(search: ChannelSearch, found: Judgement) -> Judgement:
 
 
 def _witnesses(search: ChannelSearch, time: Array, angle: Array) -> Iterator[_Witness]:
-    """Propulsion, speed ahead and rudders of the log, as far as it has them, for a heading (n,), rad."""
+    """Propulsion, speed ahead and rudders, as far as the log has them, for a heading (n,), rad; or a second heading."""
+    for other in search.named("heading", "magnetic_heading"):
+        if direction_evidence(*search.angle(other), search.motion).known >= AGREES:
+            yield _Witness(f"{other.name} follows it", np.ones(len(search.motion.time_s)))
+            return
     for quantities in (_PROPULSION, ("u_water", "u_ground")):
         streams = [stream for stream in search.named(*quantities) if np.any(stream.values)]
         if streams:
