@@ -13,17 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tank2sim.apps.logs.clock import board_start
-from tank2sim.apps.logs.streams import (
-    FIELDS,
-    LogFinding,
-    LogStream,
-    VesselLog,
-    fault,
-    not_used,
-    note,
-    text_lines,
-    unreadable,
-)
+from tank2sim.apps.logs.findings import LogFinding, fault, not_used, note
+from tank2sim.apps.logs.streams import FIELDS, LogStream, VesselLog, text_lines, unreadable
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError, optional_library
 from tank2sim.files import first_bytes

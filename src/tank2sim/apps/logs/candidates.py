@@ -10,10 +10,11 @@ import numpy as np
 
 from tank2sim.apps.logs.channels import USED_FROM, ChannelSet, LogChannel
 from tank2sim.apps.logs.content import AGREES, DIFFERS, ContentEvidence, rate_delay
+from tank2sim.apps.logs.findings import LogFinding, fault, note
 from tank2sim.apps.logs.quantities import QUANTITIES, unit_by_size
 from tank2sim.apps.logs.recorded import PulseScale, pulses_of, rest_of
 from tank2sim.apps.logs.reference import ReferenceMotion, held, interpolated, thinned_series
-from tank2sim.apps.logs.streams import LogFinding, LogStream, fault, note
+from tank2sim.apps.logs.streams import LogStream
 from tank2sim.arrays import Array
 from tank2sim.records.trials import usual_step
 

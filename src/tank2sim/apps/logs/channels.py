@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import tomlkit
 
+from tank2sim.apps.logs.findings import LogFinding
 from tank2sim.apps.logs.quantities import QUANTITIES
-from tank2sim.apps.logs.streams import LogFinding
 from tank2sim.arrays import Array
 from tank2sim.cards.reading import parsed_toml
 from tank2sim.errors import InputError, close_name

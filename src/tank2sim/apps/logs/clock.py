@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tank2sim.apps.logs.streams import LogFinding, LogStream, fault, note
+from tank2sim.apps.logs.findings import LogFinding, fault, note
+from tank2sim.apps.logs.streams import LogStream
 from tank2sim.arrays import Array
 from tank2sim.records.csv_table import LARGEST
 from tank2sim.records.signals.sampling import GAP_STEPS

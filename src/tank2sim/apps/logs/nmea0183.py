@@ -23,19 +23,9 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from tank2sim.apps.logs.clock import continued_clock, full_year, over_midnight, rollover_s, stamp_s
+from tank2sim.apps.logs.findings import LogFinding, fault, not_used, note
 from tank2sim.apps.logs.quantities import quantity_of_name
-from tank2sim.apps.logs.streams import (
-    FIELDS,
-    LogFinding,
-    LogStream,
-    Samples,
-    VesselLog,
-    fault,
-    mostly,
-    not_used,
-    note,
-    text_lines,
-)
+from tank2sim.apps.logs.streams import FIELDS, LogStream, Samples, VesselLog, mostly, text_lines
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError, optional_library
 from tank2sim.units import KNOT_MPS

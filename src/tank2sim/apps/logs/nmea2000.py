@@ -14,19 +14,9 @@ import numpy as np
 from scipy.stats import theilslopes
 
 from tank2sim.apps.logs.clock import continued_clock, rollover_s, stamp_s
+from tank2sim.apps.logs.findings import LogFinding, fault, not_used, note
 from tank2sim.apps.logs.nmea0183 import steady_times
-from tank2sim.apps.logs.streams import (
-    FIELDS,
-    LogFinding,
-    LogStream,
-    Samples,
-    VesselLog,
-    fault,
-    mostly,
-    not_used,
-    note,
-    text_lines,
-)
+from tank2sim.apps.logs.streams import FIELDS, LogStream, Samples, VesselLog, mostly, text_lines
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError, optional_library
 

@@ -11,6 +11,7 @@ import numpy as np
 from tank2sim.apps.logs.candidates import REFUTED, STATED, ChannelSearch, Judgement
 from tank2sim.apps.logs.content import AGREES, DIFFERS, FEW_SAMPLES, direction_evidence
 from tank2sim.apps.logs.direction_channels import could_be_direction
+from tank2sim.apps.logs.findings import fault
 from tank2sim.apps.logs.quantities import QUANTITIES
 from tank2sim.apps.logs.reference import (
     POSITION_WINDOW_S,
@@ -20,7 +21,7 @@ from tank2sim.apps.logs.reference import (
     local_metres,
     rounded_origin,
 )
-from tank2sim.apps.logs.streams import LogStream, fault
+from tank2sim.apps.logs.streams import LogStream
 from tank2sim.arrays import Array
 from tank2sim.records.trials import usual_step
 

@@ -12,17 +12,8 @@ from typing import Any
 import numpy as np
 
 from tank2sim.apps.logs.clock import board_start
-from tank2sim.apps.logs.streams import (
-    FIELDS,
-    LogFinding,
-    LogStream,
-    VesselLog,
-    fault,
-    heading_of_quaternion,
-    not_used,
-    note,
-    unreadable,
-)
+from tank2sim.apps.logs.findings import LogFinding, fault, not_used, note
+from tank2sim.apps.logs.streams import FIELDS, LogStream, VesselLog, heading_of_quaternion, unreadable
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError, optional_library
 

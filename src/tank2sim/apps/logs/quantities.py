@@ -34,6 +34,9 @@ _DECLARED = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding
 CLOCK_WORDS: dict[str, Any] = _DECLARED["clock"]
 """Words for times and dates, seconds of units by their words, and hours of zones."""
 
+TIME_LINES: dict[str, str] = _DECLARED["lines"]
+"""Quantities on the time line of a page, from top to bottom, and their words there."""
+
 _WORDS = {group: rf"\b({'|'.join(words)})\b" for group, words in _DECLARED["words"].items()}
 
 
@@ -44,7 +47,6 @@ class LogQuantity:
     - `words`: For people.
     - `units`: Unit to the factor that gives SI (rad, m/s, rad/s; degrees for latitude and longitude); the first is SI.
     - `column`: Signal of the trial format that it becomes; empty if it becomes none.
-    - `line`: Words on the time line of a page; empty if it is not drawn.
     - `largest_deg`: Largest size of a value in deg.
     - `unknown`, `nowhere`: Numbers that are sent for no value: if the values around are others; before the first fix.
     """
@@ -52,7 +54,6 @@ class LogQuantity:
     words: str
     units: dict[str, float]
     column: str = ""
-    line: str = ""
     largest_deg: float = math.inf
     unknown: Sequence[float] = ()
     nowhere: Sequence[float] = ()

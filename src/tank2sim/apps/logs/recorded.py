@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tank2sim.apps.logs.content import FEW_SAMPLES
+from tank2sim.apps.logs.findings import LogFinding, note
 from tank2sim.apps.logs.quantities import QUANTITIES, names_rest, plain_words
-from tank2sim.apps.logs.streams import LogFinding, LogStream, note, wrapped_angle
+from tank2sim.apps.logs.streams import LogStream, wrapped_angle
 from tank2sim.arrays import Array
 
 # Numbers that recorders write for no value: nines, and the bounds of their integers

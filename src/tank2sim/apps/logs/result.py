@@ -25,7 +25,7 @@ from tank2sim.answer.parts import (
 from tank2sim.answer.result import Result
 from tank2sim.apps.logs.channels import CHANNELS_FILE, channels_text
 from tank2sim.apps.logs.gear import LoggedGear
-from tank2sim.apps.logs.quantities import QUANTITIES
+from tank2sim.apps.logs.quantities import QUANTITIES, TIME_LINES
 from tank2sim.apps.logs.stretches import Stretch
 from tank2sim.apps.logs.study import LogStudy
 from tank2sim.apps.logs.trial_files import TrialCut, remove_earlier_trials
@@ -38,11 +38,10 @@ from tank2sim.results.craft_identification import CraftIdentificationResult, cra
 if TYPE_CHECKING:
     import pandas as pd
 
-# Panels of the time line, in the order of the quantities
+_UNITS = {name: QUANTITIES[name].units for name in TIME_LINES}
 _SIGNALS = tuple(
-    Signal(name, quantity.line, next(iter(quantity.units)), display_unit="rpm" if "rpm" in quantity.units else None)
-    for name, quantity in QUANTITIES.items()
-    if quantity.line
+    Signal(name, words, next(iter(_UNITS[name])), display_unit="rpm" if "rpm" in _UNITS[name] else None)
+    for name, words in TIME_LINES.items()
 )
 
 _MOST_TRACKS = 8

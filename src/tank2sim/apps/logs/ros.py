@@ -18,16 +18,9 @@ from typing import Any
 
 import numpy as np
 
+from tank2sim.apps.logs.findings import LogFinding, note
 from tank2sim.apps.logs.quantities import plain_words
-from tank2sim.apps.logs.streams import (
-    LogFinding,
-    LogStream,
-    VesselLog,
-    heading_of_quaternion,
-    named_stream,
-    note,
-    unreadable,
-)
+from tank2sim.apps.logs.streams import LogStream, VesselLog, heading_of_quaternion, named_stream, unreadable
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError, optional_library
 from tank2sim.files import first_bytes

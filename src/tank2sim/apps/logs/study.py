@@ -10,9 +10,9 @@ import numpy as np
 
 from tank2sim.apps.logs.channels import CHANNELS_FILE, LogChannel
 from tank2sim.apps.logs.clock import utc_text
+from tank2sim.apps.logs.findings import LogFinding
 from tank2sim.apps.logs.gear import LoggedGear, logged_gear
 from tank2sim.apps.logs.quantities import QUANTITIES
-from tank2sim.apps.logs.streams import LogFinding
 from tank2sim.apps.logs.stretches import Stretch, StretchKind
 from tank2sim.apps.logs.trial_files import TrialCut
 from tank2sim.apps.logs.voyage import DriftCurrent, Voyage, drift_current

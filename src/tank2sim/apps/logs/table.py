@@ -13,8 +13,9 @@ import numpy as np
 import pandas as pd
 
 from tank2sim.apps.logs.clock import DOUBLED_STEPS, TWO_DIGITS_FROM, over_midnight
+from tank2sim.apps.logs.findings import LogFinding, fault, note
 from tank2sim.apps.logs.quantities import CLOCK_WORDS, plain_words, quantity_of_name, unit_of_signal_k
-from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, fault, named_stream, note
+from tank2sim.apps.logs.streams import LogStream, VesselLog, named_stream
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.files import first_bytes

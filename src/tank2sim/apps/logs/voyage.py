@@ -13,6 +13,7 @@ from tank2sim.apps.logs.channel_search import find_channels
 from tank2sim.apps.logs.channels import SURE_FROM, ChannelSet, LogChannel
 from tank2sim.apps.logs.clock import gaps_of, tidied, utc_text
 from tank2sim.apps.logs.content import AGREES
+from tank2sim.apps.logs.findings import LogFinding, fault, merged_findings, note
 from tank2sim.apps.logs.quantities import QUANTITIES
 from tank2sim.apps.logs.recorded import pulses_of, without_missing
 from tank2sim.apps.logs.reference import (
@@ -25,7 +26,7 @@ from tank2sim.apps.logs.reference import (
     rounded_origin,
     thinned_series,
 )
-from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, fault, joined_parts, note
+from tank2sim.apps.logs.streams import LogStream, VesselLog, joined_parts
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice, caution
@@ -155,19 +156,7 @@ def _tidied_streams(
                 streams.append(replace(tidy, name=prefix + stream.name))
             elif stream.quantity and len(stream.values):
                 findings.append(note(f"{stream.name}: holds no valid value", stream.name))
-    return streams, _merged_findings(findings)
-
-
-def _merged_findings(findings: Iterable[LogFinding]) -> list[LogFinding]:
-    """Findings; several streams with the same one are counted in a single finding."""
-    groups: dict[str, list[LogFinding]] = {}
-    for finding in findings:
-        key = finding.text.removeprefix(f"{finding.stream}: ") if finding.stream else finding.text
-        groups.setdefault(key, []).append(finding)
-    return [
-        group[0] if len(group) == 1 else replace(group[0], text=f"{len(group)} streams: {key}", stream="")
-        for key, group in groups.items()
-    ]
+    return streams, merged_findings(findings)
 
 
 def _series(path: Path, found: ChannelSet, streams: Sequence[LogStream]) -> dict[str, QuantitySeries]:
