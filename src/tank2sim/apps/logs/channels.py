@@ -160,7 +160,7 @@ def _entry_faults(entry: Any) -> Iterator[tuple[str, str, str]]:
     """Key, problem and remedy of each fault in the form, quantity and unit of a channel."""
     if not isinstance(entry, dict):
         yield "", "is not a table", "write [[channels]] with quantity, stream and unit"
-    for key in (key for key in entry if key not in _KEYS):
+    for key in sorted(entry.keys() - set(_KEYS), key=list(entry).index):
         yield key, "is not a key", close_name(key, _KEYS)
     for key in ("quantity", "stream"):
         if not isinstance(entry.get(key), str):

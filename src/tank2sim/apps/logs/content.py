@@ -118,8 +118,8 @@ def direction_evidence(time_s: Array, angle_rad: Array, motion: ReferenceMotion)
     middle = float(np.median(differences[best]))
     offset = float(wrapped_angle(np.array([middle - quarter * math.pi / 2]))[0])
     if best != _UPRIGHT and turned:
-        mirrored = "mirrored and " if sign < 0 else ""
-        words = f"is {mirrored}off by {math.degrees(offset):.0f} deg against the course of the positions"
+        mirrored = {1: "", -1: "mirrored and "}
+        words = f"is {mirrored[sign]}off by {math.degrees(offset):.0f} deg against the course of the positions"
         return ContentEvidence(agreement, sign, offset_rad=offset, text=words)
     text = f"follows the course of the positions in {100 * agreement:.0f} % of the time"
     if turned and DIFFERS <= agreement < AGREES and (share := _sideways_share(angle, north, east)) < _SIDEWAYS:
@@ -281,7 +281,7 @@ def rate_delay(heading_time_s: Array, heading_rad: Array, rate_time_s: Array, ra
     scatter between segments (Liang and Zeger 1986, Biometrika 73), so that drift of the sensors is in it.
     """
     rate_at, rate = thinned_series(rate_time_s, rate_radps, 0.2)
-    if len(rate_at) < 3 or len(heading_time_s) < 3:
+    if min(len(rate_at), len(heading_time_s)) < 3:
         return None
     area = cumulative_trapezoid(rate, rate_at, initial=0.0)
     at, heading = thinned_series(heading_time_s, heading_rad, 0.2)

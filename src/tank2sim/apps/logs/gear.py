@@ -129,7 +129,7 @@ def logged_gear(voyage: Voyage) -> LoggedGear | None:
     begin, end = _busiest(max(time_s[0], order_s[0]), min(time_s[-1], order_s[-1]), order_s, order)
     inside = (time_s >= begin) & (time_s <= end)
     asked = order[(order_s >= begin) & (order_s <= end)]
-    moves = _moves(asked) if len(asked) >= _FEWEST_MOVES else 0
+    moves = _moves(asked)
     if np.count_nonzero(inside) < 10 * _BLOCKS or moves < _FEWEST_MOVES:
         return None
     record = _Record(time_s[inside], angle[inside], order_s, order)
@@ -179,7 +179,7 @@ def _rudder(voyage: Voyage, quantity: str) -> tuple[str, Array, Array] | None:
 
 def _moves(order: Array) -> int:
     """Movements of an order by :data:`_MOVE` or more to alternating sides."""
-    count, low, high, side = 0, order[0], order[0], 0
+    count, low, high, side = 0, math.inf, -math.inf, 0
     for value in order:
         low, high = min(low, value), max(high, value)
         if value - low >= _MOVE and side <= 0:

@@ -202,11 +202,11 @@ def _folded(pieces: Iterable[_Piece], join: Callable[[_Piece, _Piece], _Piece | 
     return out
 
 
-def _grouped(pieces: Iterable[_Piece], belongs: Callable[[_Piece, _Piece], bool]) -> list[list[_Piece]]:
-    """Pieces in groups; each `belongs` to the piece before it."""
+def _grouped(pieces: Iterable[_Piece], belongs: Callable[[Sequence[_Piece], _Piece], bool]) -> list[list[_Piece]]:
+    """Pieces in groups; each `belongs` to the group before it."""
     groups: list[list[_Piece]] = []
     for piece in pieces:
-        if groups and belongs(groups[-1][-1], piece):
+        if groups and belongs(groups[-1], piece):
             groups[-1].append(piece)
         else:
             groups.append([piece])
@@ -430,8 +430,9 @@ def _steps(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
     return out
 
 
-def _belongs(signals: _Signals, last: _Piece, piece: _Piece) -> bool:
-    """Whether a piece belongs to the manoeuvre of the one before."""
+def _belongs(signals: _Signals, group: Sequence[_Piece], piece: _Piece) -> bool:
+    """Whether a piece belongs to the manoeuvre of those before."""
+    last = group[-1]
     turning = (StretchKind.TURN, StretchKind.PIVOT)
     brief = signals.lasted(piece) < signals.rest_s
     if last.kind not in turning or not signals.same_power(last, piece):
@@ -474,18 +475,18 @@ def _single(signals: _Signals, piece: _Piece) -> _Piece:
 
 def _legs(signals: _Signals, group: Sequence[_Piece]) -> list[_Piece]:
     """Pieces of a group to one side as one each: a helmsman's corrections of an order belong to it."""
-    sides: list[list[_Piece]] = []
-    for piece in group:
-        same = sides and signals.same_power(sides[-1][0], piece)
-        if same and (_amidships(signals, piece) or sides[-1][0].level * piece.level > 0):
-            sides[-1].append(piece)
-        else:
-            sides.append([piece])
+    sides = _grouped(group, partial(_is_to_one_side, signals))
     legs = [leg for pieces in sides for leg in _levels(signals, pieces)]
     for place, (last, leg) in enumerate(pairwise(legs)):
         begin = _movement_begin(signals, leg, last.begin)
         legs[place : place + 2] = replace(legs[place], end=begin), replace(leg, begin=begin)
     return legs
+
+
+def _is_to_one_side(signals: _Signals, leg: Sequence[_Piece], piece: _Piece) -> bool:
+    """Whether a piece has the power of a leg, and its side or none."""
+    same = signals.same_power(leg[0], piece)
+    return same and (_amidships(signals, piece) or leg[0].level * piece.level > 0)
 
 
 def _amidships(signals: _Signals, piece: _Piece) -> bool:
