@@ -61,6 +61,12 @@ def test_a_heading_against_the_course_that_nothing_explains_is_to_be_confirmed(s
     assert "back to front" in said and "astern" in said
 
 
+def test_no_leg_of_a_vessel_that_goes_astern_is_a_stop(saved) -> None:
+    made = opposed().assign(shaft_rpm=-frame().shaft_rpm, rudder_deg=-frame().rudder_deg)
+    kinds = {stretch.kind.value for stretch in log(saved(made, "legs.csv")).found}
+    assert "astern" in kinds and "stop" not in kinds
+
+
 def test_a_second_heading_that_follows_the_course_shows_that_the_first_is_back_to_front(saved) -> None:
     made = opposed().assign(gyro_heading_deg=frame().heading_deg, rudder_deg=frame().rudder_deg)
     found = log(saved(made, "two.csv"))

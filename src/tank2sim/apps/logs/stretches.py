@@ -130,6 +130,7 @@ class _Signals:
     propulsion: Array
     full: float
     speed: Array
+    ahead: Array
     heading: Array
     rate: Array
     rest_s: float
@@ -233,7 +234,8 @@ def _signals(voyage: Voyage) -> _Signals | None:
     lag = steering_evidence(time, steer, rate.time_s, rate.values).lag_s
     at_heading, at_rate = (np.interp(time, entry.time_s, entry.values) for entry in (heading, rate))
     rest = float(np.clip(2 * lag, 2.0, 30.0))
-    return _Signals(time, steer, threshold, propulsion, full, _speed(series, time), at_heading, at_rate, rest)
+    speeds = _speed(series, time), _speed_ahead(series, time)
+    return _Signals(time, steer, threshold, propulsion, full, *speeds, at_heading, at_rate, rest)
 
 
 def _thrusters(series: Mapping[str, QuantitySeries]) -> tuple[str, QuantitySeries, QuantitySeries] | None:
@@ -282,6 +284,15 @@ def _speed(series: Mapping[str, QuantitySeries], time: Array) -> Array:
     if (ground := ground_velocity(series)) is None:
         return np.full(len(time), np.nan)
     return interpolated(time, ground[0], np.hypot(*ground[1:]), 30.0)
+
+
+def _speed_ahead(series: Mapping[str, QuantitySeries], time: Array) -> Array:
+    """Speed ahead over the ground (n,), m/s, negative astern; nan without a heading."""
+    heading, ground = series.get("heading"), ground_velocity(series)
+    if heading is None or ground is None:
+        return np.full(len(time), np.nan)
+    angle = interpolated(ground[0], heading.time_s, heading.values, 10.0)
+    return interpolated(time, ground[0], ground[1] * np.cos(angle) + ground[2] * np.sin(angle), 30.0)
 
 
 def _cuts(signals: _Signals) -> list[tuple[int, int]]:
@@ -338,7 +349,8 @@ def _kind(signals: _Signals, piece: _Piece) -> StretchKind:
     share = piece.propulsion / signals.full
     stopped, moved, unknown = abs(share) <= STOPPED_SHARE, most > RESTING_MPS, math.isnan(most)
     if share < -STOPPED_SHARE:
-        return StretchKind.STOP if first > 2 * RESTING_MPS and last < first else StretchKind.ASTERN
+        way_on = first > 2 * RESTING_MPS and not _speeds(signals.ahead[piece.begin : piece.end])[0] < 0
+        return StretchKind.STOP if way_on and last < first else StretchKind.ASTERN
     if signals.steered(piece):
         return StretchKind.PIVOT if stopped and not signals.ship else StretchKind.TURN
     if moved and abs(last - first) / max(first, last, 1e-9) > SPEED_CHANGE:
