@@ -76,7 +76,7 @@ class LogChannel:
     use: bool = True
 
     def because(self, why: str, *, least: float = 0.0, most: float = 1.0) -> LogChannel:
-        """The channel with a further reason, and its confidence between two bounds."""
+        """The channel with a further reason, its confidence at `least` and at `most` these."""
         reasons = "; ".join(filter(None, (self.why, why)))
         return replace(self, confidence=min(max(self.confidence, least), most), why=reasons)
 
