@@ -174,18 +174,16 @@ def _rudder_witness(search: ChannelSearch, stream: LogStream, turn: int) -> _Wit
 
 def find_unnamed_directions(search: ChannelSearch, streams: list[LogStream]) -> None:
     """Find a course and a heading by content: both follow the track, and the course more closely."""
-    known = [channel for channel in (search.best("heading"), search.best("cog")) if channel is not None]
-    tried = [*filter(_circular, streams), *(search.stream(channel.stream) for channel in known)]
-    followers = _followers(search, tried)
+    known = {name: best.stream for name in ("heading", "cog") if (best := search.best(name)) is not None}
+    followers = _followers(search, [*filter(_circular, streams), *map(search.stream, known.values())])
     spreads = [evidence.spread_rad for _, evidence in followers]
     distinct = len(spreads) == 2 and spreads[1] > _CLOSER * spreads[0]
     if not distinct and (known or len(followers) != 1):
         return
     quantities = ("cog", "heading") if distinct else ("heading",)
     confidence, more = (0.85, "") if distinct else (0.7, "; it may be the course over ground")
-    taken = {part for channel in known for part in (channel.stream, channel.quantity)}
     for (stream, evidence), quantity in zip(followers, quantities, strict=True):
-        if not taken & {stream.name, quantity}:
+        if quantity not in known and stream.name not in known.values():
             unit = stream.unit or unit_by_size("heading", stream.values)
             search.add_unnamed(stream, quantity, confidence, evidence, more, unit)
     _take_heading(search)
