@@ -6,6 +6,7 @@ import csv
 import itertools
 import re
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -228,44 +229,44 @@ class _TableClock:
 
     def times(self) -> tuple[Array, bool, set[str]]:
         """Times (rows,), whether they are UTC, and the columns that they are made of."""
-        found = self._dated() or self._of_day() or self._from_beginning()
-        if found is not None:
-            return found
+        ways: tuple[tuple[Callable[[str], tuple[Array, list[str]] | None], list[str], bool], ...] = (
+            (self._dated, [*self.named, *self.dates, *self.clocks, *self.leftmost], True),
+            (self._of_day, [*self.named, *self.clocks, *self.leftmost], False),
+            (self._from_beginning, self.named or self.leftmost, False),
+        )
+        for read, names, dated in ways:
+            for name in names:
+                if (found := read(name)) is not None:
+                    return found[0], dated, {name, *found[1]}
         problem = "it is not a log of a known format, and as a table there is no column of time"
         remedy = "give a column of ISO 8601 times, of date and time, or of seconds"
         raise InputError(self.path, "header", problem, remedy)
 
-    def _dated(self) -> tuple[Array, bool, set[str]] | None:
-        for name in [*self.named, *self.dates, *self.clocks, *self.leftmost]:
-            found = self._counted(name) if name in self.numbers else self._written(name)
-            if found is not None:
-                return found[0], True, {name, *found[1]}
-        return None
+    def _dated(self, name: str) -> tuple[Array, list[str]] | None:
+        """UTC (rows,) of a column, and the columns of dates used; None if it does not show it."""
+        return self._counted(name) if name in self.numbers else self._written(name)
 
-    def _of_day(self) -> tuple[Array, bool, set[str]] | None:
-        for name in [*self.named, *self.clocks, *self.leftmost]:
-            of_day = _clock(self.columns[name]) if re.match(r"\d{1,2}:\d\d", self.first[name]) else None
-            if name in self.numbers and self._stated_count(name) is None:
-                of_day = _clock_of_numbers(self.numbers[name])
-            if of_day is not None:
-                self._note(name, "has times of day without a date: the trials have no date")
-                return over_midnight(of_day), False, {name}
-        return None
+    def _of_day(self, name: str) -> tuple[Array, list[str]] | None:
+        """Times of day (rows,) of a column, which go on over midnight; None if it holds others."""
+        of_day = _clock(self.columns[name]) if re.match(r"\d{1,2}:\d\d", self.first[name]) else None
+        if name in self.numbers and self._stated_count(name) is None:
+            of_day = _clock_of_numbers(self.numbers[name])
+        if of_day is None:
+            return None
+        self._note(name, "has times of day without a date: the trials have no date")
+        return over_midnight(of_day), []
 
-    def _from_beginning(self) -> tuple[Array, bool, set[str]] | None:
-        for name in self.named or self.leftmost:
-            values = self.numbers.get(name, np.zeros(0))
-            steps = np.diff(values[np.isfinite(values)])
-            if len(steps) and (steps >= 0).mean() > 0.9:
-                self._note(name, "counts from the beginning of the log: the trials have no date")
-                return values * (self._stated_count(name) or self._count_by_motion(name)), False, {name}
-        return None
-
-    def _note(self, name: str, text: str) -> None:
-        self.findings.append(note(f"{name} {text}", name))
+    def _from_beginning(self, name: str) -> tuple[Array, list[str]] | None:
+        """Times (rows,) since the beginning of the log of a column that rises; None of any other."""
+        values = self.numbers.get(name, np.zeros(0))
+        steps = np.diff(values[np.isfinite(values)])
+        if not len(steps) or (steps >= 0).mean() <= 0.9:
+            return None
+        self._note(name, "counts from the beginning of the log: the trials have no date")
+        return values * (self._stated_count(name) or self._count_by_motion(name)), []
 
     def _counted(self, name: str) -> tuple[Array, list[str]] | None:
-        """UTC (rows,) of a column of numbers, and the columns of dates used; None if it does not show it."""
+        """The same of a column of numbers."""
         values = self.numbers[name]
         clock = None if self._stated_count(name) or name in self.dates else _clock_of_numbers(values)
         if clock is None:
@@ -274,7 +275,7 @@ class _TableClock:
         return (self._days(self.dates[0], self._zone_s(name)) + clock, self.dates[:1]) if self.dates else None
 
     def _written(self, name: str) -> tuple[Array, list[str]] | None:
-        """UTC (rows,) of a column of text, and the columns of dates used; None if it does not show it."""
+        """The same of a column of text."""
         column, first, offset = self.columns[name], self.first[name], self._zone_s(name)
         if re.match(r"\d{4}-\d\d-\d\d[T ]\d", first):
             moments = pd.to_datetime(column, format="ISO8601", utc=True, errors="coerce")
