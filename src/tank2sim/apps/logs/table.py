@@ -253,7 +253,7 @@ class _TableClock:
             of_day = _clock_of_numbers(self.numbers[name])
         if of_day is None:
             return None
-        self._note(name, "has times of day without a date: the trials have no date")
+        self.findings.append(note(f"{name} has times of day without a date: the trials have no date", name))
         return over_midnight(of_day), []
 
     def _from_beginning(self, name: str) -> tuple[Array, list[str]] | None:
@@ -262,7 +262,7 @@ class _TableClock:
         steps = np.diff(values[np.isfinite(values)])
         if not len(steps) or (steps >= 0).mean() <= 0.9:
             return None
-        self._note(name, "counts from the beginning of the log: the trials have no date")
+        self.findings.append(note(f"{name} counts from the beginning of the log: the trials have no date", name))
         return values * (self._stated_count(name) or self._count_by_motion(name)), []
 
     def _counted(self, name: str) -> tuple[Array, list[str]] | None:
