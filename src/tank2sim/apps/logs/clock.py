@@ -21,6 +21,7 @@ DOUBLED_STEPS = 3.0
 differs by one to two."""
 
 _ROLLOVER_S = 1024 * 604800.0  # Time after which the week number of GPS starts again, s (IS-GPS-200, 20.3.3.3.1.1)
+_LATEST_S = 253402300800.0  # The year 10000, s since 1970, which ISO 8601 does not write
 _DAY_S = 86400.0  # Difference of two clocks, s, from which one is wrong by more than a time zone
 
 TWO_DIGITS_FROM = 80
@@ -110,7 +111,7 @@ def tidied(stream: LogStream) -> tuple[LogStream, int, list[LogFinding]]:
     Of samples with one time the first stays; where many of them differ, two instruments share the name, and that is a
     fault.
     """
-    good = np.isfinite(stream.time_s) & (np.abs(stream.values) < LARGEST)  # nan is not
+    good = (np.abs(stream.time_s) < _LATEST_S) & (np.abs(stream.values) < LARGEST)  # nan is not
     time, findings = continued_clock(stream.time_s[good], stream.name)
     order = np.argsort(time, kind="stable")
     time, values = time[order], stream.values[good][order]

@@ -13,6 +13,7 @@ from tank2sim.apps.logs.findings import LogFinding, note
 from tank2sim.apps.logs.quantities import QUANTITIES, names_rest, plain_words
 from tank2sim.apps.logs.streams import LogStream, wrapped_angle
 from tank2sim.arrays import Array
+from tank2sim.records.csv_table import LARGEST
 
 # Numbers that recorders write for no value: nines, and the bounds of their integers
 _MARK = re.compile(r"-?(9{2,}(\.9+)?|32767|32768|65535|2147483647|2147483648|1023|4095)")
@@ -50,7 +51,7 @@ def without_missing(stream: LogStream) -> tuple[LogStream, list[LogFinding]]:
 
 def _beyond(values: Array, bound: float) -> np.ndarray:
     """Which values (n,) are beyond a bound of which most keep within."""
-    sizes = np.abs(values)
+    sizes = np.minimum(np.abs(values), LARGEST)
     usual = np.isfinite(sizes).any() and np.nanmedian(sizes) <= bound
     return np.asarray((sizes > bound) & usual)
 
