@@ -144,3 +144,10 @@ def test_two_instruments_under_one_name_are_a_fault() -> None:
 def test_times_in_words() -> None:
     assert utc_text(1_691_365_806.0) == "2023-08-06T23:50:06.000Z"
     assert utc_text(1_691_366_399.9996) == "2023-08-07T00:00:00.000Z"
+
+
+def test_a_time_beyond_all_calendars_is_none() -> None:
+    time = np.arange(100.0)
+    time[60] = 1e154
+    tidy, _, findings = tidied(LogStream("heading", time, np.arange(100.0)))
+    assert len(tidy.values) == 99 and not findings

@@ -225,3 +225,14 @@ def test_shares_are_never_beyond_the_full_order(tmp_path) -> None:
     assert all(
         np.abs(found.voyage.series[f"thrust_order_{side}"].values).max() <= 1.0 for side in ("port", "starboard")
     )
+
+
+def test_the_scale_of_an_order_of_pulses_is_in_plain_words(tmp_path) -> None:
+    made, path = craft(), tmp_path / "craft.csv"
+    sides = {
+        f"pwm_{name}": np.round(1500 + 400 * made[side]) for name, side in (("left", "port"), ("right", "starboard"))
+    }
+    motion(made).assign(**sides).to_csv(path, index=False)
+    units = {each.quantity: each.unit for each in log(path).study.channels}
+    assert units["thrust_order_port"] == "0.0025 of full order per recorded unit"
+    assert units["heading"] == "deg"

@@ -13,17 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tank2sim.apps.logs.clock import board_start
-from tank2sim.apps.logs.streams import (
-    FIELDS,
-    LogFinding,
-    LogStream,
-    VesselLog,
-    fault,
-    not_used,
-    note,
-    text_lines,
-    unreadable,
-)
+from tank2sim.apps.logs.findings import LogFinding, fault, not_used, note
+from tank2sim.apps.logs.streams import FIELDS, LogStream, VesselLog, text_lines, unreadable
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError, optional_library
 from tank2sim.files import first_bytes
@@ -41,14 +32,7 @@ _FIRST_BOARD_WEEK = 1500
 
 _MAGIC = b"\xa3\x95"
 
-# SERVOn_FUNCTION of ArduPilot Rover: GroundSteering, Throttle, ThrottleLeft, ThrottleRight
-_SERVO_FUNCTIONS = {
-    26: "rudder_order",
-    70: "rpm_order",
-    73: "thrust_order_port",
-    74: "thrust_order_starboard",
-}
-
+_SERVO_FUNCTIONS = FIELDS["ardupilot"]["servo_functions"]
 _FIELDS, _TELEMETRY = FIELDS["dataflash"], FIELDS["mavlink"]
 _FORMAL = ("FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG")  # Messages about the log itself
 
@@ -120,16 +104,23 @@ def _dataflash_streams(log: _Dataflash, boot: float, *, by_receiver: bool) -> It
         fixes = kind in ("GPS", "GPS2") and _has_clock(table)
         stamps = _utc(table) if fixes and by_receiver else time
         valid = _status(table) >= _FIX if fixes else np.True_
-        for field, (unit, quantity) in _FIELDS.get(kind, {}).items():
-            if field not in table or (kind == "XKF1" and instance):
-                continue
-            stated, meaning = unit_of_text(log.units.get((kind, field), "")) or unit, (quantity, "format")
-            if kind in ("RPM", "ESC"):  # whose they are is a guess, which the turn confirms or not
-                meaning = _shaft(field, instance, table, sum(other == kind for other, _ in log.tables))
-            yield LogStream(f"{label}.{field}", stamps, np.where(valid, table[field], np.nan), stated, *meaning)
+        for field, *meaning in _fields(log, kind, instance):
+            yield LogStream(f"{label}.{field}", stamps, np.where(valid, table[field], np.nan), *meaning)
         if kind == "RCOU":
             pulses = {number: table.get(f"C{number}", table.get(f"Ch{number}")) for number in range(1, 17)}
             yield from _servo_orders(time, pulses, log.params)
+
+
+def _fields(log: _Dataflash, kind: str, instance: Any) -> Iterator[tuple[str, str, str, str]]:
+    """Fields of a message that are quantities: name, unit, quantity, and what states it."""
+    table, alike = log.tables[kind, instance], sum(other == kind for other, _ in log.tables)
+    for field, (unit, quantity) in _FIELDS.get(kind, {}).items():
+        if field not in table or (kind == "XKF1" and instance):
+            continue
+        meaning = quantity, "format"
+        if kind in ("RPM", "ESC"):  # whose they are is a guess, which the turn confirms or not
+            meaning = _shaft(field, instance, table, alike)
+        yield field, unit_of_text(log.units.get((kind, field), "")) or unit, *meaning
 
 
 def _has_clock(table: _Table) -> bool:
@@ -176,20 +167,23 @@ def _dataflash_tables(reader: Any) -> _Dataflash:
     rows: dict[tuple[str, Any], _Rows] = defaultdict(_rows)
     units: dict[tuple[str, str], str] = {}
     while (message := reader.recv_match(type=[*wanted, "PARM"])) is not None:
-        kind = message.get_type()
+        kind, names = message.get_type(), message.fmt.columns
         if kind == "PARM":
             continue
-        names = message.fmt.columns
-        instance = next((getattr(message, name) for name in _INSTANCES if name in names), None)
-        if (kind, instance) not in rows:
-            stated = message.fmt.units or [""] * len(names)
-            units |= {(kind, name): unit for name, unit in zip(names, stated, strict=False)}
+        group = rows[kind, next((getattr(message, name) for name in _INSTANCES if name in names), None)]
+        if not group:
+            units |= dict(zip(((kind, name) for name in names), message.fmt.units or [""] * len(names), strict=False))
         for name in names:
-            rows[kind, instance][name].append(float(getattr(message, name)))
+            group[name].append(float(getattr(message, name)))
+    tables = {key: _table(group) for key, group in rows.items()}
+    return _Dataflash(tables, units, reader.params, _other_messages(reader, {*wanted, *_FORMAL}))
+
+
+def _other_messages(reader: Any, known: set[str]) -> dict[str, int]:
+    """Number of the messages of all other kinds."""
     counts = reader.counts if isinstance(reader.counts, dict) else dict(enumerate(reader.counts))
     numbers = {form.name: counts.get(key, 0) for key, form in reader.formats.items()}
-    others = {kind: number for kind, number in numbers.items() if number and kind not in {*wanted, *_FORMAL}}
-    return _Dataflash({key: _table(group) for key, group in rows.items()}, units, reader.params, others)
+    return {kind: number for kind, number in numbers.items() if number and kind not in known}
 
 
 def _table(rows: _Rows) -> _Table:
@@ -202,7 +196,7 @@ def _servo_orders(time: Array, pulses: Mapping[int, Array | None], params: Mappi
     for number, width in pulses.items():
         if width is None:
             continue
-        quantity = _SERVO_FUNCTIONS.get(int(params.get(f"SERVO{number}_FUNCTION", 0)))
+        quantity = _SERVO_FUNCTIONS.get(f"{params.get(f'SERVO{number}_FUNCTION', 0):.0f}")
         values, meaning = width, ("us", "", "")
         if quantity is not None:
             usual = {"MIN": 1100.0, "TRIM": 1500.0, "MAX": 1900.0}
@@ -230,30 +224,18 @@ def read_ardupilot_tlog(path: Path) -> VesselLog:
 
     Orders to servos become shares of their range where the log holds the parameters SERVOn_FUNCTION.
     """
+    telemetry = _Telemetry()
     mavutil = optional_library("pymavlink.mavutil", "logs", path)
-    rows: dict[_Sender, _Rows] = defaultdict(_rows)
-    params: dict[int, dict[str, float]] = defaultdict(dict)
-    unread: Counter[str] = Counter()
     try:
         link = mavutil.mavlogfile(str(path), robust_parsing=True)
         while (message := link.recv_match()) is not None:
-            kind, system = message.get_type(), message.get_srcSystem()
-            if kind == "PARAM_VALUE":
-                params[system][message.param_id] = message.param_value
-            elif kind in (*_TELEMETRY, "SERVO_OUTPUT_RAW", "SYSTEM_TIME"):
-                group = rows[system, kind, message.get_srcComponent()]
-                group["_time"].append(message._timestamp)
-                numbers = {name: getattr(message, name) for name in message.get_fieldnames()}
-                for name, value in numbers.items():
-                    if isinstance(value, int | float):
-                        group[name].append(float(value))
-            else:
-                unread[kind] += 1
+            telemetry.take(message)
         link.close()
     except Exception as error:
         raise unreadable(path, error, "give a whole telemetry log") from None
-    findings = not_used("messages", unread)
-    system, tables = _one_vehicle(rows, findings)
+    findings = not_used("messages", telemetry.unread)
+    system = telemetry.vehicle(findings)
+    tables = telemetry.tables(system)
     streams = []
     for kind, table in tables.items():
         for field, (factor, unit, quantity) in _TELEMETRY.get(kind, {}).items():
@@ -262,7 +244,7 @@ def read_ardupilot_tlog(path: Path) -> VesselLog:
                 streams.append(LogStream(f"{kind}.{field}", table["_time"], values, unit, quantity, "format"))
     if (servos := tables.get("SERVO_OUTPUT_RAW")) is not None:
         pulses = {number: servos.get(f"servo{number}_raw") for number in range(1, 17)}
-        streams += _servo_orders(servos["_time"], pulses, params[system])
+        streams += _servo_orders(servos["_time"], pulses, telemetry.params[system])
     if not streams:
         remedy = "give a telemetry log with positions and attitudes"
         raise InputError(path, "", "no message of it is understood", remedy)
@@ -270,17 +252,40 @@ def read_ardupilot_tlog(path: Path) -> VesselLog:
     return VesselLog(path, "MAVLink telemetry", tuple(streams), counts, tuple(findings))
 
 
-def _one_vehicle(rows: Mapping[_Sender, _Rows], findings: list[LogFinding]) -> tuple[int, dict[str, _Table]]:
-    """The system with the most messages, and its messages by kind, each of the component that sends the most of it."""
-    sizes: Counter[int] = Counter()
-    for (system, kind, _), group in rows.items():
-        sizes[system] += len(group["_time"]) if kind in _TELEMETRY else 0
-    vehicles = sorted((system for system in sizes if sizes[system]), key=lambda system: (-sizes[system], system))
-    if not vehicles:
-        return 0, {}
-    first, *others = (f"{system} ({sizes[system]} messages)" for system in vehicles)
-    if others:
-        text = f"the log is of {len(vehicles)} vehicles: system {first} is read, and not {', '.join(others)}"
-        findings.append(fault(text, system=vehicles[0]))
-    own = [(kind, group) for (system, kind, _), group in rows.items() if system == vehicles[0]]
-    return vehicles[0], {kind: _table(group) for kind, group in sorted(own, key=lambda entry: len(entry[1]["_time"]))}
+class _Telemetry:
+    """Numbers of the messages of each sender, parameters of each system, and the number of all other messages."""
+
+    def __init__(self) -> None:
+        self.rows: dict[_Sender, _Rows] = defaultdict(_rows)
+        self.params: dict[int, dict[str, float]] = defaultdict(dict)
+        self.unread: Counter[str] = Counter()
+
+    def take(self, message: Any) -> None:
+        kind, system = message.get_type(), message.get_srcSystem()
+        if kind == "PARAM_VALUE":
+            self.params[system][message.param_id] = message.param_value
+        elif kind in (*_TELEMETRY, "SERVO_OUTPUT_RAW", "SYSTEM_TIME"):
+            group = self.rows[system, kind, message.get_srcComponent()]
+            group["_time"].append(message._timestamp)
+            for name in message.get_fieldnames():
+                if isinstance(value := getattr(message, name), int | float):
+                    group[name].append(float(value))
+        else:
+            self.unread[kind] += 1
+
+    def vehicle(self, findings: list[LogFinding]) -> int:
+        """The system with the most messages that are understood; others are a fault."""
+        sizes: Counter[int] = Counter()
+        for (system, kind, _), group in self.rows.items():
+            sizes[system] += len(group["_time"]) if kind in _TELEMETRY else 0
+        vehicles = sorted(+sizes, key=lambda system: (-sizes[system], system))
+        first, *others = [f"{system} ({sizes[system]} messages)" for system in vehicles] or [""]
+        if others:
+            text = f"the log is of {len(vehicles)} vehicles: system {first} is read, and not {', '.join(others)}"
+            findings.append(fault(text, system=vehicles[0]))
+        return vehicles[0] if vehicles else 0
+
+    def tables(self, vehicle: int) -> dict[str, _Table]:
+        """The messages of a system by kind, each of the component that sends the most of it."""
+        own = [(kind, group) for (system, kind, _), group in self.rows.items() if system == vehicle]
+        return {kind: _table(group) for kind, group in sorted(own, key=lambda entry: len(entry[1]["_time"]))}

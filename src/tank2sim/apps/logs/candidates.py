@@ -9,11 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tank2sim.apps.logs.channels import USED_FROM, ChannelSet, LogChannel
-from tank2sim.apps.logs.content import AGREES, DIFFERS, ContentEvidence, angle_unit, rate_delay
-from tank2sim.apps.logs.quantities import QUANTITIES
+from tank2sim.apps.logs.content import AGREES, DIFFERS, ContentEvidence, rate_delay
+from tank2sim.apps.logs.findings import LogFinding, fault, note
+from tank2sim.apps.logs.quantities import QUANTITIES, unit_by_size
 from tank2sim.apps.logs.recorded import PulseScale, pulses_of, rest_of
-from tank2sim.apps.logs.reference import ReferenceMotion, interpolated, thinned_series
-from tank2sim.apps.logs.streams import LogFinding, LogStream, fault, note
+from tank2sim.apps.logs.reference import ReferenceMotion, held, interpolated, thinned_series
+from tank2sim.apps.logs.streams import LogStream
 from tank2sim.arrays import Array
 from tank2sim.records.trials import usual_step
 
@@ -73,6 +74,7 @@ class ChannelSearch:
         self.findings: list[LogFinding] = []
         self.motion = ReferenceMotion(empty, empty, empty, empty, empty)
         self.rate: tuple[Array, Array] = (empty, empty)
+        self.way: tuple[Array, Array] = (empty, empty)  # 1 ahead, -1 astern; empty of a vessel that goes ahead
         self.pulse_scales: dict[str, PulseScale] = {}
         # Pulses are searched as shares of full order; streams that hold their rest are no orders.
         rests = {stream.name: rest for stream in self.streams if (rest := rest_of(stream)) is not None}
@@ -112,7 +114,7 @@ class ChannelSearch:
     def angle(self, stream: LogStream) -> tuple[Array, Array]:
         """Time and angle of a direction, rad, thinned by picking."""
         stride = max(1, round(_TESTED_STEP_S / usual_step(stream.time_s)))
-        unit = angle_unit(stream.values, stream.unit)
+        unit = stream.unit or unit_by_size("heading", stream.values)
         return stream.time_s[::stride], stream.values[::stride] * QUANTITIES["heading"].units[unit]
 
     def series(self, channel: LogChannel) -> tuple[Array, Array]:
@@ -124,6 +126,11 @@ class ChannelSearch:
         """Heading (n,), rad; nan where it is not known."""
         return interpolated(at, self.motion.heading_time_s, self.motion.heading_rad, 10.0)
 
+    def way_at(self, at: Array) -> Array:
+        """Sign of the speed ahead (n,) at other times: 1, or -1 where a vessel was found to go astern."""
+        time, way = self.way
+        return np.nan_to_num(held(at, time, way), nan=way[0]) if len(way) else np.ones(len(at))
+
     # What is found ----------------------------------------------------------------------------------------------
 
     def rename(self, stream: LogStream, quantity: str) -> None:
@@ -133,6 +140,10 @@ class ChannelSearch:
     def fault(self, stream: str, text: str) -> None:
         """Say what is wrong with a stream."""
         self.findings.append(fault(f"{stream}: {text}", stream))
+
+    def note(self, stream: str, text: str, **evidence: float) -> None:
+        """Say what is found of a stream."""
+        self.findings.append(note(f"{stream} {text}", stream, **evidence))
 
     def judged(self, stream: LogStream, evidence: ContentEvidence, agrees: float = AGREES) -> Judgement:
         """Confidence of a stream in its quantity by content, and why."""
@@ -147,7 +158,7 @@ class ChannelSearch:
             confidence, why = REFUTED, f"{why}, but {evidence.text}"
         else:
             confidence, why = STATED[by] - 0.1, f"{why}; {evidence.text}, which is weak"
-        return Judgement(stream, confidence, why, stream.unit)
+        return Judgement(stream, confidence, why, stream.unit or evidence.unit)
 
     def take(self, found: Judgement, quantity: str = "") -> None:
         """Add a judged stream; one that is contradicted is a fault."""
@@ -173,6 +184,19 @@ class ChannelSearch:
                 use=False,
             )
         )
+
+    def add_unnamed(
+        self,
+        stream: LogStream,
+        quantity: str,
+        confidence: float,
+        evidence: ContentEvidence,
+        more: str = "",
+        unit: str = "",
+    ) -> None:
+        """Add a stream whose name says nothing, by its content; `more` is said of it, and a `unit` by its size."""
+        why = f"by content alone: {evidence.text}{more}"
+        self.add(Judgement(stream, confidence, why, unit or stream.unit or evidence.unit, evidence.sign), quantity)
 
     def doubt(self, why: str, *streams: str) -> None:
         """Let no channel of these streams be used."""
@@ -202,8 +226,8 @@ class ChannelSearch:
             scale = scale.two_way
         if channel.use:
             full = scale.rest_us + scale.span_us
-            text = f"{channel.stream} holds pulses: {scale.rest_us:g} us is taken as rest and {full:g} us as full order"
-            self.findings.append(note(text, channel.stream))
+            text = f"holds pulses: {scale.rest_us:g} us is taken as rest and {full:g} us as full order"
+            self.note(channel.stream, text)
         offset = scale.rest_us + channel.offset * scale.span_us
         return replace(channel, scale=channel.scale / scale.span_us, offset=offset)
 
@@ -243,10 +267,8 @@ class ChannelSearch:
         late, other = (rate, heading) if found.delay_s > 0 else (heading, rate)
         delay = round(abs(found.delay_s), 2)
         words = f"{delay:g} ± {found.standard_error_s:.1g} s behind {other.stream}"
-        why = f"{late.why}; {words}, and set back by it"
-        channels[used[late.quantity]] = replace(late, delay_s=delay, why=why)
-        text = f"{late.stream} is {words} and is set back by it (delay_s in channels.toml)"
-        self.findings.append(note(text, late.stream, delay_s=delay))
+        channels[used[late.quantity]] = replace(late.because(f"{words}, and set back by it"), delay_s=delay)
+        self.note(late.stream, f"is {words} and is set back by it (delay_s in channels.toml)", delay_s=delay)
 
 
 def _seconds(channels: Sequence[LogChannel], *quantities: str) -> list[tuple[LogChannel, LogChannel]]:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import tomlkit
 
+from tank2sim.apps.logs.findings import LogFinding
 from tank2sim.apps.logs.quantities import QUANTITIES
-from tank2sim.apps.logs.streams import LogFinding
 from tank2sim.arrays import Array
 from tank2sim.cards.reading import parsed_toml
 from tank2sim.errors import InputError, close_name
@@ -73,6 +75,11 @@ class LogChannel:
     why: str = ""
     use: bool = True
 
+    def because(self, why: str, *, least: float = 0.0, most: float = 1.0) -> LogChannel:
+        """The channel with a further reason, its confidence at `least` and at `most` these."""
+        reasons = "; ".join(filter(None, (self.why, why)))
+        return replace(self, confidence=min(max(self.confidence, least), most), why=reasons)
+
     def si(self, values: Array) -> Array:
         """Recorded values (n,) in SI: rad, m/s, rad/s; degrees for latitude and longitude, shares for orders."""
         factor = QUANTITIES[self.quantity].units.get(self.unit, 1.0)
@@ -133,42 +140,46 @@ def read_channels(path: Path) -> ChannelSet:
 
 
 def _channel(path: Path, place: int, entry: Any) -> LogChannel:
-    where = f"channel {place}"
+    for key, problem, remedy in itertools.chain(_entry_faults(entry), _number_faults(entry)):
+        raise InputError(path, ", ".join(filter(None, (f"channel {place}", key))), problem, remedy)
+    use = bool(entry.get("use", True))
+    numbers = {key: float(entry.get(key, usual)) for key, usual in _USUAL.items()}
+    return LogChannel(
+        entry["quantity"],
+        entry["stream"],
+        entry.get("unit", ""),
+        sign=int(numbers.pop("sign")),
+        **numbers,
+        confidence=1.0 if use else float(entry.get("confidence", 0.0)),
+        why="by the channels file" if use else str(entry.get("why", "")),
+        use=use,
+    )
+
+
+def _entry_faults(entry: Any) -> Iterator[tuple[str, str, str]]:
+    """Key, problem and remedy of each fault in the form, quantity and unit of a channel."""
     if not isinstance(entry, dict):
-        raise InputError(path, where, "is not a table", "write [[channels]] with quantity, stream and unit")
-    for key in entry:
-        if key not in _KEYS:
-            raise InputError(path, f"{where}, {key}", "is not a key", close_name(key, _KEYS))
+        yield "", "is not a table", "write [[channels]] with quantity, stream and unit"
+    for key in sorted(entry.keys() - set(_KEYS), key=list(entry).index):
+        yield key, "is not a key", close_name(key, _KEYS)
     for key in ("quantity", "stream"):
         if not isinstance(entry.get(key), str):
-            raise InputError(path, f"{where}, {key}", "is missing", f"write {key} as text")
-    quantity = entry["quantity"]
+            yield key, "is missing", f"write {key} as text"
+    quantity, unit = entry["quantity"], entry.get("unit", "")
     if quantity not in QUANTITIES:
-        raise InputError(path, f"{where}, quantity", f"{quantity!r} is not known", close_name(quantity, QUANTITIES))
-    use = entry.get("use", True)
-    unit = entry.get("unit", "")
-    if use and quantity != "ignore" and unit not in QUANTITIES[quantity].units:
-        units = ", ".join(QUANTITIES[quantity].units)
-        raise InputError(path, f"{where}, unit", f"{unit!r} is not a unit of {quantity}", f"write one of {units}")
+        yield "quantity", f"{quantity!r} is not known", close_name(quantity, QUANTITIES)
+    units = QUANTITIES[quantity].units
+    if entry.get("use", True) and quantity != "ignore" and unit not in units:
+        yield "unit", f"{unit!r} is not a unit of {quantity}", f"write one of {', '.join(units)}"
+
+
+def _number_faults(entry: dict[str, Any]) -> Iterator[tuple[str, str, str]]:
+    """Key, problem and remedy of each fault in the numbers of a channel."""
     numbers = {key: entry.get(key, usual) for key, usual in _USUAL.items()}
     for key, value in numbers.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise InputError(path, f"{where}, {key}", f"is {value!r}", "write a number")
+            yield key, f"is {value!r}", "write a number"
     if numbers["sign"] not in (1, -1):
-        raise InputError(path, f"{where}, sign", f"is {numbers['sign']}", "write 1 or -1")
+        yield "sign", f"is {numbers['sign']}", "write 1 or -1"
     if numbers["scale"] <= 0:
-        raise InputError(
-            path, f"{where}, scale", f"is {numbers['scale']}", "write a positive number, and the sign as sign"
-        )
-    return LogChannel(
-        quantity,
-        entry["stream"],
-        unit,
-        sign=int(numbers["sign"]),
-        scale=float(numbers["scale"]),
-        offset=float(numbers["offset"]),
-        delay_s=float(numbers["delay_s"]),
-        confidence=1.0 if use else float(entry.get("confidence", 0.0)),
-        why="by the channels file" if use else str(entry.get("why", "")),
-        use=bool(use),
-    )
+        yield "scale", f"is {numbers['scale']}", "write a positive number, and the sign as sign"

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tank2sim.apps.logs.streams import LogFinding, LogStream, fault, note
+from tank2sim.apps.logs.findings import LogFinding, fault, note
+from tank2sim.apps.logs.streams import LogStream
 from tank2sim.arrays import Array
 from tank2sim.records.csv_table import LARGEST
 from tank2sim.records.signals.sampling import GAP_STEPS
@@ -20,6 +21,7 @@ DOUBLED_STEPS = 3.0
 differs by one to two."""
 
 _ROLLOVER_S = 1024 * 604800.0  # Time after which the week number of GPS starts again, s (IS-GPS-200, 20.3.3.3.1.1)
+_LATEST_S = 253402300800.0  # The year 10000, s since 1970, which ISO 8601 does not write
 _DAY_S = 86400.0  # Difference of two clocks, s, from which one is wrong by more than a time zone
 
 TWO_DIGITS_FROM = 80
@@ -82,21 +84,24 @@ def continued_clock(time_s: Array, name: str) -> tuple[Array, list[LogFinding]]:
     leaps: list[int] = []
     for place in np.flatnonzero((steps < -FALL_STEPS * usual) | (steps > GAP_STEPS * usual)):
         step = float(steps[place])
-        if step > 0 and shift > 0 and abs(step - usual - shift) < 2 * usual:
-            times[place + 1 :] -= shift
-            shift = 0.0
-        elif step > 0:
-            leaps.append(int(place))
-        elif not (same := [leap for leap in leaps if abs(steps[leap] + step - 2 * usual) < 2 * usual]):
+        if step > 0:
+            if shift > 0 and abs(step - usual - shift) < 2 * usual:
+                times[place + 1 :] -= shift
+                shift = 0.0
+            else:
+                leaps.append(int(place))
+            continue
+        undone = [leap for leap in leaps if abs(steps[leap] + step - 2 * usual) < 2 * usual]
+        if undone:
+            leaps.remove(ahead := undone[-1])
+            times[ahead + 1 : place + 1] -= float(steps[ahead]) - usual
+            text = f"{name}: the clock is {-step + usual:.4g} s ahead from {utc_text(time_s[ahead])} on for a while"
+            findings.append(fault(f"{text}; that is taken back", name, leap_s=-step + usual))
+        else:
             shift += usual - step
             times[place + 1 :] += usual - step
             text = f"{name}: the clock falls by {-step:.4g} s at {utc_text(time_s[place])}; it is taken to run on"
             findings.append(fault(text, name, fall_s=-step))
-        else:
-            leaps.remove(ahead := same[-1])
-            times[ahead + 1 : place + 1] -= float(steps[ahead]) - usual
-            text = f"{name}: the clock is {-step + usual:.4g} s ahead from {utc_text(time_s[ahead])} on for a while"
-            findings.append(fault(f"{text}; that is taken back", name, leap_s=-step + usual))
     return times, findings
 
 
@@ -106,7 +111,7 @@ def tidied(stream: LogStream) -> tuple[LogStream, int, list[LogFinding]]:
     Of samples with one time the first stays; where many of them differ, two instruments share the name, and that is a
     fault.
     """
-    good = np.isfinite(stream.time_s) & (np.abs(stream.values) < LARGEST)  # nan is not
+    good = (np.abs(stream.time_s) < _LATEST_S) & (np.abs(stream.values) < LARGEST)  # nan is not
     time, findings = continued_clock(stream.time_s[good], stream.name)
     order = np.argsort(time, kind="stable")
     time, values = time[order], stream.values[good][order]

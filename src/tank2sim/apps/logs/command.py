@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from tank2sim.api.verbs import Written, verb
 from tank2sim.errors import ArgumentError
@@ -68,25 +68,16 @@ def log(
     'zigzag'
     """
     from tank2sim.api.trial import TrialRecord
-    from tank2sim.apps.logs.channels import CHANNELS_FILE, ChannelSet, read_channels
     from tank2sim.apps.logs.result import LogResult
     from tank2sim.apps.logs.stretches import find_stretches
     from tank2sim.apps.logs.study import study_log
     from tank2sim.apps.logs.trial_files import cut_trials
     from tank2sim.apps.logs.voyage import make_voyage
-    from tank2sim.records.csv_table import is_frame
 
-    if isinstance(files, str | Path) or is_frame(files):
-        named = {"files": files}
-    else:
-        named = {f"files[{number}]": file for number, file in enumerate(files)}
-    if not named:
-        raise ArgumentError("files", "", "is empty", "give at least one log")
+    named = _named(files)
     folder = None if output is None else Path(output)
-    if channels is None and folder is not None and (folder / CHANNELS_FILE).is_file():
-        channels = folder / CHANNELS_FILE
     with nullcontext() if folder is None else folder_made(folder):
-        stated = channels if isinstance(channels, ChannelSet) or channels is None else read_channels(Path(channels))
+        stated = _stated(channels, folder)
         craft = None if card is None else _craft(card)
         voyage = make_voyage([_read(name, file) for name, file in named.items()], stated)
         found = find_stretches(voyage)
@@ -96,6 +87,26 @@ def log(
         trials = tuple(TrialRecord(cut.trial) for cut in cuts if cut.steered)
         result = LogResult(study, voyage, found, tuple(cuts), trials, identified)
         return result if folder is None else result.written_to(folder)
+
+
+def _stated(channels: str | Path | ChannelSet | None, folder: Path | None) -> ChannelSet | None:
+    """Channels that are given, or in the file of an earlier run; None without either."""
+    from tank2sim.apps.logs.channels import CHANNELS_FILE, read_channels
+
+    if channels is None and folder is not None and (folder / CHANNELS_FILE).is_file():
+        channels = folder / CHANNELS_FILE
+    return read_channels(Path(channels)) if isinstance(channels, str | Path) else channels
+
+
+def _named(files: str | Path | pd.DataFrame | Sequence[str | Path | pd.DataFrame]) -> dict[str, Any]:
+    """Logs by the names of their arguments."""
+    from tank2sim.records.csv_table import is_frame
+
+    if isinstance(files, str | Path) or is_frame(files):
+        return {"files": files}
+    if not len(files):
+        raise ArgumentError("files", "", "is empty", "give at least one log")
+    return {f"files[{number}]": file for number, file in enumerate(files)}
 
 
 def _read(name: str, file: str | Path | pd.DataFrame) -> VesselLog:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from tank2sim.apps.logs.reference import (
     ReferenceMotion,
     differenced,
     interpolated,
+    interpolated_angle,
     thinned_series,
 )
 from tank2sim.apps.logs.streams import wrapped_angle
@@ -36,6 +38,10 @@ DIFFERS = 0.5
 _SIDEWAYS = 0.35
 """Sideways speed (rms) as a share of the speed below which a heading is one. Project choice: half of the 0.71 of an
 angle that has nothing to do with the motion; small craft in turns reach 0.3."""
+
+# Senses of rotation and quarters of a turn by which a compass may be mounted; the first is as it should be
+_ORIENTATIONS = tuple(itertools.product((1, -1), range(4)))
+_UPRIGHT, _LIKELIER = _ORIENTATIONS[0], 0.02
 
 UNIT_SLACK = 0.2
 """Relative difference of a scale from the unit that is taken for it. Project choice: units are factors of 1.85
@@ -90,49 +96,42 @@ class ContentEvidence:
 UNTESTED = ContentEvidence(text="not to be tested in this log")
 
 
-def angle_unit(values: Array, stated: str) -> str:
-    """Unit of an angle of the full circle: ``deg`` or ``rad``, by its size where nothing states it."""
-    if stated in ("deg", "rad"):
-        return stated
-    return "deg" if np.nanmax(np.abs(values)) > 2 * math.pi + 0.1 else "rad"
-
-
 def direction_evidence(time_s: Array, angle_rad: Array, motion: ReferenceMotion) -> ContentEvidence:
     """Compare a heading or a course (n,), rad, with the course of the positions, where the vessel moves.
 
     All four right angles between them and both senses of rotation are tried; the agreement is the share of samples
     that differ by less than :data:`NEAR_RAD`.
     """
-    moving, longest = motion.moving, 5 * max(usual_step(time_s), 1.0)
+    moving = motion.moving
     at, north, east = (part[moving] for part in (motion.time_s, motion.v_north_mps, motion.v_east_mps))
-    cosine, sine = (interpolated(at, time_s, part, longest) for part in (np.cos(angle_rad), np.sin(angle_rad)))
-    good = np.isfinite(cosine)
+    angle = interpolated_angle(at, time_s, angle_rad, _longest_gap_s(time_s))
+    good = np.isfinite(angle)
     if good.sum() < FEW_SAMPLES:
         return UNTESTED
-    angle, north, east = np.arctan2(sine, cosine)[good], north[good], east[good]
+    angle, north, east = angle[good], north[good], east[good]
     course = np.arctan2(east, north)
-    differences = {
-        (sign, quarter): wrapped_angle(sign * angle + quarter * math.pi / 2 - course)
-        for sign in (1, -1)
-        for quarter in range(4)
-    }
+    differences = {key: wrapped_angle(key[0] * angle + key[1] * math.pi / 2 - course) for key in _ORIENTATIONS}
     shares = {key: float((np.abs(each) < NEAR_RAD).mean()) for key, each in differences.items()}
-    agreement = shares[1, 0]
-    best = max(shares, key=lambda key: shares[key] + (0.02 if key == (1, 0) else 0.0))
+    best = max(shares, key=lambda key: shares[key] + _LIKELIER * (key == _UPRIGHT))
+    (sign, quarter), agreement = best, shares[_UPRIGHT]
     turned = np.ptp(np.unwrap(course)) > LEAST_TURNED_RAD
-    difference, (sign, quarter) = differences[best], best
-    middle = float(np.median(difference))
+    middle = float(np.median(differences[best]))
     offset = float(wrapped_angle(np.array([middle - quarter * math.pi / 2]))[0])
-    if best != (1, 0) and turned:
-        mirrored = "mirrored and " if sign < 0 else ""
-        words = f"is {mirrored}off by {math.degrees(offset):.0f} deg against the course of the positions"
+    if best != _UPRIGHT and turned:
+        mirrored = {1: "", -1: "mirrored and "}
+        words = f"is {mirrored[sign]}off by {math.degrees(offset):.0f} deg against the course of the positions"
         return ContentEvidence(agreement, sign, offset_rad=offset, text=words)
     text = f"follows the course of the positions in {100 * agreement:.0f} % of the time"
     if turned and DIFFERS <= agreement < AGREES and (share := _sideways_share(angle, north, east)) < _SIDEWAYS:
         agreement = AGREES
         text += f", and moves sideways by {100 * share:.0f} % of its speed in a steady current"
-    spread = float(np.median(np.abs(difference - middle)))
-    return ContentEvidence(agreement, 1 if turned else 0, offset_rad=offset, spread_rad=spread, text=text)
+    spread = float(np.median(np.abs(differences[best] - middle)))
+    return ContentEvidence(agreement, int(turned), offset_rad=offset, spread_rad=spread, text=text)
+
+
+def _longest_gap_s(time_s: Array) -> float:
+    """Longest gap of a stream that a comparison bridges, s."""
+    return 5 * max(usual_step(time_s), 1.0)
 
 
 def _sideways_share(heading: Array, north: Array, east: Array) -> float:
@@ -176,7 +175,7 @@ def rate_evidence(
 def speed_evidence(time_s: Array, values: Array, motion: ReferenceMotion, quantity: str) -> ContentEvidence:
     """Compare a speed (n,), in an unknown unit, with the speed of the positions: its unit, and whether it follows."""
     speed = motion.speed_mps
-    other = interpolated(motion.time_s, time_s, values, 5 * max(usual_step(time_s), 1.0))
+    other = interpolated(motion.time_s, time_s, values, _longest_gap_s(time_s))
     good = np.isfinite(other) & motion.moving
     if good.sum() < FEW_SAMPLES:
         return UNTESTED
@@ -197,7 +196,7 @@ def speed_evidence(time_s: Array, values: Array, motion: ReferenceMotion, quanti
 
 def component_evidence(time_s: Array, values: Array, reference: Array, motion: ReferenceMotion) -> ContentEvidence:
     """Compare a velocity (n,), m/s, with one of the positions at the times of the motion, without their means."""
-    other = interpolated(motion.time_s, time_s, values, 5 * max(usual_step(time_s), 1.0))
+    other = interpolated(motion.time_s, time_s, values, _longest_gap_s(time_s))
     if np.count_nonzero(np.isfinite(other) & np.isfinite(reference)) < FEW_SAMPLES:
         return UNTESTED
     found = _correlation(other, reference)
@@ -225,17 +224,6 @@ def steering_evidence(time_s: Array, values: Array, rate_time_s: Array, rate: Ar
     best = max(found, key=lambda constant: abs(found[constant]))
     text = f"the rate of turn follows it by {found[best]:.2f} with a lag of {best:g} s"
     return ContentEvidence(abs(found[best]), 1 if found[best] > 0 else -1, lag_s=best, text=text)
-
-
-def rudder_unit(values: Array) -> str:
-    """Unit of a rudder by its size: ``rad`` to 0.75, ``1`` to 1.05, ``deg`` from 1.6 to 75, ``%`` to 105; else empty.
-
-    Rudders go to 35 deg (0.61 rad), some to 45 (SOLAS II-1, 29; flap and Schilling rudders to 70). Between, and from
-    70 to 105, nothing is certain, and the confidence says so.
-    """
-    most = float(np.nanpercentile(np.abs(values), 99.9))
-    limits = ((0.75, "rad"), (1.05, "1"), (1.6, ""), (75.0, "deg"), (105.0, "%"))
-    return next((unit for limit, unit in limits if most <= limit), "")
 
 
 def _nearest_unit(scale: float, quantity: str) -> str:
@@ -266,6 +254,7 @@ LEAST_DELAY_S, SURE_ERRORS = 0.1, 5.0
 ship turns by 0.2 deg at most in it)."""
 
 _LARGEST_DELAY_S, _STEPS = 3.0, 6
+_LEAST_ROWS = 10  # Samples that a segment has more than
 
 
 @dataclass(frozen=True)
@@ -292,7 +281,7 @@ def rate_delay(heading_time_s: Array, heading_rad: Array, rate_time_s: Array, ra
     scatter between segments (Liang and Zeger 1986, Biometrika 73), so that drift of the sensors is in it.
     """
     rate_at, rate = thinned_series(rate_time_s, rate_radps, 0.2)
-    if len(rate_at) < 3 or len(heading_time_s) < 3:
+    if min(len(rate_at), len(heading_time_s)) < 3:
         return None
     area = cumulative_trapezoid(rate, rate_at, initial=0.0)
     at, heading = thinned_series(heading_time_s, heading_rad, 0.2)
@@ -301,29 +290,34 @@ def rate_delay(heading_time_s: Array, heading_rad: Array, rate_time_s: Array, ra
     delay, error = 0.0, np.inf
     for _ in range(_STEPS):
         columns = [interpolated(at + delay, rate_at, values, longest) for values in (area, rate)]
-        parts = [
-            _without_line(at[rows], np.column_stack([heading[rows], *(column[rows] for column in columns)]))
-            for number in np.unique(segment)
-            if (rows := np.flatnonzero((segment == number) & np.isfinite(columns[0]))).size > 10
-        ]
-        if len(parts) < LEAST_SEGMENTS:
+        rows = [np.flatnonzero((segment == number) & np.isfinite(columns[0])) for number in np.unique(segment)]
+        table = np.column_stack([heading, *columns])
+        found = _scale_and_step([_without_line(at[part], table[part]) for part in rows if len(part) > _LEAST_ROWS])
+        if found is None:
             return None
-        table = np.concatenate(parts)
-        X, y = table[:, 1:], table[:, 0]
-        normal = X.T @ X
-        if np.linalg.cond(normal / np.sqrt(np.outer(np.diag(normal), np.diag(normal)))) > 1e8:
-            return None
-        (scale, step), *_ = np.linalg.lstsq(X, y, rcond=None)
-        scores = np.array([part[:, 1:].T @ (part[:, 0] - part[:, 1:] @ [scale, step]) for part in parts])
-        inverse = np.linalg.inv(normal)
-        spread = np.sqrt((inverse @ (scores.T @ scores) @ inverse)[1, 1] * len(parts) / (len(parts) - 1))
-        change, error = step / scale, float(spread / abs(scale))
-        delay += float(change)
+        scale, step, step_error = found
+        change, error = step / scale, step_error / abs(scale)
+        delay += change
         if abs(delay) > _LARGEST_DELAY_S:
             return None
         if abs(change) < 0.01:
             break
     return RateDelay(delay, error)
+
+
+def _scale_and_step(parts: Sequence[Array]) -> tuple[float, float, float] | None:
+    """Scale, delay and its standard error by segments of heading, area and rate (k, 3); None where undetermined."""
+    if len(parts) < LEAST_SEGMENTS:
+        return None
+    table = np.concatenate(parts)
+    normal = table[:, 1:].T @ table[:, 1:]
+    if np.linalg.cond(normal / np.sqrt(np.outer(np.diag(normal), np.diag(normal)))) > 1e8:
+        return None
+    found = np.linalg.lstsq(table[:, 1:], table[:, 0], rcond=None)[0]
+    scores = np.array([part[:, 1:].T @ (part[:, 0] - part[:, 1:] @ found) for part in parts])
+    inverse = np.linalg.inv(normal)
+    spread = np.sqrt((inverse @ (scores.T @ scores) @ inverse)[1, 1] * len(parts) / (len(parts) - 1))
+    return float(found[0]), float(found[1]), float(spread)
 
 
 def _without_line(time_s: Array, columns: Array) -> Array:

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tank2sim.apps.logs.channels import LogChannel
 from tank2sim.apps.logs.voyage import Voyage
 from tank2sim.arrays import Array, Number
 
@@ -130,22 +129,16 @@ def logged_gear(voyage: Voyage) -> LoggedGear | None:
     begin, end = _busiest(max(time_s[0], order_s[0]), min(time_s[-1], order_s[-1]), order_s, order)
     inside = (time_s >= begin) & (time_s <= end)
     asked = order[(order_s >= begin) & (order_s <= end)]
-    moves = _moves(asked) if len(asked) >= _FEWEST_MOVES else 0
+    moves = _moves(asked)
     if np.count_nonzero(inside) < 10 * _BLOCKS or moves < _FEWEST_MOVES:
         return None
     record = _Record(time_s[inside], angle[inside], order_s, order)
-    whole = np.ones(len(record.time_s))
-    best, squares = record.fit(whole)
+    best, squares = record.fit(np.ones(len(record.time_s)))
     if math.sqrt(squares) > _FOLLOWS * float(np.std(record.angle)):
         return None
-    parts = []
-    for block in np.array_split(np.arange(len(whole)), _BLOCKS):
-        weights = whole.copy()
-        weights[block] = 0.0
-        parts.append(record.fit(weights, near=best)[0])
-    errors = np.sqrt((_BLOCKS - 1) * np.var(parts, axis=0))
     clocks = math.hypot(*(float(np.median(np.diff(times))) for times in (record.time_s, order_s)))
-    errors = np.maximum(errors, [0.0, clocks / math.sqrt(12), math.radians(_resolution_deg(angle)), 0.0])
+    least = [0.0, clocks / math.sqrt(12), math.radians(_resolution_deg(angle)), 0.0]
+    errors = np.maximum(record.jackknife(best), least)
     at_once = record.simulate(np.array([_RATES[1]]), best[1:2], best[2:3])[:, 0] + best[3]
     known = float(np.mean((at_once - record.angle) ** 2)) > _KNOWN * squares
     degrees, errors_deg = np.degrees(best).tolist(), np.degrees(errors).tolist()
@@ -170,17 +163,15 @@ def logged_gear(voyage: Voyage) -> LoggedGear | None:
 
 def _rudder(voyage: Voyage, quantity: str) -> tuple[str, Array, Array] | None:
     """Stream, times and angles (rad) of a rudder: the channel in use, else the likeliest by its format."""
-    channels = [channel for channel in voyage.channels.channels if channel.quantity == quantity]
-    channels.sort(key=lambda channel: (not channel.use, -channel.confidence))
     streams = {stream.name: stream for log in voyage.logs for stream in log.streams}
-    chosen: LogChannel | None = next((channel for channel in channels if channel.stream in streams), None)
+    channels = [c for c in voyage.channels.channels if c.quantity == quantity and c.stream in streams]
+    chosen = min(channels, key=lambda channel: (not channel.use, -channel.confidence), default=None)
     if chosen is None or (not chosen.use and not streams[chosen.stream].quantity):
         return None
+    stream = streams[chosen.stream]
+    time_s, values = stream.time_s - chosen.delay_s, chosen.si(stream.values)
     if chosen.use and quantity in voyage.series:
         time_s, values = voyage.series[quantity].time_s, voyage.series[quantity].values
-    else:
-        stream = streams[chosen.stream]
-        time_s, values = stream.time_s - chosen.delay_s, chosen.si(stream.values)
     good = np.isfinite(time_s) & (np.abs(values) < math.pi)  # nan is not
     time_s, first = np.unique(time_s[good], return_index=True)
     return (chosen.stream, time_s, values[good][first]) if len(time_s) > 1 else None
@@ -188,7 +179,7 @@ def _rudder(voyage: Voyage, quantity: str) -> tuple[str, Array, Array] | None:
 
 def _moves(order: Array) -> int:
     """Movements of an order by :data:`_MOVE` or more to alternating sides."""
-    count, low, high, side = 0, order[0], order[0], 0
+    count, low, high, side = 0, math.inf, -math.inf, 0
     for value in order:
         low, high = min(low, value), max(high, value)
         if value - low >= _MOVE and side <= 0:
@@ -283,6 +274,15 @@ class _Record:
                 best = np.array([math.exp(points[0, place]), *points[1:, place], offset[place]])
             low, high = about(best, _NARROWER * (high - low))
         return best, least
+
+    def jackknife(self, best: Array) -> Array:
+        """Standard errors (4,) of a fit, by the fits without one part of the record after another."""
+        parts = []
+        for block in np.array_split(np.arange(len(self.time_s)), _BLOCKS):
+            weights = np.ones(len(self.time_s))
+            weights[block] = 0.0
+            parts.append(self.fit(weights, near=best)[0])
+        return np.asarray(np.sqrt((_BLOCKS - 1) * np.var(parts, axis=0)))
 
     def simulate(self, rate: Array, lag: Array, band: Array) -> Array:
         """Angles (n, m) of gears with rates (rad/s), lags (s) and dead bands (rad), each (m,)."""

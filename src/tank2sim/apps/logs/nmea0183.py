@@ -13,7 +13,8 @@ import itertools
 import math
 import re
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import reduce
 from operator import xor
 from pathlib import Path
@@ -22,19 +23,9 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from tank2sim.apps.logs.clock import continued_clock, full_year, over_midnight, rollover_s, stamp_s
+from tank2sim.apps.logs.findings import LogFinding, fault, not_used, note
 from tank2sim.apps.logs.quantities import quantity_of_name
-from tank2sim.apps.logs.streams import (
-    FIELDS,
-    LogFinding,
-    LogStream,
-    Samples,
-    VesselLog,
-    fault,
-    mostly,
-    not_used,
-    note,
-    text_lines,
-)
+from tank2sim.apps.logs.streams import FIELDS, LogStream, Samples, VesselLog, mostly, text_lines
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError, optional_library
 from tank2sim.units import KNOT_MPS
@@ -70,14 +61,7 @@ _NEIGHBOURS = 10
 _FIELDS = FIELDS["nmea0183"]
 # Headings that repeat another instrument's, or rest on a compass: a gyro's goes first
 _LAST = ("HDG.true_heading", "HDM.true_heading", "VHW.heading")
-# Cells of a speed in km/h that some instruments fill in place of the one in knots
-_KMH = {("VTG", 4): 6, ("VHW", 4): 6}
-_STATUS = {"RMC": 1, "ROT": 1, "GLL": 5, "MWV": 4}  # Cells of the status of a sentence, A where it is valid
-# Cells of the mode of the receiver, N where it has no fix (NMEA 0183, 2.3)
-_MODE = {"RMC": 11, "VTG": 8, "GLL": 6, "GNS": 5}
-# Cells of the latitude and of the time of day of sentences with a position
-_PLACES = {"RMC": (2, 0), "GGA": (1, 0), "GLL": (0, 4), "GNS": (1, 0)}
-
+_CELLS = FIELDS["nmea0183_cells"]
 _STAMPS = "the recorder's time stamps"
 _FIRST_DAY = dt.date(1970, 1, 1)
 _TIME_OF_DAY = "time of day of "  # Beginning of the name of a clock without a date, before the kind of its sentences
@@ -110,6 +94,21 @@ def read_nmea0183(path: Path) -> VesselLog:
     for line in text_lines(path):
         reader.take(line)
     return reader.log()
+
+
+@dataclass(frozen=True, eq=False)
+class _Clock:
+    """Lines (n,) and their times, the name of the clock (empty: the recorder's), and the times of its own sentences."""
+
+    name: str
+    lines: np.ndarray
+    times: Array
+    ticks: Mapping[int, float] = field(default_factory=dict)
+
+    @property
+    def dated(self) -> bool:
+        """Whether its times are UTC."""
+        return not self.name.startswith(_TIME_OF_DAY)
 
 
 class _Reader:
@@ -146,11 +145,14 @@ class _Reader:
             self.number += place > 0
             body, total, label = match["body"].rstrip(), match["sum"], match["body"][1:].partition(b",")[0].rstrip()
             sentence = self.number, body, raw[: found[0].start()] or raw[found[-1].end() :]
-            if total is None and self.summed and label not in self.summed:
-                self.unsummed[label].append(sentence)
-            elif (total is None and self.summed) or (total and reduce(xor, body[1:], 0) != int(total, 16)):
+            if total is None and self.summed:
+                if label in self.summed:
+                    self.counts["corrupted"] += 1
+                else:
+                    self.unsummed[label].append(sentence)
+            elif total and reduce(xor, body[1:], 0) != int(total, 16):
                 self.counts["corrupted"] += 1
-                self.wrong[_kind(label)] += total is not None
+                self.wrong[_kind(label)] += 1
             else:
                 self._read(*sentence)
 
@@ -162,21 +164,29 @@ class _Reader:
             self.counts["ais"] += 1
             return
         label, *cells = body[1:].decode("latin-1").split(",")
-        kind, self.talker = _kind(label.encode("latin-1")), "" if label[:1] == "P" else label[:-3]
-        self.counts["proprietary"] += label[:1] == "P"
+        proprietary = label[:1] == "P"
+        kind, self.talker = _kind(label.encode("latin-1")), "" if proprietary else label[:-3]
+        self.counts["proprietary"] += proprietary
         self.kinds[kind] += 1
         before, self.line = self.added, number
         try:
-            if kind in _SPECIAL:
-                _SPECIAL[kind](self, kind, cells)
-            if kind in _FIELDS and _valid(kind, cells):
-                self._plain(kind, cells)
-            elif kind not in _SPECIAL and kind not in _FIELDS and kind not in _SATELLITES:
-                self._unknown(kind, cells)
+            self._take_values(kind, cells)
         except (LookupError, ValueError, ArithmeticError):
             self.malformed[kind] += 1
         else:
             self.void[kind] += before == self.added and kind != "ZDA"
+
+    def _take_values(self, kind: str, cells: list[str]) -> None:
+        """Keep the values of a sentence; of a kind that is not understood all numbers, for they may be named."""
+        if kind in _SPECIAL:
+            _SPECIAL[kind](self, kind, cells)
+        if kind in _FIELDS:
+            if _valid(kind, cells):
+                self._plain(kind, cells)
+        elif kind not in _SPECIAL and kind not in _SATELLITES:
+            for place, cell in enumerate(cells, start=1):
+                if _NUMBER.fullmatch(cell):
+                    self._add(f"{kind}.{place}", float(cell), "", "", "")
 
     def _add(self, name: str, value: float, unit: str, quantity: str, by: str = "format") -> None:
         self.added += 1
@@ -184,21 +194,14 @@ class _Reader:
         self.stated[name] = unit, quantity, by
 
     def _plain(self, kind: str, cells: list[str]) -> None:
-        for name, (place, unit, quantity) in _FIELDS[kind].items():
-            status = {"RSA": place + 1, "ROR": place + 1, "VBW": 2 if place < 2 else 5}.get(kind)
-            if status is not None and _cell(cells, status) != "A":
+        for label, (place, unit, quantity, *shown) in _FIELDS[kind].items():
+            name = f"{kind}.{label}"
+            if shown and _cell(cells, shown[0]) != shown[1]:
                 continue
-            kilometres = _cell(cells, _KMH.get((kind, place), len(cells)))
             if text := _cell(cells, place):
-                self._add(f"{kind}.{name}", float(text), unit, quantity)
-            elif kilometres:
-                self._add(f"{kind}.{name}", float(kilometres) / 3.6 / KNOT_MPS, unit, quantity)
-
-    def _unknown(self, kind: str, cells: list[str]) -> None:
-        """Keep the numbers of a kind that is not understood: they may be named, or found by content."""
-        for place, cell in enumerate(cells, start=1):
-            if _NUMBER.fullmatch(cell):
-                self._add(f"{kind}.{place}", float(cell), "", "", "")
+                self._add(name, float(text), unit, quantity)
+            elif kilometres := _cell(cells, _CELLS["kmh"].get(name)):
+                self._add(name, float(kilometres) / 3.6 / KNOT_MPS, unit, quantity)
 
     def _rmc(self, kind: str, cells: list[str]) -> None:
         time, date = cells[0], cells[8]
@@ -222,7 +225,7 @@ class _Reader:
         self.clocks[kind].add(seconds, self.line, self.talkers.index(self.talker))
 
     def _position(self, kind: str, cells: list[str]) -> None:
-        place, time = _PLACES[kind]
+        place, time = _CELLS["latitude"][kind], _CELLS["time"][kind]
         if len(cells) > time and cells[time]:
             self._tick(f"{_TIME_OF_DAY}{kind}", _FIRST_DAY, cells[time])
         if not _valid(kind, cells) or (kind == "GGA" and cells[5] in ("", "0")):
@@ -251,10 +254,6 @@ class _Reader:
         quantity = "rpm" if shaft == 0 else "rpm_starboard" if shaft % 2 else "rpm_port"
         self._add(f"RPM.{cells[0]}{shaft}", float(cells[2]), "rpm", quantity)
 
-    def _ths(self, kind: str, cells: list[str]) -> None:
-        if cells[0] and cells[1][:1] in ("A", "E"):  # by a compass, or estimated; not by hand, simulated, or not valid
-            self._add("THS.heading", float(cells[0]), "deg", "heading")
-
     def _mwv(self, kind: str, cells: list[str]) -> None:
         if _valid(kind, cells):
             prefix, words = ("wind_rel", "relative") if cells[1] == "R" else ("wind_theoretical", "theoretical")
@@ -274,26 +273,31 @@ class _Reader:
         """The log after the last line."""
         findings: list[LogFinding] = []
         self._take_unsummed(findings)
-        lines, times, clock, ticks = self._clock(findings)
-        streams: list[LogStream] = []
+        clock = self._clock(findings)
         self._name_single_shaft(findings)
-        for kind, name, number, values in self._instruments(findings):
-            time = steady_times(_time_of_lines(number, lines, times))
-            if clock.endswith(kind):  # it carries its own times
-                time = np.array([ticks.get(each, at) for each, at in zip(number.tolist(), time, strict=True)])
-            same = sum(stream.name.split(" #")[0] == name for stream in streams)
-            label = f"{name} #{same + 1}" if same else name
-            streams.append(LogStream(label, time, values, *self.stated[name]))
+        streams = self._streams(clock, findings)
         if not any(stream.quantity for stream in streams):
             raise InputError(self.path, "", "no sentence of it is understood", "give a log with RMC, HDT, RSA, ...")
-        streams.sort(key=lambda stream: stream.name.startswith(_LAST))
         self.counts["malformed"] = self.malformed.total()
-        counts = {key: self.counts[key] for key in ("lines", "corrupted")}
-        counts |= {key: self.counts[key] for key in ("malformed", "ais", "proprietary") if self.counts[key]}
+        always, counted = ("lines", "corrupted"), ("malformed", "ais", "proprietary")
+        counts = {key: self.counts[key] for key in (*always, *filter(self.counts.__getitem__, counted))}
         counts["dropped"] = sum(_lost(stream.time_s) for stream in streams if stream.name.startswith("HDT"))
-        self._say_unread(counts, findings)
-        dated = not clock.startswith(_TIME_OF_DAY)
-        return VesselLog(self.path, "NMEA 0183", tuple(streams), counts, tuple(findings), dated)
+        self._say_spoilt(findings)
+        self._say_unused(counts, findings)
+        return VesselLog(self.path, "NMEA 0183", tuple(streams), counts, tuple(findings), clock.dated)
+
+    def _streams(self, clock: _Clock, findings: list[LogFinding]) -> list[LogStream]:
+        """Fields of all instruments in the times of a clock; headings that rest on a compass are the last."""
+        streams: list[LogStream] = []
+        names: Counter[str] = Counter()
+        for kind, name, lines, values in self._instruments(findings):
+            time = steady_times(_time_of_lines(lines, clock.lines, clock.times))
+            if clock.name.endswith(kind):  # it carries its own times
+                time = np.array([clock.ticks.get(line, at) for line, at in zip(lines.tolist(), time, strict=True)])
+            names[name] += 1
+            label = f"{name} #{names[name]}" if names[name] > 1 else name
+            streams.append(LogStream(label, time, values, *self.stated[name]))
+        return sorted(streams, key=lambda stream: stream.name.startswith(_LAST))
 
     def _take_unsummed(self, findings: list[LogFinding]) -> None:
         """Read the sentences of kinds that never have a checksum, though others do; a few of a kind are cut ones."""
@@ -309,26 +313,27 @@ class _Reader:
         if not self.summed:
             findings.append(note("no sentence has a checksum, so that none is tested for errors"))
 
-    def _say_unread(self, counts: dict[str, int], findings: list[LogFinding]) -> None:
-        """Say what is spoilt, holds no value, is not used, or is not known; each kind with its number."""
-        read = {*_FIELDS, *_SPECIAL}
+    def _say_spoilt(self, findings: list[LogFinding]) -> None:
+        """Say what is spoilt or holds no value, each kind with its number."""
         if spoilt := self.counts["corrupted"]:
             text = f"{spoilt} of {self.counts['lines']} lines are corrupted (wrong checksum or cut) and left out"
             findings.append(note(text, share=spoilt / self.counts["lines"]))
         if self.malformed:
             listed = ", ".join(f"{number} {kind}" for kind, number in self.malformed.items())
             findings.append(note(f"sentences with a cell that cannot be read are left out: {listed}"))
-        for kind, number in self.wrong.items():
-            total = number + self.kinds[kind]
-            if number >= _FEW and number > _MOST * total:
-                text = f"{number} of {total} {kind} have a wrong checksum and are left out"
-                findings.append((fault if kind in read else note)(text, kind))
-        for kind, number in self.void.items():
-            if kind in read and number >= _FEW and number > _MOST * self.kinds[kind]:
+        totals = self.wrong + self.kinds
+        for kind, number in _most_of(self.wrong, totals):
+            text = f"{number} of {totals[kind]} {kind} have a wrong checksum and are left out"
+            findings.append((fault if kind in _READ else note)(text, kind))
+        for kind, number in _most_of(self.void, self.kinds):
+            if kind in _READ:
                 text = f"{number} of {self.kinds[kind]} {kind} hold no valid value (status V, mode N, or empty)"
                 findings.append(note(text, kind))
+
+    def _say_unused(self, counts: dict[str, int], findings: list[LogFinding]) -> None:
+        """Say and count which kinds are not used, or not known."""
         unknown = "sentences (unknown; channels.toml may name their numbers)"
-        others = self.kinds.keys() - read
+        others = self.kinds.keys() - _READ
         for key, words, which in (
             ("unused", "sentences", others & self.known),
             ("unknown", unknown, others - self.known),
@@ -337,42 +342,41 @@ class _Reader:
             findings += not_used(words, kinds)
             counts |= {key: sum(kinds.values())} if kinds else {}
 
-    def _clock(self, findings: list[LogFinding]) -> tuple[np.ndarray, Array, str, dict[int, float]]:
-        """Sentences and times of the best clock, its name, and the times of all its sentences."""
+    def _clock(self, findings: list[LogFinding]) -> _Clock:
+        """The receiver's clock, by the recorder's time stamps between its ticks where nearly all lines have one."""
         order = np.argsort(self.stamps.lines, kind="stable")
         stamp_lines, stamps = (np.array(part)[order] for part in (self.stamps.lines, self.stamps.values))
         stamped = len(stamps) > 0.9 * (sum(self.kinds.values()) + self.counts["ais"])
         name = self._best_clock()
-        clock = self.clocks[name]
-        undated = name.startswith(_TIME_OF_DAY)
-        if len(clock.lines) < 2 or (stamped and undated):
+        if len(self.clocks[name].lines) < 2 or (stamped and name.startswith(_TIME_OF_DAY)):
             if not stamped or len(stamps) < 2:
                 raise self._without_clock()
-            stamps, found = continued_clock(stamps, _STAMPS)
+            return _Clock("", stamp_lines, _continued(stamps, _STAMPS, findings))
+        lines, times = self._ticks(name, findings)
+        if stamped:
+            shift, found = rollover_s(float(np.median(times - np.interp(lines, stamp_lines, stamps))))
             findings += found
-            return stamp_lines, stamps, "", {}
+            times, stamps = times + shift, _continued(stamps, _STAMPS, findings)
+            late = times - np.interp(lines, stamp_lines, stamps)
+            if np.ptp(late) < _STAMPS_AGREE_S:
+                ticks = dict(zip(lines.tolist(), times.tolist(), strict=True))
+                return _Clock(name, stamp_lines, stamps + float(np.median(late)), ticks)
+            drift = f"drift by {np.ptp(late):.3g} s against the clock of {name}, which is taken"
+            findings.append(note(f"{_STAMPS} {drift}"))
+        rises = np.diff(times, prepend=-np.inf) > 0
+        return _Clock(name, lines[rises], times[rises], dict(zip(lines.tolist(), times.tolist(), strict=True)))
+
+    def _ticks(self, name: str, findings: list[LogFinding]) -> tuple[np.ndarray, Array]:
+        """Lines and times of the sentences of a clock, of the most frequent talker if several send at once."""
+        clock = self.clocks[name]
         lines, times, talkers = (np.array(part) for part in (clock.lines, clock.values, clock.stamps))
-        if undated:
+        if name.startswith(_TIME_OF_DAY):
             times = over_midnight(times)
             findings.append(note("no sentence has a date (RMC, ZDA): the trials have no date"))
         if _overlapping(lines, talkers):
             first = Counter(talkers.tolist()).most_common(1)[0][0]
             lines, times = lines[talkers == first], times[talkers == first]
-        times, found = continued_clock(times, name)
-        findings += found
-        if stamped:
-            shift, found = rollover_s(float(np.median(times - np.interp(lines, stamp_lines, stamps))))
-            times = times + shift
-            stamps, leaps = continued_clock(stamps, _STAMPS)
-            findings += [*found, *leaps]
-            late = times - np.interp(lines, stamp_lines, stamps)
-            if np.ptp(late) < _STAMPS_AGREE_S:
-                ticks = dict(zip(lines.tolist(), times.tolist(), strict=True))
-                return stamp_lines, stamps + float(np.median(late)), name, ticks
-            drift = f"drift by {np.ptp(late):.3g} s against the clock of {name}, which is taken"
-            findings.append(note(f"{_STAMPS} {drift}"))
-        rises = np.diff(times, prepend=-np.inf) > 0
-        return lines[rises], times[rises], name, dict(zip(lines.tolist(), times.tolist(), strict=True))
+        return lines, _continued(times, name, findings)
 
     def _best_clock(self) -> str:
         """RMC, or ZDA if it is more frequent by far, or else the commonest times of day."""
@@ -414,12 +418,13 @@ class _Reader:
                 text = f"{kind} comes from {len(groups)} instruments at the same time: {names}"
                 findings.append(note(text, kind))
             for group in groups:
-                fields = [self.series[kind, talker] for talker in group]
-                for name in dict.fromkeys(itertools.chain(*fields)):
-                    parts = [field[name] for field in fields if name in field]
-                    lines = np.concatenate([np.array(part.lines) for part in parts])
+                parts: dict[str, list[Samples]] = defaultdict(list)
+                for name, samples in itertools.chain(*(self.series[kind, talker].items() for talker in group)):
+                    parts[name].append(samples)
+                for name, each in parts.items():
+                    lines, values = (np.concatenate(column) for column in zip(*map(_columns, each), strict=True))
                     order = np.argsort(lines, kind="stable")
-                    yield kind, name, lines[order], np.concatenate([np.array(part.values) for part in parts])[order]
+                    yield kind, name, lines[order], values[order]
 
     def _groups(self, kind: str) -> list[list[str]]:
         """Talkers of a kind of sentence, those that follow each other in one group."""
@@ -446,19 +451,39 @@ _SPECIAL: dict[str, Callable[[_Reader, str, list[str]], None]] = {
     "MWV": _Reader._mwv,
     "XDR": _Reader._xdr,
     "ZDA": _Reader._zda,
-    "THS": _Reader._ths,
 }
 
 
-def _cell(cells: list[str], place: int) -> str:
-    """A cell; empty where a sentence is shorter."""
-    return cells[place] if place < len(cells) else ""
+_READ = {*_FIELDS, *_SPECIAL}
+
+
+def _columns(samples: Samples) -> tuple[np.ndarray, Array]:
+    """Lines and values (n,) of a field."""
+    return np.array(samples.lines), np.array(samples.values)
+
+
+def _continued(times: Array, name: str, findings: list[LogFinding]) -> Array:
+    """Times (n,) of a clock that goes on where it was set back, which is added to the findings."""
+    continued, found = continued_clock(times, name)
+    findings += found
+    return continued
+
+
+def _most_of(part: Counter[str], total: Counter[str]) -> list[tuple[str, int]]:
+    """Kinds of which :data:`_FEW` or more sentences, and the greater part of all, are in a part; with their number."""
+    return [(kind, n) for kind, n in part.items() if n >= _FEW and n > _MOST * total[kind]]
+
+
+def _cell(cells: list[str], place: int | None) -> str:
+    """A cell; empty where a sentence is shorter, or does not have it."""
+    return cells[place] if place is not None and place < len(cells) else ""
 
 
 def _valid(kind: str, cells: list[str]) -> bool:
     """Whether status and mode say that a sentence holds values."""
-    mode = _cell(cells, _MODE.get(kind, len(cells)))
-    return (kind not in _STATUS or cells[_STATUS[kind]] == "A") and (not mode.strip() or mode.strip().strip("N") != "")
+    mode = _cell(cells, _CELLS["mode"].get(kind)).strip()
+    place, letters = _CELLS["status"].get(kind, (None, ""))
+    return (place is None or cells[place][:1] in tuple(letters)) and (not mode or mode.strip("N") != "")
 
 
 def _kind(label: bytes) -> str:

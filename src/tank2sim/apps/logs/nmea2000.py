@@ -8,24 +8,15 @@ import math
 import re
 from collections import Counter, defaultdict
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import theilslopes
 
 from tank2sim.apps.logs.clock import continued_clock, rollover_s, stamp_s
+from tank2sim.apps.logs.findings import LogFinding, fault, not_used, note
 from tank2sim.apps.logs.nmea0183 import steady_times
-from tank2sim.apps.logs.streams import (
-    FIELDS,
-    LogFinding,
-    LogStream,
-    Samples,
-    VesselLog,
-    fault,
-    mostly,
-    not_used,
-    note,
-    text_lines,
-)
+from tank2sim.apps.logs.streams import FIELDS, LogStream, Samples, VesselLog, mostly, text_lines
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError, optional_library
 
@@ -100,7 +91,14 @@ def read_nmea2000(path: Path) -> VesselLog:
     return reader.log()
 
 
-_Key = tuple[int, int, str, str, str]  # Message (PGN), source, field, quantity, instance
+class _Key(NamedTuple):
+    """A column: message, source, field, quantity, and instance of a rudder or an engine."""
+
+    pgn: int
+    source: int
+    field: str
+    quantity: str
+    instance: str
 
 
 class _Reader:
@@ -138,30 +136,29 @@ class _Reader:
         elif not frame and _TIMED.match(line):
             stamp = message.timestamp.replace(tzinfo=dt.UTC).timestamp()
         self.counts["timed" if math.isfinite(stamp) else "untimed"] += 1
-        values = {entry.id: entry.value for entry in message.fields}
-        if message.PGN == _SYSTEM_TIME and isinstance(values.get("date"), dt.date):
-            moment = dt.datetime.combine(values["date"], values["time"], tzinfo=dt.UTC)
-            self.clocks[message.source].add(moment.timestamp(), number, stamp)
-        if message.PGN == _VARIATION and isinstance(values.get("variation"), float):
-            self.variation = values["variation"]
-        self._keep(message.PGN, message.source, values, stamp, number)
+        self._keep(message.PGN, message.source, {entry.id: entry.value for entry in message.fields}, stamp, number)
 
     def _keep(self, pgn: int, source: int, values: dict[str, object], stamp: float, number: int) -> None:
-        """Keep the fields that are quantities; of a message that is not used, all numbers."""
-        self.unused[pgn] += pgn not in _FIELDS and pgn != _SYSTEM_TIME
-        names = [name for name in values if pgn in _VESSELS and not _NOT_VALUES.match(name)]
+        """Keep a system time or a variation, and the fields that are quantities, of an unused message all numbers."""
+        if pgn == _SYSTEM_TIME:
+            if isinstance(values.get("date"), dt.date):
+                moment = dt.datetime.combine(values["date"], values["time"], tzinfo=dt.UTC)  # type: ignore[arg-type]
+                self.clocks[source].add(moment.timestamp(), number, stamp)
+            return
+        if pgn == _VARIATION:
+            self.variation = _number(values, "variation", self.variation)
+        self.unused[pgn] += pgn not in _FIELDS
         instance = str(values["instance"]) if pgn in (_RUDDER, _ENGINE) and "instance" in values else ""
+        names = filter(_is_value, values) if pgn in _VESSELS else ()
         for name in _FIELDS.get(pgn, names):
-            if not isinstance(value := values.get(name), int | float):
-                continue
-            quantity = _quantity(pgn, name, values)
-            self.columns[pgn, source, name, quantity, instance].add(float(value), number, stamp)
-            if quantity == "magnetic_heading":
-                stated = [values.get(key) for key in ("deviation", "variation")]
-                deviation, variation = (part if isinstance(part, float) else 0.0 for part in stated)
-                true = value + deviation + (variation or self.variation)
-                if math.isfinite(true):
-                    self.columns[pgn, source, _TRUE, "heading", ""].add(true % (2 * math.pi), number, stamp)
+            if isinstance(value := values.get(name), int | float):
+                key = _Key(pgn, source, name, _quantity(pgn, name, values), instance)
+                self.columns[key].add(float(value), number, stamp)
+                if key.quantity == "magnetic_heading":
+                    variation = _number(values, "variation", 0.0) or self.variation
+                    true = (value + _number(values, "deviation", 0.0) + variation) % (2 * math.pi)
+                    if math.isfinite(true):
+                        self.columns[_Key(pgn, source, _TRUE, "heading", "")].add(true, number, stamp)
 
     def _sum(self, stamp: float, number: int) -> None:
         """Count where time stamps fall, and add them up, for they may be differences (candump -t d)."""
@@ -180,16 +177,25 @@ class _Reader:
     def log(self) -> VesselLog:
         """The log after the last line."""
         ticks, findings = self._one_clock()
-        if not any(quantity for _, _, _, quantity, _ in self.columns):
+        if not any(key.quantity for key in self.columns):
             raise InputError(self.path, "", "no message of it is understood", "give a log of candump or of Actisense")
         timed = self.counts["timed"] > _SAME * (self.counts["timed"] + self.counts["untimed"])
         if not timed and len(ticks.values) < 2:
             remedy = "log with time stamps: candump -L"
             raise InputError(self.path, "", "has neither time stamps nor system times", remedy)
-        times, dated, found = self._times(ticks, timed)
+        clock, found = continued_clock(np.array(ticks.values), "system time")
         findings += found
+        if timed:
+            times, dated = self._recorded_times(ticks, clock, findings)
+        else:
+            between = [np.interp(column.lines, ticks.lines, clock) for column in self.columns.values()]
+            times, dated = [steady_times(time) for time in between], True
         streams = [self._stream(key, time) for key, time in zip(self.columns, times, strict=True)]
         streams.sort(key=lambda stream: _TRUE in stream.name)
+        return VesselLog(self.path, "NMEA 2000", tuple(streams), self._lost(findings), tuple(findings), dated)
+
+    def _lost(self, findings: list[LogFinding]) -> dict[str, int]:
+        """Number of lines, and of those that were lost or not used, which is said."""
         counts = {"lines": self.counts["lines"]}
         if spoilt := self.counts["corrupted"]:
             findings.append(note(f"{spoilt} of {self.counts['lines']} lines are corrupted and left out"))
@@ -199,32 +205,26 @@ class _Reader:
             kinds = {f"PGN {pgn}": number for pgn, number in self.unused.items() if pgn in _VESSELS and number}
             others = unused - sum(kinds.values())
             findings += not_used("messages", kinds | ({"of makers, satellites, other ships": others} if others else {}))
-        return VesselLog(self.path, "NMEA 2000", tuple(streams), counts, tuple(findings), dated)
+        return counts
 
-    def _times(self, ticks: Samples, timed: bool) -> tuple[list[Array], bool, list[LogFinding]]:
-        """Times of all columns by their stamps, else by the system times around them; if they are UTC; findings."""
+    def _recorded_times(self, ticks: Samples, clock: Array, findings: list[LogFinding]) -> tuple[list[Array], bool]:
+        """Times of all columns by their stamps, set by the system times (m,) if there are any; whether they are UTC."""
         columns = [*self.columns.values(), ticks]
         stamps = [np.array(column.stamps) for column in columns]
-        dated = not timed or float(np.nanmedian(stamps[0])) > _FIRST_EPOCH_S
-        findings: list[LogFinding] = []
-        if timed and not dated and self.counts["falls"] > _OFTEN * self.counts["lines"]:
+        dated = float(np.nanmedian(stamps[0])) > _FIRST_EPOCH_S
+        if not dated and self.counts["falls"] > _OFTEN * self.counts["lines"]:
             stamps = [np.interp(column.lines, self.sums.lines, self.sums.values) for column in columns]
             findings.append(note("the time stamps count from line to line and are added up"))
-        clock, found = continued_clock(np.array(ticks.values), "system time")
+        if not len(clock):
+            return stamps[:-1], dated
+        pace, found = _pace(stamps[-1], clock)
         findings += found
-        if not timed:
-            between = [np.interp(column.lines, ticks.lines, clock) for column in columns[:-1]]
-            return [steady_times(time) for time in between], True, findings
-        shift = 0.0
-        if len(clock):
-            pace, found = _pace(stamps[-1], clock)
-            stamps = [pace * stamp for stamp in stamps]
-            shift = float(np.nanmedian(clock - stamps[-1]))
-            if dated and pace == 1.0:
-                turned, rolled = rollover_s(shift)
-                shift, found = shift + turned, [*found, *(rolled or _recorder_off(shift))]
-            findings += found
-        return [stamp + shift for stamp in stamps[:-1]], dated or len(clock) > 0, findings
+        shift = float(np.nanmedian(clock - pace * stamps[-1]))
+        if dated and pace == 1.0:
+            turned, rolled = rollover_s(shift)
+            shift += turned
+            findings += rolled or _recorder_off(shift)
+        return [pace * stamp + shift for stamp in stamps[:-1]], True
 
     def _one_clock(self) -> tuple[Samples, list[LogFinding]]:
         """System times of the source with most (of several within a fifth, the middle one); findings on the others."""
@@ -245,21 +245,36 @@ class _Reader:
 
     def _stream(self, key: _Key, time: Array) -> LogStream:
         """A column under a name of its own; engines by their instance; a single one has no side."""
-        pgn, source, name, quantity, instance = key
-        alike = [other for other in self.columns if (other[0], *other[2:]) == (pgn, *key[2:])]
-        instances = {other[4] for other in self.columns if (other[0], other[2]) == (pgn, name)}
-        # Of engines the port one is the first (canboat, ENGINE_INSTANCE).
-        places = sorted(instances, key=lambda other: ("Starboard" in other and "Port" not in other, other))
-        label = f"{pgn}.{name}"
-        unit, usual = _FIELDS.get(pgn, {}).get(name, ["rad" if name == _TRUE else "", quantity])
-        label += f" ({quantity})" if quantity != usual else ""
-        if len(instances) > 1:
-            place = places.index(instance)
-            label += f" of {('port', 'starboard')[place]}" if pgn == _ENGINE and place < 2 else f" of {place}"
-            if pgn == _ENGINE:
-                quantity = ("rpm_port", "rpm_starboard")[place] if place < 2 else ""
-        label += f" from {source}" if len(alike) > 1 else ""
+        alike = [other for other in self.columns if other._replace(source=key.source) == key]
+        usual = ["rad" if key.field == _TRUE else "", key.quantity]
+        unit, usual_quantity = _FIELDS.get(key.pgn, {}).get(key.field, usual)
+        side, quantity = self._side(key)
+        label = f"{key.pgn}.{key.field}" + (f" ({key.quantity})" if key.quantity != usual_quantity else "")
+        label += (f" of {side}" if side else "") + (f" from {key.source}" if len(alike) > 1 else "")
         return LogStream(label, time, np.array(self.columns[key].values), unit, quantity, "format" if quantity else "")
+
+    def _side(self, key: _Key) -> tuple[str, str]:
+        """Side or number of one of several rudders or engines, and its quantity; empty, and its own, if it is alone."""
+        instances = {other.instance for other in self.columns if (other.pgn, other.field) == (key.pgn, key.field)}
+        if len(instances) < 2:
+            return "", key.quantity
+        # Of engines the port one is the first (canboat, ENGINE_INSTANCE).
+        order = sorted(instances, key=lambda other: ("Starboard" in other and "Port" not in other, other))
+        place = order.index(key.instance)
+        if key.pgn != _ENGINE:
+            return str(place), key.quantity
+        return [("port", "rpm_port"), ("starboard", "rpm_starboard")][place] if place < 2 else (str(place), "")
+
+
+def _is_value(name: str) -> bool:
+    """Whether a field is a value, and none of the message itself."""
+    return not _NOT_VALUES.match(name)
+
+
+def _number(values: dict[str, object], name: str, usual: float) -> float:
+    """A field with a fraction; the usual value where it has none."""
+    value = values.get(name)
+    return value if isinstance(value, float) else usual
 
 
 def _pace(stamps: Array, clock: Array) -> tuple[float, list[LogFinding]]:

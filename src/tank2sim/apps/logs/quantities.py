@@ -9,10 +9,14 @@ import math
 import re
 import tomllib
 import unicodedata
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from tank2sim.arrays import Array
 from tank2sim.units import KNOT_MPS
 
 _UNITS = {
@@ -30,29 +34,33 @@ _DECLARED = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding
 CLOCK_WORDS: dict[str, Any] = _DECLARED["clock"]
 """Words for times and dates, seconds of units by their words, and hours of zones."""
 
+TIME_LINES: dict[str, str] = _DECLARED["lines"]
+"""Quantities on the time line of a page, from top to bottom, and their words there."""
+
 _WORDS = {group: rf"\b({'|'.join(words)})\b" for group, words in _DECLARED["words"].items()}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class LogQuantity:
     """A quantity that a channel of a log may hold.
 
     - `words`: For people.
     - `units`: Unit to the factor that gives SI (rad, m/s, rad/s; degrees for latitude and longitude); the first is SI.
     - `column`: Signal of the trial format that it becomes; empty if it becomes none.
+    - `largest_deg`: Largest size of a value in deg.
+    - `unknown`, `nowhere`: Numbers that are sent for no value: if the values around are others; before the first fix.
     """
 
     words: str
     units: dict[str, float]
     column: str = ""
+    largest_deg: float = math.inf
+    unknown: Sequence[float] = ()
+    nowhere: Sequence[float] = ()
 
 
 QUANTITIES: dict[str, LogQuantity] = {
-    name: LogQuantity(
-        entry["words"],
-        {unit: factor for kind in entry["units"].split() for unit, factor in _UNITS[kind].items()},
-        entry.get("column", ""),
-    )
+    name: LogQuantity(**entry | {"units": {u: f for kind in entry["units"].split() for u, f in _UNITS[kind].items()}})
     for name, entry in _DECLARED["quantities"].items()
 }
 """Every quantity of a channel. Signs follow the trial format: starboard, ahead and clockwise are positive."""
@@ -62,6 +70,8 @@ def _compiled(words: str) -> re.Pattern[str]:
     """Pattern of words; names in braces are its groups. Without words it fits no name."""
     return re.compile(words.format(**_WORDS) or r"(?!)")
 
+
+_SIZES = {quantity: entry["limits"] for entry in _DECLARED["sizes"] for quantity in entry["quantities"]}
 
 _NAMES = [
     (entry["quantity"], _compiled(entry["words"]), _compiled(entry.get("barred", ""))) for entry in _DECLARED["names"]
@@ -89,6 +99,19 @@ def unit_of_signal_k(name: str, quantity: str) -> str:
     if not quantity or not _SIGNAL_K.match(name):
         return ""
     return "1/s" if name.endswith(".revolutions") else next(iter(QUANTITIES[quantity].units))
+
+
+def unit_by_size(quantity: str, values: Array) -> str:
+    """Unit of a quantity by the size of its values (n,), outliers excepted; empty where that is not certain.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> unit_by_size("rudder_angle", np.array([-20.0, 20.0])), unit_by_size("rudder_angle", np.array([1.2]))
+    ('deg', '')
+    """
+    most = float(np.nanpercentile(np.abs(values), 99.9))
+    return next((unit for limit, unit in _SIZES.get(quantity, ()) if most <= limit), "")
 
 
 def plain_words(name: str, *, numbered: bool = True) -> str:

@@ -107,19 +107,29 @@ def read_log(path: Path | str) -> VesselLog:
     head = first_bytes(path, _HEAD_BYTES)
     if not head.strip():
         raise InputError(path, "", "is empty", "give a log with values")
-    text, encoding = decoded_text(head, complete=False)
-    plain = text.encode("latin-1", errors="replace") if encoding.startswith("utf-16") else head
-    plain = plain.removeprefix(b"\xef\xbb\xbf")
+    plain = _plain(head)
     for reader in LOG_READERS.values():
         if reader.recognises(head) or reader.recognises(plain):
             return reader.read(path)
-    for beginning, problem, remedy in _FOREIGN:
-        if re.match(beginning, plain):
-            raise InputError(path, "", problem, f"{remedy}; {_known()}")
-    if b"\0" in plain and path.suffix.lower() == ".tlog":  # its first message is cut
+    _refuse_foreign(path, plain)
+    if b"\0" in plain:  # of a .tlog, the first message is cut
         return read_ardupilot_tlog(path)
-    if b"\0" in plain:
-        raise InputError(path, "", "is of no known format, or its beginning is missing", _known())
     from tank2sim.apps.logs.table import read_table_log  # slow to import
 
     return read_table_log(path)
+
+
+def _plain(head: bytes) -> bytes:
+    """The beginning of a file without a byte order mark; of a text in UTF-16 as Latin-1."""
+    text, encoding = decoded_text(head, complete=False)
+    plain = text.encode("latin-1", errors="replace") if encoding.startswith("utf-16") else head
+    return plain.removeprefix(b"\xef\xbb\xbf")
+
+
+def _refuse_foreign(path: Path, plain: bytes) -> None:
+    """Refuse a file whose beginning is of another format, or of none."""
+    for beginning, problem, remedy in _FOREIGN:
+        if re.match(beginning, plain):
+            raise InputError(path, "", problem, f"{remedy}; {_known()}")
+    if b"\0" in plain and path.suffix.lower() != ".tlog":
+        raise InputError(path, "", "is of no known format, or its beginning is missing", _known())

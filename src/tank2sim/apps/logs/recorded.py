@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tank2sim.apps.logs.content import FEW_SAMPLES
-from tank2sim.apps.logs.quantities import names_rest, plain_words
-from tank2sim.apps.logs.streams import LogFinding, LogStream, note, wrapped_angle
+from tank2sim.apps.logs.findings import LogFinding, note
+from tank2sim.apps.logs.quantities import QUANTITIES, names_rest, plain_words
+from tank2sim.apps.logs.streams import LogStream, wrapped_angle
 from tank2sim.arrays import Array
+from tank2sim.records.csv_table import LARGEST
 
 # Numbers that recorders write for no value: nines, and the bounds of their integers
 _MARK = re.compile(r"-?(9{2,}(\.9+)?|32767|32768|65535|2147483647|2147483648|1023|4095)")
-# Numbers that AIS sends for no value (ITU-R M.1371-5, table 47), if the values around are others
-_NOT_AVAILABLE = {"sog": (102.3,), "cog": (360.0,), "heading": (511.0,), "yaw_rate": (128.0, -128.0)}
-# The same of a position (AIS), and what receivers send before the first fix
-_NO_PLACE = {"latitude": (0.0, 91.0), "longitude": (0.0, 181.0)}
-
 _CIRCULAR = ("cog", "heading")
-
-# Largest size of a quantity in deg
-_BOUNDS = {"heading": 361.0, "magnetic_heading": 361.0, "cog": 361.0, "latitude": 90.0, "longitude": 360.0}
 
 _JUMP, _LEAST_JUMP = 10.0, 0.05
 """Jump to such a number, as a multiple of the 90th percentile of the steps of the others, and as a share of their range
@@ -38,16 +33,13 @@ def without_missing(stream: LogStream) -> tuple[LogStream, list[LogFinding]]:
     if stream.stated_by == "format":
         return stream, []
     values = np.array(stream.values, dtype=float)
-    bound = _BOUNDS.get(stream.quantity)
-    if bound is not None and stream.unit in ("", "deg") and np.isfinite(values).any():
-        inside = np.nanmedian(np.abs(values)) <= bound
-        values[inside & (np.abs(values) > bound)] = np.nan
-    while (mark := _lone_mark(values, _NO_PLACE.get(stream.quantity, ()))) is not None:
+    quantity = QUANTITIES.get(stream.quantity, QUANTITIES["ignore"])
+    if stream.unit in ("", "deg"):
+        values[_beyond(values, quantity.largest_deg)] = np.nan
+    while (mark := _lone_mark(values, quantity.nowhere)) is not None:
         values[values == mark] = np.nan
-    if stream.quantity in _NOT_AVAILABLE:
-        extremes = {float(known(values)) for known in (np.nanmin, np.nanmax) if np.isfinite(values).any()}
-        marks = [extreme for extreme in extremes if _MARK.fullmatch(f"{extreme:.10g}")]
-        for number in (*_NOT_AVAILABLE[stream.quantity], *marks):
+    if quantity.unknown:
+        for number in (*quantity.unknown, *filter(_is_mark, _extremes(values))):
             values[_jumps(values, number, stream.quantity in _CIRCULAR)] = np.nan
     lost = np.isnan(values) & np.isfinite(stream.values)
     if not lost.any():
@@ -57,13 +49,31 @@ def without_missing(stream: LogStream) -> tuple[LogStream, list[LogFinding]]:
     return replace(stream, values=values), [note(text, stream.name, values=float(lost.sum()))]
 
 
-def _lone_mark(values: Array, more: tuple[float, ...]) -> float | None:
+def _beyond(values: Array, bound: float) -> np.ndarray:
+    """Which values (n,) are beyond a bound of which most keep within."""
+    sizes = np.minimum(np.abs(values), LARGEST)
+    usual = np.isfinite(sizes).any() and np.nanmedian(sizes) <= bound
+    return np.asarray((sizes > bound) & usual)
+
+
+def _extremes(values: Array) -> list[float]:
+    """The least and the largest of the known values (n,)."""
+    known = values[np.isfinite(values)]
+    return [float(known.min()), float(known.max())] if len(known) else []
+
+
+def _is_mark(number: float) -> bool:
+    """Whether recorders write this number for no value."""
+    return bool(_MARK.fullmatch(f"{number:.10g}"))
+
+
+def _lone_mark(values: Array, more: Sequence[float]) -> float | None:
     """The least or largest value, if it is a mark that is far from all others; None if neither is."""
     known = values[np.isfinite(values)]
-    for extreme in (float(known.min()), float(known.max())) if len(known) else ():
+    for extreme in _extremes(values):
         others = known[known != extreme]
-        is_mark = _MARK.fullmatch(f"{extreme:.10g}") or extreme in more
-        if is_mark and len(others) >= FEW_SAMPLES and np.abs(others - extreme).min() > np.ptp(others):
+        far = len(others) >= FEW_SAMPLES and np.abs(others - extreme).min() > np.ptp(others)
+        if far and (_is_mark(extreme) or extreme in more):
             return extreme
     return None
 
@@ -148,10 +158,7 @@ def pulses_of(stream: LogStream) -> tuple[LogStream, PulseScale | None]:
     >>> scale.share(pulses.values).tolist()
     [0.0, 0.0, 0.5, -1.0]
     """
-    unit = stream.unit.lower()
-    other = unit not in ("", *_PULSE_UNITS) or (stream.quantity and stream.quantity not in _ORDERS)
-    said = unit or stream.quantity or _PULSE_WORDS.search(plain_words(stream.name))
-    if other or stream.stated_by == "format" or not said:
+    if not _may_be_pulses(stream):
         return stream, None
     values = np.where(stream.values > 0, stream.values, np.nan)
     known = values[np.isfinite(values)]
@@ -163,3 +170,12 @@ def pulses_of(stream: LogStream) -> tuple[LogStream, PulseScale | None]:
     one_way = levels[0] <= _IDLE_US and counts[0] == counts.max() and not stream.quantity.startswith("rudder")
     rest = float(levels[0]) if one_way else MIDDLE_US
     return replace(stream, values=values), PulseScale(rest, full - rest)
+
+
+def _may_be_pulses(stream: LogStream) -> bool:
+    """Whether the unit, the quantity or the name of a stream says pulses or an order, and none of them another."""
+    if stream.stated_by == "format" or (stream.quantity and stream.quantity not in _ORDERS):
+        return False
+    if stream.unit:
+        return stream.unit.lower() in _PULSE_UNITS
+    return bool(stream.quantity or _PULSE_WORDS.search(plain_words(stream.name)))

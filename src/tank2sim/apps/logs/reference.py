@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -57,6 +57,11 @@ class ReferenceMotion:
             return np.zeros(0, dtype=bool)
         return np.asarray(speed > max(LEAST_SPEED_MPS, MOVING_SHARE * float(np.percentile(speed, 95))))
 
+    def going(self, way: Array) -> ReferenceMotion:
+        """The motion with its course turned about where the sign of a `way` (n,) is negative: where the bow points."""
+        sign = np.where(way < 0, -1.0, 1.0)
+        return replace(self, v_north_mps=sign * self.v_north_mps, v_east_mps=sign * self.v_east_mps)
+
 
 def local_metres(latitude_deg: Array, longitude_deg: Array, origin_deg: tuple[float, float]) -> tuple[Array, Array]:
     """North and east (n,), m, of an origin: the inverse of the series of :mod:`tank2sim.dynamics.geographic`.
@@ -103,6 +108,12 @@ def interpolated(at_s: Array, time_s: Array, values: Array, longest_s: float) ->
     place = np.clip(np.searchsorted(time_s, at_s), 1, len(time_s) - 1)
     inside = (at_s >= time_s[0]) & (at_s <= time_s[-1]) & (time_s[place] - time_s[place - 1] <= longest_s)
     return np.where(inside, np.interp(at_s, time_s, values), np.nan)
+
+
+def interpolated_angle(at_s: Array, time_s: Array, angle_rad: Array, longest_s: float) -> Array:
+    """Angles (n,), rad, at other times, by their cosines and sines; nan as in :func:`interpolated`."""
+    sine, cosine = (interpolated(at_s, time_s, part, longest_s) for part in (np.sin(angle_rad), np.cos(angle_rad)))
+    return np.asarray(np.arctan2(sine, cosine))
 
 
 def held(at_s: Array, time_s: Array, values: Array) -> Array:

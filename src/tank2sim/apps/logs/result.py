@@ -25,6 +25,7 @@ from tank2sim.answer.parts import (
 from tank2sim.answer.result import Result
 from tank2sim.apps.logs.channels import CHANNELS_FILE, channels_text
 from tank2sim.apps.logs.gear import LoggedGear
+from tank2sim.apps.logs.quantities import QUANTITIES, TIME_LINES
 from tank2sim.apps.logs.stretches import Stretch
 from tank2sim.apps.logs.study import LogStudy
 from tank2sim.apps.logs.trial_files import TrialCut, remove_earlier_trials
@@ -37,20 +38,10 @@ from tank2sim.results.craft_identification import CraftIdentificationResult, cra
 if TYPE_CHECKING:
     import pandas as pd
 
-_SIGNALS = (
-    Signal("rudder_order", "rudder order", "rad"),
-    Signal("rudder_angle", "rudder angle", "rad"),
-    Signal("thrust_order_port", "port thruster", "1"),
-    Signal("thrust_order_starboard", "starboard thruster", "1"),
-    Signal("rpm_order", "ordered revolutions", "rad/s", display_unit="rpm"),
-    Signal("rpm", "revolutions", "rad/s", display_unit="rpm"),
-    Signal("rpm_port", "port revolutions", "rad/s", display_unit="rpm"),
-    Signal("rpm_starboard", "starboard revolutions", "rad/s", display_unit="rpm"),
-    Signal("heading", "heading", "rad"),
-    Signal("yaw_rate", "yaw rate", "rad/s"),
-    Signal("sog", "speed over ground", "m/s"),
-    Signal("u_water", "speed ahead through the water", "m/s"),
-    Signal("v_water", "speed to starboard through the water", "m/s"),
+_UNITS = {name: QUANTITIES[name].units for name in TIME_LINES}
+_SIGNALS = tuple(
+    Signal(name, words, next(iter(_UNITS[name])), display_unit="rpm" if "rpm" in _UNITS[name] else None)
+    for name, words in TIME_LINES.items()
 )
 
 _MOST_TRACKS = 8

@@ -18,16 +18,9 @@ from typing import Any
 
 import numpy as np
 
+from tank2sim.apps.logs.findings import LogFinding, note
 from tank2sim.apps.logs.quantities import plain_words
-from tank2sim.apps.logs.streams import (
-    LogFinding,
-    LogStream,
-    VesselLog,
-    heading_of_quaternion,
-    named_stream,
-    note,
-    unreadable,
-)
+from tank2sim.apps.logs.streams import LogStream, VesselLog, heading_of_quaternion, named_stream, unreadable
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError, optional_library
 from tank2sim.files import first_bytes
@@ -205,7 +198,7 @@ class _Topic:
 
     def _standard(self, columns: dict[str, Array]) -> list[tuple[str, Array, str]]:
         """Quantities, values and units of a standard message in the frames of trials; empty for any other message."""
-        words, prefix = set(plain_words(self.name).split()), _PREFIXES.get(self.kind, "")
+        prefix = _PREFIXES.get(self.kind, "")
         if self.kind == "NavSatFix":
             return [(name, columns[name], "deg") for name in ("latitude", "longitude")]
         if self.kind == "Imu":
@@ -217,12 +210,16 @@ class _Topic:
             ]
         if self.kind == "Odometry":
             return [*_pose(columns, "pose.pose."), *_velocity(columns, "twist.twist.", self.child in _WORLD_FRAMES)]
-        if self.kind.startswith("Pose") and self.kind in _PREFIXES:
+        if self.kind in _POSES:
             return _pose(columns, prefix)
-        vector = {f"{prefix}linear.x", f"{prefix}linear.y"} <= columns.keys()
-        if self.kind in _PREFIXES and vector and not {"cmd", "command", "setpoint"} & words:
-            return _velocity(columns, prefix, bool(words & set(_GROUND_WORDS)) or self.frame in _WORLD_FRAMES)
-        return []
+        words = set(plain_words(self.name).split())
+        measured = (
+            self.kind in _PREFIXES
+            and {f"{prefix}linear.x", f"{prefix}linear.y"} <= columns.keys()
+            and words.isdisjoint(_ORDER_WORDS)
+        )
+        of_world = not words.isdisjoint(_GROUND_WORDS) or self.frame in _WORLD_FRAMES
+        return _velocity(columns, prefix, of_world) if measured else []
 
 
 # Beginnings of the paths of standard messages
@@ -234,6 +231,8 @@ _PREFIXES = {
     "PoseStamped": "pose.",
     "PoseWithCovarianceStamped": "pose.pose.",
 }
+_POSES = ("Pose", "PoseStamped", "PoseWithCovarianceStamped")
+_ORDER_WORDS = ("cmd", "command", "setpoint")
 
 
 def _velocity(columns: dict[str, Array], prefix: str, of_world: bool) -> list[tuple[str, Array, str]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,13 +17,18 @@ from tank2sim.apps.logs.content import (
     UNIT_SLACK,
     UNTESTED,
     ContentEvidence,
-    angle_unit,
-    rudder_unit,
     steering_evidence,
 )
-from tank2sim.apps.logs.quantities import QUANTITIES, names_another, names_thrust, plain_words, sign_of_name
+from tank2sim.apps.logs.quantities import (
+    QUANTITIES,
+    names_another,
+    names_thrust,
+    plain_words,
+    sign_of_name,
+    unit_by_size,
+)
 from tank2sim.apps.logs.reference import LEAST_SPEED_MPS, interpolated
-from tank2sim.apps.logs.streams import LogStream, note
+from tank2sim.apps.logs.streams import LogStream
 from tank2sim.arrays import Array
 from tank2sim.records.trials import usual_step
 
@@ -55,9 +60,8 @@ _ASTERN_SHARE, _ASTERN_S = 0.15, 8.0
 """Shares of the usual speed and of the usual revolutions, and a time, s, from which a vessel goes astern against them.
 Project choice: beyond what a current or a coasting propeller does."""
 
-_FASTEST_SHAFT_HZ, _LARGEST_HEEL_RAD = 100.0, 0.8
-"""Revolutions beyond which a record without a unit is in rpm, 1/s (small thrusters reach 80), and heel beyond which it
-is in deg: 46 deg in rad (project choices)."""
+_FASTEST_SHAFT_HZ = 100.0
+"""Revolutions beyond which a record without a unit is in rpm, 1/s: small thrusters reach 80 (project choice)."""
 
 _LEAST_ZERO, _LEAST_ZERO_SHARE = 10.0, 0.4
 """Rudder on straight legs, deg or %, from which a zero of the record is taken out, and the same of a rudder of unknown
@@ -70,6 +74,8 @@ _LEAST_HELM = 4.0
 _SHOWN = 0.6
 """Agreement of a rudder with the turn from which its sign and zero are shown. Project choice: waves and currents turn
 a ship too."""
+
+_LEAST_LEAD_S = 1.0  # Least lag of the turn behind a rudder without a name, s (project choice: a rate has none)
 
 _SERVO_DEG = 90.0  # Servos rest at 90 deg of 180, or at 180 of 360
 
@@ -95,7 +101,7 @@ def find_steering(search: ChannelSearch) -> None:
         for port, starboard in zip(ports, starboards, strict=False):
             _judge_pair(search, names, (port, starboard))
         for stream in ports[len(starboards) :] + starboards[len(ports) :]:
-            search.add(Judgement(stream, 0.6, "the other side is missing", _share_unit(stream, stream.quantity)))
+            search.add(Judgement(stream, 0.6, "the other side is missing", _unit(stream, stream.quantity)))
     _take_others(search)
     _scale_engine_shares(search)
     _report_lost_signs(search)
@@ -145,9 +151,8 @@ def _zero(search: ChannelSearch, stream: LogStream, evidence: ContentEvidence) -
     zero, span = float(np.median(values[straight])), float(np.nanmax(values) - np.nanmin(values))
     size = abs(zero) * math.degrees(QUANTITIES["rudder_angle"].units.get(stream.unit or "deg", 1.0))
     if size >= _LEAST_ZERO if stream.unit else abs(zero) > _LEAST_ZERO_SHARE * span:
-        words = f"{stream.name} is at {zero:.4g} {stream.unit}".strip() + " on straight legs"
-        text = f"{words}, which is taken as its zero (offset in channels.toml)"
-        search.findings.append(note(text, stream.name, zero=zero))
+        words = f"is at {zero:.4g} {stream.unit}".strip() + " on straight legs"
+        search.note(stream.name, f"{words}, which is taken as its zero (offset in channels.toml)", zero=zero)
         return zero
     if size > _LEAST_HELM:
         text = f"at {zero:.3g} {stream.unit or 'deg'} on straight legs: helm against wind, or its zero"
@@ -156,10 +161,11 @@ def _zero(search: ChannelSearch, stream: LogStream, evidence: ContentEvidence) -
 
 
 def _judge_rudder(search: ChannelSearch, stream: LogStream) -> None:
-    evidence = _evidence(search, *search.thin(stream))
+    time, values = search.thin(stream)
+    evidence = _evidence(search, time, values * search.way_at(time))  # astern, a rudder turns the bow the other way
     zero = _zero(search, stream, evidence)
     found = search.judged(stream, evidence, agrees=_SHOWN)
-    found.unit, found.offset = stream.unit or rudder_unit(stream.values - zero), zero
+    found.unit, found.offset = stream.unit or unit_by_size("rudder_angle", stream.values - zero), zero
     stated, shown = sign_of_name(stream.name), evidence.known >= _SHOWN
     if stated:
         found.sign = stated
@@ -168,7 +174,7 @@ def _judge_rudder(search: ChannelSearch, stream: LogStream) -> None:
     elif shown and evidence.sign < 0:
         found.turn(0.9, "it is positive to port, against its format")
         if found.sign < 0:
-            search.findings.append(note(f"{stream.name} is positive to port", stream.name))
+            search.note(stream.name, "is positive to port")
     if found.confidence < DIFFERS:
         search.fault(stream.name, found.why)
     _doubt_rudder(found, zero)
@@ -177,49 +183,55 @@ def _judge_rudder(search: ChannelSearch, stream: LogStream) -> None:
 
 def _doubt_rudder(found: Judgement, zero: float) -> None:
     """Lower the confidence in a rudder whose kind, unit, size or zero is uncertain."""
-    stream = found.stream
-    if stream.quantity == "rudder_order" and not stream.unit and found.unit == "deg":
+    stream, unit_stated = found.stream, bool(found.stream.unit)
+    if not unit_stated and (stream.quantity, found.unit) == ("rudder_order", "deg"):
         found.doubt(_DOUBTED, "; deg by its size, and it may be in %")
-    if stream.quantity == "rudder_angle" and stream.stated_by == "name" and _held_share(stream) > _HOLDS:
+    if (stream.quantity, stream.stated_by) == ("rudder_angle", "name") and _held_share(stream) > _HOLDS:
         found.doubt(_DOUBTED, "; it holds its values as an order does")
-    factor = QUANTITIES["rudder_angle"].units.get(found.unit, 0)
+    factor = {unit: QUANTITIES["rudder_angle"].units[unit] for unit in ("deg", "rad")}.get(found.unit, 0.0)
     most = factor * float(np.nanpercentile(np.abs(stream.values - zero), 99.9))
-    if found.unit in ("deg", "rad") and most > LARGEST_LOGGED_RUDDER_RAD:
+    if most > LARGEST_LOGGED_RUDDER_RAD:
         found.doubt(0.6, f"; it goes to {math.degrees(most):.3g} deg, as no rudder does")
-    if zero and not stream.unit and abs(zero / _SERVO_DEG - round(zero / _SERVO_DEG)) > 0.01:
-        found.doubt(0.6, "; its unit is known by its size alone")
     if zero:
+        if not unit_stated and abs(zero / _SERVO_DEG - round(zero / _SERVO_DEG)) > 0.01:
+            found.doubt(0.6, "; its unit is known by its size alone")
         found.doubt(STATED["name"], f"; {zero:.4g} on straight legs is taken as its zero")
 
 
 def _find_unnamed_rudder(search: ChannelSearch) -> None:
     """The stream without a name that leads the turn as a rudder does; none where no rate of turn is known."""
     rates = [best.confidence for name in ("yaw_rate", "heading") if (best := search.best(name)) is not None]
-    candidates = _leading_the_turn(search) if rates else []
-    rivals = [evidence.known for evidence, stream in candidates if not _alike(candidates[0][1], stream)]
-    for place, (evidence, stream) in enumerate(candidates):
-        why = f"by content alone: {evidence.text}"
-        if not rivals or (place == 0 and evidence.known > rivals[0] + _CLEARLY):
-            confidence = 0.75 if max(rates) > 0.8 else 0.7
-        else:
-            confidence = 0.7 if place == 0 else 0.5
-            why += f"; the same is true of {', '.join(other.name for _, other in candidates if other is not stream)}"
+    leading = _leading_the_turn(search) if rates else []
+    for place, (evidence, stream) in enumerate(leading):
+        confidence, more = _among_rivals(leading, place, 0.75 if max(rates) > 0.8 else 0.7)
         quantity = "rudder_order" if _held_share(stream) > _HOLDS else "rudder_angle"
-        unit = stream.unit or rudder_unit(stream.values)
-        search.add(Judgement(stream, confidence, why, unit, evidence.sign), quantity)
+        search.add_unnamed(stream, quantity, confidence, evidence, more, _unit(stream, quantity))
+
+
+def _among_rivals(leading: list[tuple[ContentEvidence, LogStream]], place: int, confidence: float) -> tuple[float, str]:
+    """Confidence in one of the streams that lead the turn; less, and the others, where more than one rudder does."""
+    (clearest, first), (_, stream) = leading[0], leading[place]
+    rivals = [evidence.known for evidence, other in leading if not _alike(first, other)]
+    if not rivals or (place == 0 and clearest.known > rivals[0] + _CLEARLY):
+        return confidence, ""
+    others = ", ".join(other.name for _, other in leading if other is not stream)
+    return 0.7 if place == 0 else 0.5, f"; the same is true of {others}"
 
 
 def _leading_the_turn(search: ChannelSearch) -> list[tuple[ContentEvidence, LogStream]]:
     """Streams without a name that the turn follows as it follows a rudder, the clearest first."""
     taken = {channel.stream for channel in search.found if channel.confidence >= USED_FROM}
-    found: list[tuple[ContentEvidence, LogStream]] = []
-    for stream in search.streams:
-        if stream.name in taken or stream.quantity or np.ptp(stream.values) == 0 or names_another(stream.name):
-            continue
-        evidence = _evidence(search, *search.thin(stream))
-        if evidence.known > AGREES and evidence.lag_s >= 1.0 and (stream.unit or rudder_unit(stream.values)):
-            found.append((evidence, stream))
-    return sorted(found, key=lambda entry: -entry[0].known)
+    free = [stream for stream in search.streams if stream.name not in taken and _could_be_rudder(stream)]
+    tested = [(_evidence(search, *search.thin(stream)), stream) for stream in free]
+    leading = [entry for entry in tested if entry[0].known > AGREES and entry[0].lag_s >= _LEAST_LEAD_S]
+    return sorted(leading, key=lambda entry: -entry[0].known)
+
+
+def _could_be_rudder(stream: LogStream) -> bool:
+    """Whether a stream of no known quantity moves within the angles or shares of rudders."""
+    if stream.quantity or names_another(stream.name) or np.ptp(stream.values) == 0:
+        return False
+    return bool(_unit(stream, "rudder_angle"))
 
 
 def _alike(first: LogStream, second: LogStream) -> bool:
@@ -230,21 +242,26 @@ def _alike(first: LogStream, second: LogStream) -> bool:
 
 def _scale_rudder_shares(search: ChannelSearch) -> None:
     """Orders in shares of the full rudder, scaled by the angle where it is known, else by the usual full rudder."""
-    for place, given in enumerate(search.found):
+    for place, channel in enumerate(search.found):
         angle = next((c for c in search.found if c.quantity == "rudder_angle" and c.unit in ("deg", "rad")), None)
         known = angle if angle is not None and angle.confidence >= USED_FROM else None
-        channel = search.found[place] = _by_angle(search, given, known)
-        if channel.quantity not in ("rudder_order", "rudder_angle") or channel.unit not in ("1", "%"):
-            continue
-        share = QUANTITIES["rudder_order"].units[channel.unit]
+        search.found[place] = _in_degrees(search, _by_angle(search, channel, known), known)
+
+
+def _in_degrees(search: ChannelSearch, channel: LogChannel, angle: LogChannel | None) -> LogChannel:
+    """A rudder in shares of the full rudder in deg, by the `angle` that is known; any other channel as it is."""
+    if channel.quantity not in ("rudder_order", "rudder_angle") or channel.unit not in ("1", "%"):
+        return channel
+    share = QUANTITIES["rudder_order"].units[channel.unit]
+    ratio = None if angle is None else _ratio(search, angle, channel)
+    if angle is not None and ratio is not None:
+        full = math.degrees(ratio)
+        found = channel.because(f"full order is {full:.3g} deg by {angle.stream}")
+    else:
         full = FULL_RUDDER_DEG / max(1 - abs(share * channel.offset), 0.5)  # 50 of 0 to 100 % leaves 50 to a side
-        confidence, why = min(channel.confidence, 0.75), channel.why
-        if known is None:
-            why += f"; full order is taken as {FULL_RUDDER_DEG:g} deg"
-        elif (ratio := _ratio(search, known, channel)) is not None:
-            full, confidence = math.degrees(ratio), channel.confidence
-            why += f"; full order is {full:.3g} deg by {known.stream}"
-        search.found[place] = replace(channel, unit="deg", scale=full * share, confidence=confidence, why=why)
+        text = f"full order is taken as {FULL_RUDDER_DEG:g} deg" if angle is None else ""
+        found = channel.because(text, most=STATED["name"])
+    return replace(found, unit="deg", scale=full * share)
 
 
 def _by_angle(search: ChannelSearch, order: LogChannel, angle: LogChannel | None) -> LogChannel:
@@ -254,8 +271,7 @@ def _by_angle(search: ChannelSearch, order: LogChannel, angle: LogChannel | None
     if angle is None or ratio is None:
         return order
     if abs(ratio - 1) < UNIT_SLACK:
-        why = f"{order.why}; {angle.stream} shows deg"
-        return replace(order, confidence=max(order.confidence, SURE_FROM), why=why)
+        return order.because(f"{angle.stream} shows deg", least=SURE_FROM)
     return replace(order, unit="%")
 
 
@@ -278,14 +294,7 @@ def _find_unnamed_thrusters(search: ChannelSearch) -> None:
     """Two streams of orders without a name whose difference turns the vessel, which neither does alone."""
     if search.named("thrust_order_port", "thrust_order_starboard", "rudder_order", "rudder_angle"):
         return
-    orders = [
-        stream
-        for stream in search.streams
-        if not stream.quantity
-        and (stream.unit == "1" or (not stream.unit and names_thrust(stream.name)))
-        and np.ptp(stream.values) > 0.1
-        and np.nanmax(np.abs(stream.values)) < 2
-    ]
+    orders = [stream for stream in search.streams if _could_be_thruster(stream)]
     if len(orders) != 2:
         return
     time, port, starboard = _pair_series(search, *orders)
@@ -293,6 +302,12 @@ def _find_unnamed_thrusters(search: ChannelSearch) -> None:
     if both > 0.6 and both > max(alone) + ALONE_LESS:
         for stream, quantity in zip(orders, _PAIRS[0], strict=True):
             search.rename(stream, quantity)
+
+
+def _could_be_thruster(stream: LogStream) -> bool:
+    """Whether a stream of no known quantity may be a share of the full order of a thruster."""
+    share = not stream.quantity and (stream.unit == "1" or (not stream.unit and names_thrust(stream.name)))
+    return bool(share and np.ptp(stream.values) > 0.1 and np.nanmax(np.abs(stream.values)) < 2)
 
 
 def _pair_series(search: ChannelSearch, port: LogStream, starboard: LogStream) -> tuple[Array, Array, Array]:
@@ -303,35 +318,47 @@ def _pair_series(search: ChannelSearch, port: LogStream, starboard: LogStream) -
 
 def _judge_pair(search: ChannelSearch, names: tuple[str, str], pair: tuple[LogStream, LogStream]) -> None:
     """Judge two orders or revolutions: their sides by the turn, and their signs by the speed ahead."""
-    signs, reversal = _reversed(search, *pair)
+    way = _reversed(search, *pair)
     time, port, starboard = _pair_series(search, *pair)
-    evidence = _evidence(search, time, signs[0] * port - signs[1] * starboard)
-    swap = evidence.known > _SHOWN and evidence.sign < 0
-    for stream, name, other, sign in zip(pair, names, names[::-1], signs, strict=True):
+    evidence = _evidence(search, time, way.signs[0] * port - way.signs[1] * starboard)
+    swapped = evidence.known > _SHOWN and evidence.sign < 0
+    for side, stream in enumerate(pair):
         found = search.judged(stream, evidence, agrees=_SHOWN)
+        found.sign = way.signs[side]
         # A reversed controller is found by the speed, and then the turn shows the sides, or nothing.
-        exchanged = swap and (stream.stated_by == "" or -1 in signs)
-        quantity, found.sign = other if exchanged else name, sign
+        exchanged = swapped and (stream.stated_by == "" or way.one_reversed)
+        quantity = names[1 - side if exchanged else side]
         if exchanged:
             found.confidence, found.why = 0.9, f"{evidence.text} with the sides exchanged"
-        elif swap:
+        elif swapped:
             found.refuse(f"{found.why}: the turn contradicts its side")
             search.fault(stream.name, found.why)
-        if reversal and signs == (1, 1):
-            found.confidence = REFUTED
-            search.fault(stream.name, reversal)
-        elif reversal:
-            found.confidence = _DOUBTED if swap or (evidence.agreement or 1.0) >= _SHOWN else STATED["name"]
-            found.why += f"; {reversal}"
-        found.unit = _share_unit(stream, quantity)
-        shown = "rpm" in plain_words(stream.name).split() or np.abs(stream.values).max() > _FASTEST_SHAFT_HZ
-        if found.unit == "rpm" != stream.unit and not shown:
-            found.doubt(_DOUBTED, "; rpm by their size")
+        _judge_way(search, found, way, swapped or evidence.agreement is None or evidence.known >= _SHOWN)
+        _take_share_unit(found, quantity)
         search.add(found, quantity)
         if exchanged and stream.stated_by == "name":
             search.fault(stream.name, f"is {QUANTITIES[quantity].words}, against its name: {evidence.text}")
-        if sign < 0:
-            search.fault(stream.name, f"is positive astern: {reversal}")
+        if found.sign < 0:
+            search.fault(stream.name, f"is positive astern: {way.text}")
+
+
+def _judge_way(search: ChannelSearch, found: Judgement, way: _PairSigns, sides_shown: bool) -> None:
+    """Confidence of one of a pair of orders of which the speed ahead shows that one, or either, is reversed."""
+    if way.one_reversed:
+        found.confidence = _DOUBTED if sides_shown else STATED["name"]
+        found.why += f"; {way.text}"
+    elif way.text:
+        found.confidence = REFUTED
+        search.fault(found.stream.name, way.text)
+
+
+def _take_share_unit(found: Judgement, quantity: str) -> None:
+    """Unit of an order or of revolutions; rpm by their size is doubted unless the name or the size is clear."""
+    stream = found.stream
+    found.unit = _unit(stream, quantity)
+    clear = "rpm" in plain_words(stream.name).split() or np.abs(stream.values).max() > _FASTEST_SHAFT_HZ
+    if found.unit == "rpm" != stream.unit and not clear:
+        found.doubt(_DOUBTED, "; rpm by their size")
 
 
 def _speed_ahead(search: ChannelSearch) -> Array:
@@ -340,14 +367,27 @@ def _speed_ahead(search: ChannelSearch) -> Array:
     return search.motion.v_north_mps * np.cos(angle) + search.motion.v_east_mps * np.sin(angle)
 
 
-def _reversed(search: ChannelSearch, port: LogStream, starboard: LogStream) -> tuple[tuple[int, int], str]:
-    """Signs of two orders by the speed ahead, which follows their sum, and why; 1, 1 also if unknown which."""
+@dataclass(frozen=True)
+class _PairSigns:
+    """Signs of two orders, and what the speed ahead shows of them; 1 and 1 also if either may be reversed."""
+
+    signs: tuple[int, int] = (1, 1)
+    text: str = ""
+
+    @property
+    def one_reversed(self) -> bool:
+        """Whether one of them is reversed, and which one is known."""
+        return -1 in self.signs
+
+
+def _reversed(search: ChannelSearch, port: LogStream, starboard: LogStream) -> _PairSigns:
+    """Signs of two orders by the speed ahead, which follows their sum."""
     at, ahead = search.motion.time_s, _speed_ahead(search)
     good = np.isfinite(ahead)
     if search.best("heading") is None or good.sum() < FEW_SAMPLES or port.stated_by == "format":
-        return (1, 1), ""
+        return _PairSigns()
     if np.percentile(np.abs(ahead[good]), 95) < 2 * LEAST_SPEED_MPS:
-        return (1, 1), ""
+        return _PairSigns()
     time, first, second = _pair_series(search, port, starboard)
     total, difference = (
         steering_evidence(time, values, at[good], ahead[good]) for values in (first + second, first - second)
@@ -356,22 +396,16 @@ def _reversed(search: ChannelSearch, port: LogStream, starboard: LogStream) -> t
     turned = np.ptp(search.heading_at(at)[good])
     straight = np.std(first + second) < _LITTLE * np.std(first - second) and turned < _TURNED_RAD
     if difference.known >= max(_SHOWN, 0.0 if straight else total.known + _CLEARLY_REVERSED):
-        way = difference.sign
-        return (way, -way), f"the speed ahead follows the difference of the orders by {difference.known:.2f}"
+        text = f"the speed ahead follows the difference of the orders by {difference.known:.2f}"
+        return _PairSigns((difference.sign, -difference.sign), text)
     if total.known >= _SHOWN and total.sign < 0:
-        return (1, 1), "the speed falls with the orders: one or both are reversed"
-    return (1, 1), ""
+        return _PairSigns(text="the speed falls with the orders: one or both are reversed")
+    return _PairSigns()
 
 
-def _share_unit(stream: LogStream, quantity: str) -> str:
-    """Unit of an order or of revolutions by size, where nothing states it."""
-    units = QUANTITIES[quantity].units
-    if stream.unit in units:
-        return stream.unit
-    most = float(np.nanpercentile(np.abs(stream.values), 99.9))
-    # Slower shafts turn at 60 rpm and more at full ahead; above 30 per second none do.
-    fitting = {"1": most <= 1.05, "%": most <= 105, "rpm": most > 30}
-    return next((unit for unit, fits in fitting.items() if fits and unit in units), "")
+def _unit(stream: LogStream, quantity: str) -> str:
+    """Stated unit of a stream, or its unit as a quantity by its size."""
+    return stream.unit or unit_by_size(quantity, stream.values)
 
 
 # The others -----------------------------------------------------------------------------------------------------
@@ -381,16 +415,10 @@ def _take_others(search: ChannelSearch) -> None:
     """Take the streams that nothing tests, by format or name, and their units by size."""
     done = {channel.stream for channel in search.found}
     for stream in search.streams:
-        if stream.name in done or not stream.quantity:
-            continue
-        found, quantity = search.judged(stream, UNTESTED), stream.quantity
-        if quantity in ("rpm", "rpm_order"):
-            found.unit = _share_unit(stream, quantity)
-        elif not stream.unit and quantity.startswith("wind") and quantity.endswith("direction"):
-            found.unit = angle_unit(stream.values, "")
-        elif not stream.unit and quantity == "heel":
-            found.unit = "deg" if np.percentile(np.abs(stream.values), 99.9) > _LARGEST_HEEL_RAD else ""
-        search.add(found)
+        if stream.quantity and stream.name not in done:
+            found = search.judged(stream, UNTESTED)
+            found.unit = _unit(stream, stream.quantity)
+            search.add(found)
 
 
 def _scale_engine_shares(search: ChannelSearch) -> None:
@@ -401,14 +429,12 @@ def _scale_engine_shares(search: ChannelSearch) -> None:
             continue
         ratio = None if measured is None else _ratio(search, measured, channel)
         if ratio is None:
-            why = f"{channel.why}; the revolutions at full order are not known"
-            search.found[place] = replace(channel, confidence=min(channel.confidence, 0.6), why=why)
+            search.found[place] = channel.because("the revolutions at full order are not known", most=0.6)
             continue
-        share = QUANTITIES["rpm_order"].units[channel.unit]
         rpm = ratio * 60 / (2 * math.pi)
-        why = f"{channel.why}; full order is {rpm:.4g} rpm by the measured revolutions"
-        confidence = max(channel.confidence, 0.9)
-        search.found[place] = replace(channel, unit="rpm", scale=rpm * share, confidence=confidence, why=why)
+        found = channel.because(f"full order is {rpm:.4g} rpm by the measured revolutions", least=SURE_FROM)
+        scale = rpm * QUANTITIES["rpm_order"].units[channel.unit]
+        search.found[place] = replace(found, unit="rpm", scale=scale)
 
 
 def _report_lost_signs(search: ChannelSearch) -> None:

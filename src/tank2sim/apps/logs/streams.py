@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from tank2sim.apps.logs.findings import LogFinding, note
 from tank2sim.apps.logs.quantities import quantity_of_name
-from tank2sim.arrays import Array, Number
+from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.files import first_bytes
 from tank2sim.records.text_layout import decoded_text
@@ -58,28 +59,6 @@ class LogStream:
     stated_by: str = ""
 
 
-@dataclass(frozen=True)
-class LogFinding:
-    """Something that the reader of a log must know.
-
-    Parameters
-    ----------
-    kind : str
-        ``fault``: the log or a stream is not what it seems, and the result is marked; ``note``: a gap, lost sentences.
-    text : str
-        One sentence.
-    stream : str
-        The stream or channel that it is about; empty if it is the log as a whole.
-    evidence : mapping
-        Figures, the unit in the name.
-    """
-
-    kind: str
-    text: str
-    stream: str = ""
-    evidence: Mapping[str, Number] = field(default_factory=dict)
-
-
 @dataclass(frozen=True, eq=False)
 class VesselLog:
     """A log as its reader gives it.
@@ -106,16 +85,6 @@ class VesselLog:
     dated: bool = True
 
 
-def note(text: str, stream: str = "", **evidence: float) -> LogFinding:
-    """A finding on a `stream`, or on the log as a whole, with `evidence`; the result stays as it is."""
-    return LogFinding("note", text, stream, evidence)
-
-
-def fault(text: str, stream: str = "", **evidence: float) -> LogFinding:
-    """A finding on a `stream`, or on the log as a whole, with `evidence`, that marks the result."""
-    return LogFinding("fault", text, stream, evidence)
-
-
 class Samples:
     """Values of a field while a file is read, with the line of the file and the time stamp (s) of each."""
 
@@ -133,12 +102,6 @@ def named_stream(name: str, time_s: Array, values: Array, unit: str = "") -> Log
     """A stream of the quantity that its name suggests, unless its unit is of another kind."""
     quantity = quantity_of_name(name, unit)
     return LogStream(name, time_s, values, unit, quantity, "name" if quantity else "")
-
-
-def not_used(words: str, kinds: Mapping[str, int]) -> list[LogFinding]:
-    """A note that counts what was not used, `words` are ``sentences`` or such, by `kinds`; none without any."""
-    listed = ", ".join(f"{number} {kind}" for kind, number in sorted(kinds.items()))
-    return [LogFinding("note", f"{words} that are not used: {listed}", evidence=dict(kinds))] if kinds else []
 
 
 def unreadable(path: Path, error: Exception, remedy: str, problem: str = "cannot be read") -> InputError:

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +19,7 @@ from scipy.ndimage import median_filter
 
 from tank2sim.apps.logs.content import steering_evidence
 from tank2sim.apps.logs.reference import differenced, held, interpolated
-from tank2sim.apps.logs.voyage import QuantitySeries, Voyage
+from tank2sim.apps.logs.voyage import QuantitySeries, Voyage, ground_velocity
 from tank2sim.arrays import Array
 from tank2sim.records.trials import usual_step
 
@@ -129,6 +130,7 @@ class _Signals:
     propulsion: Array
     full: float
     speed: Array
+    ahead: Array
     heading: Array
     rate: Array
     rest_s: float
@@ -182,10 +184,34 @@ def find_stretches(voyage: Voyage) -> tuple[Stretch, ...]:
     signals = _signals(voyage)
     if signals is None:
         return ()
-    pieces = _merged(signals, [_piece(signals, begin, end) for begin, end in _cuts(signals)])
+    pieces = [_piece(signals, begin, end) for begin, end in _cuts(signals)]
+    pieces = _folded(pieces, partial(_with_movement, signals))
+    groups = _grouped(pieces, partial(_belongs, signals))
+    pieces = _steps(signals, [piece for group in groups for piece in _manoeuvres(signals, group)])
+    pieces = _folded(pieces, partial(_continued, signals))
     if not signals.ship:
-        pieces = _without_splinters(signals, pieces)
+        pieces = _folded(pieces, partial(_with_splinter, signals))
     return tuple(_stretch(signals, piece) for piece in pieces)
+
+
+def _folded(pieces: Iterable[_Piece], join: Callable[[_Piece, _Piece], _Piece | None]) -> list[_Piece]:
+    """Pieces, each joined with the one before where `join` gives their whole."""
+    out: list[_Piece] = []
+    for piece in pieces:
+        whole = join(out[-1], piece) if out else None
+        out[-1:] = [*out[-1:], piece] if whole is None else [whole]
+    return out
+
+
+def _grouped(pieces: Iterable[_Piece], belongs: Callable[[Sequence[_Piece], _Piece], bool]) -> list[list[_Piece]]:
+    """Pieces in groups; each `belongs` to the group before it."""
+    groups: list[list[_Piece]] = []
+    for piece in pieces:
+        if groups and belongs(groups[-1], piece):
+            groups[-1].append(piece)
+        else:
+            groups.append([piece])
+    return groups
 
 
 def _signals(voyage: Voyage) -> _Signals | None:
@@ -201,18 +227,15 @@ def _signals(voyage: Voyage) -> _Signals | None:
     steer = median_filter(_on_grid(time, entry), size=3, mode="nearest")
     propulsion = _propulsion(series, time)
     full = max(float(np.nanpercentile(np.abs(propulsion), 99)), 1e-9) if np.isfinite(propulsion).any() else 1.0
-    heading = series.get("heading", series.get("magnetic_heading"))
-    rate = series.get("yaw_rate")
-    if rate is None and heading is not None:
-        slopes = QuantitySeries(*differenced(heading.time_s, heading.values, 2.0))
-        rate = slopes if len(slopes.time_s) else None
-    at_heading, at_rate = (
-        np.full(len(time), np.nan) if entry is None else np.interp(time, entry.time_s, entry.values)
-        for entry in (heading, rate)
-    )
-    lag = steering_evidence(time, steer, *((rate.time_s, rate.values) if rate else (time, at_rate))).lag_s
+    unknown = QuantitySeries(time, np.full(len(time), np.nan))
+    heading = series.get("heading", series.get("magnetic_heading", unknown))
+    rate = series.get("yaw_rate", QuantitySeries(*differenced(heading.time_s, heading.values, 2.0)))
+    rate = rate if len(rate.time_s) else unknown
+    lag = steering_evidence(time, steer, rate.time_s, rate.values).lag_s
+    at_heading, at_rate = (np.interp(time, entry.time_s, entry.values) for entry in (heading, rate))
     rest = float(np.clip(2 * lag, 2.0, 30.0))
-    return _Signals(time, steer, threshold, propulsion, full, _speed(series, time), at_heading, at_rate, rest)
+    speeds = _speed(series, time), _speed_ahead(series, time)
+    return _Signals(time, steer, threshold, propulsion, full, *speeds, at_heading, at_rate, rest)
 
 
 def _thrusters(series: Mapping[str, QuantitySeries]) -> tuple[str, QuantitySeries, QuantitySeries] | None:
@@ -254,42 +277,58 @@ def _on_grid(time: Array, entry: QuantitySeries) -> Array:
 
 
 def _speed(series: Mapping[str, QuantitySeries], time: Array) -> Array:
+    """Speed (n,), through the water where it is known, m/s; nan without."""
     entry = next((series[name] for name in ("u_water", "sog", "u_ground") if name in series), None)
     if entry is not None:
         return np.abs(interpolated(time, entry.time_s, entry.values, 30.0))
-    if "x" in series:
-        at, north = differenced(series["x"].time_s, series["x"].values, 4.0)
-        _, east = differenced(series["y"].time_s, series["y"].values, 4.0)
-        return interpolated(time, at, np.hypot(north, east), 30.0)
-    return np.full(len(time), np.nan)
+    if (ground := ground_velocity(series)) is None:
+        return np.full(len(time), np.nan)
+    return interpolated(time, ground[0], np.hypot(*ground[1:]), 30.0)
+
+
+def _speed_ahead(series: Mapping[str, QuantitySeries], time: Array) -> Array:
+    """Speed ahead over the ground (n,), m/s, negative astern; nan without a heading."""
+    heading, ground = series.get("heading"), ground_velocity(series)
+    if heading is None or ground is None:
+        return np.full(len(time), np.nan)
+    angle = interpolated(ground[0], heading.time_s, heading.values, 10.0)
+    return interpolated(time, ground[0], ground[1] * np.cos(angle) + ground[2] * np.sin(angle), 30.0)
 
 
 def _cuts(signals: _Signals) -> list[tuple[int, int]]:
     """Begin and end of pieces between jumps of the orders; a piece begins where its jump does."""
-    step, count = signals.step, len(signals.time)
-    reach, settling = max(1, round(JUMP_S / step)), round(signals.rest_s / step)
-    jumping = np.zeros(count, dtype=bool)
-    for values, least in (
-        (signals.steering, 0.75 * signals.threshold),
-        (signals.propulsion, PROPULSION_STEP * signals.full),
-    ):
-        moved = np.abs(values[reach:] - values[:-reach]) > least
-        for place in np.flatnonzero(moved & ~np.concatenate([[False], moved[:-1]])):
-            window = np.abs(np.diff(values[place : place + reach + 1]))
-            jumping[place + int(np.argmax(window > 0.2 * least)) + 1] = True
-        # Within a long movement there may be another order: a reversal of the movement itself.
-        slope = np.sign(values[reach:] - values[:-reach]) * moved
-        jumping[np.flatnonzero(slope[1:] * slope[:-1] < 0) + reach // 2 + 1] = True
-    inactive = np.abs(signals.steering) < signals.threshold
-    turns = [0, *(np.flatnonzero(np.diff(inactive.astype(int))) + 1), count]
-    for begin, end in pairwise(turns):
-        rests = inactive[begin] and begin > settling and end - begin >= settling
-        if rests and not jumping[begin - settling : begin].any():
-            jumping[begin] = True  # a rudder that was brought back slowly
-    least = max(2, round(1.5 / step))
+    count, jumping = len(signals.time), np.zeros(len(signals.time), dtype=bool)
+    jumping[_jumps(signals, signals.steering, 0.75 * signals.threshold)] = True
+    jumping[_jumps(signals, signals.propulsion, PROPULSION_STEP * signals.full)] = True
+    _mark_slow_returns(signals, jumping)
+    least = max(2, round(1.5 / signals.step))
     kept = [0]
     kept += [int(edge) for edge in np.flatnonzero(jumping) if edge - kept[-1] >= least and count - edge >= least]
     return list(pairwise([*kept, count]))
+
+
+def _jumps(signals: _Signals, values: Array, least: float) -> list[int]:
+    """Samples at which an order begins to change by more than `least` within :data:`JUMP_S`."""
+    reach = max(1, round(JUMP_S / signals.step))
+    change = values[reach:] - values[:-reach]
+    moved = np.abs(change) > least
+    begins = np.flatnonzero(moved & ~np.concatenate([[False], moved[:-1]]))
+    steps = [np.abs(np.diff(values[place : place + reach + 1])) > 0.2 * least for place in begins]
+    jumps = [int(place + np.argmax(step)) + 1 for place, step in zip(begins, steps, strict=True)]
+    # Within a long movement there may be another order: a reversal of the movement itself.
+    slope = np.sign(change) * moved
+    return [*jumps, *(np.flatnonzero(slope[1:] * slope[:-1] < 0) + reach // 2 + 1)]
+
+
+def _mark_slow_returns(signals: _Signals, jumping: np.ndarray) -> None:
+    """Mark where a rudder rests after it was brought back slowly, without a jump."""
+    settling = round(signals.rest_s / signals.step)
+    inactive = np.abs(signals.steering) < signals.threshold
+    turns = [0, *(np.flatnonzero(np.diff(inactive.astype(int))) + 1), len(inactive)]
+    for begin, end in pairwise(turns):
+        rests = inactive[begin] and begin > settling and end - begin >= settling
+        if rests and not jumping[begin - settling : begin].any():
+            jumping[begin] = True
 
 
 def _piece(signals: _Signals, begin: int, end: int) -> _Piece:
@@ -305,23 +344,29 @@ def _piece(signals: _Signals, begin: int, end: int) -> _Piece:
 
 
 def _kind(signals: _Signals, piece: _Piece) -> StretchKind:
-    """Kind of a piece by its orders and the speed."""
-    speed = signals.speed[piece.begin : piece.end]
-    known = speed[np.isfinite(speed)]
-    tenth = max(1, len(known) // 10)
-    first, last = (float(np.median(part)) if len(part) else math.nan for part in (known[:tenth], known[-tenth:]))
-    turning, share = signals.steered(piece), piece.propulsion / signals.full
-    moved = len(known) > 0 and float(np.max(known)) > RESTING_MPS
-    changes = moved and abs(last - first) / max(first, last, 1e-9) > SPEED_CHANGE
+    """Kind of a piece by its orders and the speed: the first that applies."""
+    first, last, usual, most = _speeds(signals.speed[piece.begin : piece.end])
+    share = piece.propulsion / signals.full
+    stopped, moved, unknown = abs(share) <= STOPPED_SHARE, most > RESTING_MPS, math.isnan(most)
     if share < -STOPPED_SHARE:
-        return StretchKind.STOP if first > 2 * RESTING_MPS and last < first else StretchKind.ASTERN
-    stopped = abs(share) <= STOPPED_SHARE
-    if turning:
+        way_on = first > 2 * RESTING_MPS and not _speeds(signals.ahead[piece.begin : piece.end])[0] < 0
+        return StretchKind.STOP if way_on and last < first else StretchKind.ASTERN
+    if signals.steered(piece):
         return StretchKind.PIVOT if stopped and not signals.ship else StretchKind.TURN
-    if changes:
+    if moved and abs(last - first) / max(first, last, 1e-9) > SPEED_CHANGE:
         return StretchKind.COAST if stopped else StretchKind.ACCELERATE
-    steady = float(np.median(known)) > UNDER_WAY_MPS if stopped and len(known) else moved or not (stopped or len(known))
+    steady = usual > UNDER_WAY_MPS if stopped else moved or unknown
     return StretchKind.STEADY if steady else StretchKind.REST
+
+
+def _speeds(speed: Array) -> tuple[float, float, float, float]:
+    """Speed at the begin and at the end of a piece, its median and its largest, m/s; nan where none is known."""
+    known = speed[np.isfinite(speed)]
+    if not len(known):
+        return (math.nan,) * 4
+    tenth = max(1, len(known) // 10)
+    first, last, usual = (float(np.median(part)) for part in (known[:tenth], known[-tenth:], known))
+    return first, last, usual, float(np.max(known))
 
 
 _UNSTEERED = (StretchKind.STEADY, StretchKind.ACCELERATE, StretchKind.COAST, StretchKind.REST, StretchKind.ASTERN)
@@ -356,51 +401,28 @@ _STEPS_LONGEST = 2.5
 """Longest of them, as a multiple of the time that the vessel needs to settle. Project choice."""
 
 
-def _merged(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
-    """Pieces that belong together as one: zigzags, steps, slow changes of propulsion, short corrections between."""
-    joined: list[_Piece] = []
-    for piece in pieces:
-        last = joined[-1] if joined else None
-        if last is not None and last.kind in _UNSTEERED and _is_movement(signals, last, piece):
-            joined[-1] = _piece(signals, last.begin, piece.end)
-        else:
-            joined.append(piece)
-    groups: list[list[_Piece]] = []
-    for piece in joined:
-        if groups and _belongs(signals, groups[-1][-1], piece):
-            groups[-1].append(piece)
-        else:
-            groups.append([piece])
-    out: list[_Piece] = []
-    for piece in _steps(signals, [piece for group in groups for piece in _manoeuvres(signals, group)]):
-        same = out and out[-1].kind == piece.kind and piece.kind in _JOINABLE
-        settled = out and out[-1].kind is StretchKind.ACCELERATE and piece.kind is StretchKind.STEADY
-        if same or (settled and signals.lasted(piece) < 2 * signals.rest_s):
-            out[-1] = replace(out[-1], end=piece.end)
-        else:
-            out.append(piece)
-    return out
-
-
-def _is_movement(signals: _Signals, last: _Piece, piece: _Piece) -> bool:
-    """Whether a piece is the way to the order of the next: it is short, or the propulsion changes throughout."""
+def _with_movement(signals: _Signals, last: _Piece, piece: _Piece) -> _Piece | None:
+    """A piece with the one before, if that is the way to its order: short, or a change of propulsion throughout."""
     lasted, power = signals.lasted(last), signals.propulsion[last.begin : last.end]
     changes = lasted < signals.rest_s and bool(np.ptp(power) > PROPULSION_STEP * signals.full)
     straight = piece.kind in (*_UNSTEERED, StretchKind.STOP) and abs(piece.level) < signals.threshold
-    return lasted < JUMP_S or (changes and straight)
+    way = last.kind in _UNSTEERED and (lasted < JUMP_S or (changes and straight))
+    return _piece(signals, last.begin, piece.end) if way else None
 
 
-def _without_splinters(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
-    """Pieces of a craft; a short one next to another that excites the craft joins it: both are steps."""
-    out: list[_Piece] = []
-    for piece in pieces:
-        last = out[-1] if out else None
-        both = last is not None and last.kind.excites and piece.kind.excites
-        if last is not None and both and min(map(signals.lasted, (last, piece))) < SPLINTER_S:
-            out[-1] = replace(last, end=piece.end, kind=StretchKind.STEPS)
-        else:
-            out.append(piece)
-    return out
+def _continued(signals: _Signals, last: _Piece, piece: _Piece) -> _Piece | None:
+    """A piece that is the same as the one before, or the end of its acceleration, with it."""
+    same = last.kind == piece.kind and piece.kind in _JOINABLE
+    settled = (last.kind, piece.kind) == (StretchKind.ACCELERATE, StretchKind.STEADY)
+    brief = signals.lasted(piece) < 2 * signals.rest_s
+    return replace(last, end=piece.end) if same or (settled and brief) else None
+
+
+def _with_splinter(signals: _Signals, last: _Piece, piece: _Piece) -> _Piece | None:
+    """Two pieces of a craft that excite it, of which one is short: steps."""
+    if not (last.kind.excites and piece.kind.excites) or min(map(signals.lasted, (last, piece))) >= SPLINTER_S:
+        return None
+    return replace(last, end=piece.end, kind=StretchKind.STEPS)
 
 
 def _steps(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
@@ -420,8 +442,9 @@ def _steps(signals: _Signals, pieces: list[_Piece]) -> list[_Piece]:
     return out
 
 
-def _belongs(signals: _Signals, last: _Piece, piece: _Piece) -> bool:
-    """Whether a piece belongs to the manoeuvre of the one before."""
+def _belongs(signals: _Signals, group: Sequence[_Piece], piece: _Piece) -> bool:
+    """Whether a piece belongs to the manoeuvre of those before."""
+    last = group[-1]
     turning = (StretchKind.TURN, StretchKind.PIVOT)
     brief = signals.lasted(piece) < signals.rest_s
     if last.kind not in turning or not signals.same_power(last, piece):
@@ -464,18 +487,18 @@ def _single(signals: _Signals, piece: _Piece) -> _Piece:
 
 def _legs(signals: _Signals, group: Sequence[_Piece]) -> list[_Piece]:
     """Pieces of a group to one side as one each: a helmsman's corrections of an order belong to it."""
-    sides: list[list[_Piece]] = []
-    for piece in group:
-        same = sides and signals.same_power(sides[-1][0], piece)
-        if same and (_amidships(signals, piece) or sides[-1][0].level * piece.level > 0):
-            sides[-1].append(piece)
-        else:
-            sides.append([piece])
+    sides = _grouped(group, partial(_is_to_one_side, signals))
     legs = [leg for pieces in sides for leg in _levels(signals, pieces)]
     for place, (last, leg) in enumerate(pairwise(legs)):
         begin = _movement_begin(signals, leg, last.begin)
         legs[place : place + 2] = replace(legs[place], end=begin), replace(leg, begin=begin)
     return legs
+
+
+def _is_to_one_side(signals: _Signals, leg: Sequence[_Piece], piece: _Piece) -> bool:
+    """Whether a piece has the power of a leg, and its side or none."""
+    same = signals.same_power(leg[0], piece)
+    return same and (_amidships(signals, piece) or leg[0].level * piece.level > 0)
 
 
 def _amidships(signals: _Signals, piece: _Piece) -> bool:
@@ -515,15 +538,18 @@ def _movement_begin(signals: _Signals, leg: _Piece, least: int) -> int:
 def _zigzag_length(signals: _Signals, legs: Sequence[_Piece]) -> int:
     """How many of the first legs are a zigzag: opposite orders of one size that each turn the vessel; 0 for none."""
     count = 0
-    for place, leg in enumerate(legs):
-        sizes = [abs(each.level) for each in legs[: place + 1]]
-        alike = max(sizes) - min(sizes) < _ALIKE * max(sizes)
-        other = place == 0 or leg.level * legs[place - 1].level < 0
-        if not (alike and other and signals.same_power(legs[0], leg, 2.0)) or _turns_far(signals, leg):
-            break
-        count = place + 1
+    while count < len(legs) and _is_next_leg(signals, legs[:count], legs[count]):
+        count += 1
     following = sum(signals.turned(leg) * leg.level >= 0 for leg in legs[:count])
     return count if count > 2 and following > _FOLLOWING * count else 0
+
+
+def _is_next_leg(signals: _Signals, legs: Sequence[_Piece], leg: _Piece) -> bool:
+    """Whether a leg continues the legs of a zigzag: to the other side, of one size, with one power, and not far."""
+    if legs and (leg.level * legs[-1].level >= 0 or not signals.same_power(legs[0], leg, 2.0)):
+        return False
+    sizes = [abs(each.level) for each in (*legs, leg)]
+    return max(sizes) - min(sizes) < _ALIKE * max(sizes) and not _turns_far(signals, leg)
 
 
 def _turns_far(signals: _Signals, leg: _Piece) -> bool:

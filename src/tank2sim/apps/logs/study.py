@@ -10,9 +10,9 @@ import numpy as np
 
 from tank2sim.apps.logs.channels import CHANNELS_FILE, LogChannel
 from tank2sim.apps.logs.clock import utc_text
+from tank2sim.apps.logs.findings import LogFinding
 from tank2sim.apps.logs.gear import LoggedGear, logged_gear
 from tank2sim.apps.logs.quantities import QUANTITIES
-from tank2sim.apps.logs.streams import LogFinding
 from tank2sim.apps.logs.stretches import Stretch, StretchKind
 from tank2sim.apps.logs.trial_files import TrialCut
 from tank2sim.apps.logs.voyage import DriftCurrent, Voyage, drift_current
@@ -209,7 +209,10 @@ def _why_no_trial(voyage: Voyage, stretches: Sequence[Stretch]) -> Notice:
 
 
 def _channel(channel: LogChannel) -> ChannelStudy:
-    unit = channel.unit if channel.scale == 1 else f"{channel.scale:.4g} {channel.unit}"
+    unit = channel.unit
+    if channel.scale != 1:
+        words = {"1": "of full order per recorded unit", "": "of an unknown unit"}.get(unit, unit)
+        unit = f"{channel.scale:.4g} {words}"
     same = {name: getattr(channel, name) for name in ("quantity", "stream", "sign", "confidence", "use", "why")}
     return ChannelStudy(unit=unit, **same)
 

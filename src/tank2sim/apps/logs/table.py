@@ -6,6 +6,7 @@ import csv
 import itertools
 import re
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,9 @@ import numpy as np
 import pandas as pd
 
 from tank2sim.apps.logs.clock import DOUBLED_STEPS, TWO_DIGITS_FROM, over_midnight
+from tank2sim.apps.logs.findings import LogFinding, fault, note
 from tank2sim.apps.logs.quantities import CLOCK_WORDS, plain_words, quantity_of_name, unit_of_signal_k
-from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, fault, named_stream, note
+from tank2sim.apps.logs.streams import LogStream, VesselLog, named_stream
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.files import first_bytes
@@ -84,35 +86,34 @@ def read_table_log(path: Path) -> VesselLog:
     lines = text.splitlines()
     layout = text_layout(path, lines[:-1] if len(head) == _HEAD_BYTES and len(lines) > 1 else lines)  # a cut line
     frame, findings, skipped = _frame(path, layout, encoding)
-    rows = len(frame)
-    clock = _TableClock(path, frame, layout, findings)
-    time, dated, used = clock.times()
+    time, dated, used = _TableClock(path, frame, layout, findings).times()
+    counts = {"rows": len(frame), "repeated_rows": 0, "skipped": skipped}
     last = max(used, key=list(frame.columns).index)
     if not np.isfinite(time).any():
         remedy = "write ISO 8601 times, as 2024-05-04T09:30:00.2Z, or seconds since 1970"
         problem = f"holds no time that can be read, as {_first_cell(frame[last])[:40]!r}"
         raise InputError(path, f"column {last}", problem, remedy)
     values = frame.drop(columns=list(used))
-    by_signal = _by_signal(values, time)
-    spread = None if by_signal else _spread(time, values)
-    if spread is not None:
+    if not _by_signal(values, time) and (spread := _spread(time, values)) is not None:
         time, each = spread
         text = f"{last} has {each} rows at each time (median): they are spread evenly between them"
         findings.append(note(text, last, rows=each))
     else:
         new = ~frame.duplicated().to_numpy()
-        frame, time = frame[new], time[new]
-        by_signal = _by_signal(values[new], time)
-    streams = by_signal or [
-        _stream(name, unit, time, numbers)
-        for name, unit in zip(layout.names, layout.units, strict=True)
-        if name not in used and (numbers := _numbers(frame[name], layout.comma)) is not None
-    ]
+        values, time = values[new], time[new]
+        counts["repeated_rows"] = counts["rows"] - len(values)
+    streams = _by_signal(values, time) or _by_column(values, time, layout)
     if not streams:
         raise InputError(path, "", "has no column of numbers next to its time", "give a table of measured values")
-    counts = {"rows": rows, "repeated_rows": rows - len(frame), "skipped": skipped}
     counts["without_time"] = int(np.isnan(time).sum())
     return VesselLog(path, "CSV", tuple(streams), counts, tuple(findings), dated)
+
+
+def _by_column(frame: pd.DataFrame, time: Array, layout: TextLayout) -> list[LogStream]:
+    """A stream of each column of numbers."""
+    units = dict(zip(layout.names, layout.units, strict=True))
+    columns = {name: _numbers(frame[name], layout.comma) for name in frame.columns}
+    return [_stream(name, units[name], time, values) for name, values in columns.items() if values is not None]
 
 
 def _frame(path: Path, layout: TextLayout, encoding: str) -> tuple[pd.DataFrame, list[LogFinding], int]:
@@ -165,16 +166,10 @@ def _spread(time: Array, values: pd.DataFrame) -> tuple[Array, int] | None:
     if each < 2 or not np.isfinite(time).all() or (np.diff(time) < 0).any():
         return None
     runs = np.repeat(np.arange(len(counts)), counts)
-    moves = False
-    for _, column in values.select_dtypes("number").items():
-        numbers = column.to_numpy(dtype=float)
-        inside = np.abs(np.diff(numbers))[np.diff(runs) == 0]
-        outside = np.nanmedian(np.abs(np.diff(numbers[begins]))) if np.isfinite(np.diff(numbers[begins])).any() else 0.0
-        inside = inside[np.isfinite(inside)]
-        if len(inside) and np.median(inside) > DOUBLED_STEPS * outside > 0:
-            return None
-        moves = moves or (len(inside) > _MOST * (len(time) - len(counts)) and bool(inside.any()))
-    if not moves:
+    numbers = [column.to_numpy(dtype=float) for _, column in values.select_dtypes("number").items()]
+    if any(_is_of_two(column, begins, runs) for column in numbers):
+        return None
+    if not any(_moves_within(column, runs) for column in numbers):
         return None
     steps = np.diff(time[begins])
     step = float(np.median(steps))
@@ -182,6 +177,26 @@ def _spread(time: Array, values: pd.DataFrame) -> tuple[Array, int] | None:
     full = np.maximum(counts, each * (np.arange(len(counts)) % (len(counts) - 1) == 0))  # the first and last are cut
     place = np.arange(len(time)) - begins[runs] + np.where(runs == 0, full[0] - counts[0], 0)
     return time + place * (lengths / full)[runs], each
+
+
+def _steps_within(column: Array, runs: np.ndarray) -> Array:
+    """Sizes of the known steps of a column (rows,) between rows of one time."""
+    steps = np.abs(np.diff(column))[np.diff(runs) == 0]
+    return np.asarray(steps[np.isfinite(steps)])
+
+
+def _moves_within(column: Array, runs: np.ndarray) -> bool:
+    """Whether a column (rows,) is sampled row by row, and moves between rows of one time."""
+    steps = _steps_within(column, runs)
+    return len(steps) > _MOST * (len(runs) - runs[-1] - 1) and bool(steps.any())
+
+
+def _is_of_two(column: Array, begins: np.ndarray, runs: np.ndarray) -> bool:
+    """Whether a column (rows,) differs more between rows of one time than from one time to the next."""
+    inside, outside = _steps_within(column, runs), np.abs(np.diff(column[begins]))
+    known = outside[np.isfinite(outside)]
+    usual = float(np.median(known)) if len(known) else 0.0
+    return len(inside) > 0 and bool(np.median(inside) > DOUBLED_STEPS * usual > 0)
 
 
 def _stream(name: str, unit: str, time: Array, values: Array) -> LogStream:
@@ -197,63 +212,61 @@ class _TableClock:
     def __init__(self, path: Path, frame: pd.DataFrame, layout: TextLayout, findings: list[LogFinding]) -> None:
         self.path, self.layout, self.findings = path, layout, findings
         self.columns = {name: _as_numbers(frame[name]) for name in frame.columns}
-        first = {name: _first_cell(column) for name, column in self.columns.items()}
-        self.numbers = {
-            name: column.to_numpy(dtype=float) for name, column in self.columns.items() if column.dtype.kind in "iufb"
-        }
-        self.named = [name for name in first if _TIME_WORDS.search(plain_words(name))]
-        self.dates = [
-            name
-            for name in first
-            if _DATE_WORDS.search(plain_words(name))
-            and name not in self.named
-            and (_DATE.match(first[name]) or self._days_of_numbers(name) is not None)
-        ]
-        known = (*self.named, *self.dates)
-        self.clocks = [name for name in first if name not in known and _LIKE_TIME.match(first[name])]
-        self.first = first
+        self.first = {name: _first_cell(column) for name, column in self.columns.items()}
+        numeric = {name: column for name, column in self.columns.items() if column.dtype.kind in "iufb"}
+        self.numbers = {name: column.to_numpy(dtype=float) for name, column in numeric.items()}
+        self.named = [name for name in self.first if _TIME_WORDS.search(plain_words(name))]
+        others = [name for name in self.first if name not in self.named]
+        self.dates = list(filter(self._holds_dates, others))
+        self.clocks = [name for name in others if name not in self.dates and _LIKE_TIME.match(self.first[name])]
         self.leftmost = list(self.columns)[:1]
+
+    def _holds_dates(self, name: str) -> bool:
+        """Whether a column is of dates, by its name and its cells."""
+        if not _DATE_WORDS.search(plain_words(name)):
+            return False
+        return bool(_DATE.match(self.first[name])) or self._days_of_numbers(name) is not None
 
     def times(self) -> tuple[Array, bool, set[str]]:
         """Times (rows,), whether they are UTC, and the columns that they are made of."""
-        found = self._dated() or self._of_day() or self._from_beginning()
-        if found is not None:
-            return found
+        ways: tuple[tuple[Callable[[str], tuple[Array, list[str]] | None], list[str], bool], ...] = (
+            (self._dated, [*self.named, *self.dates, *self.clocks, *self.leftmost], True),
+            (self._of_day, [*self.named, *self.clocks, *self.leftmost], False),
+            (self._from_beginning, self.named or self.leftmost, False),
+        )
+        for read, names, dated in ways:
+            for name in names:
+                if (found := read(name)) is not None:
+                    return found[0], dated, {name, *found[1]}
         problem = "it is not a log of a known format, and as a table there is no column of time"
         remedy = "give a column of ISO 8601 times, of date and time, or of seconds"
         raise InputError(self.path, "header", problem, remedy)
 
-    def _dated(self) -> tuple[Array, bool, set[str]] | None:
-        for name in [*self.named, *self.dates, *self.clocks, *self.leftmost]:
-            found = self._counted(name) if name in self.numbers else self._written(name)
-            if found is not None:
-                return found[0], True, {name, *found[1]}
-        return None
+    def _dated(self, name: str) -> tuple[Array, list[str]] | None:
+        """UTC (rows,) of a column, and the columns of dates used; None if it does not show it."""
+        return self._counted(name) if name in self.numbers else self._written(name)
 
-    def _of_day(self) -> tuple[Array, bool, set[str]] | None:
-        for name in [*self.named, *self.clocks, *self.leftmost]:
-            of_day = _clock(self.columns[name]) if re.match(r"\d{1,2}:\d\d", self.first[name]) else None
-            if name in self.numbers and self._stated_count(name) is None:
-                of_day = _clock_of_numbers(self.numbers[name])
-            if of_day is not None:
-                self._note(name, "has times of day without a date: the trials have no date")
-                return over_midnight(of_day), False, {name}
-        return None
+    def _of_day(self, name: str) -> tuple[Array, list[str]] | None:
+        """Times of day (rows,) of a column, which go on over midnight; None if it holds others."""
+        of_day = _clock(self.columns[name]) if re.match(r"\d{1,2}:\d\d", self.first[name]) else None
+        if name in self.numbers and self._stated_count(name) is None:
+            of_day = _clock_of_numbers(self.numbers[name])
+        if of_day is None:
+            return None
+        self.findings.append(note(f"{name} has times of day without a date: the trials have no date", name))
+        return over_midnight(of_day), []
 
-    def _from_beginning(self) -> tuple[Array, bool, set[str]] | None:
-        for name in self.named or self.leftmost:
-            values = self.numbers.get(name, np.zeros(0))
-            steps = np.diff(values[np.isfinite(values)])
-            if len(steps) and (steps >= 0).mean() > 0.9:
-                self._note(name, "counts from the beginning of the log: the trials have no date")
-                return values * (self._stated_count(name) or self._count_by_motion(name)), False, {name}
-        return None
-
-    def _note(self, name: str, text: str) -> None:
-        self.findings.append(note(f"{name} {text}", name))
+    def _from_beginning(self, name: str) -> tuple[Array, list[str]] | None:
+        """Times (rows,) since the beginning of the log of a column that rises; None of any other."""
+        values = self.numbers.get(name, np.zeros(0))
+        steps = np.diff(values[np.isfinite(values)])
+        if not len(steps) or (steps >= 0).mean() <= 0.9:
+            return None
+        self.findings.append(note(f"{name} counts from the beginning of the log: the trials have no date", name))
+        return values * (self._stated_count(name) or self._count_by_motion(name)), []
 
     def _counted(self, name: str) -> tuple[Array, list[str]] | None:
-        """UTC (rows,) of a column of numbers, and the columns of dates used; None if it does not show it."""
+        """The same of a column of numbers."""
         values = self.numbers[name]
         clock = None if self._stated_count(name) or name in self.dates else _clock_of_numbers(values)
         if clock is None:
@@ -262,7 +275,7 @@ class _TableClock:
         return (self._days(self.dates[0], self._zone_s(name)) + clock, self.dates[:1]) if self.dates else None
 
     def _written(self, name: str) -> tuple[Array, list[str]] | None:
-        """UTC (rows,) of a column of text, and the columns of dates used; None if it does not show it."""
+        """The same of a column of text."""
         column, first, offset = self.columns[name], self.first[name], self._zone_s(name)
         if re.match(r"\d{4}-\d\d-\d\d[T ]\d", first):
             moments = pd.to_datetime(column, format="ISO8601", utc=True, errors="coerce")
@@ -279,13 +292,12 @@ class _TableClock:
         known = values[np.isfinite(values)]
         size = float(np.median(np.abs(known))) if len(known) else 0.0
         for least, largest, factor in _EPOCHS:
-            counts = least <= size <= largest and np.percentile(known, _BEGINNING) >= least
-            if counts and (len(known) < 2 or np.median(np.diff(known)) * factor < _SLOWEST_STEP_S):
+            if least <= size <= largest and _counts_from_1970(known, least, factor):
                 return np.asarray(values * factor)
         moments = _moments_of_numbers(values)
-        for least, largest, day in _DAYS:
-            if moments is None and least <= size <= largest and np.ptp(known) < _LONGEST_IN_DAYS:
-                moments = (values - day) * 86400
+        if moments is None and len(known) and np.ptp(known) < _LONGEST_IN_DAYS:
+            day = next((day for least, largest, day in _DAYS if least <= size <= largest), None)
+            moments = None if day is None else (values - day) * 86400
         return None if moments is None else moments - self._zone_s(name)
 
     def _stated_count(self, name: str) -> float | None:
@@ -391,6 +403,12 @@ def _first_cell(column: pd.Series[Any]) -> str:
     return next((str(value) for value in column.dropna()[:1]), "")
 
 
+def _counts_from_1970(known: Array, least: float, factor: float) -> bool:
+    """Whether nearly all of these numbers (n,) are at `least` so large, and count in steps of a log."""
+    large = bool(np.percentile(known, _BEGINNING) >= least)
+    return large and (len(known) < 2 or bool(np.median(np.diff(known)) * factor < _SLOWEST_STEP_S))
+
+
 def _clock_of_numbers(values: Array) -> Array | None:
     """Seconds of the day (rows,) of hhmmss[cc|mmm] or fractions of a day; None of a count, whose digits go on to 99."""
     known = values[np.isfinite(values)]
@@ -399,11 +417,12 @@ def _clock_of_numbers(values: Array) -> Array | None:
     if known.max() <= 1:
         return np.asarray(values * 86400)
     for scale in (1.0, 1e-2, 1e-3):
-        digits = values * scale
+        digits = known * scale
         seconds, minutes = digits % 100, digits // 100 % 100
-        if known.max() * scale < 240000 and np.nanmax(seconds) < 60 and np.nanmax(minutes) < 60:
-            crosses = np.ptp(known * scale // 100) > 0 and len(np.unique(known * scale % 100 // 1)) >= _CLOCK_DIGITS
-            return np.asarray(digits // 10000 * 3600 + minutes * 60 + seconds) if crosses else None
+        if max(digits.max() / 240000, seconds.max() / 60, minutes.max() / 60) < 1:
+            crosses = np.ptp(digits // 100) > 0 and len(np.unique(seconds // 1)) >= _CLOCK_DIGITS
+            every = values * scale
+            return every // 10000 * 3600 + every // 100 % 100 * 60 + every % 100 if crosses else None
     return None
 
 

@@ -115,35 +115,46 @@ def _places(stretches: Sequence[Stretch], whole: bool) -> Iterator[tuple[int, in
 
 
 def _cut(voyage: Voyage, stretches: tuple[Stretch, ...], begin: float, number: int) -> TrialCut | None:
+    """A trial of stretches that begins at a time; None where it is too short, or lacks orders or a measured motion."""
     series = dict(voyage.series)
     clock = next((series[name] for name in ("heading", "yaw_rate", "x", "sog") if name in series), None)
     if clock is None:
         return None
     step = float(np.clip(usual_step(clock.time_s), SHORTEST_STEP_S, LONGEST_STEP_S))
-    first = clock.time_s[np.clip(np.searchsorted(clock.time_s, begin), 0, len(clock.time_s) - 1)]
-    first -= step * math.floor((first - begin) / step)
-    rows = math.floor((stretches[-1].end_s - first) / step + 1e-6) + 1
-    if rows < LEAST_TRIAL_ROWS:
+    at = _rows(clock.time_s, begin, stretches[-1].end_s, step)
+    if len(at) < LEAST_TRIAL_ROWS:
         return None
-    at = first + step * np.arange(rows)
-    if "rpm" in series:  # the format has ordered revolutions
-        series.setdefault("rpm_order", series["rpm"])
-    columns = {name: quantity.column for name, quantity in QUANTITIES.items() if quantity.column} | {"rpm": ""}
-    columns |= {"rpm_order": QUANTITIES["rpm"].column} | dict.fromkeys(_redundant(series), "")
-    sampled = {columns.get(name): _sampled(entry, at, step, name) for name, entry in series.items()}
-    signals = {name: sampled[name] for name in TRIAL_SIGNALS if name in sampled and np.isfinite(sampled[name]).any()}
+    signals = _signals(series, at, step)
     thrusters = {
         column: factor * _sampled(series[name], at, step, name)
         for name, (column, factor) in _THRUSTER_COLUMNS.items()
         if name in series
     }
-    steered = any(name in signals for name in RUDDERS)
-    if not any(name in signals for name in MEASURED_COLUMNS) or not (steered or thrusters):
+    steered = not signals.keys().isdisjoint(RUDDERS)
+    if signals.keys().isdisjoint(MEASURED_COLUMNS) or not (steered or thrusters):
         return None
     name = f"{number:02d}_run" if len(stretches) > 1 else _name(number, stretches[0], steered)
+    first = float(at[0])
     trial = Trial(Path(f"{name}.csv"), np.round(at - first, 6), signals)
     text = trial_text(trial, _remarks(voyage, stretches, first), thrusters)
     return TrialCut(stretches, trial, first, text, steered)
+
+
+def _rows(time_s: Array, begin: float, end: float, step: float) -> Array:
+    """Times of the rows of a trial (n,), the first at a sample of its clock or whole steps before."""
+    first = time_s[np.clip(np.searchsorted(time_s, begin), 0, len(time_s) - 1)]
+    first -= step * math.floor((first - begin) / step)
+    return np.asarray(first + step * np.arange(math.floor((end - first) / step + 1e-6) + 1))
+
+
+def _signals(series: dict[str, QuantitySeries], at: Array, step: float) -> dict[str, Array]:
+    """Signals of the trial format at the rows (n,), those that the log has."""
+    if "rpm" in series:  # the format has ordered revolutions
+        series.setdefault("rpm_order", series["rpm"])
+    columns = {name: quantity.column for name, quantity in QUANTITIES.items()}
+    columns |= {"rpm": "", "rpm_order": columns["rpm"]} | dict.fromkeys(_redundant(series), "")
+    sampled = {columns.get(name): _sampled(entry, at, step, name) for name, entry in series.items()}
+    return {name: sampled[name] for name in TRIAL_SIGNALS if name in sampled and np.isfinite(sampled[name]).any()}
 
 
 def _redundant(series: Mapping[str, QuantitySeries]) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from tank2sim.apps.logs.channel_search import find_channels
 from tank2sim.apps.logs.channels import SURE_FROM, ChannelSet, LogChannel
 from tank2sim.apps.logs.clock import gaps_of, tidied, utc_text
 from tank2sim.apps.logs.content import AGREES
+from tank2sim.apps.logs.findings import LogFinding, fault, merged_findings, note
 from tank2sim.apps.logs.quantities import QUANTITIES
 from tank2sim.apps.logs.recorded import pulses_of, without_missing
 from tank2sim.apps.logs.reference import (
@@ -20,11 +21,12 @@ from tank2sim.apps.logs.reference import (
     POSITION_WINDOW_S,
     differenced,
     interpolated,
+    interpolated_angle,
     local_metres,
     rounded_origin,
     thinned_series,
 )
-from tank2sim.apps.logs.streams import LogFinding, LogStream, VesselLog, fault, joined_parts, note
+from tank2sim.apps.logs.streams import LogStream, VesselLog, joined_parts
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice, caution
@@ -142,27 +144,19 @@ def _tidied_streams(
     streams: list[LogStream] = []
     findings = [finding for log in parts for finding in log.findings]
     for log in parts:
-        repeated = 0
+        prefix = "" if len(parts) == 1 else f"{log.path.stem}: "
+        counts[log.path.name]["repeated_samples"] = 0
         for stream in log.streams:
             known, missing = without_missing(stream)
-            tidy, doubled, found_in_time = tidied(known)
-            repeated += doubled
+            tidy, repeated, found_in_time = tidied(known)
+            counts[log.path.name]["repeated_samples"] += repeated
             findings += [*missing, *found_in_time]
             tidy, _ = pulses_of(tidy)
             if len(tidy.values):
-                name = stream.name if len(parts) == 1 else f"{log.path.stem}: {stream.name}"
-                streams.append(replace(tidy, name=name))
+                streams.append(replace(tidy, name=prefix + stream.name))
             elif stream.quantity and len(stream.values):
                 findings.append(note(f"{stream.name}: holds no valid value", stream.name))
-        counts[log.path.name]["repeated_samples"] = repeated
-    groups: dict[str, list[LogFinding]] = {}
-    for finding in findings:
-        key = finding.text.removeprefix(f"{finding.stream}: ") if finding.stream else finding.text
-        groups.setdefault(key, []).append(finding)
-    return streams, [
-        group[0] if len(group) == 1 else replace(group[0], text=f"{len(group)} streams: {key}", stream="")
-        for key, group in groups.items()
-    ]
+    return streams, merged_findings(findings)
 
 
 def _series(path: Path, found: ChannelSet, streams: Sequence[LogStream]) -> dict[str, QuantitySeries]:
@@ -201,23 +195,28 @@ do not overlap."""
 
 def _clock_findings(names: list[str], found: ChannelSet, streams: list[LogStream]) -> list[LogFinding]:
     """Differences of the clocks of several logs, by rates of turn or headings that two of them hold."""
-    named = {stream.name: stream for stream in streams}
-    rates: dict[str, tuple[Array, Array]] = {}
-    for quantity in ("yaw_rate", "heading"):
-        for channel in found.channels:
-            name = next((name for name in names if channel.stream.startswith(f"{name}: ")), "")
-            if channel.quantity == quantity and channel.confidence >= SURE_FROM and name not in rates:
-                time, values = named[channel.stream].time_s, channel.si(named[channel.stream].values)
-                turned = quantity == "heading"
-                rates[name] = differenced(time, np.unwrap(values), HEADING_WINDOW_S) if turned else (time, values)
-    findings = []
+    rates = {name: rate for name in names if (rate := _rate_of_turn(name, found, streams)) is not None}
+    findings, first = [], names[0]
     for name in names[1:]:
-        shift = _shift(rates[names[0]], rates[name]) if names[0] in rates and name in rates else None
+        shift = _shift(rates[first], rates[name]) if {first, name} <= rates.keys() else None
         if shift is not None and abs(shift) > _CLOCKS_AGREE_S:
             side = "ahead of" if shift > 0 else "behind"
-            text = f"the clock of {name} is {abs(shift):.3g} s {side} the clock of {names[0]} by the rate of turn"
+            text = f"the clock of {name} is {abs(shift):.3g} s {side} the clock of {first} by the rate of turn"
             findings.append(fault(f"{text}: give its channels delay_s = {shift:.3g}", shift_s=shift))
     return findings
+
+
+def _rate_of_turn(name: str, found: ChannelSet, streams: list[LogStream]) -> tuple[Array, Array] | None:
+    """Times and values of the rate of turn of a log, or of the slope of its heading; None where neither is sure."""
+    named = {stream.name: stream for stream in streams if stream.name.startswith(f"{name}: ")}
+    sure = [each for each in found.channels if each.stream in named and each.confidence >= SURE_FROM]
+    for channel in sorted(sure, key=lambda each: each.quantity != "yaw_rate"):
+        time, values = named[channel.stream].time_s, channel.si(named[channel.stream].values)
+        if channel.quantity == "yaw_rate":
+            return time, values
+        if channel.quantity == "heading":
+            return differenced(time, np.unwrap(values), HEADING_WINDOW_S)
+    return None
 
 
 def _shift(first: tuple[Array, Array], second: tuple[Array, Array]) -> float | None:
@@ -249,21 +248,24 @@ def _not_understood(found: ChannelSet, streams: list[LogStream]) -> list[LogFind
 # Quantities without which no manoeuvre is understood
 _ESSENTIAL = ("rudder_angle", "rudder_order", "heading", "yaw_rate")
 
+_MAGNETIC_ALONE = (
+    "{} is a magnetic heading, and there is no true one: the trials have no heading; make it one in channels.toml "
+    '(quantity = "heading", offset = less the variation in deg, + east, and the deviation)'
+)
+
 
 def _to_confirm(found: ChannelSet) -> list[LogFinding]:
     """Findings of channels in use that are not sure, and of quantities whose only streams are not used."""
-    findings = _unsure([channel for channel in found.channels if channel.use and channel.confidence < SURE_FROM])
-    used = {channel.quantity: channel.stream for channel in found.channels if channel.use}
+    used = {channel.quantity: channel for channel in found.channels if channel.use}
+    findings = _unsure([channel for channel in used.values() if channel.confidence < SURE_FROM])
     for quantity in _ESSENTIAL:
         best = next((channel for channel in found.channels if channel.quantity == quantity), None)
         if best and quantity not in used and best.confidence >= 0.5:
             text = f"{QUANTITIES[quantity].words} may be {best.stream} ({best.why}), and is not used"
             findings.append(fault(text, best.stream))
     if "magnetic_heading" in used and "heading" not in used:
-        name = used["magnetic_heading"]
-        text = f"{name} is a magnetic heading, and there is no true one: the trials have no heading; make it one in "
-        text += 'channels.toml (quantity = "heading", offset = less the variation in deg, + east, and the deviation)'
-        findings.append(fault(text, name))
+        name = used["magnetic_heading"].stream
+        findings.append(fault(_MAGNETIC_ALONE.format(name), name))
     return findings
 
 
@@ -310,20 +312,20 @@ def _derived(series: dict[str, QuantitySeries]) -> tuple[dict[str, QuantitySerie
 
 def _gap_findings(series: Mapping[str, QuantitySeries]) -> list[LogFinding]:
     """A note of the gaps of each set of channels that share them."""
+    words = {name: "position" if name == "x" else QUANTITIES[name].words for name in series if name != "y"}
     groups: dict[tuple[str, ...], tuple[list[tuple[float, float]], list[str]]] = {}
-    for name, entry in series.items():
-        gaps = gaps_of(entry.time_s, max(_GAP_LEAST_S, GAP_STEPS * usual_step(entry.time_s)))
-        if name != "y" and len(entry.time_s) > 2 and gaps:
-            words = "position" if name == "x" else QUANTITIES[name].words
-            key = tuple(utc_text(begin)[:19] for begin, _ in gaps)
-            groups.setdefault(key, (gaps, []))[1].append(words)
-    findings = []
-    for gaps, names in groups.values():
-        shown = ", ".join(f"{end - begin:.3g} s from {utc_text(begin)[11:19]}" for begin, end in gaps[:_GAPS_LISTED])
-        more = f" and {len(gaps) - _GAPS_LISTED} more" if len(gaps) > _GAPS_LISTED else ""
-        text = f"nothing for {shown}{more}: {'; '.join(names)}"
-        findings.append(note(text, total_s=sum(end - begin for begin, end in gaps)))
-    return findings
+    for name, word in words.items():
+        time = series[name].time_s
+        gaps = gaps_of(time, max(_GAP_LEAST_S, GAP_STEPS * usual_step(time))) if len(time) > 2 else []
+        groups.setdefault(tuple(utc_text(begin)[:19] for begin, _ in gaps), (gaps, []))[1].append(word)
+    return [_gap_note(gaps, names) for gaps, names in groups.values() if gaps]
+
+
+def _gap_note(gaps: list[tuple[float, float]], names: list[str]) -> LogFinding:
+    shown = ", ".join(f"{end - begin:.3g} s from {utc_text(begin)[11:19]}" for begin, end in gaps[:_GAPS_LISTED])
+    more = f" and {len(gaps) - _GAPS_LISTED} more" if len(gaps) > _GAPS_LISTED else ""
+    text = f"nothing for {shown}{more}: {'; '.join(names)}"
+    return note(text, total_s=sum(end - begin for begin, end in gaps))
 
 
 AVERAGED_S = 60.0
@@ -358,54 +360,54 @@ def drift_current(voyage: Voyage, begin_s: float, end_s: float) -> DriftCurrent 
     water. With the speed ahead alone the difference of the speeds ahead is fitted by the current's component on the
     heading, for which the heading must have changed. A scale error of the log through the water is part of it.
     """
-    series = voyage.series
-    ground = _ground(voyage)
+    series, ground = voyage.series, ground_velocity(voyage.series)
     if "heading" not in series or "u_water" not in series or ground is None:
         return None
     inside = (ground[0] >= begin_s) & (ground[0] <= end_s)
     time, north, east = (part[inside] for part in ground)
-    if len(time) < _FEWEST:
-        return None
-    heading, ahead, side = (
-        interpolated(time, series[name].time_s, series[name].values, 5.0) if name in series else np.zeros(0)
-        for name in ("heading", "u_water", "v_water")
-    )
+    names = [name for name in ("heading", "u_water", "v_water") if name in series]
+    heading, ahead, *side = (interpolated(time, series[name].time_s, series[name].values, 5.0) for name in names)
     cosine, sine = np.cos(heading), np.sin(heading)
-    if "v_water" in series:
-        x, y = north - (ahead * cosine - side * sine), east - (ahead * sine + side * cosine)
-        good = np.isfinite(x) & np.isfinite(y)
-        if good.sum() < _FEWEST:
-            return None
-        time, x, y = time[good], x[good], y[good]
-        spread = math.hypot(*(float(np.std(thinned_series(time, part, AVERAGED_S)[1])) for part in (x, y)))
-        return _current(float(x.mean()), float(y.mean()), spread, "velocities over the ground and through the water")
-    difference = north * cosine + east * sine - ahead
-    good = np.isfinite(difference)
-    matrix = np.column_stack([cosine[good], sine[good]])
-    if good.sum() < _FEWEST or np.linalg.eigvalsh(matrix.T @ matrix / good.sum())[0] < _LEAST_TURN:
+    if side:
+        water = np.column_stack([ahead * cosine - side[0] * sine, ahead * sine + side[0] * cosine])
+        return _mean_difference(time, np.column_stack([north, east]) - water)
+    return _fitted_ahead(np.column_stack([cosine, sine]), north * cosine + east * sine - ahead)
+
+
+def _mean_difference(time: Array, difference: Array) -> DriftCurrent | None:
+    """Current by the velocities over the ground less those through the water (n, 2), to north and east."""
+    good = np.isfinite(difference).all(axis=1)
+    if good.sum() < _FEWEST:
         return None
-    mean, *_ = np.linalg.lstsq(matrix, difference[good], rcond=None)
-    spread = float(np.std(difference[good] - matrix @ mean))
-    return _current(float(mean[0]), float(mean[1]), spread, "speeds ahead over the ground and through the water")
+    averages = [thinned_series(time[good], part, AVERAGED_S)[1] for part in difference[good].T]
+    spread = math.hypot(*(float(np.std(part)) for part in averages))
+    return _current(difference[good].mean(axis=0), spread, "velocities over the ground and through the water")
 
 
-def _current(north: float, east: float, spread: float, by: str) -> DriftCurrent:
+def _fitted_ahead(toward: Array, difference: Array) -> DriftCurrent | None:
+    """Current by the speed ahead over the ground less the speed through the water (n,), for heading vectors (n, 2)."""
+    good = np.isfinite(difference)
+    matrix, known = toward[good], difference[good]
+    if len(known) < _FEWEST or np.linalg.eigvalsh(matrix.T @ matrix / len(known))[0] < _LEAST_TURN:
+        return None
+    mean = np.asarray(np.linalg.lstsq(matrix, known, rcond=None)[0], dtype=np.float64)
+    spread = float(np.std(known - matrix @ mean))
+    return _current(mean, spread, "speeds ahead over the ground and through the water")
+
+
+def _current(mean: Array, spread: float, by: str) -> DriftCurrent:
+    north, east = mean.tolist()
     return DriftCurrent(math.hypot(north, east), math.degrees(math.atan2(east, north)) % 360, spread, by)
 
 
-def _ground(voyage: Voyage) -> tuple[Array, Array, Array] | None:
-    """Times and velocity to north and east over the ground."""
-    series = voyage.series
+def ground_velocity(series: Mapping[str, QuantitySeries]) -> tuple[Array, Array, Array] | None:
+    """Times and velocity to north and east over the ground (n,), m/s; None where it is not known."""
     if "v_north" in series and "v_east" in series:
         north, east = series["v_north"], series["v_east"]
         return north.time_s, north.values, np.interp(north.time_s, east.time_s, east.values)
     if "sog" in series and "cog" in series:
         sog, cog = series["sog"], series["cog"]
-        longest = 3 * max(usual_step(cog.time_s), 1.0)
-        cosine, sine = (
-            interpolated(sog.time_s, cog.time_s, part, longest) for part in (np.cos(cog.values), np.sin(cog.values))
-        )
-        course = np.arctan2(sine, cosine)
+        course = interpolated_angle(sog.time_s, cog.time_s, cog.values, 3 * max(usual_step(cog.time_s), 1.0))
         return sog.time_s, sog.values * np.cos(course), sog.values * np.sin(course)
     if "x" in series and "y" in series:
         time, v_north = differenced(series["x"].time_s, series["x"].values, POSITION_WINDOW_S)

@@ -84,6 +84,18 @@ def signals(
     return SignalsResult(SignalsStudy(trials=analysed, filter=study), TrialRecord(changed) if changed else None)
 
 
+def _only_trial(trials: Sequence[Trial], request: FilterRequest, settings: SignalSettings) -> Trial:
+    """The trial of a filter; ArgumentError unless it is one, with one column, or none if the filter thins it."""
+    if len(trials) != 1:
+        raise ArgumentError("filter", "", f"filters one trial, and {len(trials)} are given", "filter them one by one")
+    if request.thins and settings.columns:
+        raise ArgumentError("columns", "", f"{request.text} thins the whole trial", "leave the column out")
+    if len(settings.columns) != 1 and not request.thins:
+        remedy = "filter each column in a separate run; decimate takes no column: it thins the whole trial"
+        raise ArgumentError("filter", "", "filters one column, which must be named", remedy)
+    return trials[0]
+
+
 def _filter(trials: Sequence[Trial], request: FilterRequest, settings: SignalSettings) -> tuple[FilterStudy, Trial]:
     """Study of a filter, and the trial with the filtered signals."""
     from tank2sim.apps.signals.study import filtered
@@ -91,14 +103,7 @@ def _filter(trials: Sequence[Trial], request: FilterRequest, settings: SignalSet
     from tank2sim.records.signals.sampling import even_series
     from tank2sim.records.signals.writing import thinned, with_filtered
 
-    if len(trials) != 1:
-        raise ArgumentError("filter", "", f"filters one trial, and {len(trials)} are given", "filter them one by one")
-    trial = trials[0]
-    if request.thins and settings.columns:
-        raise ArgumentError("columns", "", f"{request.text} thins the whole trial", "leave the column out")
-    if len(settings.columns) != 1 and not request.thins:
-        remedy = "filter each column in a separate run; decimate takes no column: it thins the whole trial"
-        raise ArgumentError("filter", "", "filters one column, which must be named", remedy)
+    trial = _only_trial(trials, request, settings)
     every = [name for name in trial.signals if name not in HELD_COLUMNS]
     names = every if request.thins else [find_signal(settings.columns[0], trial)]
     before = [even_series(trial, name, settings.max_gap_s) for name in names]
