@@ -62,8 +62,9 @@ def test_the_card_written_is_a_craft_with_the_estimates_and_their_errors(found) 
     assert card.derivatives["Xu"] == pytest.approx(values["derivatives.Xu"], rel=1e-9)
     assert card.uncertainty["Nr"] == pytest.approx(errors["derivatives.Nr"], rel=1e-9)
     for thruster in card.thrusters:
-        assert thruster.ahead_Ns2 == pytest.approx(values["thrusters.port.ahead"], rel=1e-9)
-        assert thruster.uncertainty["astern_Ns2"] == pytest.approx(errors["thrusters.port.astern"], rel=1e-9)
+        name = f"thrusters.{thruster.name}"
+        assert thruster.ahead_Ns2 == pytest.approx(values[f"{name}.ahead"], rel=1e-9)
+        assert thruster.uncertainty["astern_Ns2"] == pytest.approx(errors[f"{name}.astern"], rel=1e-9)
 
 
 @pytest.mark.slow
