@@ -9,6 +9,7 @@ import sys
 import types
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -359,6 +360,7 @@ def _print(verb: Verb, given: Mapping[str, Any]) -> None:
 def _run(verb: Verb, given: dict[str, Any]) -> int:
     """Call a verb with what the command line gave, write its files, and print its result."""
     from tank2sim.cli.console import show_result, write_outputs
+    from tank2sim.cli.naming import in_options, options_of
     from tank2sim.cli.progress import showing_stages
 
     values, changes = dict(given), given.get("set", ())
@@ -378,9 +380,11 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
         result, contents = _with_outputs(verb, verb.function(**call), values, inputs, stack)
     given_files = {name: values[name] for name in ("page", "plot", "json")}
     written = write_outputs(result, contents, [*inputs, *result.inputs], **given_files)
-    show_result(result, [*result.written, *written], quiet=values["quiet"], verbose=values["verbose"])
+    words = partial(in_options, options=options_of(click.get_current_context().command))
+    all_written = [*result.written, *written]
+    show_result(result, all_written, quiet=values["quiet"], verbose=values["verbose"], words=words)
     for fault in result.faults:
-        print(f"tank2sim: {one_line(fault)}", file=sys.stderr)
+        print(f"tank2sim: {one_line(words(fault))}", file=sys.stderr)
     code: int = result.exit_code
     return code
 

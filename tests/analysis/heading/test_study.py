@@ -74,7 +74,7 @@ def test_a_gear_that_waves_overwork_is_reported_with_the_remedy_which_helps() ->
     ship = build(card)
     found, _ = study_autopilot(card, ship, StudySettings())
     (reported,) = [notice for notice in found.notices if "full rate" in notice]
-    assert found.closed_loop.course_keeping.rate_limited_percent > 50 and "--wave-filter 0.424" in reported
+    assert found.closed_loop.course_keeping.rate_limited_percent > 50 and "wave_filter_radps=0.424" in reported
     filtered, _ = study_autopilot(card, ship, StudySettings(wave_filter_radps=0.424))
     assert filtered.closed_loop.course_keeping.rate_limited_percent < 10
     assert not any("full rate" in notice for notice in filtered.notices)

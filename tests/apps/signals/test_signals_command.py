@@ -142,7 +142,7 @@ def test_a_column_with_a_long_gap_is_left_out_with_a_notice_or_refused_by_name(p
     cut = [line if not 1000 <= n < 1100 else ",".join([*line.split(",")[:-1], ""]) for n, line in enumerate(lines)]
     gappy.write_text("\n".join(cut) + "\n")
     assert "psi_deg is left out: it has no value from" in run(gappy).output
-    with pytest.raises(InputError, match=r"gappy.csv: column psi_deg: has no value from .* allow it with --max-gap"):
+    with pytest.raises(InputError, match=r"gappy.csv: column psi_deg: has no value from .* allow it by max_gap_s"):
         run(gappy, "--columns", "psi")
     assert "interpolated by straight lines" in run(gappy, "--columns", "psi", "--max-gap", "12").output
 

@@ -438,7 +438,8 @@ def _of_the_gear(ship: Model, design: HeadingDesign, kept: CourseKeeping, weathe
     """Notices on the load of the gear in waves, and on limits of the autopilot below the gear's."""
     notices = []
     if kept.rate_limited_percent > _BUSY_PERCENT:
-        remedy = f"--wave-filter {weather.wave_radps:.3g}" if design.kind == "pid" else "--design pid --wave-filter"
+        remedy = f"wave_filter_radps={weather.wave_radps:.3g}"
+        remedy += "" if design.kind == "pid" else ' with design="pid"'
         filtered = "wave_filter_radps" in design.gains
         notices.append(
             f"keeping a course in waves the rudder is at full rate {kept.rate_limited_percent:.0f} % of the time: "

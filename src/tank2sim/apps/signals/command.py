@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 def _written(result: SignalsResult, path: Path) -> dict[Path, str | bytes]:
     if result.filtered is None:
-        raise ArgumentError("output", "", "needs a filter", "say which with filter, such as lowpass:0.5")
+        raise ArgumentError("output", "", "needs a filter", 'say which, such as filter="lowpass:0.5"')
     return {path: result.filtered.to_csv()}
 
 

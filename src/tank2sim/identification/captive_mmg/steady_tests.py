@@ -166,7 +166,7 @@ def read_steady_tests(path: Path) -> SteadyTests:
     with_torque = _have_torque(steady, path)
     if heeled := next((run.name for run in steady if run.heel_rad), ""):
         problem = f"{heeled} has a heel; the method is of an upright hull"
-        raise InputError(path, "averages.columns.heel_rad", problem, "reduce such tests to a polynomial, without --mmg")
+        raise InputError(path, "averages.columns.heel_rad", problem, "reduce such tests to a polynomial")
     tests = SteadyTests(
         path=path,
         form=form,

@@ -115,7 +115,7 @@ def even_series(trial: Trial, name: str, max_gap_s: float | None = None) -> Seri
     limit = (GAP_STEPS + 0.5) * step if max_gap_s is None else max_gap_s
     if (longest := float(time[gap + 1] - time[gap])) > limit:
         problem = f"has no value from {time[gap]:.6g} to {time[gap + 1]:.6g} s, longer than {limit:.3g} s"
-        raise trial.fault(column, problem, "cut the record there, or allow it with --max-gap SECONDS")
+        raise trial.fault(column, problem, "cut the record there, or allow it by max_gap_s")
     count = round(float(time[-1] - time[0]) / step) + 1
     step = float(time[-1] - time[0]) / (count - 1)
     grid = time[0] + step * np.arange(count, dtype=np.float64)

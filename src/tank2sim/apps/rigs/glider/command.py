@@ -97,7 +97,7 @@ def glide(
     used_by["as_printed"] = as_printed and programme is None
     angles = np.atleast_1d(np.asarray(angles_deg, dtype=float))
     for argument in filter(used_by.get, used_by if not angles.size else ()):
-        raise ArgumentError(argument, "", "is of steady glides", "give their path angles as well (--angles 30)")
+        raise ArgumentError(argument, "", "is of steady glides", "give their path angles as well (angles_deg=30)")
     question = GlideQuestion(
         angles_rad=tuple(np.radians(angles).tolist()),
         roll_rad=math.radians(roll_deg),

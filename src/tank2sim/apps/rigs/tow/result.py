@@ -137,7 +137,7 @@ class TowResult(Result[TowStudy]):
             No body has these estimates: the total mass is not positive. Or B3, which a card needs, was not estimated.
         """
         if "B3_kgpm" not in self.fit.estimates:
-            raise ArgumentError("terms", "", "leaves out B3, the drag that a surge card needs", "add it (--terms B3)")
+            raise ArgumentError("terms", "", "leaves out B3, the drag that a surge card needs", 'add it (terms="B3")')
         body = self.study.body
         source = f"tank2sim tow {PurePath(self.study.tows).name}, method {self.method}"
         length = body.length_m if body else None

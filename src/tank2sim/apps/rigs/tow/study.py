@@ -268,10 +268,10 @@ def _notes_on_models(study: TowStudy) -> Iterator[Notice]:
         yield Notice(f"The model of lowest AIC is {best.label}, with {fault}; a better fit is not a better model.")
     late = {model.unknowns: model.aic for model in study.models}
     if not study.start_delay and late.get(SIMPLE_LATE.unknowns, 0.0) < late.get(SIMPLE.unknowns, 0.0) - 4:
-        yield Notice("A start delay explains these tows much better than none (--start-delay).")
+        yield Notice("A start delay explains these tows much better than none (start_delay=True).")
     if any(fit.condition_scaled > COLLINEAR**2 for fit in study.methods.values()):
         yield Notice(
-            "Take the drag as B3 v^2 alone (--terms B3), or hold M at a known value (--total-mass-kg, "
+            'Take the drag as B3 v^2 alone (terms="B3"), or hold M at a known value (total_mass_kg, '
             f"{_mass_by_theory(study)})."
         )
 
