@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tank2sim.arguments import PositiveArgument
 from tank2sim.arrays import Array
 from tank2sim.notices import Notice
 from tank2sim.records.csv_table import CsvTable, read_table
@@ -48,7 +49,7 @@ def read_trial_csv(path: Path | str | CsvTable) -> Trial:
     if _rudder_sign(table) == "port":
         signals |= {name: 0.0 - signals[name] for name in RUDDERS if name in signals}
         notices.append(Notice("the rudder is positive to port in the file, and to starboard here"))
-    scale = table.positive_comment("scale")
+    scale = table.bounded_comment("scale", PositiveArgument)
     columns = {name: table.heading(name) for name in signals if table.heading(name) != name}
     return Trial(table.path, time, signals, _noise(table), scale, tuple(notices), columns, origin_deg=_origin(table))
 

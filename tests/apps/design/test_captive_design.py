@@ -164,7 +164,7 @@ def test_the_other_side_of_a_figure_has_the_opposite_rudder():
         ({"figures": ""}, "no figure"),
         ({"carriage_length_m": 2.0}, "carriage_length_m"),
         ({"carriage_length_m": float("nan")}, "carriage_length_m"),
-        ({"model_length_m": 1000.0}, "--model-length"),
+        ({"model_length_m": 1000.0}, "model_length_m"),
         ({"largest": (12.0, 95.0, 0.5)}, "largest"),
         ({"tank": "nowhere.toml"}, "nowhere.toml"),
     ],

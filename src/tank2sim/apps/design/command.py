@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from tank2sim.api.verbs import Output, verb
-from tank2sim.arguments import ArgumentBounds, DrawsArgument, PositiveArgument, Seed
+from tank2sim.arguments import ArgumentBounds, DrawsArgument, Seed
 from tank2sim.errors import ArgumentError
 from tank2sim.files import CARD, TABLE
+from tank2sim.quantities import TankModelLength, TankSize
 
 if TYPE_CHECKING:
     from tank2sim.apps.design.result import CampaignDesignResult, TrialDesignResult
@@ -131,8 +132,8 @@ def design_campaign(
     figures: str | Sequence[str] = DESIGN_FIGURES,
     hours: Hours | None = None,
     tank: str | Path | TankFile | None = None,
-    carriage_length_m: PositiveArgument | None = None,
-    model_length_m: PositiveArgument | None = None,
+    carriage_length_m: TankSize | None = None,
+    model_length_m: TankModelLength | None = None,
     usual: str | Path | None = None,
     largest: tuple[float, float, float] | None = None,
     check_runs: bool = True,

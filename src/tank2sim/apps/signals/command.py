@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tank2sim.api.verbs import Output, verb
-from tank2sim.arguments import PositiveArgument
 from tank2sim.errors import ArgumentError
 from tank2sim.files import TABLE
+from tank2sim.quantities import GapLength
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,8 +35,8 @@ def signals(
     trials: str | Path | TrialRecord | pd.DataFrame | Sequence[str | Path | TrialRecord | pd.DataFrame],
     columns: str | Sequence[str] = (),
     *,
-    max_gap_s: PositiveArgument | None = None,
-    segment_s: PositiveArgument | None = None,
+    max_gap_s: GapLength | None = None,
+    segment_s: GapLength | None = None,
     filter: str | None = None,
 ) -> SignalsResult:
     """Mean, spread, correlation time, stationarity, normality and spectra of the signals of trials.

@@ -94,7 +94,7 @@ def test_bad_input_is_one_line(folder):
     refused(tank2sim("yaw", "none.csv", cwd=folder), "none.csv", "does not exist")
     refused(tank2sim("yaw", "water.csv", "--card", "mariner", cwd=folder), "--card", "-o")
     refused(tank2sim("yaw", "water.csv", "--mirror-percent", "0.1", cwd=folder), "not mirror images", "%")
-    refused(tank2sim("yaw", "water.csv", "-o", "x.toml", "--card", "mariner", cwd=folder), "inertia_kgm2")
+    refused(tank2sim("yaw", "water.csv", "-o", "x.toml", "--card", "mariner", cwd=folder), "--inertia")
     refused(tank2sim("yaw", "air.csv", "-o", "x.toml", "--card", "mariner", cwd=folder), "records in water")
     refused(tank2sim("yaw", "water.csv", "--reference", "air.csv", cwd=folder), "--reference-inertia")
     refused(tank2sim("yaw", "water.csv", "--rig", "mariner", cwd=folder), "model.kind")
