@@ -131,11 +131,10 @@ def write_outputs(
         contents[json] = result.to_json()
     if page:
         contents[page] = result.page()
+    if plot and not result.chart_names:
+        raise ArgumentError("plot", "", "there is no chart to draw", "leave it out")
     if plot and plot.suffix.lower() in PICTURE:
-        try:
-            contents[plot] = result.picture(ending=plot.suffix)
-        except LookupError:
-            raise ArgumentError("plot", "", "there is no chart to draw", "leave it out") from None
+        contents[plot] = result.picture(ending=plot.suffix)
     elif plot:
         writable_folder(plot)
         contents |= {plot / f"{file_name(name)}.png": picture for name, picture in result.pictures().items()}

@@ -83,6 +83,13 @@ def test_a_column_that_is_not_there_is_refused(path):
         run(path, "--columns", "phi_deg")
 
 
+def test_a_filter_whose_trial_is_not_written_says_how_to_write_it(path, tmp_path):
+    said = "the filtered trial is not written: add -o FILTERED.csv"
+    assert said in run(path, "--columns", "r", "--filter", "lowpass:0.3").output
+    assert said not in run(path, "--columns", "r", "--filter", "lowpass:0.3", "-o", tmp_path / "o.csv").output
+    assert said not in run(path).output
+
+
 def test_a_filtered_column_takes_the_place_of_the_measured_one(path, tmp_path):
     out = tmp_path / "filtered.csv"
     shown = run(path, "--columns", "r", "--filter", "lowpass:0.3,causal", "-o", out)

@@ -27,6 +27,7 @@ Instance = Annotated[int, ArgumentBounds(0, 100, whole=True)]
     default_ship="otter",
     name="serve",
     results=("tank2sim.apps.ardupilot.result:ServeResult",),
+    charts=False,
 )
 def serve(
     ship: Vessel,

@@ -33,6 +33,7 @@ Language = Literal[
     ),
     choices={"to": {name: form.words for name, form in FORMS.items()}},
     results=("tank2sim.apps.programs.convert_result:ConversionResult",),
+    charts=False,
 )
 def convert(
     ship: Vessel,

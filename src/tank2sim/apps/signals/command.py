@@ -26,9 +26,13 @@ def _written(result: SignalsResult, path: Path) -> dict[Path, str | bytes]:
     return {path: result.filtered.to_csv()}
 
 
+def _unwritten(result: SignalsResult) -> str:
+    return "" if result.filtered is None else "the filtered trial is not written: add -o FILTERED.csv"
+
+
 @verb(
     "statistics, spectra and filters of a record",
-    Output("-o", TABLE, "Write the trial with the filtered column.", _written, "FILTERED.csv"),
+    Output("-o", TABLE, "Write the trial with the filtered column.", _written, "FILTERED.csv", unwritten=_unwritten),
     results=("tank2sim.apps.signals.result:SignalsResult",),
 )
 def signals(
