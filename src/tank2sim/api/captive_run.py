@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from tank2sim.api.verbs import Output, verb
 from tank2sim.errors import ArgumentError, InputError
-from tank2sim.files import TABLE
+from tank2sim.files import TABLE, refuse_missing
 from tank2sim.quantities import SlantAngle, Speed
 
 if TYPE_CHECKING:
@@ -135,6 +135,8 @@ def _files(runs: str | Path | Sequence[str | Path]) -> list[Path]:
         raise ArgumentError("runs", "", "has no file", "give at least one run")
     if again := next((path for place, path in enumerate(paths) if path in paths[:place]), None):
         raise InputError(again, "", "is given twice", "give each run once")
+    for path in paths:
+        refuse_missing(path)
     return paths
 
 
