@@ -87,10 +87,12 @@ def _meant(name: str) -> str | None:
 
 def _check_content(table: CsvTable, signals: dict[str, Array]) -> None:
     if not any(name in signals for name in RUDDERS):
+        if craft := [table.heading(name) for name in table.columns if re.match(r"order_\w|n_\w+_", name)]:
+            problem = f"there is no rudder; by {', '.join(craft)} it is a trial of a craft with thrusters"
+            remedy = "identify, validate and gap take it with its card; for a ship with a rudder add delta_deg"
+            raise table.fault("header", problem, remedy)
         present = ", ".join(table.heading(name) for name in table.columns)
         remedy = f"add delta_deg (angle) or delta_order_deg (order); the columns are {present}"
-        if any(re.match(r"order_\w|n_\w+_", name) for name in table.columns):
-            remedy += "; trials of a craft with thrusters are taken by identify, validate and gap with its card"
         raise table.fault("header", "there is no rudder", remedy)
     for name in ("wind_speed_mps", "current_speed_mps"):
         if name in signals and np.any(signals[name] < 0):
