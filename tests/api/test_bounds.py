@@ -97,6 +97,8 @@ def test_what_is_no_number_is_refused(value: object) -> None:
         (lambda: SHIP.replace({"model.speed_mps": None}), SHIP.card.source),
         (lambda: SHIP.replace({"model.speed_mps": np.array([7.0])}), SHIP.card.source),
         (lambda: t2s.load(None), "card"),
+        (lambda: t2s.Ship("mariner"), "card"),
+        (lambda: t2s.Ship(5), "card"),
         (lambda: t2s.load(5), "card"),
         (lambda: t2s.load("mariner", 5), "values"),
         (lambda: t2s.guess(**GUESSED, turn35={"advance": 970}), "turn35"),

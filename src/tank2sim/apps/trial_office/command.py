@@ -103,4 +103,5 @@ def trial_office(
         sea_state=sea_state,
     )
     card = as_vessel(ship).manoeuvring()
-    return TrialOfficeResult(*study_trials(card, trials_of(trials) if trials else [], given, members))
+    none = isinstance(trials, list | tuple) and not trials
+    return TrialOfficeResult(*study_trials(card, [] if none else trials_of(trials), given, members))
