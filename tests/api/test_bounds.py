@@ -117,7 +117,7 @@ def test_what_is_no_number_is_refused(value: object) -> None:
         (lambda: t2s.compare(5), "cards"),
         (lambda: t2s.compare(["mariner", "kvlcc2"], members=1e99), "members"),
         (lambda: t2s.convert("kvlcc2-mmg", scatter=-1), "scatter"),
-        (lambda: t2s.design_campaign(SHIP, draws=-1), "draws"),
+        (lambda: t2s.design_campaign(SHIP, members=-1), "members"),
         (lambda: t2s.signals("x.csv", max_gap_s=-1), "max_gap_s"),
         (lambda: t2s.audit([5]), "trials"),
         (lambda: t2s.yaw("x.csv", inertia_kgm2=-1), "inertia_kgm2"),

@@ -8,7 +8,7 @@ import pytest
 
 from tests.cli.command_line import refused, tank2sim
 
-FAST = ("--figures", "steady_radius_m@20", "--draws", "0")
+FAST = ("--figures", "steady_radius_m@20", "--members", "0")
 
 
 @pytest.mark.slow

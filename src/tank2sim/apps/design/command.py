@@ -138,7 +138,7 @@ def design_campaign(
     largest: tuple[float, float, float] | None = None,
     check_runs: bool = True,
     one_side: bool = False,
-    draws: DrawsArgument | None = None,
+    members: DrawsArgument | None = None,
     seed: Seed = 0,
 ) -> CampaignDesignResult:
     """Design the next captive campaign of a ship: the runs that make its figures most certain.
@@ -174,7 +174,7 @@ def design_campaign(
     one_side : bool
         Figures to the side of the given rudder, in place of the mean over both sides, as trials are reported: a single
         side depends on Y0 and N0, which every run shows equally well.
-    draws : int
+    members : int
         Ships drawn from the errors of the card, for which the plan is to be good as well.
     seed : int
         Seed of the drawn ships.
@@ -187,7 +187,7 @@ def design_campaign(
     Examples
     --------
     >>> import tank2sim as t2s
-    >>> plan = t2s.design_campaign("mariner", figures="overshoot_1_deg@10/10", hours=2, draws=0)
+    >>> plan = t2s.design_campaign("mariner", figures="overshoot_1_deg@10/10", hours=2, members=0)
     >>> float(plan.runs["tank_min"].sum()) < 2 * 60
     True
     """
@@ -203,7 +203,7 @@ def design_campaign(
         hours=hours,
         check_runs=check_runs,
         one_side=one_side,
-        draws=DRAWN_SHIPS if draws is None else draws,
+        draws=DRAWN_SHIPS if members is None else members,
         seed=seed,
         source="tank" if tank is None or isinstance(tank, TankFile) else str(tank),
     )
