@@ -149,6 +149,20 @@ def bounds_of(kind: Any) -> ArgumentBounds | None:
     return next((part for part in get_args(kind) if isinstance(part, ArgumentBounds)), None)
 
 
+def range_of(kind: Any) -> tuple[float, float]:
+    """Lowest and highest value of a type of :mod:`tank2sim.quantities`, for example ``WindSpeed``.
+
+    Raises
+    ------
+    ValueError
+        It is not bounded on both sides.
+    """
+    bounds = bounds_of(kind)
+    if bounds is None or bounds.low is None or bounds.high is None:
+        raise ValueError(f"{kind} is not bounded")
+    return bounds.low, bounds.high
+
+
 def checked(function: Callable[_P, _T]) -> Callable[_P, _T]:
     """A function whose arguments are checked by their annotations: what they are, and the bounds of numbers.
 

@@ -49,10 +49,10 @@ Speed = Annotated[float, ArgumentBounds(0.001, 100.0)]
 """m/s, of a ship or a model."""
 SpeedKnots = Annotated[float, ArgumentBounds(0.002, 200.0)]
 """kn: the same."""
-WindSpeed = Annotated[float, ArgumentBounds(0, 100.0)]
-"""m/s, a mean. The strongest over one minute had 95 m/s (Patricia, 2015)."""
-StreamSpeed = Annotated[float, ArgumentBounds(0, 20.0)]
-"""m/s, of the water over the ground. The fastest tidal streams have 10 m/s (Saltstraumen)."""
+WindSpeed = Annotated[float, ArgumentBounds(0, 60.0)]
+"""m/s, a mean. A hurricane of the highest category begins at 70 m/s over one minute, and no ship manoeuvres in it."""
+StreamSpeed = Annotated[float, ArgumentBounds(0, 5.0)]
+"""m/s, of the water over the ground: faster tidal streams (Saltstraumen, 10 m/s) are passed at slack water."""
 WaveFrequency = Annotated[float, ArgumentBounds(0, 100.0, above=True)]
 """rad/s, of encounter. Waves of 6 mm length have 100."""
 Revolutions = Annotated[float, ArgumentBounds(-1e6, 1e6)]
