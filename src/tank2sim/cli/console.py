@@ -90,7 +90,7 @@ def show_result(
     if quiet:
         return
     for line in result.headline:
-        screen.print(escape(one_line(line)), soft_wrap=True)
+        screen.print(escape(one_line(words(line))), soft_wrap=True)
     for table in result.tables if verbose else result.screen_tables:
         show_table(table, words)
     for path in written:
