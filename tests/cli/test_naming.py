@@ -24,6 +24,7 @@ from tests.sources import tree
         ("tow", "none (start_delay=True), or length_m.", "none (--start-delay), or --length."),
         ("tow", "give length_m, or a line '# length_m: 0.67'", "give --length, or a line '# length_m: 0.67'"),
         ("tow", "ship.length_m and 'mass_kg: 3' and B3_kgpm=2", "ship.length_m and 'mass_kg: 3' and B3_kgpm=2"),
+        ("tow", "tows/length_m.csv: give length_m.", "tows/length_m.csv: give --length."),
         ("glide", "leave views=False out, give angles_deg=30", "leave --no-views out, give --angles 30"),
         ("gap", "kvlcc2: black_box: is not for a craft", "kvlcc2: --black-box: is not for a craft"),
         ("autopilot", 'wave_filter_radps=0.4 with design="pid"', "--wave-filter 0.4 with --design pid"),

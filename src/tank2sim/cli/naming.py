@@ -10,8 +10,9 @@ import click
 _VALUE = re.compile(r"(?<![\w.'-])([a-zA-Z]\w*)=(True|False|\"[^\"]*\"|[^\s\"',;:)]+)")
 """An argument with its value, as messages give it: ``terms="B3"``, ``start_delay=True``."""
 
-_NAME = re.compile(r"(?<![\w.'\"#=-])(?<!# )([a-z][a-zA-Z0-9]*(?:_[a-zA-Z0-9]+)+)(?![\w='\"])")
-"""A name that no English word is. Keys of files are written in quotation marks, or after a section and a point."""
+_NAME = re.compile(r"(?<![\w.'\"#=/-])(?<!# )([a-z][a-zA-Z0-9]*(?:_[a-zA-Z0-9]+)+)(?![\w='\"/]|\.\w)")
+"""A name that no English word is, and no part of a path. Keys of files are in quotation marks, or after a section and a
+point."""
 
 
 def options_of(command: click.Command) -> dict[str, click.Option]:
