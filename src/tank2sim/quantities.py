@@ -51,8 +51,8 @@ SpeedKnots = Annotated[float, ArgumentBounds(0.002, 200.0)]
 """kn: the same."""
 WindSpeed = Annotated[float, ArgumentBounds(0, 60.0)]
 """m/s, a mean. A hurricane of the highest category begins at 70 m/s over one minute, and no ship manoeuvres in it."""
-StreamSpeed = Annotated[float, ArgumentBounds(0, 5.0)]
-"""m/s, of the water over the ground: faster tidal streams (Saltstraumen, 10 m/s) are passed at slack water."""
+StreamSpeed = Annotated[float, ArgumentBounds(0, 10.0)]
+"""m/s, of the water over the ground: the fastest tidal stream (Saltstraumen)."""
 WaveFrequency = Annotated[float, ArgumentBounds(0, 100.0, above=True)]
 """rad/s, of encounter. Waves of 6 mm length have 100."""
 Revolutions = Annotated[float, ArgumentBounds(-1e6, 1e6)]

@@ -17,7 +17,7 @@ from tank2sim.dynamics.effects.particulars import with_particulars
 from tank2sim.dynamics.effects.surroundings import STILL_MPS, WIND, bearing, relative_air
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model, Parameter, Quantity, State
-from tank2sim.quantities import StreamSpeed, WindSpeed
+from tank2sim.quantities import WindSpeed
 
 STATIONS_IN_WIND = 4
 """Gauss-Legendre stations along the side: exact for a wind that does not change its side along the ship."""
@@ -118,7 +118,7 @@ CURRENT_FIELD = Effect(
     description="Water whose motion changes with time and place carries the ship, and takes its time to speed it up.",
     source="Fossen (2011), Handbook of Marine Craft Hydrodynamics and Motion Control, 8.3",
     parameters=(
-        *_horizontal("water", "current.", "towards which the current sets", range_of(StreamSpeed)[1], speeds(0.05)),
+        *_horizontal("water", "current.", "towards which the current sets", 5.0, speeds(0.05)),
         EffectParameter(
             "entry_time_s",
             "time in which the hull comes into the water of the input, by default L/u0",

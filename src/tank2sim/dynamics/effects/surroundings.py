@@ -16,7 +16,7 @@ from tank2sim.dynamics.effects.froude_scale import DIRECTION_SIGNS, lengths, spe
 from tank2sim.dynamics.effects.particulars import AREA_ERROR, with_particulars
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model
-from tank2sim.quantities import StreamSpeed, WindSpeed
+from tank2sim.quantities import WindSpeed
 
 STILL_MPS = 1e-6
 """Added to the square of a relative speed, so that its root has a slope at rest; far below any speed of air."""
@@ -61,7 +61,8 @@ CURRENT = Effect(
         EffectParameter(
             "speed_mps",
             "speed of the current over the ground",
-            *range_of(StreamSpeed),
+            0.0,
+            5.0,
             input_name="current.speed",
             absent=0.0,
             typical=speeds(0.05),  # 0.4 m/s at 15 knots (project choice)
