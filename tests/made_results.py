@@ -83,7 +83,7 @@ RESULTS: dict[str, Callable[[Path], Result]] = {
     "convention": _convention,
     "convert": lambda _: t2s.convert("kvlcc2-l7-mmg"),
     "convert to another scaling": lambda _: t2s.convert("mariner", scaling="dimensional"),
-    "design": lambda _: t2s.design_campaign("esso-osaka", figures="steady_radius_m@20", hours=1.0, draws=0),
+    "design": lambda _: t2s.design_campaign("esso-osaka", figures="steady_radius_m@20", hours=1.0, members=0),
     "design of a sea trial": lambda _: t2s.design_trial("mariner", figures="steady_radius_m@20", minutes=10.0),
     "export": lambda folder: t2s.load("mariner").to_fmu(folder / "m.fmu", fmi=2),
     "gap": lambda _: _gap(made_up.missing),

@@ -7,11 +7,11 @@ import functools
 import inspect
 import math
 import os
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import UnionType
-from typing import Annotated, Any, Literal, ParamSpec, TypeVar, Union, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Literal, ParamSpec, TypeVar, Union, get_args, get_origin
 
 from tank2sim.errors import ArgumentError, close_name
 
@@ -37,6 +37,17 @@ class ArgumentBounds:
     above: bool = False
     whole: bool = False
 
+    __is_annotated_types_grouped_metadata__: ClassVar[Literal[True]] = True
+
+    def __iter__(self) -> Iterator[object]:
+        """The same bounds as pydantic takes them, so that a key of a file may have the type of an argument."""
+        from annotated_types import Ge, Gt, Le
+
+        if self.low is not None:
+            yield Gt(self.low) if self.above else Ge(self.low)
+        if self.high is not None:
+            yield Le(self.high)
+
     @property
     def words(self) -> str:
         """The expected value in words: ``a number above 0``."""
@@ -44,6 +55,12 @@ class ArgumentBounds:
         lowest = "" if self.low is None else f" above {self.low:g}" if self.above else f" from {self.low:,.10g}"
         highest = "" if self.high is None else f" up to {self.high:,.10g}"
         return f"{kind}{lowest}{highest}"
+
+    def hold(self, number: float) -> bool:
+        """Whether a number is finite and within the bounds."""
+        low, high = self.low, self.high
+        too_low = low is not None and (number <= low if self.above else number < low)
+        return not too_low and (high is None or number <= high) and _finite(number)
 
     def checked(self, name: str, value: object) -> float | int:
         """The number as Python has it; numbers of NumPy are taken, text, truth values and arrays are not.
@@ -61,9 +78,7 @@ class ArgumentBounds:
         if not isinstance(number, int if self.whole else int | float) or isinstance(number, bool):
             raise ArgumentError(name, "", f"is {_short(value)}", f"give {self.words}")
         assert isinstance(number, int | float)
-        low, high = self.low, self.high
-        too_low = low is not None and (number <= low if self.above else number < low)
-        if too_low or (high is not None and number > high) or not _finite(number):
+        if not self.hold(number):
             raise ArgumentError(name, "", f"is {_short(value)}", f"give {self.words}")
         return number
 
@@ -89,11 +104,10 @@ NumberArgument = Annotated[float, ArgumentBounds()]
 PositiveArgument = Annotated[float, ArgumentBounds(0, above=True)]
 NonNegativeArgument = Annotated[float, ArgumentBounds(0)]
 AngleArgument = Annotated[float, ArgumentBounds(-360, 360)]
-SpeedArgument = Annotated[float, ArgumentBounds(0, 100, above=True)]
-"""m/s; as a card has it."""
 TuningRange = Annotated[float, ArgumentBounds(0, 100, above=True)]
 """Standard errors."""
 Percent = Annotated[float, ArgumentBounds(0, 1000)]
+PositivePercent = Annotated[float, ArgumentBounds(0, 1000, above=True)]
 Scatter = Annotated[float, ArgumentBounds(0, 10, above=True)]
 DrawsArgument = Annotated[int, ArgumentBounds(0, 1000, whole=True)]
 Seed = Annotated[int, ArgumentBounds(0, whole=True)]
@@ -130,9 +144,23 @@ def bounds_of(kind: Any) -> ArgumentBounds | None:
     Parameters
     ----------
     kind : type
-        ``SpeedArgument``, for example.
+        ``AngleArgument``, for example.
     """
     return next((part for part in get_args(kind) if isinstance(part, ArgumentBounds)), None)
+
+
+def range_of(kind: Any) -> tuple[float, float]:
+    """Lowest and highest value of a type of :mod:`tank2sim.quantities`, for example ``WindSpeed``.
+
+    Raises
+    ------
+    ValueError
+        It is not bounded on both sides.
+    """
+    bounds = bounds_of(kind)
+    if bounds is None or bounds.low is None or bounds.high is None:
+        raise ValueError(f"{kind} is not bounded")
+    return bounds.low, bounds.high
 
 
 def checked(function: Callable[_P, _T]) -> Callable[_P, _T]:

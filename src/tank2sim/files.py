@@ -224,6 +224,13 @@ def refuse_folder(path: Path) -> None:
         raise InputError(path, "", "is a folder, and a file was expected", "give the file in it")
 
 
+def refuse_missing(path: Path) -> None:
+    """Raise InputError if no file has this name, or a folder has it."""
+    refuse_folder(path)
+    if not path.exists():
+        raise InputError(path, "", "the file does not exist", "check the name")
+
+
 def read_text(path: Path) -> str:
     """Text of a UTF-8 file; a byte order mark is dropped, and every line ends in a line feed.
 

@@ -17,11 +17,8 @@ from tank2sim.apps.rigs.glider.command import glide
 from tank2sim.apps.steering.command import make_steering_page
 from tank2sim.apps.steering_cards.tuning_command import tune_ship_through
 from tank2sim.arguments import (
-    AngleArgument,
     EnsembleSize,
-    NumberArgument,
     Seed,
-    SpeedArgument,
     checked,
 )
 from tank2sim.arrays import Array
@@ -29,6 +26,7 @@ from tank2sim.cards import read_card
 from tank2sim.dynamics.vessel import Vessel
 from tank2sim.errors import InputError, close_name
 from tank2sim.files import FMU, refuse_other_ending, write_together
+from tank2sim.quantities import Breadth, Revolutions, SlantAngle, Speed
 from tank2sim.units import to_si
 
 if TYPE_CHECKING:
@@ -72,8 +70,8 @@ class Ship(Vessel):
         self,
         mesh: str | Path,
         *,
-        metacentric_height_m: float | None = None,
-        roll_gyradius_m: float | None = None,
+        metacentric_height_m: Breadth | None = None,
+        roll_gyradius_m: Breadth | None = None,
         roll_damping: float | None = None,
         frequencies_radps: Sequence[float] | None = None,
         directions_deg: Sequence[float] | None = None,
@@ -119,7 +117,7 @@ class Ship(Vessel):
         return Ship(card_in_waves(card, mesh, hull_of(card, given)))
 
     @checked
-    def turn(self, rudder_deg: AngleArgument = 35.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
+    def turn(self, rudder_deg: SlantAngle = 35.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
         """Simulate a turning circle: the rudder is put over at t = 0 and held for 540 deg of heading.
 
         Options as for :meth:`simulate`.
@@ -128,7 +126,7 @@ class Ship(Vessel):
 
     @checked
     def zigzag(
-        self, rudder_deg: AngleArgument = 10.0, heading_deg: AngleArgument = 10.0, **options: Unpack[SimulationOptions]
+        self, rudder_deg: SlantAngle = 10.0, heading_deg: SlantAngle = 10.0, **options: Unpack[SimulationOptions]
     ) -> ManoeuvreResult:
         """Simulate a zigzag: the rudder (negative begins to port) is reversed at each `heading_deg` off the course.
 
@@ -137,12 +135,12 @@ class Ship(Vessel):
         return self.simulate(f"zigzag:{rudder_deg:.10g}/{heading_deg:.10g}", **options)
 
     @checked
-    def pullout(self, rudder_deg: AngleArgument = 20.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
+    def pullout(self, rudder_deg: SlantAngle = 20.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
         """Simulate a pull-out: a steady turn with `rudder_deg`, then the neutral rudder. Options: :meth:`simulate`."""
         return self.simulate(f"pullout:{rudder_deg:.10g}", **options)
 
     @checked
-    def spiral(self, rudder_deg: AngleArgument = 20.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
+    def spiral(self, rudder_deg: SlantAngle = 20.0, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
         """Simulate a direct (Dieudonne) spiral, from `rudder_deg` to the other side and back.
 
         Options as for :meth:`simulate`.
@@ -150,9 +148,7 @@ class Ship(Vessel):
         return self.simulate(f"spiral:{rudder_deg:.10g}", **options)
 
     @checked
-    def stop(
-        self, revolutions_rpm: NumberArgument | None = None, **options: Unpack[SimulationOptions]
-    ) -> ManoeuvreResult:
+    def stop(self, revolutions_rpm: Revolutions | None = None, **options: Unpack[SimulationOptions]) -> ManoeuvreResult:
         """Simulate a stop with revolutions astern (rpm, negative or 0), by default full astern.
 
         Options as for :meth:`simulate`.
@@ -209,7 +205,7 @@ class Ship(Vessel):
     @checked
     def state_space(
         self,
-        speed_mps: SpeedArgument | None = None,
+        speed_mps: Speed | None = None,
         *,
         states: Iterable[str] | None = None,
         inputs: Iterable[str] | None = None,

@@ -15,12 +15,11 @@ import pytest
 
 import tank2sim as t2s
 from tank2sim import memory
-from tank2sim.api.commands import VERBS
+from tank2sim.api.commands import VERBS, variants_of
 from tank2sim.arguments import (
     AngleArgument,
     ArgumentBounds,
     FalseDiscovery,
-    SpeedArgument,
     annotated_kind,
     bounds_of,
     checked,
@@ -30,9 +29,13 @@ from tank2sim.arguments import (
 from tank2sim.cli import COMMANDS
 from tank2sim.cli import tank2sim as group
 from tank2sim.gap.search.decision import LIKELY, SUREST
+from tank2sim.quantities import Speed
+from tank2sim.units import in_words
 from tests.cli.command_line import refused, tank2sim
+from tests.conftest import ROOT
 
 SHIP = t2s.load("mariner")
+TOWS = ROOT / "models" / "wilinski-zellman" / "tows.csv"
 GUESSED = {"length_m": 320, "beam_m": 58, "draught_m": 20.8, "block": 0.81, "speed_kn": 15.5}
 TWICE = pd.DataFrame([[0, 1, 2], [1, 1, 2]], columns=["t_s", "delta_order_deg", "delta_order_deg"])
 TIMES = {"t_s": [0.0, 1.0]}
@@ -94,6 +97,8 @@ def test_what_is_no_number_is_refused(value: object) -> None:
         (lambda: SHIP.replace({"model.speed_mps": None}), SHIP.card.source),
         (lambda: SHIP.replace({"model.speed_mps": np.array([7.0])}), SHIP.card.source),
         (lambda: t2s.load(None), "card"),
+        (lambda: t2s.Ship("mariner"), "card"),
+        (lambda: t2s.Ship(5), "card"),
         (lambda: t2s.load(5), "card"),
         (lambda: t2s.load("mariner", 5), "values"),
         (lambda: t2s.guess(**GUESSED, turn35={"advance": 970}), "turn35"),
@@ -112,7 +117,7 @@ def test_what_is_no_number_is_refused(value: object) -> None:
         (lambda: t2s.compare(5), "cards"),
         (lambda: t2s.compare(["mariner", "kvlcc2"], members=1e99), "members"),
         (lambda: t2s.convert("kvlcc2-mmg", scatter=-1), "scatter"),
-        (lambda: t2s.design_campaign(SHIP, draws=-1), "draws"),
+        (lambda: t2s.design_campaign(SHIP, members=-1), "members"),
         (lambda: t2s.signals("x.csv", max_gap_s=-1), "max_gap_s"),
         (lambda: t2s.audit([5]), "trials"),
         (lambda: t2s.yaw("x.csv", inertia_kgm2=-1), "inertia_kgm2"),
@@ -157,7 +162,7 @@ def test_a_function_is_checked_by_its_annotations() -> None:
     def asked(
         angle: AngleArgument,
         *,
-        speed: SpeedArgument | None = None,
+        speed: Speed | None = None,
         texts: Sequence[str] = (),
         numbers: Mapping[str, float] | None = None,
         path: str | Path = "",
@@ -258,6 +263,65 @@ def test_the_command_line_calls_an_argument_by_its_option(arguments: str, option
     done = tank2sim(*arguments.split(), cwd=tmp_path)
     assert option in done.stderr and not list(tmp_path.iterdir())
     refused(done)
+
+
+def test_every_argument_with_a_unit_is_bounded_on_both_sides() -> None:
+    """A length of 1e9 m, a depth of 1e6 m: a number that no vessel and no sea has is a slip of the unit."""
+    functions = [one for name in VERBS.names() for one in (VERBS[name], *variants_of(VERBS[name]).values())]
+    calls = [call for verb in functions for call in (verb.function, *(output.write for output in verb.outputs))]
+    calls += [call for name, call in vars(t2s.Ship).items() if inspect.isfunction(call) and name[0] != "_"]
+    bounded, open_ended = 0, set()
+    for function in calls:
+        for argument in inspect.signature(function).parameters.values():
+            kind = annotated_kind(argument.annotation, function)
+            parts = (kind,) if get_origin(kind) is Annotated else get_args(kind) or (kind,)
+            numbers = [one for one in parts if one is float or (get_origin(one) is Annotated and bounds_of(one))]
+            for bounds in map(bounds_of, numbers if in_words(argument.name)[1] else ()):
+                if bounds is None or bounds.low is None or bounds.high is None:
+                    open_ended.add((function.__name__, argument.name))
+                bounded += 1
+    assert open_ended == {("tow", "force_N")}  # a number or the coefficients of a polynomial: bounded by its values
+    assert bounded > 50
+
+
+@pytest.mark.parametrize(
+    "call, name",
+    [
+        (lambda: t2s.load("kulikovsky-velikanov").glide(budget_kg=1, depth_m=1e6), "depth_m"),
+        (lambda: t2s.load("kulikovsky-velikanov").glide(budget_kg=1e15, depth_m=100), "budget_kg"),
+        (lambda: t2s.tow(TOWS, length_m=1e9), "length_m"),
+        (lambda: t2s.tow(TOWS, beam_m=1e-9), "beam_m"),
+        (lambda: t2s.tow(TOWS, volume_m3=1e30), "volume_m3"),
+        (lambda: t2s.tow(TOWS, mass_kg=1e30), "mass_kg"),
+        (lambda: t2s.tow(TOWS, total_mass_kg=1e30), "total_mass_kg"),
+        (lambda: t2s.tow(TOWS, force_N=1e30), "force_N"),
+        (lambda: t2s.tow(TOWS, force_N=[1.0, 1e30]), "force_N"),
+        (lambda: t2s.yaw("x.csv", torque_constant_NmpA=1e30), "torque_constant_NmpA"),
+        (lambda: t2s.yaw("x.csv", inertia_error_kgm2=1e30), "inertia_error_kgm2"),
+        (lambda: t2s.simulate_yaw("alyshev", "x.csv", noise_A=1e30), "noise_A"),
+        (lambda: t2s.signals("x.csv", max_gap_s=1e12), "max_gap_s"),
+        (lambda: SHIP.turn(300), "rudder_deg"),
+        (lambda: SHIP.turn(35, duration_s=1e12), "duration_s"),
+        (lambda: SHIP.autopilot(wind_mps=1e6), "wind_mps"),
+        (lambda: SHIP.autopilot(current_mps=1e6), "current_mps"),
+        (lambda: SHIP.autopilot(wave_yaw_deg=1e6), "wave_yaw_deg"),
+        (lambda: SHIP.autopilot(wave_filter_radps=1e6), "wave_filter_radps"),
+        (lambda: SHIP.stop(-1e9), "revolutions_rpm"),
+        (lambda: SHIP.state_space(1e-30), "speed_mps"),
+        (lambda: t2s.trial_office("x.csv", ship=SHIP, draught_fore_m=1e6), "draught_fore_m"),
+        (lambda: t2s.trial_office("x.csv", ship=SHIP, sea_state=99), "sea_state"),
+        (lambda: t2s.design_campaign(SHIP, model_length_m=1e9), "model_length_m"),
+        (lambda: t2s.validate(SHIP, required_percent=1e9), "required_percent"),
+        (lambda: SHIP.replace({"ship.beam_m": 1e9}), SHIP.card.source),
+        (lambda: SHIP.replace({"ship.draught_m": 1e6}), SHIP.card.source),
+        (lambda: SHIP.replace({"ship.rudder_area_m2": 1e9}), SHIP.card.source),
+        (lambda: SHIP.replace({"ship.water_depth_m": 1e6}), SHIP.card.source),
+    ],
+)
+def test_a_size_that_nothing_has_is_refused(call: Callable[[], object], name: str) -> None:
+    with pytest.raises(t2s.InputError) as caught:
+        call()
+    assert caught.value.source == name and caught.value.remedy
 
 
 @pytest.mark.parametrize("text", ["15,5", "15kn", "fast"])

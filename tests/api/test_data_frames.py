@@ -183,6 +183,14 @@ def test_orders_and_tracks_are_frames() -> None:
     np.testing.assert_array_equal(asked.call_args.args[2].waypoints, track.to_numpy())
 
 
+def test_the_report_of_a_sea_trial_takes_a_frame_as_its_file(tmp_path) -> None:
+    run = t2s.load("mariner").turn(35, duration_s=1100.0)
+    run.to_csv(tmp_path / "turn.csv")
+    by_file = t2s.trial_office(tmp_path / "turn.csv", ship="mariner", members=0)
+    by_frame = t2s.trial_office(pd.read_csv(tmp_path / "turn.csv", comment="#"), ship="mariner", members=0)
+    assert by_frame.study.current == by_file.study.current
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [

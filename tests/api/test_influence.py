@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -103,3 +105,30 @@ def test_a_ship_card_is_not_a_steering_card() -> None:
     with pytest.raises(t2s.InputError) as refused:
         t2s.steering_models("mariner")
     assert refused.value.remedy
+
+
+def test_no_name_of_a_parameter_is_cut_in_the_charts_of_a_craft() -> None:
+    """Vega cuts labels at 180 px where an axis states no limit."""
+    cut = []
+    for name, chart in t2s.load("otter").influence()._charts().items():
+        for part in _parts(chart):
+            for axis, field in ((part.get("y"), "name"), (part.get("y"), "figure"), (part.get("x"), "name")):
+                if isinstance(axis, dict) and axis.get("field") == field:
+                    labels = {row[field] for row in _rows(chart) if field in row}
+                    widest = 7 * max(map(len, labels), default=0)  # px; Arial takes 6 a letter, the widest fonts 7
+                    if widest > (axis.get("axis") or {}).get("labelLimit", 180):
+                        cut.append((name, field))
+    assert not cut
+
+
+def _parts(chart: object) -> Iterator[dict[str, Any]]:
+    """All mappings in a chart."""
+    if isinstance(chart, dict):
+        yield chart
+    for part in chart.values() if isinstance(chart, dict) else chart if isinstance(chart, list) else ():
+        yield from _parts(part)
+
+
+def _rows(chart: object) -> list[dict[str, Any]]:
+    """All rows of the data of a chart."""
+    return [row for part in _parts(chart) if isinstance(part.get("values"), list) for row in part["values"]]

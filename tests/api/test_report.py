@@ -44,3 +44,10 @@ def test_a_page_never_takes_the_place_of_its_json(turn: t2s.ManoeuvreResult, tmp
     turn.to_json(tmp_path / "turn.json")
     refused(tank2sim("report", "turn.json", "-o", "turn.json", cwd=tmp_path), "turn.json")
     assert json.loads((tmp_path / "turn.json").read_text())["ship"] == "Mariner class"
+
+
+def test_the_report_of_a_page_to_steer_says_how_to_make_the_page() -> None:
+    made = t2s.load("mariner").steering_page()
+    assert not any("not in the JSON" in line for line in made.headline)
+    again = t2s.make_report(made.to_dict())
+    assert "tank2sim steer CARD --page FILE.html" in again.headline[-1] and again.headline[-1] in again.page()

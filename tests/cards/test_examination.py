@@ -58,7 +58,7 @@ IMPLAUSIBLE = {
     ),
     "resistance that falls with speed": ("mariner", {"derivatives.Xu": 184e-5}, "Xu"),
     "steering rate in deg/min": ("mariner", {"steering_gear.max_rate_degps": 300.0}, "max_rate_degps"),
-    "rudder's height in mm": ("kvlcc2-l7-mmg", {"rudder.height_m": 345.0}, "rudder height"),
+    "rudder's height in cm": ("kvlcc2-l7-mmg", {"rudder.height_m": 34.5}, "rudder height"),
     "slope of the rudder's force per degree": ("kvlcc2-l7-mmg", {"rudder.f_alpha": 0.0479}, "f_alpha"),
     "thrust that rises with J": ("kvlcc2-l7-mmg", {"propeller.k_1": 0.2753}, "k_1"),
     "thrust deduction in place of 1 - t": ("kvlcc2-l7-mmg", {"propeller.t_P": 0.78}, "t_P"),

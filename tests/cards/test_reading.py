@@ -112,7 +112,7 @@ def test_uncertainty_left_out_is_two_percent() -> None:
         ("length_m = 100.0", "length_m = 1e100", "ship.length_m", "at most 1000 "),
         ("length_m = 100.0", "length_m = 1e-300", "ship.length_m", "at least 0.01 "),
         ("speed_mps = 10.0", "speed_mps = 1e-300", "model.speed_mps", "at least 0.001 "),
-        ("kgpm3 = 1000.0", "kgpm3 = 1e30", "environment.water_density_kgpm3", "below 1300 "),
+        ("kgpm3 = 1000.0", "kgpm3 = 1e30", "environment.water_density_kgpm3", "at most 1300 "),
         ("[derivatives]", "[steering_gear]\ntime_constant_s = 1e-9\n[derivatives]", "time_constant_s", "0.001 "),
         (
             "[derivatives]",

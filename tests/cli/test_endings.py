@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import re
 from pathlib import Path
 from xml.etree import ElementTree
 
+import click
 import pytest
 
 import tank2sim as t2s
+from tank2sim.api.commands import VERBS
+from tank2sim.api.results import result_classes
+from tank2sim.cli import COMMANDS
+from tank2sim.cli import tank2sim as group
 from tank2sim.cli.derived import OutputFile
 from tank2sim.files import write_together
 from tests.cli.command_line import refused, tank2sim
@@ -105,6 +111,21 @@ def test_the_command_line_draws_what_the_ending_says(tmp_path: Path) -> None:
     assert (tmp_path / "y.pdf").read_bytes().startswith(b"%PDF-")
 
 
+def test_a_command_whose_results_have_no_chart_does_not_offer_to_draw_one(tmp_path: Path) -> None:
+    commands = {name: group.get_command(click.Context(group), name) for name in COMMANDS if VERBS[name].results}
+    without = {
+        name
+        for name, command in commands.items()
+        if command and not any("--plot" in option.opts for option in command.params)
+    }
+    assert without == {"convention", "convert", "demo", "export", "serve", "ships", "steer"}
+    for name in without:
+        for kind in result_classes(name):
+            assert "charts" not in inspect.getsource(kind), kind
+    refused(tank2sim("ships", "--plot", "x.png", cwd=tmp_path), "--plot")
+    assert not list(tmp_path.iterdir())
+
+
 def test_results_refuse_the_ending_of_another_kind(tmp_path: Path) -> None:
     ship = t2s.load("mariner")
     run = ship.turn(35, duration_s=20.0)
@@ -127,11 +148,6 @@ def test_results_refuse_the_ending_of_another_kind(tmp_path: Path) -> None:
 
 
 def test_every_option_for_a_file_that_is_written_checks_its_ending() -> None:
-    import click
-
-    from tank2sim.cli import COMMANDS
-    from tank2sim.cli import tank2sim as group
-
     written = {"--page", "--plot", "-o", "--ssp", "--budget", "--cycle", "--orders", "--export", "--out"}
     for name in COMMANDS:
         command = group.get_command(click.Context(group), name)

@@ -35,7 +35,9 @@ def test_influence_tells_both_coefficients_of_every_parameter(tmp_path) -> None:
 
 def test_a_result_without_a_chart_cannot_be_drawn(tmp_path) -> None:
     points = ("influence", "mariner", "--through", "35@35", "1400m@3")
-    refused(tank2sim(*points, "--plot", "p.png", cwd=tmp_path), "--plot", "there is no chart to draw")
+    for place in ("p.png", "charts"):
+        refused(tank2sim(*points, "--plot", place, cwd=tmp_path), "--plot", "there is no chart to draw")
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_tuned_card_is_written_and_read_again(tmp_path) -> None:

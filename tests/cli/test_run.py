@@ -152,6 +152,12 @@ def run(*arguments):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("name, problem", [("dir.csv", "is a folder"), ("none.csv", "does not exist")])
+def test_a_name_that_is_wrong_is_said_before_a_type_that_is_missing(tmp_path, name, problem):
+    (tmp_path / "dir.csv").mkdir()
+    refused(tank2sim("run", name, cwd=tmp_path), name, problem)
+
+
 def test_a_missing_run_is_refused_and_nothing_is_written(tmp_path):
     faulty = write(Campaign(seed=6, size="linear", rate_hz=5.0, faults={"drift_+04": "missing"}), tmp_path / "c").path
     card = tmp_path / "card.toml"

@@ -270,7 +270,7 @@ RESULTS: dict[str, list[str]] = {
     "compare.json": ["compare", "card.toml", "tanker.toml", "--members", "0"],
     "validate.json": ["validate", "card.toml", "zigzag.csv", "--members", "0"],
     "influence.json": ["influence", "card.toml", "--figures", "K_per_s"],
-    "design.json": ["design", "card.toml", "--figures", "steady_radius_m@20", "--hours", "3", "--draws", "0"],
+    "design.json": ["design", "card.toml", "--figures", "steady_radius_m@20", "--hours", "3", "--members", "0"],
     "glide.json": ["glide", "glider.toml", "--angles", "-30", "--programme", "programme.csv"],
     "autopilot.json": ["autopilot", "card.toml"],
     "signals.json": ["signals", "zigzag.csv"],

@@ -13,7 +13,7 @@ from tests.corpus.worker import Job
 Recipe = tuple[list[str], list[str]]
 """Arguments, and the files among them that are mutated."""
 
-QUICK = ["--figures", "steady_radius_m@20", "--hours", "3", "--draws", "0"]
+QUICK = ["--figures", "steady_radius_m@20", "--hours", "3", "--members", "0"]
 FAST = ["--structure", "linear", "--members", "0", "--method"]
 
 RECIPES: dict[str, list[Recipe]] = {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from tank2sim.gap.result import (
     OUTSIDE_LIBRARY,
     Passed,
     Refitted,
+    Surroundings,
 )
 from tank2sim.gap.search.decision import Decision
 from tank2sim.gap.search.explanations import Search
@@ -127,3 +129,23 @@ def test_no_wind_of_each_trial_takes_the_place_of_what_closes_most_of_the_gap(
     judged = Judged(decision(MISSING, ONE), Proof((), named, CARD, CARD, [replace(far, before=passed(60, 0).before)]))
     assert judge_surroundings.judge_surroundings(Prover(20.0, lambda effects: after), FOUND, judged, ()) is judged
     assert bool(tried) == sought
+
+
+@pytest.mark.parametrize(("speed_mps", "named"), [(8.0, True), (110.0, False)])
+def test_a_wind_that_never_blows_is_not_named_by_simulation(monkeypatch, speed_mps: float, named: bool) -> None:
+    """Two numbers to a trial also follow a card that is far off; a wind of 110 m/s is no explanation."""
+    blows = {"a": Surroundings(speed_mps, 0.0, 1.0, 0.1)}
+    common = judge_surroundings.CommonSurroundings("wind", {}, {}, blows, np.array([0.1]))
+    monkeypatch.setattr(judge_surroundings, "fit_common_surroundings", lambda *arguments: common)
+    monkeypatch.setattr(judge_surroundings, "_at", lambda fit, *others: fit)
+    monkeypatch.setattr(judge_surroundings, "closes_gap", lambda *arguments: True)
+    wind = SimpleNamespace(hypothesis=SimpleNamespace(effects=("wind",)))
+    none = SimpleNamespace(hypothesis=SimpleNamespace(recorded=()))
+    search = SimpleNamespace(fits=(wind,), none=none, likelihood=SimpleNamespace(motion=SimpleNamespace(names=("a",))))
+    prover = SimpleNamespace(
+        card=CARD,
+        trials=(None, None),
+        replays=SimpleNamespace(executor=None, noise={}),
+        prove=lambda fit, named: SimpleNamespace(results=()),
+    )
+    assert bool(judge_surroundings._simulated(prover, search, ["wind"])) == named

@@ -118,7 +118,7 @@ def test_a_gauge_that_shows_nothing_in_any_row_of_averages_is_refused_by_its_col
     ("change", "place", "reported"),
     [
         (("length_m = 4.0", "lenght_m = 4.0"), "model.lenght_m", "did you mean length_m"),
-        (("length_m = 4.0", "length_m = -4.0"), "model.length_m", "greater than 0"),
+        (("length_m = 4.0", "length_m = -4.0"), "model.length_m", "at least 0.1"),
         (("mass_kg = 400.0", ""), "model.mass_kg", "is missing"),
         (('"on_gauge"', '"gauge"'), "test.force_convention", "on_model"),
         (("speed_mps = 1.2", 'speed_mps = "fast"'), "test.speed_mps", "a number was expected"),
@@ -146,7 +146,7 @@ def test_missing_files_and_bad_cells_are_reported_together_by_run(folder):
     runs += RUN.format(file="gone.csv", type="pure_sway", more="")
     runs += RUN.format(file="bad.csv", type="static_drift", more="")
     path = campaign(folder, runs)
-    with pytest.raises(InputError, match=r"gone\.csv.*does not exist.*bad\.csv.*line 2, column X_N.*--keep-going"):
+    with pytest.raises(InputError, match=r"gone\.csv.*does not exist.*bad\.csv.*line 2, column X_N.*keep_going=True"):
         read_campaign(path)
     read = read_campaign(path, keep_going=True)
     assert [run.name for run in read.runs] == ["drift.csv"]

@@ -92,7 +92,7 @@ def test_faulty_csvs_are_refused_with_their_place(write, old, new, said):
 
 
 def test_a_trial_of_a_craft_is_refused_with_the_commands_that_take_it(write):
-    with pytest.raises(InputError, match="craft with thrusters are taken by identify"):
+    with pytest.raises(InputError, match="is a trial of a craft with thrusters; identify, validate and gap take it"):
         read_trial_file(write("t_s,psi_deg,order_port,order_starboard\n0,0,0,0\n1,0,0,0\n"))
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
 from tank2sim.cards import SteeredBy
 from tank2sim.identification.craft.fit import CoefficientVerdict
 from tank2sim.identification.craft.study import (
@@ -120,3 +122,14 @@ def test_results_read_from_their_json_have_the_same_pages() -> None:
 def test_one_trial_determines_in_the_singular() -> None:
     found = CraftIdentificationResult(replace(IDENTIFIED, trials=("steps",)))
     assert "1 trial determines 1 of 2 coefficients" in found.headline[0]
+
+
+def test_the_coefficients_of_a_craft_are_drawn_next_to_those_of_its_card() -> None:
+    result = CraftIdentificationResult(IDENTIFIED)
+    assert result.chart_names == ("coefficients",)
+    drawn = result._charts()["coefficients"]
+    rows = [row for part in drawn["hconcat"][0]["layer"] for row in part["data"]["values"]]
+    found = next(row for row in rows if row.get("name") == "Xu" and row["run"] == "estimate")
+    assert found["v"] == pytest.approx(-10 / 30)
+    assert found["high"] - found["v"] == pytest.approx(1.96 * 5 / 30, rel=1e-3)
+    assert result.picture().startswith(b"\x89PNG")

@@ -22,6 +22,7 @@ from tank2sim.cards.reading import parse_card
 from tank2sim.cards.wave_table import DRIFT_COLUMNS, MIRRORED, WAVE_MOTIONS, motion_columns, wave_table
 from tank2sim.dynamics.effects.effect import card_particular
 from tank2sim.errors import InputError
+from tank2sim.files import refuse_missing
 
 DIRECTIONS_DEG = tuple(float(angle) for angle in range(0, 181, 15))
 """Directions of a table, deg: drift forces and motions change little within 15 deg. Project choice."""
@@ -92,8 +93,7 @@ def read_hull(path: str | Path) -> Any:
     except ImportError:
         remedy = "install it with: pip install 'tank2sim[waves]'"
         raise InputError(path, "", "needs the library capytaine, which is not installed", remedy) from None
-    if not Path(path).is_file():
-        raise InputError(path, "", "the file does not exist", "check the name")
+    refuse_missing(Path(path))
     try:
         mesh = solver.load_mesh(str(path)).immersed_part()
         body = solver.FloatingBody(

@@ -157,6 +157,11 @@ class Result(ABC, Generic[_S]):
 
         return AltairCharts(self._charts())
 
+    @property
+    def chart_names(self) -> tuple[str, ...]:
+        """Names of :meth:`charts`, the main one first."""
+        return tuple(self._charts())
+
     def _charts(self) -> dict[str, ChartSpec | alt.TopLevelMixin]:
         """Charts of all sections by name, as the sections have them."""
         charts: dict[str, ChartSpec | alt.TopLevelMixin] = {}

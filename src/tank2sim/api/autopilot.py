@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tank2sim.api.verbs import Output, Progress, verb
-from tank2sim.arguments import ArgumentBounds, NonNegativeArgument, PositiveArgument, Seed, SpeedArgument
+from tank2sim.arguments import ArgumentBounds, Seed
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.files import FMU
+from tank2sim.quantities import Speed, StreamSpeed, WaveFrequency, WeightAngle, WindSpeed, YawingAngle
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -60,14 +61,14 @@ def autopilot(
     ship: Vessel,
     design: Literal["pd", "pid", "lqr", "robust"] = "pid",
     *,
-    speed_mps: SpeedArgument | None = None,
-    heading_weight_deg: PositiveArgument = 5.0,
-    rudder_weight_deg: PositiveArgument = 5.0,
-    wave_filter_radps: PositiveArgument | None = None,
+    speed_mps: Speed | None = None,
+    heading_weight_deg: WeightAngle = 5.0,
+    rudder_weight_deg: WeightAngle = 5.0,
+    wave_filter_radps: WaveFrequency | None = None,
     course_change_deg: CourseAngle = 20.0,
-    current_mps: NonNegativeArgument | None = None,
-    wind_mps: NonNegativeArgument | None = None,
-    wave_yaw_deg: NonNegativeArgument | None = None,
+    current_mps: StreamSpeed | None = None,
+    wind_mps: WindSpeed | None = None,
+    wave_yaw_deg: YawingAngle | None = None,
     seed: Seed | None = None,
     track: pd.DataFrame | Sequence[Sequence[Any]] | Array | str | Path | None = None,
 ) -> AutopilotResult | CraftAutopilotResult:

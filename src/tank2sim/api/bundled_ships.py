@@ -10,7 +10,12 @@ if TYPE_CHECKING:
     from tank2sim.results.ships import ShipsResult
 
 
-@verb("the bundled ships, by the names that CARD takes", name="ships", results=("tank2sim.results.ships:ShipsResult",))
+@verb(
+    "the bundled ships, by the names that CARD takes",
+    name="ships",
+    results=("tank2sim.results.ships:ShipsResult",),
+    charts=False,
+)
 def list_ships() -> ShipsResult:
     """List the bundled ships, by the names that CARD takes."""
     from tank2sim.bundled import bundled_cards

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from tank2sim.api.verbs import Output, verb
-from tank2sim.arguments import AngleArgument, SpeedArgument
 from tank2sim.errors import ArgumentError, InputError
-from tank2sim.files import TABLE
+from tank2sim.files import TABLE, refuse_missing
+from tank2sim.quantities import SlantAngle, Speed
 
 if TYPE_CHECKING:
     from tank2sim.records.campaign_form import CampaignFile, RunSheet, RunType, TankTest
@@ -59,9 +59,9 @@ def reduce_runs(
     type: RunName | None = None,
     campaign: str | Path | None = None,
     force_convention: Literal["on_model", "on_gauge", "hydrodynamic"] | None = None,
-    speed_mps: SpeedArgument | None = None,
-    drift_deg: AngleArgument | None = None,
-    rudder_deg: AngleArgument | None = None,
+    speed_mps: Speed | None = None,
+    drift_deg: SlantAngle | None = None,
+    rudder_deg: SlantAngle | None = None,
 ) -> CaptiveRunResult:
     """Reduce one captive run by itself to Fourier coefficients with errors, an averaged cycle and a residual.
 
@@ -135,6 +135,8 @@ def _files(runs: str | Path | Sequence[str | Path]) -> list[Path]:
         raise ArgumentError("runs", "", "has no file", "give at least one run")
     if again := next((path for place, path in enumerate(paths) if path in paths[:place]), None):
         raise InputError(again, "", "is given twice", "give each run once")
+    for path in paths:
+        refuse_missing(path)
     return paths
 
 

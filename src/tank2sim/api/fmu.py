@@ -28,6 +28,7 @@ HOSTS = {
     Output("--c", (), "Write the ship as plain C99, too.", lambda result, path: result.c_files(path), "DIR"),
     name="export",
     results=("tank2sim.results.fmu:ExportResult",),
+    charts=False,
 )
 def make_fmu_file(
     ship: Vessel,

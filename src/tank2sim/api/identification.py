@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tank2sim.api.verbs import Output, Progress, verb
-from tank2sim.arguments import Count, DrawsOfChain, PositiveArgument, SmallEnsemble, refuse_set
+from tank2sim.arguments import Count, DrawsOfChain, SmallEnsemble, refuse_set
 from tank2sim.errors import ArgumentError, InputError, close_name
 from tank2sim.files import CARD
 from tank2sim.identification.trials.options import (
@@ -24,6 +24,7 @@ from tank2sim.identification.trials.options import (
     Sampler,
     TrialMethod,
 )
+from tank2sim.quantities import Duration
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -65,7 +66,7 @@ def identify(
     structure: str = BY_EVIDENCE,
     campaign: str | Path | None = None,
     inertia: bool = False,
-    piece_s: PositiveArgument | None = None,
+    piece_s: Duration | None = None,
     trust_card: bool = False,
     hold: Sequence[str] = (),
     force: bool = False,

@@ -7,9 +7,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tank2sim.api.verbs import Output, named_numbers, verb
-from tank2sim.arguments import PROCESSES, EnsembleSize, PositiveArgument, Seed
+from tank2sim.arguments import PROCESSES, EnsembleSize, Seed
 from tank2sim.errors import ArgumentError
 from tank2sim.files import TABLE
+from tank2sim.quantities import Duration
 
 if TYPE_CHECKING:
     from tank2sim.dynamics.vessel import Vessel
@@ -29,7 +30,7 @@ def simulate_manoeuvre(
     ship: Vessel,
     manoeuvre: str | Manoeuvre,
     *,
-    duration_s: PositiveArgument | None = None,
+    duration_s: Duration | None = None,
     external: Mapping[str, float] | None = None,
     members: EnsembleSize = 0,
     seed: Seed = 0,

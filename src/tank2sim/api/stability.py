@@ -6,7 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from tank2sim.api.verbs import verb
-from tank2sim.arguments import PROCESSES, EnsembleSize, Seed, SpeedArgument
+from tank2sim.arguments import PROCESSES, EnsembleSize, Seed
+from tank2sim.quantities import Speed
 
 if TYPE_CHECKING:
     from tank2sim.dynamics.vessel import Vessel
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 )
 def judge_stability(
     ship: Vessel,
-    speed_mps: SpeedArgument | None = None,
+    speed_mps: Speed | None = None,
     *,
     spirals: bool = True,
     members: EnsembleSize = 0,

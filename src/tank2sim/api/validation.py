@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tank2sim.api.verbs import verb
-from tank2sim.arguments import REQUIRED_PERCENT, VALIDATION_MEMBERS, PositiveArgument, SmallEnsemble
+from tank2sim.arguments import REQUIRED_PERCENT, VALIDATION_MEMBERS, PositivePercent, SmallEnsemble
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,7 +28,7 @@ def validate(
     trials: str | Path | TrialRecord | pd.DataFrame | Sequence[str | Path | TrialRecord | pd.DataFrame] = (),
     *,
     members: SmallEnsemble = VALIDATION_MEMBERS,
-    required_percent: PositiveArgument = REQUIRED_PERCENT,
+    required_percent: PositivePercent = REQUIRED_PERCENT,
 ) -> ValidationResult:
     """Validate a ship in the manner of ITTC 7.5-02-06-03 by trials that did not make its card, figure by figure.
 

@@ -55,6 +55,8 @@ class Output:
     required : bool
     folder_without_ending : bool
         Whether a name without an ending means a folder for several files.
+    unwritten : callable, optional
+        Called with the result where the file was not asked for; returns a note about it, or nothing.
     """
 
     option: str
@@ -64,6 +66,7 @@ class Output:
     metavar: str = "FILE"
     required: bool = False
     folder_without_ending: bool = False
+    unwritten: Callable[[Any], str] | None = None
 
     def is_folder(self, path: Path) -> bool:
         """Whether a folder of this name is written."""
@@ -82,7 +85,7 @@ class Verb:
     that `takes` certain first arguments is their kind, ``steering_card``); `takes`: as a variant, the verb is called
     if this is true of the first argument as a text; `default_ship`: name of the bundled ship that the command takes
     where no card is given; empty if one must be; `page_required`: whether the page is the result itself, and must be
-    written.
+    written; `charts`: whether its results may have a chart, which ``--plot`` draws.
     """
 
     function: Callable[..., Any]
@@ -97,6 +100,7 @@ class Verb:
     takes: Callable[[str], bool] | None = None
     default_ship: str = ""
     page_required: bool = False
+    charts: bool = True
 
 
 def named_numbers(argument: str, example: str) -> Callable[[Sequence[str]], dict[str, float]]:

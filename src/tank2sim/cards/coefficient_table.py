@@ -16,12 +16,24 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from tank2sim.arguments import bounds_of
 from tank2sim.cards.card import OPPOSITE
 from tank2sim.cards.form import Environment
 from tank2sim.cards.reading import parsed_toml
 from tank2sim.cards.terms import parse_term
 from tank2sim.errors import InputError, close_name
 from tank2sim.files import BYTE_ORDER_MARK, read_text
+from tank2sim.quantities import (
+    Area,
+    BlockCoefficient,
+    BodyPlace,
+    Breadth,
+    Draught,
+    Length,
+    Mass,
+    Speed,
+    WaterDensity,
+)
 
 STATED_CONVENTIONS: Mapping[str, tuple[str, ...]] = {
     "rudder_sign": ("starboard", "port"),
@@ -32,17 +44,11 @@ STATED_CONVENTIONS: Mapping[str, tuple[str, ...]] = {
 """Conventions of a table, and what each may be."""
 
 _SIZES = {
-    "length_m": (0.1, 1000.0),
-    "beam_m": (0.01, 200.0),
-    "draught_m": (0.005, 50.0),
-    "speed_mps": (0.01, 50.0),
-    "displacement_kg": (1e-3, 1e9),
-    "block_coefficient": (0.1, 1.0),
-    "rudder_area_m2": (1e-6, 1e3),
-    "centre_of_gravity_m": (-100.0, 100.0),
-    "water_density_kgpm3": (900.0, 1100.0),
+    **{"length_m": Length, "beam_m": Breadth, "draught_m": Draught, "speed_mps": Speed, "displacement_kg": Mass},
+    **{"block_coefficient": BlockCoefficient, "rudder_area_m2": Area, "centre_of_gravity_m": BodyPlace},
+    "water_density_kgpm3": WaterDensity,
 }
-"""Known sizes of a ship and their bounds: wider than any ship or model of one."""
+"""Known sizes of a ship."""
 
 _LENGTH_TO_BEAM, _BEAM_TO_DRAUGHT, _BLOCK = 6.5, 2.7, 0.7
 """Proportions of an ordinary merchant ship, used where a table has no beam, draught or displacement. Project choices:
@@ -205,9 +211,9 @@ def _assume_sizes(sizes: dict[str, Any], water: Environment) -> tuple[str, ...]:
 def _sizes(stated: Mapping[str, Any], source: str) -> dict[str, Any]:
     sizes = {key: _number(stated[key], key, source) for key in _SIZES if key in stated}
     for key, value in sizes.items():
-        low, high = _SIZES[key]
-        if not low <= value <= high:
-            raise InputError(source, key, f"is {value:g}", f"{low:g} to {high:g} was expected")
+        bounds = bounds_of(_SIZES[key])
+        if bounds is not None and not bounds.hold(value):
+            raise InputError(source, key, f"is {value:g}", f"{bounds.words} was expected")
     for key in ("length_m", "speed_mps"):
         if key not in sizes:
             raise InputError(source, key, "is missing", "give length_m and speed_mps, and beam_m, draught_m if known")

@@ -11,23 +11,27 @@ from typing import Annotated, Literal, Self
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from tank2sim.cards.wave_table import wave_table
+from tank2sim.quantities import (
+    Area,
+    BlockCoefficient,
+    BodyPlace,
+    Breadth,
+    Draught,
+    Length,
+    Mass,
+    Speed,
+    TimeConstant,
+    Viscosity,
+    WaterDensity,
+    WaterDepth,
+)
 
 Positive = Annotated[float, Field(gt=0)]
-# Bounds of plausibility, far outside anything that was ever built, towed or steered: a number beyond them is a slip of
-# the pen or of the unit, and the powers of it in the prime system (up to L^5) leave the range of a float.
-Length = Annotated[float, Field(ge=0.01, le=1000.0)]
-Speed = Annotated[float, Field(ge=0.001, le=100.0)]
-WaterDensity = Annotated[float, Field(gt=900, lt=1300)]
-"""kg/m3. Fresh water has 958 (boiling) to 1000, sea water up to 1030, the Dead Sea 1240: g/cm3 and t/m3 are refused."""
 AirDensity = Annotated[float, Field(gt=0.3, lt=2.0)]
 """kg/m3. Air has 1.23 at sea level and 15 deg, 1.5 at -40 deg, 0.7 on the highest lakes."""
 Gravity = Annotated[float, Field(gt=9.7, lt=9.9)]
 """On Earth: 9.764 m/s2 (Huascaran) to 9.834 (Arctic Ocean), EGM2008; wider by half a percent."""
-Viscosity = Annotated[float, Field(gt=1e-7, lt=1e-5)]
-"""m2/s. Water has 0.3e-6 (boiling) to 1.8e-6 (freezing): refuses centistokes."""
-TimeConstant = Annotated[float, Field(ge=1e-3, le=1000.0)]
 AngularRate = Annotated[float, Field(ge=1e-6, le=1e5)]
-Mass = Annotated[float, Field(ge=1e-6, le=1e12)]
 Text = Annotated[str, Field(min_length=1)]
 
 
@@ -65,17 +69,17 @@ class BodySection(CardSection):
     name: Text
     source: Text
     length_m: Length | None = None
-    beam_m: Positive | None = None
-    draught_m: Positive | None = None
-    displacement_kg: Positive | None = None
-    block_coefficient: Annotated[float, Field(gt=0, le=1)] | None = None
+    beam_m: Breadth | None = None
+    draught_m: Draught | None = None
+    displacement_kg: Mass | None = None
+    block_coefficient: BlockCoefficient | None = None
     speed_trials_mps: Speed | None = None
-    projected_area_front_m2: Positive | None = None
-    projected_area_side_m2: Positive | None = None
-    rudder_area_m2: Positive | None = None
-    propeller_diameter_m: Positive | None = None
+    projected_area_front_m2: Area | None = None
+    projected_area_side_m2: Area | None = None
+    rudder_area_m2: Area | None = None
+    propeller_diameter_m: Breadth | None = None
     metacentric_height_m: float | None = None
-    water_depth_m: Positive | None = None
+    water_depth_m: WaterDepth | None = None
     notes: str | None = None
 
 
@@ -232,9 +236,9 @@ class Propulsion(CardSection):
 class MmgShipSection(ShipSection):
     """``[ship]`` of an MMG card, whose propeller and rudder need their sizes."""
 
-    draught_m: Positive
-    propeller_diameter_m: Positive
-    rudder_area_m2: Positive
+    draught_m: Draught
+    propeller_diameter_m: Breadth
+    rudder_area_m2: Area
 
 
 class MmgPropulsion(CardSection):
@@ -326,7 +330,7 @@ class MmgRudder(CardSection):
     """
 
     number: Literal[1, 2] = 1
-    height_m: Positive
+    height_m: Breadth
     aspect_ratio: Positive | None = None
     f_alpha: Positive | None = None
     t_R: Share
@@ -383,8 +387,8 @@ class ThrusterSection(CardSection):
     """
 
     name: Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,30}$")]
-    x_m: Annotated[float, Field(ge=-1e3, le=1e3)] = 0.0
-    y_m: Annotated[float, Field(ge=-1e3, le=1e3)] = 0.0
+    x_m: BodyPlace = 0.0
+    y_m: BodyPlace = 0.0
     azimuth_rad: Annotated[float, Field(ge=-6.283185307179586, le=6.283185307179586)] = 0.0
     ahead_Ns2: Annotated[float, Field(ge=1e-9, le=1e6)]
     astern_Ns2: Annotated[float, Field(ge=0.0, le=1e6)]

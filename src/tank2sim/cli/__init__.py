@@ -68,13 +68,13 @@ class _Commands(click.Group):
         return command_of(VERBS[cmd_name])
 
     def invoke(self, ctx: click.Context) -> Any:
-        """As of any group; a fault of an argument of the API is called by the option that sets it."""
+        """As of any group; arguments of the API are called by the options that set them."""
         try:
             return super().invoke(ctx)
-        except ArgumentError as fault:
-            command = self.get_command(ctx, ctx.invoked_subcommand or "")
-            option = _option_of(command, fault.source) if command else fault.source
-            raise InputError(option, fault.place, fault.problem, fault.remedy) from None
+        except InputError as fault:
+            if (command := self.get_command(ctx, ctx.invoked_subcommand or "")) is None:
+                raise
+            raise _in_options(fault, command) from None
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -83,6 +83,17 @@ class _Commands(click.Group):
             remedy = close_name(args[0], known)
             raise click.UsageError(f"{args[0]!r} is not a command; {remedy}", ctx)
         return super().resolve_command(ctx, args)
+
+
+def _in_options(fault: InputError, command: click.Command) -> InputError:
+    """A fault with options in place of arguments; place and problem of a file name columns and keys, and stay."""
+    from tank2sim.cli.naming import in_options, options_of
+
+    options = options_of(command)
+    source, problem = fault.source, fault.problem
+    if isinstance(fault, ArgumentError):
+        source, problem = _option_of(command, source), in_options(problem, options)
+    return InputError(source, fault.place, problem, in_options(fault.remedy, options))
 
 
 def _option_of(command: click.Command, argument: str) -> str:

@@ -9,6 +9,7 @@ import sys
 import types
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -103,7 +104,8 @@ def command_of(verb: Verb) -> click.Command:
             given[next(iter(inspect.signature(called.function).parameters))] = given[first]
         return _run(called, given)
 
-    params = [*own.values(), *switches, *_shared_options(verb, own.values())]
+    drawn = any(one.charts for one in (verb, *others.values()))
+    params = [*own.values(), *switches, *_shared_options(verb, own.values(), drawn)]
     return VerbCommand(verb.name, params=params, callback=run, help=text)
 
 
@@ -127,14 +129,18 @@ def _parameters_of_variants(
     return own, takers
 
 
-def _shared_options(verb: Verb, own: Iterable[click.Parameter]) -> list[click.Option]:
-    """The options of every command that shows a result; -o is the page where a command writes no file of its own."""
+def _shared_options(verb: Verb, own: Iterable[click.Parameter], drawn: bool) -> list[click.Option]:
+    """The options of every command that shows a result; -o is the page where a command writes no file of its own.
+
+    `drawn`: whether a result may have charts, for --plot.
+    """
+    plot = _option(["--plot"], type=OutputFile(PICTURE), metavar="FILE|DIR", help="Draw the main chart (.png, .svg, "
+                   ".pdf), or each chart and the page into a folder.")  # fmt: skip
     main = [] if any("-o" in parameter.opts for parameter in own) else ["-o"]
     return [
         _option([*main, "--page"], type=OutputFile(PAGE), metavar="FILE.html", help="Write the page.",
                 required=verb.page_required),
-        _option(["--plot"], type=OutputFile(PICTURE), metavar="FILE|DIR", help="Draw the main chart (.png, .svg, .pdf),"
-                " or each chart and the page into a folder."),
+        *([plot] if drawn else []),
         _option(["--json"], type=OutputFile(JSON), metavar="FILE", help="Write the full result; - is standard output."),
         _option(["--quiet"], is_flag=True, help="Print doubts and errors alone."),
         _option(["--verbose"], is_flag=True, help="Print every table."),
@@ -358,7 +364,8 @@ def _print(verb: Verb, given: Mapping[str, Any]) -> None:
 
 def _run(verb: Verb, given: dict[str, Any]) -> int:
     """Call a verb with what the command line gave, write its files, and print its result."""
-    from tank2sim.cli.console import show_result, write_outputs
+    from tank2sim.cli.console import show_notices, show_result, write_outputs
+    from tank2sim.cli.naming import in_options, options_of
     from tank2sim.cli.progress import showing_stages
 
     values, changes = dict(given), given.get("set", ())
@@ -366,7 +373,7 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
     folders = [path for output, path in zip(verb.outputs, named, strict=True) if path and output.is_folder(path)]
     outputs = [path for path in (*named, values["page"], values["json"]) if path is not None and path not in folders]
     refuse_doubled(outputs)
-    _refuse_unplaced(outputs, [values["plot"], *named])
+    _refuse_unplaced(outputs, [values.get("plot"), *named])
     _refuse_idle(output for output, path in zip(verb.outputs, named, strict=True) if path is None)
     inputs: list[Path] = []
     with ExitStack() as stack:
@@ -376,11 +383,16 @@ def _run(verb: Verb, given: dict[str, Any]) -> int:
         if "report" in inspect.signature(verb.function).parameters:
             call["report"] = stack.enter_context(showing_stages(verb.words))
         result, contents = _with_outputs(verb, verb.function(**call), values, inputs, stack)
-    given_files = {name: values[name] for name in ("page", "plot", "json")}
+    given_files = {name: values.get(name) for name in ("page", "plot", "json")}
     written = write_outputs(result, contents, [*inputs, *result.inputs], **given_files)
-    show_result(result, [*result.written, *written], quiet=values["quiet"], verbose=values["verbose"])
+    words = partial(in_options, options=options_of(click.get_current_context().command))
+    all_written = [*result.written, *written]
+    show_result(result, all_written, quiet=values["quiet"], verbose=values["verbose"], words=words)
+    if not values["quiet"]:
+        pairs = zip(verb.outputs, named, strict=True)
+        show_notices(filter(None, (one.unwritten(result) for one, path in pairs if one.unwritten and not path)))
     for fault in result.faults:
-        print(f"tank2sim: {one_line(fault)}", file=sys.stderr)
+        print(f"tank2sim: {one_line(words(fault))}", file=sys.stderr)
     code: int = result.exit_code
     return code
 

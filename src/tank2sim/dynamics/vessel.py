@@ -12,6 +12,7 @@ from tank2sim.cards import Card, ManoeuvringCard, SteeredCard, parse_card, read_
 from tank2sim.cards.reading import changed_text
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.model import Model
+from tank2sim.errors import ArgumentError
 from tank2sim.files import write_together
 
 if TYPE_CHECKING:
@@ -25,9 +26,17 @@ class Vessel:
     ----------
     card : Card
         What is known of the ship, SI and radians.
+
+    Raises
+    ------
+    InputError
+        It is something else, such as the name of a ship.
     """
 
     def __init__(self, card: Card) -> None:
+        if not isinstance(card, Card):
+            named = repr(card) if isinstance(card, str | Path) else f"of the type {type(card).__name__}"
+            raise ArgumentError("card", "", f"is {named}, and no card", 'tank2sim.load("mariner") reads one')
         self.card = card
 
     @property

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from tank2sim.bundled import bundled
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.dynamics.model import Model
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.files import write_whole
 from tank2sim.fmu.dependencies import fmu_structure
 from tank2sim.fmu.interface import FmuVariable, Interface, interface
@@ -127,7 +127,7 @@ def make_fmu(
         neither 2 nor 3.
     """
     if fmi not in (2, 3):
-        raise InputError("--fmi", "", f"there is no FMI {fmi} here", "choose 2 or 3")
+        raise ArgumentError("fmi", "", f"there is no FMI {fmi} here", "choose 2 or 3")
     require_compilers(platforms)
     documents = documents or Documents()
     described = interface(model)

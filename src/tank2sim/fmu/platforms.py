@@ -6,7 +6,7 @@ import platform
 import sys
 from dataclasses import dataclass
 
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.native.cross import CompileTarget
 
 
@@ -35,7 +35,7 @@ PLATFORMS = (
     Platform("darwin64", "x86_64-darwin", CompileTarget("x86_64-macos.10.13", ".dylib")),
     Platform("darwin64", "aarch64-darwin", CompileTarget("aarch64-macos.11.0", ".dylib")),
 )
-"""Every platform, by which ``--platforms all`` is meant."""
+"""Every platform, which ``all`` means."""
 
 _PROCESSORS = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}
 _SYSTEMS = {"linux": "linux", "win32": "windows", "darwin": "darwin"}
@@ -59,7 +59,7 @@ def host_platform() -> Platform:
 
 
 def named_platforms(names: str) -> tuple[Platform, ...] | None:
-    """The platforms that ``--platforms`` asks for, in the order of `PLATFORMS`; None for the one of this machine.
+    """The platforms that are asked for by name, in the order of `PLATFORMS`; None for the one of this machine.
 
     Parameters
     ----------
@@ -79,5 +79,5 @@ def named_platforms(names: str) -> tuple[Platform, ...] | None:
     unknown = sorted(asked - {name for each in PLATFORMS for name in (each.fmi2, each.fmi3)})
     if unknown:
         remedy = f"choose all, host, or of {', '.join(each.fmi3 for each in PLATFORMS)} with commas between"
-        raise InputError("--platforms", unknown[0] or repr(names), "is not a platform of the exporter", remedy)
+        raise ArgumentError("platforms", unknown[0] or repr(names), "is not a platform of the exporter", remedy)
     return tuple(each for each in PLATFORMS if asked & {each.fmi2, each.fmi3})

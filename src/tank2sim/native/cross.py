@@ -11,7 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.native.compiler import FLAGS
 from tank2sim.native.library import cache_folder, kept
 
@@ -85,7 +85,7 @@ def _compile(compiler: Path, target: CompileTarget, library: Path) -> None:
         )
     except OSError as error:
         problem = f"its compiler for other machines cannot be run ({error.strerror})"
-        raise InputError("--platforms", "", problem, "install ziglang again, or take --platforms host") from None
+        raise ArgumentError("platforms", "", problem, 'install ziglang again, or take platforms="host"') from None
     if done.returncode != 0 or not library.exists():
         raise RuntimeError(f"zig cc refused generated C for {target.triple}\n{done.stderr.strip()}")
 
@@ -96,7 +96,7 @@ def _compiler() -> Path:
     compiler = Path(folders[0], "zig.exe" if sys.platform == "win32" else "zig") if folders else None
     if compiler is None or not compiler.is_file():
         problem = "needs a compiler for other machines, which is not installed"
-        raise InputError("--platforms", "", problem, "pip install tank2sim[platforms], or take --platforms host")
+        raise ArgumentError("platforms", "", problem, 'pip install tank2sim[platforms], or take platforms="host"')
     return compiler
 
 

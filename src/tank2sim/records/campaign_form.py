@@ -11,9 +11,22 @@ from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 from pydantic import Field, ValidationError
 
-from tank2sim.cards.form import CardSection, Gravity, Positive, Text, Viscosity, WaterDensity
+from tank2sim.cards.form import CardSection, Gravity, Positive, Text
 from tank2sim.cards.form_faults import form_fault
 from tank2sim.errors import InputError
+from tank2sim.quantities import (
+    Area,
+    BlockCoefficient,
+    Breadth,
+    Draught,
+    Mass,
+    Speed,
+    TankModelLength,
+    TankSize,
+    Viscosity,
+    WaterDensity,
+    YawInertia,
+)
 from tank2sim.units import to_si
 
 RunType = Literal[
@@ -43,18 +56,18 @@ class ModelSection(CardSection):
     """
 
     name: Text
-    length_m: Positive
-    beam_m: Positive | None = None
-    draught_m: Positive | None = None
-    mass_kg: Positive
-    yaw_inertia_kgm2: Positive | None = None
+    length_m: TankModelLength
+    beam_m: Breadth | None = None
+    draught_m: Draught | None = None
+    mass_kg: Mass
+    yaw_inertia_kgm2: YawInertia | None = None
     x_G_m: float = 0.0
     z_G_m: float | None = None
     trim_m: float | None = None
-    block_coefficient: Annotated[float, Field(gt=0, le=1)] | None = None
+    block_coefficient: BlockCoefficient | None = None
     scale: Annotated[float, Field(ge=1)] | None = None
-    rudder_area_m2: Positive | None = None
-    propeller_diameter_m: Positive | None = None
+    rudder_area_m2: Area | None = None
+    propeller_diameter_m: Breadth | None = None
 
 
 class TankTest(CardSection):
@@ -81,7 +94,7 @@ class TankTest(CardSection):
 
     water_density_kgpm3: WaterDensity = 1000.0
     gravity_mps2: Gravity = 9.80665
-    speed_mps: Positive
+    speed_mps: Speed
     force_convention: Literal["on_model", "on_gauge", "hydrodynamic"]
     rudder_sign: Literal["starboard", "port"] = "starboard"
     inertia_speed: Literal["test", "axial"] = "test"
@@ -99,9 +112,9 @@ class TankTest(CardSection):
 class TankSection(CardSection):
     """``[tank]``: the basin."""
 
-    length_m: Positive | None = None
-    breadth_m: Positive | None = None
-    depth_m: Positive | None = None
+    length_m: TankSize | None = None
+    breadth_m: TankSize | None = None
+    depth_m: TankSize | None = None
 
 
 class UncertaintySection(CardSection):
@@ -317,7 +330,7 @@ class RudderTest(CardSection):
         Place over L of the right one of two rudders, to starboard.
     """
 
-    height_m: Positive
+    height_m: Breadth
     aspect_ratio: Positive | None = None
     f_alpha: Positive | None = None
     x_R: Annotated[float, Field(gt=-1, lt=1)] = -0.5

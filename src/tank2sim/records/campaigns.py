@@ -183,7 +183,7 @@ def together(faults: list[InputError], *, can_leave_out: bool = True) -> InputEr
     if rest := sum(map(len, list(alike.values())[_FAULTS_SAID:])):
         said.append(f"and {rest} more faults")
     first = faults[0]
-    remedy = first.remedy + (", or leave such runs out with --keep-going" if can_leave_out else "")
+    remedy = first.remedy + (", or leave such runs out (keep_going=True)" if can_leave_out else "")
     return InputError(first.source, first.place, "; ".join(said), remedy)
 
 

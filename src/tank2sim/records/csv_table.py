@@ -11,7 +11,7 @@ import csv
 import difflib
 import re
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn, TypeGuard
@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, NoReturn, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
+from tank2sim.arguments import bounds_of
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.files import read_all_bytes, read_text
@@ -41,9 +42,6 @@ _QUOTED_LENGTH = 30
 SHORTEST_STEP = 1e-9
 """Least step of a quantity that must rise from row to row (a time, s): below, two rows are one, and slopes are noise of
 the last digit. Project choice, a thousand times faster than any gauge is read."""
-LONGEST_RUN_S = 2e5
-"""Longest run, s, that is simulated: beyond two days a manoeuvre or a tow is a mistake in units, and its motion (two
-million steps of 40 numbers) would fill gigabytes."""
 LARGEST = 1e15
 """Largest size of a number that a record may hold, in the unit of its column. No length, time, force or count of a
 ship is near it (an epoch is 1.8e9 s, or 1.8e12 ms), and squares and products of what is below stay far inside the
@@ -116,19 +114,21 @@ class CsvTable:
             raise self.fault(self.place(int(empty[0]), name), "is empty", remedy)
         return values
 
-    def positive_comment(self, key: str) -> float | None:
+    def bounded_comment(self, key: str, kind: object) -> float | None:
         """The number in the comment line ``# key: number``; None without such a line.
 
-        Raises InputError: As :meth:`comment_number`, or it is not positive.
+        `kind`: Type with bounds, of :mod:`tank2sim.quantities`. Raises InputError: As :meth:`comment_number`, or it is
+        out of its bounds.
         """
-        value = self.comment_number(key)
-        if value is not None and value <= 0:
-            raise self.fault(f"comment {key}", f"is {value:g}", "a positive number was expected")
+        value, bounds = self.comment_number(key), bounds_of(kind)
+        if value is not None and bounds is not None and not bounds.hold(value):
+            raise self.fault(f"comment {key}", f"is {value:g}", f"{bounds.words} was expected")
         return value
 
-    def positive_comments(self, keys: Iterable[str]) -> dict[str, float]:
-        """Positive numbers of the comments among `keys` that the file has. Raises as :meth:`positive_comment`."""
-        return {key: value for key in keys if (value := self.positive_comment(key)) is not None}
+    def bounded_comments(self, kinds: Mapping[str, object]) -> dict[str, float]:
+        """Numbers of the comments that the file has, by key. `kinds`: Key to its type. Raises as
+        :meth:`bounded_comment`."""
+        return {key: value for key, kind in kinds.items() if (value := self.bounded_comment(key, kind)) is not None}
 
     def comment_number(self, key: str) -> float | None:
         """The finite number in the comment line ``# key: number``; None without such a line.

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tank2sim.arguments import PositiveArgument
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice
@@ -44,7 +45,7 @@ def read_trial_csv(path: Path | str | CsvTable) -> Trial:
     if _rudder_sign(table) == "port":
         signals |= {name: 0.0 - signals[name] for name in RUDDERS if name in signals}
         notices.append(Notice("the rudder is positive to port in the file, and to starboard here"))
-    scale = table.positive_comment("scale")
+    scale = table.bounded_comment("scale", PositiveArgument)
     columns = {name: table.heading(name) for name in signals if table.heading(name) != name}
     return Trial(table.path, time, signals, _noise(table), scale, tuple(notices), columns, origin_deg=_origin(table))
 
@@ -89,10 +90,12 @@ def _meant(name: str) -> str | None:
 
 
 def _without_rudder(table: CsvTable) -> InputError:
+    if craft := [table.heading(name) for name in table.columns if re.match(r"order_\w|n_\w+_", name)]:
+        problem = f"there is no rudder; by {', '.join(craft)} it is a trial of a craft with thrusters"
+        remedy = "identify, validate and gap take it with its card; for a ship with a rudder add delta_deg"
+        return table.fault("header", problem, remedy)
     present = ", ".join(map(table.heading, table.columns))
     remedy = f"add delta_deg (angle) or delta_order_deg (order); the columns are {present}"
-    if any(re.match(r"order_\w|n_\w+_", name) for name in table.columns):
-        remedy += "; trials of a craft with thrusters are taken by identify, validate and gap with its card"
     return table.fault("header", "there is no rudder", remedy)
 
 

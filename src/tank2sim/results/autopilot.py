@@ -272,12 +272,13 @@ class AutopilotResult(ResultWithController[AutopilotStudy]):
         if unstable := [f"{one.speed_mps:.3g}" for one in study.margins if not one.stable]:
             return (f"The loop is unstable at {', '.join(unstable)} m/s.", f"{study.source}.")
         change, kept = loop.course_changes["change"], loop.course_keeping
+        share = kept.rate_limited_percent
         settled = "does not settle in the run," if change.settling_time_s is None else _settles(change.settling_time_s)
         weather = f"In weather the heading is {kept.heading_error_rms_deg:.2g} deg off (rms)"
         if max(abs(kept.heading_error_mean_deg), kept.heading_error_rms_deg) <= HELD_DEG:
             weather += (
                 f", by {kept.rudder_rms_deg:.2g} deg of rudder. Mean rudder rate {kept.rudder_travel_degps:.2g} deg/s, "
-                f"rate limit reached {kept.rate_limited_percent:.2g} % of the time"
+                + ("no rate limit is stated" if share is None else f"rate limit reached {share:.2g} % of the time")
             )
         return (
             f"A change of course by {change.ordered_deg:.3g} deg {settled} with {change.overshoot_deg:.2g} deg of "

@@ -6,11 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from tank2sim.answer.parts import Cell, Column, KeyFigure, Section, records_table, table
+from tank2sim.answer.parts import Cell, Column, Illustration, KeyFigure, Section, records_table, table
 from tank2sim.answer.result import Result
 from tank2sim.cards import SteeredCard
 from tank2sim.identification.craft.fit import CoefficientVerdict, CraftFit, FreePrediction
 from tank2sim.identification.craft.study import CandidateTrial, CraftIdentificationStudy
+from tank2sim.identification.trials.study import ParameterEstimate
+from tank2sim.results.identification import parameter_chart
+
+_IN_ERRORS = (
+    "Value less that of the card in the card's standard errors, with the interval of 95 %, and the share of the "
+    "information that is from the trials."
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -115,11 +122,25 @@ def craft_sections(study: CraftIdentificationStudy) -> list[Section]:
         orders: list[list[Cell]] = [[one.words, ", ".join(one.determines) or None] for one in study.next_trials]
         further = (Column("five minutes of (port/starboard, % of full)"), "would determine")
         tables.append(table("Next five minutes", further, orders))
+    by_trials = {
+        name: ParameterEstimate(
+            value=one.value,
+            standard_error=one.standard_error,
+            before=one.before,
+            before_standard_error=one.prior_standard_error,
+            prior_standard_error=one.prior_standard_error,
+            share_from_trials=1 - (one.standard_error / one.prior_standard_error) ** 2,
+        )
+        for name, one in study.coefficients.items()
+        if one.prior_standard_error > 0
+    }
+    chart = parameter_chart(by_trials, title="Coefficients")
     text = (
         "Identified: the standard error is at most a quarter of the value. Bounded: the trials have at least halved "
         "the standard error of the card. Not determined: the value is the card's."
     )
-    return [Section("Coefficients determined by the trials", text=text, tables=tables)]
+    charts = [Illustration(chart, caption=_IN_ERRORS, name="coefficients")]
+    return [Section("Coefficients determined by the trials", text=text, tables=tables, charts=charts)]
 
 
 def _trials(count: int) -> str:

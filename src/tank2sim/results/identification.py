@@ -253,7 +253,7 @@ class IdentificationResult(Result[IdentificationStudy]):
             text=_PARAMETERS + _widened(study.prior_scale),
             tables=tables,
             charts=[
-                Illustration(_parameter_chart(study.parameters, title=title), caption=in_errors, name="parameters"),
+                Illustration(parameter_chart(study.parameters, title=title), caption=in_errors, name="parameters"),
                 Illustration(correlation, name="correlation"),
                 Illustration(singular, caption=_SINGULAR, name="singular_values"),
             ],
@@ -384,7 +384,7 @@ def _value_with_error(value: float, error: float) -> str:
     return f"{value:.5g} ± {error:.2g}"
 
 
-def _parameter_chart(parameters: Mapping[str, ParameterEstimate], *, title: str = "") -> ChartSpec:
+def parameter_chart(parameters: Mapping[str, ParameterEstimate], *, title: str = "") -> ChartSpec:
     """Estimates with their 95 % intervals next to the priors', in standard errors of the prior; shares next to."""
     found = [_parameter_row(name, parameter) for name, parameter in parameters.items()]
     farthest = max((abs(row[key] or 0.0) for row in found for key in ("low", "high")), default=1.0)

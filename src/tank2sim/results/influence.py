@@ -373,6 +373,8 @@ _MOST_BARS = 12
 screen high."""
 
 _WIDTH = 600
+_NAMES = {"labelLimit": 320}
+"""Room for the names of parameters and figures, px: ``cross_flow_drag.drag_coefficient`` needs 220 in a wide font."""
 
 
 def most_influential(result: InfluenceStudy, row: int) -> list[int]:
@@ -406,7 +408,7 @@ def _bars(result: InfluenceStudy, row: int) -> ChartSpec:
         across=PlotAxis("K (%)", zero=True, ticks=4),
         shown={"name:N": "parameter", "exact:Q": f"K, {EXACT} (%)", "step:Q": f"K, {DIFFERENCE} (%)"},
         look=look,
-        side={"labelLimit": 170},
+        side=_NAMES,
     )
     bars = row_layers(exact, mark="bar", height=9, opacity=0.65)
     difference = replace(exact, rows=both[DIFFERENCE], rules=[Rule([0.0])])
@@ -439,8 +441,8 @@ def variance_chart(result: InfluenceStudy) -> ChartSpec:
             names=("figure", "name"),
             scale={"domain": [0, max(10.0, float(shares.max(initial=0.0)))], "scheme": "blues"},
             legend={"title": "share of the variance (%)"},
-            side={"labelLimit": 200, "ticks": False},
-            foot={"labelAngle": -90, "ticks": False},
+            side=_NAMES | {"ticks": False},
+            foot=_NAMES | {"labelAngle": -90, "ticks": False},
             shown={"figure:N": "figure", "name:N": "parameter", "share:Q": ("share (%)", ".1f")},
             written=False,
         ).layers,
@@ -463,7 +465,7 @@ def moves_chart(tuned: TunedStudy) -> ChartSpec:
         RowPlot(
             rows,
             across=PlotAxis("move (standard errors of the card)", zero=True),
-            side={"labelLimit": 170},
+            side=_NAMES,
             rules=[Rule([0.0]), Rule([-within, within], style="limit", dash=(5, 3))],
             shown={
                 "name:N": "parameter",

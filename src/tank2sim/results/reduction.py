@@ -151,7 +151,7 @@ class ReductionResult(Result[ReductionStudy]):
         if self.study.card_scale is not None or not isinstance(scale, float) or not isinstance(length, float):
             return []
         return [
-            f"The card is of the model, {length:.4g} m long; --scale ship makes a card of the ship, "
+            f'The card is of the model, {length:.4g} m long; scale="ship" makes a card of the ship, '
             f"{length * scale:.4g} m long."
         ]
 

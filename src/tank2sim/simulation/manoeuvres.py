@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Input, Model
 from tank2sim.errors import ArgumentError, InputError
-from tank2sim.records.csv_table import LONGEST_RUN_S, read_table
+from tank2sim.quantities import LONGEST_RUN_S
+from tank2sim.records.csv_table import read_table
 from tank2sim.simulation.running import Running, SwitchedManoeuvre, SwitchingPlan
 from tank2sim.simulation.thruster_manoeuvres import (
     DifferenceTurn,

@@ -10,7 +10,7 @@ import numpy as np
 from tank2sim.dynamics.model import Model
 from tank2sim.errors import ArgumentError
 from tank2sim.notices import Notice
-from tank2sim.records.csv_table import LONGEST_RUN_S
+from tank2sim.quantities import LONGEST_RUN_S
 from tank2sim.simulation.card_range import CardRangeReading, reading
 from tank2sim.simulation.figures import Figures, figures_of
 from tank2sim.simulation.integrator import NO_COMPILER, Integrator

@@ -68,13 +68,27 @@ def test_a_linear_card_has_margins_at_its_own_speed_alone() -> None:
         study_autopilot(card, ship, StudySettings(speed_mps=6.0))
 
 
+def test_a_rudder_whose_rate_nothing_limits_is_a_caution_that_names_the_key() -> None:
+    card = read_card("esso-osaka")
+    found, _ = study_autopilot(card, build(card), StudySettings())
+    kept = found.closed_loop.course_keeping
+    assert kept.rate_limited_percent is None and found.closed_loop.course_changes["change"].rate_limited_s is None
+    assert kept.rudder_travel_degps > 10
+    (doubt,) = [notice for notice in found.notices if notice.leads]
+    assert "no largest rate" in doubt and "steering_gear.max_rate_degps" in doubt
+    stated = read_card("esso-osaka", {"steering_gear.max_rate_degps": 20.0})
+    limited, _ = study_autopilot(stated, build(stated), StudySettings())
+    assert limited.closed_loop.course_keeping.rate_limited_percent is not None
+    assert not any("no largest rate" in notice for notice in limited.notices)
+
+
 @pytest.mark.slow
 def test_a_gear_that_waves_overwork_is_reported_with_the_remedy_which_helps() -> None:
     card = read_card("kvlcc2-captive")
     ship = build(card)
     found, _ = study_autopilot(card, ship, StudySettings())
     (reported,) = [notice for notice in found.notices if "full rate" in notice]
-    assert found.closed_loop.course_keeping.rate_limited_percent > 50 and "--wave-filter 0.424" in reported
+    assert found.closed_loop.course_keeping.rate_limited_percent > 50 and "wave_filter_radps=0.424" in reported
     filtered, _ = study_autopilot(card, ship, StudySettings(wave_filter_radps=0.424))
     assert filtered.closed_loop.course_keeping.rate_limited_percent < 10
     assert not any("full rate" in notice for notice in filtered.notices)

@@ -167,6 +167,7 @@ def test_the_circles_of_a_poster_are_those_of_a_simulated_turn(poster: t2s.Poste
 
 def test_a_poster_read_back_shows_the_figures_of_its_tracks(poster: t2s.PosterResult) -> None:
     again = t2s.make_report(poster.to_dict())
+    assert "tank2sim poster CARD --page FILE.html" in again.headline[1] and again.headline[1] in again.page()
     figures = {one.caption: one.df for section in again.sections for one in section.tables}
     run = t2s.load("mariner").turn(40).figures
     circles = figures["Turning circles, deep water"].set_index("figure")

@@ -27,7 +27,7 @@ FIGURES = "steady_radius_m@20,K_prime"
 
 @cache
 def plan(**options):
-    return design_campaign("esso-osaka", **{"figures": FIGURES, "hours": 8.0, "draws": 0, **options})
+    return design_campaign("esso-osaka", **{"figures": FIGURES, "hours": 8.0, "members": 0, **options})
 
 
 @pytest.mark.slow
@@ -145,7 +145,7 @@ def test_inertia_in_the_terms_of_a_card_is_taken_out():
 )
 def test_a_figure_has_its_one_name(text, name):
     with pytest.raises(InputError, match=f"did you mean {name}") as raised:
-        design_campaign("mariner", figures=text, hours=2, draws=0)
+        design_campaign("mariner", figures=text, hours=2, members=0)
     assert (raised.value.source, raised.value.place) == ("figures", text)
 
 
@@ -162,29 +162,29 @@ def test_the_other_side_of_a_figure_has_the_opposite_rudder():
         pytest.param({"hours": 0.05}, "hours", marks=pytest.mark.slow),
         ({"figures": "advanc@35"}, "advance_m"),
         ({"figures": ""}, "no figure"),
-        ({"carriage_length_m": 2.0}, "--carriage-length"),
+        ({"carriage_length_m": 2.0}, "carriage_length_m"),
         ({"carriage_length_m": float("nan")}, "carriage_length_m"),
-        ({"model_length_m": 1000.0}, "--model-length"),
+        ({"model_length_m": 1000.0}, "model_length_m"),
         ({"largest": (12.0, 95.0, 0.5)}, "largest"),
         ({"tank": "nowhere.toml"}, "nowhere.toml"),
     ],
 )
 def test_what_cannot_be_designed_is_refused(options, words):
     with pytest.raises(InputError) as caught:
-        design_campaign("esso-osaka", **{"figures": FIGURES, "draws": 0, **options})
+        design_campaign("esso-osaka", **{"figures": FIGURES, "members": 0, **options})
     assert words in str(caught.value)
 
 
 def test_an_unknown_key_of_the_tank_is_refused_with_its_place(tmp_path):
     (tmp_path / "tank.toml").write_text("[gauges]\nY_range = 3.0\n", encoding="utf-8")
     with pytest.raises(InputError) as caught:
-        design_campaign("esso-osaka", figures=FIGURES, draws=0, tank=tmp_path / "tank.toml")
+        design_campaign("esso-osaka", figures=FIGURES, members=0, tank=tmp_path / "tank.toml")
     assert caught.value.place == "gauges.Y_range"
 
 
 @pytest.mark.slow
 def test_drawn_ships_count_as_much_as_the_one_of_the_card():
-    found = plan(draws=3, hours=40.0)
+    found = plan(members=3, hours=40.0)
     assert len(found.design.slopes.drawn) > 1
     assert (found.figures["variance_ratio"] < 1).all()
 

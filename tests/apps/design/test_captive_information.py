@@ -222,7 +222,7 @@ def test_a_tank_that_holds_the_model_is_taken():
 
 def test_the_file_of_the_tank_is_named_and_the_beam_is_that_of_the_model(tmp_path):
     (tmp_path / "tank.toml").write_text("[tank]\nbreadth_m = 0.5\n", encoding="utf-8")
-    options = {"figures": "K_prime", "draws": 0, "tank": tmp_path / "tank.toml", "largest": (10, 20, 0.5)}
+    options = {"figures": "K_prime", "members": 0, "tank": tmp_path / "tank.toml", "largest": (10, 20, 0.5)}
     with pytest.raises(InputError, match=r"0\.5 m.*0\.576 m") as fault:  # 4 m by 23.165/160.93
         t2s.design_campaign("mariner", **options)
     assert fault.value.source == str(tmp_path / "tank.toml")
@@ -240,5 +240,5 @@ def test_the_file_of_the_tank_is_named_and_the_beam_is_that_of_the_model(tmp_pat
 def test_gauges_without_an_error_are_refused(errors):
     tank = TankFile.model_validate({"gauges": errors})
     with pytest.raises(InputError, match="no error of X") as fault:
-        t2s.design_campaign("esso-osaka", figures="K_prime", draws=0, tank=tank, largest=(10, 20, 0.5))
+        t2s.design_campaign("esso-osaka", figures="K_prime", members=0, tank=tank, largest=(10, 20, 0.5))
     assert fault.value.place == "gauges"

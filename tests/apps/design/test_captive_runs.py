@@ -84,8 +84,8 @@ def test_amplitudes_stay_within_the_mechanism():
 @pytest.mark.parametrize(
     ("sections", "place"),
     [
-        ({"carriage": {"length_m": 10.0}}, "--carriage-length"),
-        ({"carriage": {"length_m": 30.0}, "mechanism": {"cycles": 5}}, "--carriage-length"),
+        ({"carriage": {"length_m": 10.0}}, "carriage_length_m"),
+        ({"carriage": {"length_m": 30.0}, "mechanism": {"cycles": 5}}, "carriage_length_m"),
         ({"carriage": {"speed_mps": 1.0}}, "tank"),
     ],
 )

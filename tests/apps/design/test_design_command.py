@@ -2,19 +2,20 @@
 
 import csv
 import json
+import re
 
 import pytest
 
 from tests.cli.command_line import refused, tank2sim
 
-FAST = ("--figures", "steady_radius_m@20", "--draws", "0")
+FAST = ("--figures", "steady_radius_m@20", "--members", "0")
 
 
 @pytest.mark.slow
 def test_a_campaign_is_written_as_plan_template_and_json(tmp_path):
     result = tank2sim(
         *("design", "esso-osaka", *FAST, "--hours", "4", "--largest", "12/25/0.6"),
-        *("-o", "plan.csv", "--campaign", "campaign.toml", "--json", "d.json"),
+        *("-o", "plan.csv", "--campaign", "campaign.toml", "--json", "d.json", "--page", "d.html"),
         cwd=tmp_path,
     )
     assert result.returncode == 0, result.stderr
@@ -27,6 +28,9 @@ def test_a_campaign_is_written_as_plan_template_and_json(tmp_path):
     reach = {"drift_deg": 12.0, "rudder_deg": 25.0, "yaw_rate_prime": 0.6}
     assert {key: found["model"][key] for key in reach} == pytest.approx(reach)
     assert max(abs(run["drift_deg"]) for run in found["runs"]) <= 12.0 + 1e-6
+    sway = next(kind for kind in found["kinds"] if kind["type"] == "pure sway")
+    assert sway["drift"] is None and sway["rudder"] is None
+    assert not re.search(r"<td[^>]*>\s*</td>", (tmp_path / "d.html").read_text(encoding="utf-8"))
     missing = tank2sim("reduce", "campaign.toml", cwd=tmp_path)
     refused(missing, "run_001.csv")
 

@@ -83,6 +83,13 @@ def test_a_column_that_is_not_there_is_refused(path):
         run(path, "--columns", "phi_deg")
 
 
+def test_a_filter_whose_trial_is_not_written_says_how_to_write_it(path, tmp_path):
+    said = "the filtered trial is not written: add -o FILTERED.csv"
+    assert said in run(path, "--columns", "r", "--filter", "lowpass:0.3").output
+    assert said not in run(path, "--columns", "r", "--filter", "lowpass:0.3", "-o", tmp_path / "o.csv").output
+    assert said not in run(path).output
+
+
 def test_a_filtered_column_takes_the_place_of_the_measured_one(path, tmp_path):
     out = tmp_path / "filtered.csv"
     shown = run(path, "--columns", "r", "--filter", "lowpass:0.3,causal", "-o", out)
@@ -142,7 +149,7 @@ def test_a_column_with_a_long_gap_is_left_out_with_a_notice_or_refused_by_name(p
     cut = [line if not 1000 <= n < 1100 else ",".join([*line.split(",")[:-1], ""]) for n, line in enumerate(lines)]
     gappy.write_text("\n".join(cut) + "\n")
     assert "psi_deg is left out: it has no value from" in run(gappy).output
-    with pytest.raises(InputError, match=r"gappy.csv: column psi_deg: has no value from .* allow it with --max-gap"):
+    with pytest.raises(InputError, match=r"gappy.csv: column psi_deg: has no value from .* allow it by max_gap_s"):
         run(gappy, "--columns", "psi")
     assert "interpolated by straight lines" in run(gappy, "--columns", "psi", "--max-gap", "12").output
 

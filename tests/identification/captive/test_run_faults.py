@@ -60,7 +60,7 @@ def test_a_fault_is_reported_with_the_name_of_its_run(tmp_path, fault, name, mes
     with pytest.raises(InputError, match=message) as error:
         reduce_campaign(read_campaign(path))
     assert f"{name}.csv" in str(error.value)
-    assert "--keep-going" in str(error.value)
+    assert "keep_going=True" in str(error.value)
 
 
 @pytest.mark.slow

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tank2sim.records.csv_table import number_rows, read_bytes_as_text
+from tank2sim.records.csv_table import read_bytes_as_text, table_of_rows
 from tank2sim.records.trials import Trial, TrialReader
 from tank2sim.units import KNOT_MPS
 
@@ -12,8 +12,9 @@ COLUMNS = ("time (s)", "heading (deg)", "rate (deg/min)", "ahead (kn)", "starboa
 def read(path):
     """Signals in SI, angles in rad, continuous heading, rudder positive to starboard."""
     lines = enumerate(read_bytes_as_text(path).splitlines(), start=1)
-    rows = [(number, line.split()) for number, line in lines if number > 1 and line.strip()]
-    time, heading, rate, ahead, starboard, rudder = number_rows(path, rows, COLUMNS).T
+    rows = {number: ",".join(line.split()) for number, line in lines if number > 1 and line.strip()}
+    table = table_of_rows(path, COLUMNS, [*rows.values()], np.array([*rows]))
+    time, heading, rate, ahead, starboard, rudder = map(table.column, COLUMNS)
     motion = {"psi_rad": np.unwrap(np.radians(heading)), "r_radps": np.radians(rate / 60)}
     speeds = {"u_mps": KNOT_MPS * ahead, "v_mps": KNOT_MPS * starboard}
     return Trial(path, time, {"delta_rad": np.radians(rudder), **motion, **speeds})

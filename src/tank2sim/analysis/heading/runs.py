@@ -91,7 +91,7 @@ class CourseChange:
 
     `rise_time_s`: from 10 to 90 % of the change; None if not reached; `settling_time_s`: time after which it stays
     within :data:`_SETTLED` of the change; None if it does not; `rate_limited_s`: time of rudder motion at the largest
-    rate.
+    rate; None if the card states none.
     """
 
     ordered_deg: float
@@ -99,7 +99,7 @@ class CourseChange:
     overshoot_deg: float
     settling_time_s: float | None
     largest_rudder_deg: float
-    rate_limited_s: float
+    rate_limited_s: float | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,7 +109,8 @@ class CourseKeeping:
     `heading_error_deg2s`, `rudder_deg2s`: integrals of the square of the heading error and of the rudder angle about
     its mean; `heading_error_rms_deg`, `heading_error_mean_deg`, `rudder_rms_deg`: the same as root mean squares (the
     rudder about its mean), and the remaining mean error; `rudder_travel_degps`: mean absolute rudder rate: the wear of
-    the gear; `rate_limited_percent`: share of the time of rudder motion at the largest rate.
+    the gear; `rate_limited_percent`: share of the time of rudder motion at the largest rate; None
+    if the card states none.
     """
 
     duration_s: float
@@ -119,7 +120,7 @@ class CourseKeeping:
     heading_error_mean_deg: float
     rudder_rms_deg: float
     rudder_travel_degps: float
-    rate_limited_percent: float
+    rate_limited_percent: float | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,14 +150,14 @@ def without_anti_windup(autopilot: Model) -> dict[str, float]:
 
 def course_change(run: Trajectory, ordered_rad: float) -> CourseChange:
     """Figures of a run in which ``heading.command`` steps from the heading at the start by `ordered_rad` at t = 0."""
-    heading = step_figures(run.t, run["motion.psi"], ordered_rad)
+    heading, at_limit = step_figures(run.t, run["motion.psi"], ordered_rad), _rate_limited(run)
     return CourseChange(
         ordered_deg=math.degrees(ordered_rad),
         rise_time_s=heading.rise_time_s,
         overshoot_deg=math.degrees(heading.overshoot),
         settling_time_s=heading.settling_time_s,
         largest_rudder_deg=float(np.degrees(np.abs(run["rudder.angle"]).max())),
-        rate_limited_s=float(_rate_limited(run).sum() * run.model.step_s),
+        rate_limited_s=None if at_limit is None else float(at_limit.sum() * run.model.step_s),
     )
 
 
@@ -196,7 +197,7 @@ def course_keeping(run: Trajectory, course_rad: float, from_s: float) -> CourseK
     rudder = np.degrees(run["rudder.angle"][part])
     rudder = rudder - rudder.mean()
     duration = float(run.t[-1] - run.t[part][0])
-    moved = np.abs(np.diff(rudder)).sum()
+    moved, at_limit = np.abs(np.diff(rudder)).sum(), _rate_limited(run)
     return CourseKeeping(
         duration_s=duration,
         heading_error_deg2s=float(np.mean(error**2) * duration),
@@ -205,7 +206,7 @@ def course_keeping(run: Trajectory, course_rad: float, from_s: float) -> CourseK
         heading_error_mean_deg=float(error.mean()),
         rudder_rms_deg=_rms(rudder),
         rudder_travel_degps=float(moved / duration),
-        rate_limited_percent=float(100 * _rate_limited(run)[part[1:]].mean()),
+        rate_limited_percent=None if at_limit is None else float(100 * at_limit[part[1:]].mean()),
     )
 
 
@@ -235,8 +236,16 @@ def _reached(time: Array, values: Array, level: float) -> float | None:
     return float(time[k - 1] + share * (time[k] - time[k - 1]))
 
 
-def _rate_limited(run: Trajectory) -> Array:
-    """True for each step (n - 1,) in which the rudder moved at its largest rate."""
-    largest = run.model.defaults.get(acting_variable(run.model, "steering.max_rate"), math.inf)
+def largest_rudder_rate(ship: Model) -> float | None:
+    """Largest rate of the steering gear, rad/s; None if the card states none."""
+    largest = ship.defaults.get(acting_variable(ship, "steering.max_rate"), math.inf)
+    return largest if math.isfinite(largest) else None
+
+
+def _rate_limited(run: Trajectory) -> Array | None:
+    """True for each step (n - 1,) in which the rudder moved at its largest rate; None if none is stated."""
+    largest = largest_rudder_rate(run.model)
+    if largest is None:
+        return None
     moved = np.abs(np.diff(run["rudder.angle"])) / run.model.step_s
     return np.asarray(moved > 0.999 * largest)

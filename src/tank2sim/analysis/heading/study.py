@@ -436,9 +436,17 @@ def _notices(
 
 def _of_the_gear(ship: Model, design: HeadingDesign, kept: CourseKeeping, weather: Weather) -> list[Notice]:
     """Notices on the load of the gear in waves, and on limits of the autopilot below the gear's."""
-    notices = []
-    if kept.rate_limited_percent > _BUSY_PERCENT:
-        remedy = f"--wave-filter {weather.wave_radps:.3g}" if design.kind == "pid" else "--design pid --wave-filter"
+    notices: list[str] = []
+    if kept.rate_limited_percent is None:
+        notices.append(
+            caution(
+                "the card states no largest rate of the steering gear, and nothing limits the rudder, which moves at "
+                f"{kept.rudder_travel_degps:.3g} deg/s in the mean; state steering_gear.max_rate_degps on the card"
+            )
+        )
+    elif kept.rate_limited_percent > _BUSY_PERCENT:
+        remedy = f"wave_filter_radps={weather.wave_radps:.3g}"
+        remedy += "" if design.kind == "pid" else ' with design="pid"'
         filtered = "wave_filter_radps" in design.gains
         notices.append(
             f"keeping a course in waves the rudder is at full rate {kept.rate_limited_percent:.0f} % of the time: "
@@ -450,4 +458,4 @@ def _of_the_gear(ship: Model, design: HeadingDesign, kept: CourseKeeping, weathe
             f"the autopilot orders no more than {math.degrees(LARGEST_RUDDER_RAD):.0f} deg of rudder, the angle that "
             f"SOLAS II-1, regulation 29, requires of a gear; this gear goes to {math.degrees(limit):.3g} deg"
         )
-    return [Notice(text) for text in notices]
+    return [text if isinstance(text, Notice) else Notice(text) for text in notices]

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from tank2sim.api.verbs import Progress, Written, verb
-from tank2sim.arguments import ArgumentBounds, PositiveArgument
+from tank2sim.arguments import ArgumentBounds
 from tank2sim.errors import ArgumentError
+from tank2sim.quantities import Duration
 
 if TYPE_CHECKING:
     from tank2sim.apps.ardupilot.result import ServeResult
@@ -26,13 +27,14 @@ Instance = Annotated[int, ArgumentBounds(0, 100, whole=True)]
     default_ship="otter",
     name="serve",
     results=("tank2sim.apps.ardupilot.result:ServeResult",),
+    charts=False,
 )
 def serve(
     ship: Vessel,
     output: str | Annotated[Path, _PARAMETERS] | None = None,
     *,
     instance: Instance = 0,
-    silence_s: PositiveArgument | None = None,
+    silence_s: Duration | None = None,
     report: Progress = lambda _: None,
 ) -> ServeResult:
     """Answer ArduPilot's SITL as the physics of its ``--model JSON``, in lock-step, until it is interrupted.

@@ -85,7 +85,8 @@ class BridgeResult(Result[BridgeStudy]):
     def headline(self) -> tuple[str, ...]:
         """Name of the ship and number of blanks."""
         if self.bridge is None:
-            return (f"Manoeuvring data of {self.study.ship}.",)
+            again = f"tank2sim {self.command} CARD --page FILE.html"
+            return f"Manoeuvring data of {self.study.ship}.", f"The sheet itself is not in the JSON: {again} draws it."
         hatched = self.beyond_card
         outside = f", {hatched} of them hatched: outside the range of the card" if hatched else ""
         return (f"{self.study.ship}: {self.blanks} blanks are to be filled in by hand{outside}",)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     "the whole way on bundled data: tows to an FMU, the Mariner to an FMU",
     name="demo",
     results=("tank2sim.apps.demo.result:DemoResult",),
+    charts=False,
 )
 def run_demo(
     output: str | Annotated[Path, Written((), "DIR", by_function=True)] = "demo",

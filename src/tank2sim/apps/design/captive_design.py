@@ -19,7 +19,7 @@ from tank2sim.apps.design.tank_form import TankFile, refuse_contradictions
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.writing import TestedRange
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.identification.captive.equations import candidate_terms
 from tank2sim.identification.captive.tank_conditions import SHORTEST_MODEL_M
 from tank2sim.records.campaign_form import ModelSection
@@ -333,7 +333,7 @@ class CaptiveDesigner:
             rest.cost[chosen],
         )
         if left < allocation.cost.min():
-            raise InputError("--hours", f"{budget / 3600:.3g}", "has no room for a run", "give more hours")
+            raise ArgumentError("hours", f"{budget / 3600:.3g}", "has no room for a run", "give more hours")
         relaxed, _ = allocation.relaxed(left, start)
         counts[chosen] += allocation.whole(left, relaxed)
         return counts, relaxed

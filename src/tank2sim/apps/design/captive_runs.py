@@ -10,7 +10,7 @@ import numpy as np
 
 from tank2sim.apps.design.tank_form import TankFile
 from tank2sim.cards.writing import TestedRange
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.identification.captive.tank_conditions import (
     LARGEST_FREQUENCY_PARAMETER,
     LARGEST_REDUCED_FREQUENCY,
@@ -108,7 +108,7 @@ class TankRuns:
             problem = (
                 f"is {self.tank.carriage.length_m:g} m, and start and stop at {self.speed_mps:.3g} m/s take {way:.3g} m"
             )
-            raise InputError("--carriage-length", "", problem, "take a longer one, or a shorter model")
+            raise ArgumentError("carriage_length_m", "", problem, "take a longer one, or a shorter model")
 
     @property
     def longest_s(self) -> float:
@@ -157,7 +157,7 @@ class TankRuns:
                 f"leaves {self.longest_s:.3g} s of record, and {self.tank.mechanism.cycles} cycles of {motion} at the "
                 f"highest frequency ({highest:.3g} rad/s) need {self.tank.mechanism.cycles * 2 * math.pi / highest:.3g}"
             )
-            raise InputError("--carriage-length", f"{self.tank.carriage.length_m:g}", problem, "take a longer one")
+            raise ArgumentError("carriage_length_m", f"{self.tank.carriage.length_m:g}", problem, "take a longer one")
         found = np.geomspace(max(lowest, highest / ratio), highest, count) if lowest < highest else np.array([highest])
         return [frequency for frequency in found.tolist() if not self._resonant(motion, frequency)]
 

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from tank2sim.api.verbs import Output, verb
-from tank2sim.arguments import ArgumentBounds, DrawsArgument, PositiveArgument, Seed
+from tank2sim.arguments import ArgumentBounds, DrawsArgument, Seed
 from tank2sim.errors import ArgumentError
 from tank2sim.files import CARD, TABLE
+from tank2sim.quantities import TankModelLength, TankSize
 
 if TYPE_CHECKING:
     from tank2sim.apps.design.result import CampaignDesignResult, TrialDesignResult
@@ -131,13 +132,13 @@ def design_campaign(
     figures: str | Sequence[str] = DESIGN_FIGURES,
     hours: Hours | None = None,
     tank: str | Path | TankFile | None = None,
-    carriage_length_m: PositiveArgument | None = None,
-    model_length_m: PositiveArgument | None = None,
+    carriage_length_m: TankSize | None = None,
+    model_length_m: TankModelLength | None = None,
     usual: str | Path | None = None,
     largest: tuple[float, float, float] | None = None,
     check_runs: bool = True,
     one_side: bool = False,
-    draws: DrawsArgument | None = None,
+    members: DrawsArgument | None = None,
     seed: Seed = 0,
 ) -> CampaignDesignResult:
     """Design the next captive campaign of a ship: the runs that make its figures most certain.
@@ -173,7 +174,7 @@ def design_campaign(
     one_side : bool
         Figures to the side of the given rudder, in place of the mean over both sides, as trials are reported: a single
         side depends on Y0 and N0, which every run shows equally well.
-    draws : int
+    members : int
         Ships drawn from the errors of the card, for which the plan is to be good as well.
     seed : int
         Seed of the drawn ships.
@@ -186,7 +187,7 @@ def design_campaign(
     Examples
     --------
     >>> import tank2sim as t2s
-    >>> plan = t2s.design_campaign("mariner", figures="overshoot_1_deg@10/10", hours=2, draws=0)
+    >>> plan = t2s.design_campaign("mariner", figures="overshoot_1_deg@10/10", hours=2, members=0)
     >>> float(plan.runs["tank_min"].sum()) < 2 * 60
     True
     """
@@ -202,7 +203,7 @@ def design_campaign(
         hours=hours,
         check_runs=check_runs,
         one_side=one_side,
-        draws=DRAWN_SHIPS if draws is None else draws,
+        draws=DRAWN_SHIPS if members is None else members,
         seed=seed,
         source="tank" if tank is None or isinstance(tank, TankFile) else str(tank),
     )

@@ -134,8 +134,8 @@ def _kinds(design: CaptiveDesign) -> tuple[PlannedKind, ...]:
         kind = PlannedKind(
             runs=test.repeats * len(test.runs),
             type=run.type.replace("_", " "),
-            drift=f"{sides}{math.degrees(run.drift_rad):.3g}" if run.drift_rad else "",
-            rudder=f"{opposite}{math.degrees(abs(run.rudder_rad)):.3g}" if run.rudder_rad else "",
+            drift=f"{sides}{math.degrees(run.drift_rad):.3g}" if run.drift_rad else None,
+            rudder=f"{opposite}{math.degrees(abs(run.rudder_rad)):.3g}" if run.rudder_rad else None,
             frequency_radps=run.frequency_radps or None,
             amplitude_prime=run.velocity / run.speed_mps * length if run.oscillates else None,
             cycles=run.cycles if run.oscillates else None,

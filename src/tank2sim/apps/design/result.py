@@ -117,7 +117,7 @@ class CampaignDesignResult(DesignResult[CampaignStudy]):
     Examples
     --------
     >>> import tank2sim as t2s
-    >>> plan = t2s.design_campaign("mariner", figures="K_prime", draws=0)
+    >>> plan = t2s.design_campaign("mariner", figures="K_prime", members=0)
     >>> bool((plan.figures["design"] < plan.figures["usual"]).all())
     True
     """

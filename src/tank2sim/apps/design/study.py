@@ -82,8 +82,8 @@ class PlannedKind:
 
     runs: int
     type: str
-    drift: str
-    rudder: str
+    drift: str | None
+    rudder: str | None
     frequency_radps: float | None
     amplitude_prime: float | None
     cycles: int | None

@@ -21,7 +21,7 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.estimates import RELATIVE_ERROR
 from tank2sim.dynamics.card_parameters import CardParameter, JointErrors, card_parameters, joint_errors, study_model
-from tank2sim.errors import ArgumentError, InputError
+from tank2sim.errors import ArgumentError
 from tank2sim.gap.outcome.next_test import Explanation, SailedShip
 from tank2sim.gap.outcome.next_test_candidates import Candidate, candidate_manoeuvres, orders_csv
 from tank2sim.identification.trials.problem.problem_from_card import free_parameters
@@ -132,8 +132,8 @@ def design_of_trial(
     usual_s = float(usual @ cost)
     budget = usual_s if minutes is None else 60 * minutes
     if budget < cost.min():
-        raise InputError("--minutes", f"{budget / 60:.3g}", f"has no room for a manoeuvre of {cost.min() / 60:.3g} min",
-                         "give more minutes")  # fmt: skip
+        problem = f"has no room for a manoeuvre of {cost.min() / 60:.3g} min"
+        raise ArgumentError("minutes", f"{budget / 60:.3g}", problem, "give more minutes")
     by_usual = every.variances(usual * budget / usual_s)
     targets = every.scaled(by_usual)
 

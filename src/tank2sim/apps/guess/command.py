@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tank2sim.api.verbs import Output, verb
-from tank2sim.arguments import DEFAULT_MEMBERS, GuessedShips, PositiveArgument, Seed
+from tank2sim.arguments import DEFAULT_MEMBERS, GuessedShips, Seed
 from tank2sim.files import CARD
+from tank2sim.quantities import BlockCoefficient, Breadth, Draught, Length, SpeedKnots
 
 if TYPE_CHECKING:
     from tank2sim.apps.guess.result import GuessResult
@@ -24,11 +25,11 @@ _BYTES = 15_000
 )
 def guess(
     *,
-    length_m: PositiveArgument,
-    beam_m: PositiveArgument,
-    draught_m: PositiveArgument,
-    block: PositiveArgument,
-    speed_kn: PositiveArgument,
+    length_m: Length,
+    beam_m: Breadth,
+    draught_m: Draught,
+    block: BlockCoefficient,
+    speed_kn: SpeedKnots,
     turn35: str | None = None,
     zigzag10: str | None = None,
     zigzag20: str | None = None,

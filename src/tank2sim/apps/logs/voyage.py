@@ -177,7 +177,7 @@ def _series(path: Path, found: ChannelSet, streams: Sequence[LogStream]) -> dict
         remedy = "give a log with values at several times, that rise"
         raise InputError(path, "", "has values at one time alone, or none", remedy)
     if not series:
-        remedy = f"say which is what in a channels file (--channels), as docs/logs.md shows: {listed}"
+        remedy = f'say which is what with channels="channels.toml", as docs/logs.md shows: {listed}'
         raise InputError(path, "", "no channel of it is understood", remedy)
     return series
 

@@ -335,7 +335,7 @@ def _spacing(card: SteeredCard) -> float:
     fixed = all(one.azimuth_rad == 0 and one.max_azimuth_rad is None for one in (first, last))
     if len(card.thrusters) != 2 or not alike or not fixed or not first.y_m or first.y_m != -last.y_m:
         problem = "are not two alike that push ahead, one at either side, as the engines of Bridge Command are"
-        raise card.fault("thrusters", problem, "export an FMU, or convert the card --to gazebo")
+        raise card.fault("thrusters", problem, 'export an FMU, or convert the card with to="gazebo"')
     return 2 * abs(first.y_m)
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     "what a table of derivatives with unstated conventions means",
     Output("-o", CARD, "Write the card of the first reading.", lambda result, path: result.files(path), "CARD.toml"),
     results=("tank2sim.apps.programs.convention_result:ConventionResult",),
+    charts=False,
 )
 def convention(coefficients: str | Path) -> ConventionResult:
     """Say what a table of derivatives with unstated conventions may mean.

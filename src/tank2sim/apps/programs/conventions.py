@@ -44,7 +44,7 @@ def in_conventions(card: ManoeuvringCard, wanted: Conventions) -> ManoeuvringCar
         return card
     mmg = card.model.kind == "mmg"
     if mmg and (wanted.origin_m or wanted.rudder_sign == "port"):
-        remedy = "convert it --to abkowitz, with the same options"
+        remedy = 'convert it with to="abkowitz", with the same options'
         raise card.fault("model.kind", "is mmg, which is about midships with the rudder to starboard", remedy)
     if wanted.origin_m and card.effects:
         names = ", ".join(entry.name for entry in card.effects)

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Literal
 
 from tank2sim.api.verbs import Output, verb
 from tank2sim.apps.programs.forms import FORMS
-from tank2sim.arguments import NumberArgument, Scatter
+from tank2sim.arguments import Scatter
+from tank2sim.quantities import BodyPlace
 
 if TYPE_CHECKING:
     from tank2sim.apps.programs.convert_result import ConversionResult
@@ -32,6 +33,7 @@ Language = Literal[
     ),
     choices={"to": {name: form.words for name, form in FORMS.items()}},
     results=("tank2sim.apps.programs.convert_result:ConversionResult",),
+    charts=False,
 )
 def convert(
     ship: Vessel,
@@ -39,7 +41,7 @@ def convert(
     *,
     scaling: Literal["prime", "prime_ii", "bis", "dimensional"] | None = None,
     rudder_sign: Literal["port", "starboard"] | None = None,
-    origin_m: NumberArgument = 0.0,
+    origin_m: BodyPlace = 0.0,
     scatter: Scatter | None = None,
     added_mass: Literal["plugin", "inertial"] | None = None,
 ) -> ConversionResult:

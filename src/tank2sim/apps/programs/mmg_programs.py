@@ -14,6 +14,8 @@ from tank2sim.cards.card import MmgCard
 from tank2sim.dynamics.mmg.hull import HULL_TERMS
 from tank2sim.escaping import python_text
 
+_OTHER_PROGRAMS = 'convert it with to="mss" or to="pvs"'
+
 
 def shipmmg_values(card: MmgCard) -> tuple[dict[str, float], dict[str, float]]:
     """Keyword arguments of ``Mmg3DofBasicParams`` and ``Mmg3DofManeuveringParams``.
@@ -68,7 +70,7 @@ def mmgdynamics_values(card: MmgCard) -> dict[str, float]:
         raise card.fault("ship.beam_m", "is missing, and mmgdynamics needs it", "add it")
     arm = rudder.x_R + rudder.a_H * rudder.x_H
     if not rudder.a_H and rudder.x_R != -0.5:
-        raise card.fault("rudder.x_R", f"is {rudder.x_R:g}, and mmgdynamics has -0.5", "convert it --to mss or pvs")
+        raise card.fault("rudder.x_R", f"is {rudder.x_R:g}, and mmgdynamics has -0.5", _OTHER_PROGRAMS)
     mass = card.rigid_body.mass * scales.mass
     ratio = length / ship.draught_m
     added = {name: -card.derivatives.get(name, 0.0) * ratio for name in ("Xudot", "Yvdot", "Nrdot")}
@@ -106,7 +108,7 @@ def mmgdynamics_values(card: MmgCard) -> dict[str, float]:
 
 def _refuse_what_others_lack(card: MmgCard, program: str) -> None:
     """Raise InputError if the ship has two propellers, an asymmetric hull (Y0, N0), rolls, or has other forms."""
-    remedy = "convert it --to mss or pvs"
+    remedy = _OTHER_PROGRAMS
     if card.propeller.number != 1:
         raise card.fault("propeller.number", f"is 2, and {program} has one propeller", remedy)
     if card.roll is not None:

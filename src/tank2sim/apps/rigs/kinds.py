@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 from tank2sim.apps.rigs.glider.card import GliderCard
 from tank2sim.apps.rigs.yaw.card import YawRigCard
 from tank2sim.cards.card import Card
-from tank2sim.cards.form import CardSection, Mass, Uncertainty
+from tank2sim.cards.form import CardSection, Uncertainty
 from tank2sim.cards.kinds import body_kind
+from tank2sim.quantities import Mass
 
 if TYPE_CHECKING:
     from tank2sim.dynamics.model import Model

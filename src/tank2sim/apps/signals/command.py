@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tank2sim.api.verbs import Output, verb
-from tank2sim.arguments import PositiveArgument
 from tank2sim.errors import ArgumentError
 from tank2sim.files import TABLE
+from tank2sim.quantities import GapLength
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,21 +22,25 @@ if TYPE_CHECKING:
 
 def _written(result: SignalsResult, path: Path) -> dict[Path, str | bytes]:
     if result.filtered is None:
-        raise ArgumentError("output", "", "needs a filter", "say which with filter, such as lowpass:0.5")
+        raise ArgumentError("output", "", "needs a filter", 'say which, such as filter="lowpass:0.5"')
     return {path: result.filtered.to_csv()}
+
+
+def _unwritten(result: SignalsResult) -> str:
+    return "" if result.filtered is None else "the filtered trial is not written: add -o FILTERED.csv"
 
 
 @verb(
     "statistics, spectra and filters of a record",
-    Output("-o", TABLE, "Write the trial with the filtered column.", _written, "FILTERED.csv"),
+    Output("-o", TABLE, "Write the trial with the filtered column.", _written, "FILTERED.csv", unwritten=_unwritten),
     results=("tank2sim.apps.signals.result:SignalsResult",),
 )
 def signals(
     trials: str | Path | TrialRecord | pd.DataFrame | Sequence[str | Path | TrialRecord | pd.DataFrame],
     columns: str | Sequence[str] = (),
     *,
-    max_gap_s: PositiveArgument | None = None,
-    segment_s: PositiveArgument | None = None,
+    max_gap_s: GapLength | None = None,
+    segment_s: GapLength | None = None,
     filter: str | None = None,
 ) -> SignalsResult:
     """Mean, spread, correlation time, stationarity, normality and spectra of the signals of trials.

@@ -252,7 +252,7 @@ def _cautions(correlation: Correlation, transfer: Transfer, step_s: float) -> It
     if abs(lag) > 0.1 * segment:
         yield Notice(
             f"the yaw rate is most like the rudder of {lag:.3g} s before, which is long for spectral segments of "
-            f"{segment:.3g} s: gain and coherence come out low; a longer --segment helps"
+            f"{segment:.3g} s: gain and coherence come out low; a longer segment_s helps"
         )
     if not np.any(transfer.sure):
         yield Notice("no coherence of rudder and yaw rate is above chance: the transfer function says nothing")

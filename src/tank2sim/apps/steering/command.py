@@ -32,6 +32,7 @@ STEERED_SHIP = "esso-osaka-ship"
     page_required=True,
     name="steer",
     results=("tank2sim.apps.steering.result:SteeringPageResult",),
+    charts=False,
 )
 def make_steering_page(
     ship: Vessel,

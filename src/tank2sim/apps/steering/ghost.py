@@ -59,7 +59,7 @@ def ghost_of(trial: Trial, model: Model) -> Ghost:
         name: np.asarray(values, dtype=float) for name, values in trial.signals.items() if np.isfinite(values).any()
     }
     if not {"x_m", "y_m"} <= set(signals):
-        raise trial.fault("columns x_m, y_m", "hold no track", "a ghost needs positions: leave out --ghost")
+        raise trial.fault("columns x_m, y_m", "hold no track", "a ghost needs positions: leave the ghost out")
     start = {f"initial.{name}": _first(signals[key]) for name, unit in _START if (key := f"{name}_{unit}") in signals}
     course, way = _approach(trial.time_s, signals["x_m"], signals["y_m"])
     start["initial.psi"] = _first(signals["psi_rad"]) if "psi_rad" in signals else course

@@ -67,7 +67,9 @@ class SteeringPageResult(Result[SteeringStudy]):
         """Name of the ship, size of the page, and the ships that are steered together with it."""
         study = self.study
         others = f"{study.members} ships from the covariance of the card" if study.members else NO_COVARIANCE
-        return (f"{study.ship}: a page of {study.page_kB:.0f} kB", others)
+        found = f"{study.ship}: a page of {study.page_kB:.0f} kB", others
+        again = "The page itself is not in the JSON: tank2sim steer CARD --page FILE.html makes it."
+        return found if self.html else (*found, again)
 
     @property
     def sections(self) -> Sequence[Section]:

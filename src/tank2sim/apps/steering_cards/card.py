@@ -15,11 +15,12 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationError
 
 from tank2sim.bundled import bundled
-from tank2sim.cards.form import CardSection, Length, Positive, Speed, Text
+from tank2sim.cards.form import CardSection, Positive, Text
 from tank2sim.cards.form_faults import form_fault
 from tank2sim.cards.reading import parsed_toml
 from tank2sim.errors import InputError
 from tank2sim.files import read_text
+from tank2sim.quantities import Draught, Length, Speed
 from tank2sim.units import to_si
 
 _FORMAT = "tank2sim-steering/1"
@@ -45,7 +46,7 @@ class SteeringEntry(CardSection):
     title: Text
     form: Text
     source: Text
-    draught_m: Positive | None = None
+    draught_m: Draught | None = None
     coefficients: dict[str, float] = Field(default_factory=dict)
     notes: str | None = None
 
@@ -91,7 +92,7 @@ class PrintedInfluence(CardSection):
     source: Text
     change_percent: Positive
     radius_m: Positive
-    draughts_m: list[Positive]
+    draughts_m: list[Draught]
     K_percent: dict[str, list[float]]
     misread_as: dict[str, str] = Field(default_factory=dict)
 

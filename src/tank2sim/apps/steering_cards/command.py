@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tank2sim.api.verbs import verb
-from tank2sim.arguments import AngleArgument
+from tank2sim.quantities import SlantAngle
 
 if TYPE_CHECKING:
     from tank2sim.apps.steering_cards.result import SteeringModelsResult
@@ -24,7 +24,7 @@ def _is_steering_card(name: str) -> bool:
     takes=_is_steering_card,
     results=("tank2sim.apps.steering_cards.result:SteeringModelsResult",),
 )
-def steering_models(card: str | Path, rudder_deg: AngleArgument | None = None) -> SteeringModelsResult:
+def steering_models(card: str | Path, rudder_deg: SlantAngle | None = None) -> SteeringModelsResult:
     """Compare the models of a steering card.
 
     Parameters

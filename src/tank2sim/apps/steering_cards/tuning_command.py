@@ -29,6 +29,7 @@ _POINT = re.compile(r"(?P<value>[\d.]+)(?P<metre>m?)@(?P<rudder>[+-]?[\d.]+)")
     name="influence.through",
     options={"points": "--through"},
     results=("tank2sim.apps.steering_cards.tuning_result:TurnTuningResult",),
+    charts=False,
 )
 def tune_ship_through(ship: Vessel, points: Sequence[str]) -> TurnTuningResult:
     """Scale the hull's moments and the rudder until the steady turns meet two points of the steering diagram.

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tank2sim.api.verbs import Output, verb
-from tank2sim.arguments import VALIDATION_MEMBERS, AngleArgument, NonNegativeArgument, PositiveArgument, SmallEnsemble
+from tank2sim.arguments import VALIDATION_MEMBERS, AngleArgument, SmallEnsemble
+from tank2sim.quantities import Draught, SeaState, WaterDepth, WindSpeed
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -31,13 +32,13 @@ def trial_office(
     *,
     ship: Vessel | str | Path,
     notes: str | Path | None = None,
-    draught_fore_m: PositiveArgument | None = None,
-    draught_aft_m: PositiveArgument | None = None,
-    full_load_draught_m: PositiveArgument | None = None,
-    depth_m: PositiveArgument | None = None,
-    wind_speed_mps: NonNegativeArgument | None = None,
+    draught_fore_m: Draught | None = None,
+    draught_aft_m: Draught | None = None,
+    full_load_draught_m: Draught | None = None,
+    depth_m: WaterDepth | None = None,
+    wind_speed_mps: WindSpeed | None = None,
     wind_from_deg: AngleArgument | None = None,
-    sea_state: int | None = None,
+    sea_state: SeaState | None = None,
     members: SmallEnsemble = VALIDATION_MEMBERS,
 ) -> TrialOfficeResult:
     """Make the report of a sea trial: conditions, figures without current and wind, the ship at full load, a verdict.
@@ -102,4 +103,5 @@ def trial_office(
         sea_state=sea_state,
     )
     card = as_vessel(ship).manoeuvring()
-    return TrialOfficeResult(*study_trials(card, trials_of(trials) if trials else [], given, members))
+    none = isinstance(trials, list | tuple) and not trials
+    return TrialOfficeResult(*study_trials(card, [] if none else trials_of(trials), given, members))

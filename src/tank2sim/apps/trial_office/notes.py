@@ -7,15 +7,15 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError
 
+from tank2sim.arguments import AngleArgument
 from tank2sim.cards.form import CardSection
 from tank2sim.cards.form_faults import form_fault
 from tank2sim.cards.reading import parsed_toml
 from tank2sim.errors import ArgumentError, InputError, close_name
 from tank2sim.files import read_text
+from tank2sim.quantities import Draught, SeaState, Speed, WaterDepth, WindSpeed
 from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag, parse_manoeuvre
 
-_Draught = Annotated[float, Field(gt=0, le=50)]
-_Speed = Annotated[float, Field(gt=0, le=50)]
 _Words = Annotated[str, Field(max_length=200)]
 
 REPORTED = (
@@ -69,14 +69,14 @@ class TrialNotes(CardSection):
     """
 
     format: Literal["tank2sim-trials/1"] = "tank2sim-trials/1"
-    draught_fore_m: _Draught | None = None
-    draught_aft_m: _Draught | None = None
-    full_load_draught_m: _Draught | None = None
-    depth_m: Annotated[float, Field(gt=0, le=20_000)] | None = None
-    wind_speed_mps: Annotated[float, Field(ge=0, le=60)] | None = None
-    wind_from_deg: Annotated[float, Field(ge=-360, le=360)] | None = None
-    sea_state: Annotated[int, Field(ge=0, le=9)] | None = None
-    speed_85_mcr_mps: _Speed | None = None
+    draught_fore_m: Draught | None = None
+    draught_aft_m: Draught | None = None
+    full_load_draught_m: Draught | None = None
+    depth_m: WaterDepth | None = None
+    wind_speed_mps: WindSpeed | None = None
+    wind_from_deg: AngleArgument | None = None
+    sea_state: SeaState | None = None
+    speed_85_mcr_mps: Speed | None = None
     engine_untouched: bool | None = None
     place: _Words = ""
     date: _Words = ""

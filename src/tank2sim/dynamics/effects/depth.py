@@ -7,7 +7,7 @@ from typing import Any
 import casadi as ca
 
 from tank2sim.cards.card import SteeredCard
-from tank2sim.dynamics.effects.derivatives import at_depth, least_depth
+from tank2sim.dynamics.effects.derivatives import DEEPEST_M, at_depth, least_depth
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols
 from tank2sim.dynamics.effects.forces import scales, with_forces, with_validity
 from tank2sim.dynamics.effects.particulars import model_particular, with_particulars
@@ -122,7 +122,7 @@ FINITE_DEPTH = Effect(
     description="Shallow water slows the ship, lets it sink deeper and turn wider, until it grounds.",
     source="Kijima et al. (1990); Lackenby (1963), ITTC 7.5-04-01-01.1; Barrass (2004); ICORELS (1980)",
     parameters=(
-        EffectParameter("depth_m", "depth of the water", least_depth, 1e4, input_name="water.depth"),
+        EffectParameter("depth_m", "depth of the water", least_depth, DEEPEST_M, input_name="water.depth"),
         EffectParameter(
             "resistance", "share of the added resistance that acts (0: the card is of this depth)", 0.0, 1.0, 1.0
         ),

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 
 import casadi as ca
 
+from tank2sim.arguments import range_of
 from tank2sim.cards.card import SteeredCard
 from tank2sim.cards.terms import known_term
 from tank2sim.dynamics.abkowitz import ACCELERATION_TERMS, ALL_TERMS
@@ -14,6 +15,7 @@ from tank2sim.dynamics.effects.forces import scales
 from tank2sim.dynamics.effects.froude_scale import lengths
 from tank2sim.dynamics.effects.particulars import model_particular, with_particulars
 from tank2sim.dynamics.model import Model
+from tank2sim.quantities import WaterDepth
 
 USUAL_CHANGE = 0.15
 """Relative change of linear damping at which a search begins: as derivatives of one ship from different tanks differ
@@ -229,6 +231,9 @@ SHALLOW_WATER = Effect(
 )
 
 
+DEEPEST_M = range_of(WaterDepth)[1]
+"""Depth of the deepest water, m."""
+
 AGROUND = 0.95
 """Largest draught over depth: at 1 the ship is aground, and the fit of the source ends before. Project choice."""
 
@@ -260,7 +265,7 @@ WATER_DEPTH = Effect(
     source="Kijima, Katsuno, Nakiri and Furukawa (1990), J. Soc. Naval Architects of Japan 168",
     parameters=(
         # Not sought in trials: they show one factor of shallow water, SHALLOW_WATER's.
-        EffectParameter("depth_m", "depth of the water", least_depth, 1e4, input_name="water.depth"),
+        EffectParameter("depth_m", "depth of the water", least_depth, DEEPEST_M, input_name="water.depth"),
     ),
     equations=at_depth,
     reads_derivatives=True,

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import casadi as ca
 import numpy as np
 
+from tank2sim.arguments import range_of
 from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, with_steps_for
 from tank2sim.dynamics.effects.forces import with_forces
@@ -16,6 +17,7 @@ from tank2sim.dynamics.effects.particulars import with_particulars
 from tank2sim.dynamics.effects.surroundings import STILL_MPS, WIND, bearing, relative_air
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model, Parameter, Quantity, State
+from tank2sim.quantities import WindSpeed
 
 STATIONS_IN_WIND = 4
 """Gauss-Legendre stations along the side: exact for a wind that does not change its side along the ship."""
@@ -174,7 +176,7 @@ WIND_FIELD = Effect(
     description="Wind that changes pushes a ship whose side area is not the same all along.",
     source="Fossen (2011), 8.1, with the side area along the ship",
     parameters=(
-        *_horizontal("air", "wind.", "from which the wind comes", 60.0, wave_speeds(0.25)),
+        *_horizontal("air", "wind.", "from which the wind comes", range_of(WindSpeed)[1], wave_speeds(0.25)),
         *(
             parameter
             for parameter in WIND.parameters

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import casadi as ca
 
+from tank2sim.arguments import range_of
 from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects.effect import Effect, EffectParameter, EffectSymbols, side_force
 from tank2sim.dynamics.effects.forces import scales, with_forces, with_side_force
@@ -15,6 +16,7 @@ from tank2sim.dynamics.effects.froude_scale import DIRECTION_SIGNS, lengths, spe
 from tank2sim.dynamics.effects.particulars import AREA_ERROR, with_particulars
 from tank2sim.dynamics.kinematics import earth_velocity
 from tank2sim.dynamics.model import Model
+from tank2sim.quantities import WindSpeed
 
 STILL_MPS = 1e-6
 """Added to the square of a relative speed, so that its root has a slope at rest; far below any speed of air."""
@@ -138,8 +140,7 @@ WIND = Effect(
         EffectParameter(
             "speed_mps",
             "true speed of the wind",
-            0.0,
-            60.0,
+            *range_of(WindSpeed),
             input_name="wind.speed",
             absent=0.0,
             typical=wave_speeds(0.25),  # 10 m/s, a fresh breeze (Beaufort 5), for a ship of 160 m (project choice)

@@ -21,7 +21,7 @@ from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.proof.cross_check import MUCH, closes_gap
 from tank2sim.gap.proof.improvement import NamedEffects, Proof, Prover
 from tank2sim.gap.proof.judge import CLEARLY, Judged
-from tank2sim.gap.proof.surrounded_trial import STEP_SHARE, SurroundedTrial, typical_speed
+from tank2sim.gap.proof.surrounded_trial import STEP_SHARE, SurroundedTrial, largest_speed, typical_speed
 from tank2sim.gap.result import AMBIGUOUS, MISSING, Surroundings, misfit_of
 from tank2sim.gap.search.decision import LIKELY, TEMPER
 from tank2sim.gap.search.explanations import Search
@@ -142,7 +142,9 @@ def _simulated(prover: Prover, search: Search, names: Sequence[str]) -> dict[str
     arguments = at_sea, [fitted] * len(sought), sought, [dict(replays.noise)] * len(sought)
     found = {}
     for name, common in zip(sought, each(fit_common_surroundings, *arguments), strict=True):
-        if common is None or (predicted := float(np.median(common.predicted))) >= PREDICTS:
+        if common is None or common.strongest_mps > largest_speed(name):
+            continue  # a wind that never blows imitates something else
+        if (predicted := float(np.median(common.predicted))) >= PREDICTS:
             continue
         fit = fits[name,]
         named = NamedEffects([(name, common.values, common.errors)], {name: common.by_trial})
@@ -219,6 +221,11 @@ class CommonSurroundings:
     errors: Mapping[str, float]
     by_trial: Mapping[str, Surroundings]
     predicted: Array
+
+    @property
+    def strongest_mps(self) -> float:
+        """The largest speed in a trial, m/s."""
+        return max(at.speed_mps for at in self.by_trial.values())
 
 
 def fit_common_surroundings(

@@ -12,6 +12,7 @@ from scipy.optimize import OptimizeResult, least_squares
 from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredCard
 from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.effects.effect import EffectParameter
 from tank2sim.gap.proof.open_loop import InputRecord, Replayer, difference_slopes, input_record
 from tank2sim.gap.result import Surroundings
 from tank2sim.records.trials import Trial
@@ -49,8 +50,17 @@ def with_columns(trial: Trial, found: ByTrial) -> Trial:
 
 def typical_speed(card: SteeredCard, name: str) -> float:
     """Size of a usual wind or current, m/s."""
+    return max(map(abs, _speed_of(name).typical_values(card)))
+
+
+def largest_speed(name: str) -> float:
+    """The strongest wind or current that is possible, m/s."""
+    return _speed_of(name).maximum
+
+
+def _speed_of(name: str) -> EffectParameter:
     (speed,) = (parameter for parameter in EFFECTS[name].parameters if parameter.name == "speed_mps")
-    return max(map(abs, speed.typical_values(card)))
+    return speed
 
 
 class SurroundedTrial:

@@ -99,7 +99,7 @@ def _omitted_runs(reduction: Reduction) -> Iterator[Notice]:
         if cause == "its speed" and _constant_revolutions(reduction, names):
             yield Notice(
                 "The runs away from the test speed keep its revolutions, so that speed and propeller load change "
-                "together: they give no term in Du of hull or rudder alone. --off-speed uses them, and its "
+                "together: they give no term in Du of hull or rudder alone. off_speed=True uses them, and its "
                 "terms in Du then hold at constant revolutions."
             )
     if reduction.options.off_speed:

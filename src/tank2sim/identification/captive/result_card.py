@@ -237,7 +237,7 @@ def fill_notices(card: Contents, fill: str | None, ratio: float | None, campaign
             f"Estimated, not measured, with wide standard errors ({FILLS[fill or '']}): {', '.join(card.estimated)}."
         )
     if card.missing:
-        remedy = "" if fill else f" --fill {next(iter(FILLS))} takes some of them from a published estimate."
+        remedy = "" if fill else f' fill="{next(iter(FILLS))}" takes some of them from a published estimate.'
         notices.append(
             f"The card has no {', '.join(card.missing)}: they are zero there, and a manoeuvre simulated with it is as "
             f"wrong as that.{remedy}"

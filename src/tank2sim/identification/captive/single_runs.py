@@ -164,7 +164,7 @@ def study_runs(
         notices.append(
             Notice(
                 "Without a campaign the forces are as recorded, with the reaction of the model's inertia, and no "
-                "derivatives are given: --campaign campaign.toml."
+                'derivatives are given: give campaign="campaign.toml".'
             )
         )
     if not alike:

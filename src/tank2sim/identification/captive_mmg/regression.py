@@ -180,7 +180,7 @@ def fit_mmg(tests: SteadyTests) -> MmgFit:
 
 
 def _refuse_poor(tests: SteadyTests) -> None:
-    count, remedy = len(tests.names), "test it, or reduce the others without --mmg"
+    count, remedy = len(tests.names), "test it, or reduce the others to a polynomial"
     if count < _FEWEST:
         raise InputError(tests.path, "averages", f"has {count} conditions", f"{_FEWEST} and more are needed")
     for column, what in ((3, "rudder angle"), (1, "drift angle")):

@@ -185,7 +185,7 @@ def read_steady_tests(path: Path) -> SteadyTests:
 def _refuse_heel(runs: Sequence[CaptiveRun], path: Path) -> None:
     if heeled := next((run.name for run in runs if run.heel_rad), ""):
         problem = f"{heeled} has a heel; the method is of an upright hull"
-        raise InputError(path, "averages.columns.heel_rad", problem, "reduce such tests to a polynomial, without --mmg")
+        raise InputError(path, "averages.columns.heel_rad", problem, "reduce such tests to a polynomial")
 
 
 def _have_torque(runs: Sequence[CaptiveRun], path: Path) -> bool:

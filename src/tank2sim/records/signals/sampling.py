@@ -109,7 +109,7 @@ def _longest_gap(trial: Trial, column: str, time: Array, limit: float) -> float:
     longest = float(time[gap + 1] - time[gap])
     if longest > limit:
         problem = f"has no value from {time[gap]:.6g} to {time[gap + 1]:.6g} s, longer than {limit:.3g} s"
-        raise trial.fault(column, problem, "cut the record there, or allow it with --max-gap SECONDS")
+        raise trial.fault(column, problem, "cut the record there, or allow it by max_gap_s")
     return longest
 
 

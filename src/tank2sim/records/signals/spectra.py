@@ -9,7 +9,7 @@ import numpy as np
 from scipy import signal, stats
 
 from tank2sim.arrays import Array, ComplexArray, Mask
-from tank2sim.errors import InputError
+from tank2sim.errors import ArgumentError, InputError
 from tank2sim.records.signals.columns import SignalName
 from tank2sim.records.signals.sampling import Series, at_common_times
 from tank2sim.records.signals.statistics import autocorrelation
@@ -173,7 +173,7 @@ def transfer_function(source: Series, result: Series, segment_s: float | None = 
     averaging = _averaging([source, result], segment_s)
     if averaging.segments < 2:
         problem = "is the only segment, and one segment has a coherence of 1 whatever the signals"
-        raise InputError(source.source, "segment", problem, "give a shorter --segment")
+        raise InputError(source.source, "segment", problem, "give a shorter segment_s")
     options = _options(source, averaging)
     inner = _inner(averaging)
     frequency, power = signal.welch(source.values, **options)
@@ -214,7 +214,7 @@ def _averaging(signals: Sequence[Series], segment_s: float | None) -> Averaging:
     if not _FEWEST_IN_SEGMENT <= samples <= count // 2:
         allowed = f"{_FEWEST_IN_SEGMENT * series.step_s:.4g} to {count // 2 * series.step_s:.4g} s"
         problem = f"{samples * series.step_s:.4g} s is not a length of a segment of {series.source}"
-        raise InputError("--segment", "", problem, f"give {allowed}")
+        raise ArgumentError("segment_s", "", problem, f"give {allowed}")
     hop = samples - samples // 2
     segments = (count - samples) // hop + 1
     window = signal.get_window("hann", samples)

@@ -41,7 +41,7 @@ class Stationary(StrEnum):
 
 _MEANINGS = {
     Stationary.YES: "it returns to its level (Dickey-Fuller), and nothing speaks against a steady level (KPSS)",
-    Stationary.TREND: "it returns to a straight line in time, and nothing speaks against that; --filter detrend:1",
+    Stationary.TREND: 'it returns to a straight line in time, and nothing speaks against that; filter="detrend:1"',
     Stationary.NO: "its level wanders as in a random walk (both tests); mean and spectrum mean little, detrend it",
     Stationary.CONTRADICTORY: "neither a steady level nor a random walk: a step, a bend or a change of spread",
     Stationary.UNDECIDED: "the record is too short to distinguish a steady level from a random walk",

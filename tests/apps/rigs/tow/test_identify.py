@@ -62,7 +62,7 @@ def test_warnings_on_table_1_with_four_unknowns(four_unknowns):
     text = "\n".join(four_unknowns.notices)
     expected = [
         r"M, B1, B2, B3 cannot all be identified from these tows: .* 2.2e\+04 \(qr\) and 5.8e\+05 \(output_error\)",
-        r"take fewer terms \(--terms B3\)",
+        r"take fewer terms \(terms=\"B3\"\)",
         r"qr: almost fully correlated are B1 and B2",
         r"qr: the drag terms have opposite signs \(B2 negative\)",
         r"output_error: the drag is negative over \d+ % of the speeds up to 0.176 m/s",
@@ -133,7 +133,7 @@ def test_what_is_given_comes_before_the_file_and_is_reported(table_1):
     reference = identify_tow(table_1, model=SIMPLE)
     for name, fit in result.methods.items():
         np.testing.assert_allclose(fit.values, 2 * reference.methods[name].values, rtol=1e-6)
-    assert "The file of the tows states force_N 11.63; 23.26 was given and used." in result.notices
+    assert "The file of the tows states 'force_N: 11.63'; 23.26 was given and used." in result.notices
 
 
 def test_largest_speed_error_is_that_of_the_integrated_model(two_unknowns, table_1):

@@ -150,9 +150,9 @@ def test_notes_tell_the_range_and_offer_a_way_out(study, table_1):
     text = " ".join(study.notices)
     assert "M only within 2547 to 3399 kg (added mass 304 to 1156 kg)" in text
     assert "The model of lowest AIC is M, B1, B2, B3, with a drag that is negative at some speeds" in text
-    assert "(--start-delay)" in text and "--terms B3" in text and "--total-mass-kg, 2357 by (2.5)" in text
+    assert "(start_delay=True)" in text and 'terms="B3"' in text and "total_mass_kg, 2357 by (2.5)" in text
     posed = study_tows(identify_tow(table_1, model=SIMPLE_LATE), table_1)
-    assert "--start-delay" not in " ".join(posed.notices) and "--total-mass-kg" not in " ".join(posed.notices)
+    assert "start_delay" not in " ".join(posed.notices) and "total_mass_kg" not in " ".join(posed.notices)
     assert posed.mass_by_theory == () and posed.drag_coefficients == {}
 
 

@@ -45,6 +45,16 @@ def test_mass_and_drag_are_those_of_the_analytic_motion(found):
     assert low < TOTAL_KG < high
 
 
+def test_with_a_given_mass_the_headline_is_about_it_and_a_far_one_is_doubted(path):
+    held = t2s.tow(path, terms="B3", total_mass_kg=TOTAL_KG)
+    assert held.headline[0].startswith(f"M is held at {TOTAL_KG:g} kg, as given") and "B3 = " in held.headline[0]
+    assert held.headline[1].startswith("By themselves the tows determine")
+    assert held.key_figures[0].value == TOTAL_KG and held.key_figures[0].note == "held, as given"
+    assert not held.cautions
+    doubted = t2s.tow(path, terms="B3", total_mass_kg=1.4 * TOTAL_KG)
+    assert any("The mass given" in caution and "by themselves" in caution for caution in doubted.cautions)
+
+
 def test_the_card_has_the_numbers_and_simulates(found, tmp_path):
     found.card.save(tmp_path / "body.toml")
     card = t2s.load(tmp_path / "body.toml").card

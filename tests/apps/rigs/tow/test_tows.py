@@ -66,8 +66,12 @@ def test_rows_without_a_reading_are_left_out(write):
         ("speed_2_mps", "speed_2_cmps", "column speed_2_cmps: is not a speed in m/s; convert it to m/s"),
         ("0.06", "x", "line 5, column speed_2_mps: 'x' is not a number"),
         ("15,0.04,0.06\n", "", "has readings at 4 times only; give readings at 5 times or more"),
-        ("t_s,", "# force_N: 0\nt_s,", "comment force_N: is 0; a positive number was expected"),
-        ("t_s,", "# mass_kg: -2\nt_s,", "comment mass_kg: is -2; a positive number was expected"),
+        (
+            "t_s,",
+            "# force_N: 0\nt_s,",
+            "comment force_N: is 0; a finite number above 0 up to",
+        ),
+        ("t_s,", "# mass_kg: -2\nt_s,", "comment mass_kg: is -2; a finite number from 1e-06 up to 1e+12 was expected"),
         ("t_s,", "# force_N: 1 kN\nt_s,", "comment force_N: '1 kN' is not a number"),
     ],
 )

@@ -89,12 +89,12 @@ def test_bad_input_is_one_line(folder):
     for text in ("38,8,100", "38,8,nan,120", "38,8,100,5"):
         refused(tank2sim("yaw", "none.csv", *simulated, "--similar-to", text, cwd=folder), "--similar-to")
     refused(tank2sim("yaw", "similar.csv", "--similar-to", "38,8,100,120", cwd=folder), "--similar-to", "simulate")
-    for text in ("0.67,0.2", "0.67,0.2,0.08,x", "0.67,0.2,0.08,0.22,47", "mariner"):
+    for text in ("0.67,0.2", "0.67,0.2,0.08,x", "0.67,0.2,0.08,0.22,47", "1e9,0.2,0.08,0.22", "mariner"):
         refused(tank2sim("yaw", "water.csv", "--theory", text, cwd=folder), "--theory")
     refused(tank2sim("yaw", "none.csv", cwd=folder), "none.csv", "does not exist")
     refused(tank2sim("yaw", "water.csv", "--card", "mariner", cwd=folder), "--card", "-o")
     refused(tank2sim("yaw", "water.csv", "--mirror-percent", "0.1", cwd=folder), "not mirror images", "%")
-    refused(tank2sim("yaw", "water.csv", "-o", "x.toml", "--card", "mariner", cwd=folder), "inertia_kgm2")
+    refused(tank2sim("yaw", "water.csv", "-o", "x.toml", "--card", "mariner", cwd=folder), "--inertia")
     refused(tank2sim("yaw", "air.csv", "-o", "x.toml", "--card", "mariner", cwd=folder), "records in water")
     refused(tank2sim("yaw", "water.csv", "--reference", "air.csv", cwd=folder), "--reference-inertia")
     refused(tank2sim("yaw", "water.csv", "--rig", "mariner", cwd=folder), "model.kind")

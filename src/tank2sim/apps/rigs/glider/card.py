@@ -8,7 +8,8 @@ from typing import Annotated
 from pydantic import Field
 
 from tank2sim.cards.card import Card
-from tank2sim.cards.form import CardSection, Mass, Positive, TimeConstant
+from tank2sim.cards.form import CardSection
+from tank2sim.quantities import Area, Mass, TimeConstant, Volume
 
 
 class Glider(CardSection):
@@ -20,10 +21,10 @@ class Glider(CardSection):
     """
 
     mass_kg: Mass
-    volume_m3: Positive
+    volume_m3: Volume
     buoyancy_kg: Mass
     hull_mass_kg: Mass | None = None
-    reference_area_m2: Annotated[float, Field(ge=1e-6, le=1e6)]
+    reference_area_m2: Area
     lift_slope: Annotated[float, Field(ge=1e-3, le=1e4)]
     lift_quadratic: Annotated[float, Field(ge=0.0, le=1e4)]
     drag_zero: Annotated[float, Field(ge=1e-6, le=1e3)]

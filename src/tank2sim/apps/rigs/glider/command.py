@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tank2sim.api.verbs import verb
-from tank2sim.arguments import AngleArgument, PositiveArgument
 from tank2sim.errors import ArgumentError
+from tank2sim.quantities import Area, Mass, SlantAngle, WaterDepth
 
 if TYPE_CHECKING:
     from tank2sim.apps.rigs.glider.path import GlideProgramme
@@ -28,15 +28,15 @@ BUNDLED_GLIDER = "kulikovsky-velikanov"
 )
 def glide(
     ship: Vessel,
-    angles_deg: AngleArgument | Sequence[AngleArgument] = (),
+    angles_deg: SlantAngle | Sequence[SlantAngle] = (),
     *,
-    roll_deg: AngleArgument = 0.0,
-    buoyancy_kg: PositiveArgument | None = None,
-    reference_area_m2: PositiveArgument | None = None,
+    roll_deg: SlantAngle = 0.0,
+    buoyancy_kg: Mass | None = None,
+    reference_area_m2: Area | None = None,
     programme: GlideProgramme | str | Path | None = None,
     as_printed: bool = False,
-    budget_kg: PositiveArgument | None = None,
-    depth_m: PositiveArgument | None = None,
+    budget_kg: Mass | None = None,
+    depth_m: WaterDepth | None = None,
     views: bool = True,
 ) -> GlideResult:
     """Fly an underwater glider: steady glides, the path of a programme, the best glides and their range.
@@ -97,7 +97,7 @@ def glide(
     used_by["as_printed"] = as_printed and programme is None
     angles = np.atleast_1d(np.asarray(angles_deg, dtype=float))
     for argument in filter(used_by.get, used_by if not angles.size else ()):
-        raise ArgumentError(argument, "", "is of steady glides", "give their path angles as well (--angles 30)")
+        raise ArgumentError(argument, "", "is of steady glides", "give their path angles as well (angles_deg=30)")
     question = GlideQuestion(
         angles_rad=tuple(np.radians(angles).tolist()),
         roll_rad=math.radians(roll_deg),

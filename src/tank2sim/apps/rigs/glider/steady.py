@@ -175,7 +175,7 @@ def glide_as_printed(
     size = (section.lift_slope * tau - section.drag_zero) / under if under > 0 else -1.0
     if size <= 0:
         problem = f"{math.degrees(path_angle_rad):g} deg gives no incidence by (8) as printed"
-        raise card.fault("path angle", problem, "give another angle, or leave --as-printed out")
+        raise card.fault("path angle", problem, "give another angle, or leave as_printed out")
     drag = size * (section.drag_zero + section.drag_quadratic * size)
     return _glide(card, (path_angle_rad, roll_rad, buoyancy), size, drag, as_printed=True)
 

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from tank2sim.api.verbs import Output, verb
-from tank2sim.arguments import PositiveArgument, chosen_names
+from tank2sim.arguments import chosen_names
 from tank2sim.files import CARD
+from tank2sim.quantities import Breadth, Length, Mass, Volume
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -33,13 +34,13 @@ def tow(
     tows: str | Path | pd.DataFrame,
     *,
     force_N: float | Sequence[float] | None = None,
-    mass_kg: PositiveArgument | None = None,
+    mass_kg: Mass | None = None,
     terms: str | Sequence[str] = "B3,B2,B1",
     start_delay: bool = False,
-    total_mass_kg: PositiveArgument | None = None,
-    length_m: PositiveArgument | None = None,
-    beam_m: PositiveArgument | None = None,
-    volume_m3: PositiveArgument | None = None,
+    total_mass_kg: Mass | None = None,
+    length_m: Length | None = None,
+    beam_m: Breadth | None = None,
+    volume_m3: Volume | None = None,
     method: Literal["paper", "qr", "output_error"] = "output_error",
     name: str | None = None,
 ) -> TowResult:

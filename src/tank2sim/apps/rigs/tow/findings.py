@@ -187,7 +187,7 @@ def _collinear(fits: Sequence[TowFit], designs: Mapping[str, Array]) -> Iterator
         yield Notice(
             f"{', '.join(collinear[-1].estimated)} cannot all be identified from these tows: the scaled condition "
             f"number is {numbers}, above the limit of {COLLINEAR**2:g}; take fewer terms "
-            f"(--terms {','.join(identifiable_terms(fits, designs)) or 'none'})."
+            f'(terms="{",".join(identifiable_terms(fits, designs)) or "none"}").'
         )
 
 

@@ -114,7 +114,7 @@ def identify_tow(
     pull = checked_force(as_force(_known(tows, "force_N", force)), tows.time_s)
     mass = _known(tows, "mass_kg", mass_kg)
     if model.total_mass_kg is not None and not model.terms:
-        raise ArgumentError("total_mass_kg", "", "leaves nothing to estimate", "take drag terms (--terms B3)")
+        raise ArgumentError("total_mass_kg", "", "leaves nothing to estimate", 'take drag terms (terms="B3")')
     speed = equation_error.fit_mean_speed(tows, speed_degree)
     problem = equation_error.discretise(speed.polynomial, tows.time_s, model.terms, pull, mass_kg=model.total_mass_kg)
     _check_solvable(tows, problem)
@@ -126,7 +126,7 @@ def identify_tow(
     if fitted := output_error.fit_speeds(tows, pull, model):
         solutions["output_error"] = _Solution(fitted.estimates, fitted.design, fitted.covariance)
     else:
-        notes.append("output_error: the fit did not converge and is left out; take fewer terms (--terms B3).")
+        notes.append('output_error: the fit did not converge and is left out; take fewer terms (terms="B3").')
     fits = {name: _fit(name, solution, (tows, mass, pull), problem) for name, solution in solutions.items()}
     designs = {name: solution.design for name, solution in solutions.items()}
     return TowIdentification(
@@ -189,7 +189,7 @@ def _notes(tows: Tows, force: float | Polynomial | None, mass_kg: float) -> Iter
     words = force_words(force) if isinstance(force, Polynomial) else f"{tows.force_N if force is None else force:g}"
     for name, given, stated in (("force_N", words, tows.force_N), ("mass_kg", f"{mass_kg:g}", tows.mass_kg)):
         if stated is not None and given != f"{stated:g}":
-            yield f"The file of the tows states {name} {stated:g}; {given} was given and used."
+            yield f"The file of the tows states '{name}: {stated:g}'; {given} was given and used."
     if tows.time_s[0] == 0 and np.nanmax(np.abs(tows.speed_mps[0])) > 0:
         yield "The speed at t_s = 0 is not zero in every tow; a start from rest at that time is assumed."
 
@@ -216,7 +216,7 @@ def _check_solvable(tows: Tows, problem: equation_error.EquationError) -> None:
         raise InputError(tows.path, "", problem_text, "give tows that accelerate from rest")
     if scaled_condition(problem.free_design) > SINGULAR_CONDITION:
         unknowns = ", ".join(("M", *problem.terms)[len(problem.known) :])
-        raise InputError(tows.path, "", f"the equations for {unknowns} are singular", "take fewer terms (--terms B3)")
+        raise InputError(tows.path, "", f"the equations for {unknowns} are singular", 'take fewer terms (terms="B3")')
 
 
 def tow_card_text(

@@ -152,7 +152,7 @@ def fit_speeds(tows: Tows, force: float | Polynomial, model: TowModel) -> Output
     scale, start, highest = _search(tows, mean_force(as_force(force), tows.time_s), model)
     if len(readings) <= len(scale):
         problem = f"{len(readings)} readings after the release do not test {len(scale)} estimates"
-        raise InputError(tows.path, "", problem, "give more readings, or take fewer terms (--terms B3)")
+        raise InputError(tows.path, "", problem, 'give more readings, or take fewer terms (terms="B3")')
 
     def misfit(scaled: Array) -> tuple[Array, Array]:
         speeds, sensitivities = predict(scaled * scale)

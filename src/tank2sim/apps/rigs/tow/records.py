@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
@@ -11,10 +12,11 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-from tank2sim.arguments import numbers_in
+from tank2sim.arguments import bounds_of, numbers_in
 from tank2sim.arrays import Array
 from tank2sim.errors import ArgumentError
-from tank2sim.records.csv_table import LONGEST_RUN_S, CsvTable, read_table
+from tank2sim.quantities import LONGEST_RUN_S, Breadth, Length, Mass, TowingForce, Viscosity, Volume, WaterDensity
+from tank2sim.records.csv_table import CsvTable, read_table
 from tank2sim.records.same_record import same_readings
 
 _SPEED = re.compile(r"speed_([1-9]\d*)_mps")
@@ -28,8 +30,11 @@ _SLOWEST_MPS = 1e-6
 """A tow whose fastest reading is below it did not move. Project choice: a hundredth of the last digit of the paper's
 speeds (Wilinski & Zellman, Table 1, prints 0.0001 m/s)."""
 
-BODY_KEYS = ("length_m", "beam_m", "volume_m3", "water_density_kgpm3", "kinematic_viscosity_m2ps")
-"""Comments that describe the body and the water, all positive; they turn drag into coefficients."""
+BODY_KEYS: Mapping[str, object] = {
+    **{"length_m": Length, "beam_m": Breadth, "volume_m3": Volume},
+    **{"water_density_kgpm3": WaterDensity, "kinematic_viscosity_m2ps": Viscosity},
+}
+"""Comments that describe the body and the water, with their types; they turn drag into coefficients."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,8 +111,8 @@ def read_tows(path: Path | str | CsvTable) -> Tows:
     if np.count_nonzero(read) < FEWEST_TIMES:
         problem = f"has readings at {np.count_nonzero(read)} times only"
         raise table.fault("", problem, f"give readings at {FEWEST_TIMES} times or more")
-    force, mass = table.positive_comment("force_N"), table.positive_comment("mass_kg")
-    return Tows(table.path, names, time[read], speed[read], force, mass, table.positive_comments(BODY_KEYS))
+    force, mass = table.bounded_comment("force_N", TowingForce), table.bounded_comment("mass_kg", Mass)
+    return Tows(table.path, names, time[read], speed[read], force, mass, table.bounded_comments(BODY_KEYS))
 
 
 def _speeds(table: CsvTable, name: str) -> Array:
@@ -161,6 +166,9 @@ def checked_force(force: Polynomial, times_s: Array) -> Polynomial:
         at = times[values.argmin()]
         problem = f"is {values.min():.4g} N at {at:.4g} s, and must pull forward from 0 to {end:g} s"
         raise ArgumentError("force_N", "", problem, "check signs and order: c0,c1,... with T = c0 + c1 t + ...")
+    bounds = bounds_of(TowingForce)
+    if bounds is not None and not bounds.hold(float(values.max())):
+        raise ArgumentError("force_N", "", f"reaches {values.max():.4g} N", f"give {bounds.words}, in N")
     return force
 
 

@@ -137,7 +137,7 @@ class TowResult(Result[TowStudy]):
             No body has these estimates: the total mass is not positive. Or B3, which a card needs, was not estimated.
         """
         if "B3_kgpm" not in self.fit.estimates:
-            raise ArgumentError("terms", "", "leaves out B3, the drag that a surge card needs", "add it (--terms B3)")
+            raise ArgumentError("terms", "", "leaves out B3, the drag that a surge card needs", 'add it (terms="B3")')
         body = self.study.body
         source = f"tank2sim tow {PurePath(self.study.tows).name}, method {self.method}"
         length = body.length_m if body else None
@@ -159,8 +159,10 @@ class TowResult(Result[TowStudy]):
 
     @property
     def headline(self) -> tuple[str, ...]:
-        """Total and added mass of the best usable model."""
-        best = self.study.best
+        """Total and added mass of the best usable model; the drag, if the mass was given."""
+        best, given = self.study.best, self.study.given_total_mass_kg
+        if given is not None:
+            return self._with_given_mass(given)
         if best is None:
             return ("These tows determine no model with a drag that a hull can have. Take more tows, or longer ones.",)
         water = best.estimates["M"] - self.study.mass_kg
@@ -169,11 +171,24 @@ class TowResult(Result[TowStudy]):
             f"{best.label}, and no more.",
         )
 
+    def _with_given_mass(self, given_kg: float) -> tuple[str, ...]:
+        """The drag found with a given mass, and the mass that the tows have by themselves."""
+        drag = ", ".join(f"{name} = {_with_error(self.fit, TOW_PARAMETERS[name])} {_UNITS[name]}" for name in
+                         self.fit.drag_terms)  # fmt: skip
+        added = f"{given_kg - self.study.mass_kg:.0f} kg of it is water"
+        found = f"M is held at {given_kg:g} kg, as given, and {added}; {drag} by {_METHODS[self.method]}."
+        best = self.study.best
+        alone = "no usable model" if best is None else f"{best.mass_words} kg (95 %), with {best.label}"
+        return found, f"By themselves the tows determine {alone}."
+
     @property
     def key_figures(self) -> Sequence[KeyFigure]:
         """Total and added mass, the range of M, the worst condition number."""
         study, best, figures = self.study, self.study.best, []
-        if best is not None:
+        if (given := study.given_total_mass_kg) is not None:
+            figures.append(KeyFigure("Total mass M", round(given), "kg", note="held, as given"))
+            figures.append(KeyFigure("Added mass λ₁₁ = M − m", round(given - study.mass_kg), "kg"))
+        elif best is not None:
             mass, half = best.estimates["M"], best.half_widths_95["M"]
             note = f"± {half:.0f} kg at 95 %; output error of {best.label}"
             figures.append(KeyFigure("Total mass M", round(mass), "kg", note=note))

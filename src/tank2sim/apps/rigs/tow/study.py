@@ -29,7 +29,7 @@ from tank2sim.apps.rigs.tow.theory import (
 from tank2sim.arrays import Array, Columns, Number, Unbounded
 from tank2sim.errors import InputError
 from tank2sim.identification.conditioning import COLLINEAR, SINGULAR_CONDITION, scaled_condition
-from tank2sim.notices import Notice
+from tank2sim.notices import Notice, caution
 from tank2sim.records.thinning import drawn_columns
 
 
@@ -255,7 +255,13 @@ def _continued(study: TowStudy, tows: Tows) -> Iterator[Notice]:
 
 def _notes_on_models(study: TowStudy) -> Iterator[Notice]:
     """What the tows leave open, and which model they prefer."""
-    if span := study.mass_range_kg:
+    span, given = study.mass_range_kg, study.given_total_mass_kg
+    if given is not None and span is not None and not span[0] <= given <= span[1]:
+        yield caution(
+            f"The mass given, {given:g} kg, is outside the {span[0]:.0f} to {span[1]:.0f} kg that the tows leave by "
+            "themselves: check the force, and whether the mass includes the water."
+        )
+    if span:
         low, high = span
         yield Notice(
             f"These tows determine M only within {low:.0f} to {high:.0f} kg (added mass {low - study.mass_kg:.0f} to "
@@ -268,10 +274,10 @@ def _notes_on_models(study: TowStudy) -> Iterator[Notice]:
         yield Notice(f"The model of lowest AIC is {best.label}, with {fault}; a better fit is not a better model.")
     late = {model.unknowns: model.aic for model in study.models}
     if not study.start_delay and late.get(SIMPLE_LATE.unknowns, 0.0) < late.get(SIMPLE.unknowns, 0.0) - 4:
-        yield Notice("A start delay explains these tows much better than none (--start-delay).")
+        yield Notice("A start delay explains these tows much better than none (start_delay=True).")
     if any(fit.condition_scaled > COLLINEAR**2 for fit in study.methods.values()):
         yield Notice(
-            "Take the drag as B3 v^2 alone (--terms B3), or hold M at a known value (--total-mass-kg, "
+            'Take the drag as B3 v^2 alone (terms="B3"), or hold M at a known value (total_mass_kg, '
             f"{_mass_by_theory(study)})."
         )
 

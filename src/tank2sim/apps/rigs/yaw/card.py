@@ -8,7 +8,8 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from tank2sim.cards.card import Card
-from tank2sim.cards.form import CardSection, Length, TimeConstant, Uncertainty
+from tank2sim.cards.form import CardSection, Uncertainty
+from tank2sim.quantities import Length, MotorCurrent, TimeConstant, TorqueConstant, YawInertia
 
 
 class TankWalls(CardSection):
@@ -77,14 +78,14 @@ class YawRig(CardSection):
         Pulses of the encoder in a turn.
     """
 
-    inertia_kgm2: Annotated[float, Field(ge=1e-9, le=1e15)]
+    inertia_kgm2: YawInertia
     added_inertia_kgm2: float = 0.0
     coulomb_Nm: float = 0.0
     viscous_Nms: float = 0.0
     quadratic_Nms2: float = 0.0
-    torque_constant_NmpA: Annotated[float, Field(ge=1e-6, le=1e6)]
+    torque_constant_NmpA: TorqueConstant
     current_lag_s: TimeConstant = 0.055
-    max_current_A: Annotated[float, Field(ge=1e-3, le=1e6)] = 1.0
+    max_current_A: MotorCurrent = 1.0
     inertia_accelerating_kgm2: float = 0.0
     inertia_braking_kgm2: float = 0.0
     braking_quadratic_Nms2: float | None = None

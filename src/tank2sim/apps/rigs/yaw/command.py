@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Literal
 
 from tank2sim.api.verbs import Output, verb
 from tank2sim.apps.rigs.yaw import YawMethod
-from tank2sim.arguments import NonNegativeArgument, Percent, PositiveArgument, checked
+from tank2sim.arguments import Percent, checked
 from tank2sim.errors import ArgumentError, InputError
 from tank2sim.files import CARD, write_together
 from tank2sim.notices import Notice
+from tank2sim.quantities import CurrentNoise, Length, TorqueConstant, YawInertia, YawInertiaError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 
 def write_yaw_card(
-    result: YawResult, path: Path, *, card: Vessel | str | Path | None = None, length_m: PositiveArgument | None = None
+    result: YawResult, path: Path, *, card: Vessel | str | Path | None = None, length_m: Length | None = None
 ) -> YawResult:
     """Return the result with the card as its file, and a notice about it.
 
@@ -64,11 +65,11 @@ def write_yaw_card(
 def yaw(
     records: str | Path | pd.DataFrame | Sequence[str | Path | pd.DataFrame],
     *,
-    inertia_kgm2: PositiveArgument | None = None,
-    inertia_error_kgm2: NonNegativeArgument | None = None,
-    torque_constant_NmpA: PositiveArgument | None = None,
+    inertia_kgm2: YawInertia | None = None,
+    inertia_error_kgm2: YawInertiaError | None = None,
+    torque_constant_NmpA: TorqueConstant | None = None,
     reference: str | Path | pd.DataFrame | None = None,
-    reference_inertia_kgm2: PositiveArgument | None = None,
+    reference_inertia_kgm2: YawInertia | None = None,
     rig: Vessel | Card | str | Path | None = None,
     terms: str | Sequence[str] | None = None,
     mirror_percent: Percent = 25.0,
@@ -78,7 +79,7 @@ def yaw(
     medium: Literal["water", "air"] = "water",
     controller: Literal["tuned", "adaptive"] = "tuned",
     similar_to: str | None = None,
-    noise_A: NonNegativeArgument = 0.0,
+    noise_A: CurrentNoise = 0.0,
 ) -> YawResult:
     """Estimate added yaw inertia and dissipation from records of the yaw rig (Alyshev 2019).
 
@@ -224,7 +225,7 @@ def simulate_yaw(
     medium: Literal["water", "air"] = "water",
     controller: Literal["tuned", "adaptive"] = "tuned",
     similar_to: str | None = None,
-    noise_A: NonNegativeArgument = 0.0,
+    noise_A: CurrentNoise = 0.0,
 ) -> Path:
     """Write the record that the yaw rig of a card would give, and return its file.
 

@@ -317,7 +317,7 @@ def fit_energy(balance: Balance, record: YawRecord, programmed: Balance | None =
     freedom = len(rows) - len(balance.terms)
     if freedom < 1 or not scaled_condition(rows) < _HOPELESS:
         problem = f"does not distinguish {', '.join(balance.terms)}"
-        raise record.fault("", problem, "give more records, or take fewer --terms")
+        raise record.fault("", problem, "give more records, or take fewer terms")
     instruments = rows if programmed is None else programmed.rows
     norms, scaled = column_norms(rows), (instruments / column_norms(instruments)).T
     inverse = np.linalg.solve(scaled @ (rows / norms), scaled) / norms[:, None]  # (Z'X)^-1 Z'

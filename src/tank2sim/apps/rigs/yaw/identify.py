@@ -246,7 +246,7 @@ def _with_gravity(fits: Fits, fitted: Callable[[tuple[str, ...]], Fits]) -> tupl
         return fits, ()
     note = (
         f"The residual of (3) varies with the angle: a moment of gravity of {moment:.3g} N m is among the terms "
-        f"(--terms {','.join(fit.balance.terms[1:])} omits it). The two-interval formulas neglect it."
+        f'(terms="{",".join(fit.balance.terms[1:])}" omits it). The two-interval formulas neglect it.'
     )
     return (extended, reference), (Notice(note),)
 

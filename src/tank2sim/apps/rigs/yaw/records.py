@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, get_args
@@ -11,9 +11,19 @@ from typing import Literal, get_args
 import numpy as np
 
 from tank2sim.apps.rigs.yaw.programme import PAPER_PROGRAMME, PROGRAMME_KINDS, YawProgramme, full_turns
+from tank2sim.arguments import PositiveArgument
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice, caution
+from tank2sim.quantities import (
+    Duration,
+    Length,
+    MotorCurrent,
+    TorqueConstant,
+    WaterDensity,
+    YawInertia,
+    YawInertiaError,
+)
 from tank2sim.records.csv_table import CsvTable, read_table
 from tank2sim.records.same_record import Likeness, Recording, has_noise, likeness
 from tank2sim.units import to_si
@@ -21,15 +31,11 @@ from tank2sim.units import to_si
 Medium = Literal["air", "water"]
 
 _COMMENTS = "medium programme max_rate_degps max_rate_radps rise_s settle_s start_s humps".split()
-_PLAIN = (
-    "torque_constant_NmpA",
-    "inertia_kgm2",
-    "inertia_error_kgm2",
-    "max_current_A",
-    "current_lag_s",
-    "length_m",
-    "water_density_kgpm3",
-)
+_PLAIN: Mapping[str, object] = {
+    **{"torque_constant_NmpA": TorqueConstant, "inertia_kgm2": YawInertia, "inertia_error_kgm2": YawInertiaError},
+    **{"max_current_A": MotorCurrent, "current_lag_s": PositiveArgument, "length_m": Length},
+    "water_density_kgpm3": WaterDensity,
+}
 """Comments that are numbers and no part of the programme."""
 
 
@@ -116,7 +122,7 @@ def read_yaw_record(path: Path | str | CsvTable) -> YawRecord:
         medium="air" if medium == "air" else "water",
         programme=programme,
         stated=not missing,
-        constants=table.positive_comments(_PLAIN),
+        constants=table.bounded_comments(_PLAIN),
         notes=tuple(map(Notice, notes)),
     )
 
@@ -163,7 +169,7 @@ def _programme(table: CsvTable, time: Array) -> tuple[YawProgramme, list[str]]:
         raise table.fault("comment programme", problem, remedy)
     stated = {
         "max_rate_radps": _rate(table),
-        "rise_s": table.positive_comment("rise_s"),
+        "rise_s": table.bounded_comment("rise_s", Duration),
         "settle_s": table.comment_number("settle_s"),
         "start_s": table.comment_number("start_s"),
     }

@@ -11,10 +11,11 @@ from typing import Literal
 
 from scipy.special import ellipeinc, ellipkinc
 
-from tank2sim.arguments import numbers_in
+from tank2sim.arguments import bounds_of, numbers_in
 from tank2sim.dynamics.ellipsoid import lamb_coefficients
 from tank2sim.dynamics.vessel import as_vessel
 from tank2sim.errors import ArgumentError
+from tank2sim.quantities import Breadth, Draught, Length, WaterDepth
 
 Stage = Literal["accelerating", "braking"]
 
@@ -189,7 +190,10 @@ def parse_body(text: str) -> FloatingBody:
     else:
         ship = as_vessel(text).card.ship
         sizes = [ship.length_m, ship.beam_m, ship.draught_m, ship.water_depth_m, ship.block_coefficient]
-    stated, block = [size for size in sizes[:4] if size and size > 0], sizes[4] if len(sizes) > 4 else None
+    kinds = (Length, Breadth, Draught, WaterDepth)
+    known = zip(sizes, map(bounds_of, kinds), strict=False)
+    stated = [size for size, bounds in known if size is not None and bounds is not None and bounds.hold(size)]
+    block = sizes[4] if len(sizes) > 4 else None
     if len(stated) < 4 or (block is not None and not 0 < block <= 1):
         problem = f"{text!r} does not state length, beam, draught and depth of water"
         remedy = "write for example 0.67,0.20,0.08,0.22,0.47, or name a card with them"
