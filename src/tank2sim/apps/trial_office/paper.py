@@ -9,7 +9,6 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
 from tank2sim.answer.parts import cell_text
-from tank2sim.apps.trial_office.form import form_boxes
 from tank2sim.errors import InputError
 from tank2sim.version import __version__
 
@@ -25,23 +24,16 @@ _PLAIN = dict(zip("–—−‘’“”≤≥…•", ["-", "-", "-", "'", "'",
 
 
 def report_pdf(result: Result[TrialOffice]) -> bytes:
-    """Return the report as PDF, A4: the form, and the sections of the page as its annex.
+    """The report as PDF, A4: the form, and the sections of the page as its annex.
 
-    Parameters
-    ----------
-    result : Result of a TrialOffice
-
-    Raises
-    ------
-    InputError
-        The library that writes PDF is not installed.
+    Raises InputError: The library that writes PDF is not installed.
     """
     try:
         from fpdf import FPDF
     except ImportError:
         remedy = "install it with: pip install 'tank2sim[paper]'"
         raise InputError("report.pdf", "", "needs the library fpdf2, which is not installed", remedy) from None
-    study = result.study
+    study, (*annex, form) = result.study, result.sections
     pdf = FPDF(format="A4")
     pdf.set_title(result.title)
     pdf.set_creator(f"tank2sim {__version__}")
@@ -51,16 +43,16 @@ def report_pdf(result: Result[TrialOffice]) -> bytes:
     pdf.add_page()
     _heading(pdf, "Form for reporting manoeuvring data to IMO", 14)
     _text(pdf, ", ".join(part for part in (study.ship, study.place, study.date) if part))
-    for box in form_boxes(study):
-        _heading(pdf, box.title, 10)
-        width = max(1, *(len(row.values) for row in box.rows), len(box.heads))
-        rows = [[row.label or "", *(str(value or "") for value in row.values)] for row in box.rows]
-        _table(pdf, ["", *box.heads], rows, [0.55] + [0.45 / width] * width)
+    for box in form.tables:
+        _heading(pdf, box.caption, 10)
+        width = max(1, len(box.heads) - 1)
+        rows = [[str(cell or "") for cell in row] for row in box.rows]
+        _table(pdf, box.heads, rows, [0.55] + [0.45 / width] * width)
     pdf.add_page()
     _heading(pdf, "Annex: methods, corrections, and uncertainty", 14)
     for line in (*(notice.line for notice in result.cautions), *result.headline):
         _text(pdf, line)
-    for section in result.sections[:-1]:
+    for section in annex:
         _section(pdf, section)
     if result.notices:
         _heading(pdf, "Notices", 11)
