@@ -39,6 +39,9 @@ tenth of it runs without force have so much more information than others that th
 _HOURS = (0.4, 0.6, 0.8)
 """Shares of the hours at which certainty is drawn, next to all of them."""
 
+_TERMS = [term.name for force in FORCE_COLUMNS for term in candidate_terms(force) if not term.u]
+"""Terms that may become known."""
+
 _NOT_IN_CARD = ("X0",)
 """Terms that the tank measures and that a card does not take: the resistance of a towed model."""
 
@@ -143,9 +146,8 @@ class CaptiveDesigner:
         settings: CaptiveDesignSettings,
     ) -> None:
         self.card, self.settings = card, settings
-        terms = [term.name for force in FORCE_COLUMNS for term in candidate_terms(force) if not term.u]
         self.slopes = figure_slopes(
-            card, figures, terms, draws=settings.draws, seed=settings.seed, one_side=settings.one_side
+            card, figures, _TERMS, draws=settings.draws, seed=settings.seed, one_side=settings.one_side
         )
         reach = settings.largest or range_of_figures(card, figures)
         self.tank_runs = tank_runs(card, tank, reach, settings.source)

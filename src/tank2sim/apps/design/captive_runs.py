@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import chain, product
 
 import numpy as np
 
@@ -56,7 +56,7 @@ class PlannedRun:
     @property
     def motion(self) -> str:
         """``sway`` or ``yaw``; empty in a steady run."""
-        return motion_of(self.type)
+        return oscillation_of(self.type)
 
     @property
     def oscillates(self) -> bool:
@@ -88,7 +88,7 @@ class PlannedRun:
         return self, replace(self, drift_rad=-self.drift_rad + 0.0, rudder_rad=-self.rudder_rad + 0.0)
 
 
-def motion_of(kind: RunType) -> str:
+def oscillation_of(kind: RunType) -> str:
     """``sway`` or ``yaw``, in which the model oscillates in runs of a type; empty for steady ones."""
     return ("sway" if kind == "pure_sway" else "yaw") if kind in OSCILLATING else ""
 
@@ -306,7 +306,7 @@ class TankRuns:
         each motion between a fifth and four fifths of its range; and two frequencies of sway and of yaw, by which
         `reduce` distinguishes a delay of the forces from added mass.
         """
-        runs = [run for group in planned for run in group]
+        runs = list(chain.from_iterable(planned))
         steady, share = [run for run in runs if not run.oscillates], _STEADY_RECORDS[-1]
         groups: list[RunGroup] = []
         if all(run.drift_rad or run.rudder_rad for run in steady):
@@ -319,7 +319,7 @@ class TankRuns:
 
     def _oscillating_checks(self, kind: RunType, planned: Sequence[PlannedRun]) -> Sequence[RunGroup]:
         """Runs at half the largest velocity, highest and lowest frequency, unless there are such ones."""
-        motion = motion_of(kind)
+        motion = oscillation_of(kind)
         largest, runs = self.largest_velocity(motion), [run for run in planned if run.motion == motion]
         used = {run.frequency_radps for run in runs}
         every = (

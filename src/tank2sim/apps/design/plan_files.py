@@ -13,7 +13,7 @@ from pathlib import Path
 import tomlkit
 
 from tank2sim.apps.design.captive_design import CaptiveDesign
-from tank2sim.apps.design.captive_runs import RunGroup, TankRuns, motion_of
+from tank2sim.apps.design.captive_runs import RunGroup, TankRuns, oscillation_of
 from tank2sim.apps.design.study import PlannedManoeuvre, PlannedRow
 from tank2sim.errors import InputError
 from tank2sim.files import read_text
@@ -219,7 +219,7 @@ def _run(row: Mapping[str, float], runs: TankRuns) -> RunGroup:
     kind, velocity = "pure_sway", sway * runs.speed_mps
     if yaw:
         kind, velocity = "yaw_with_drift" if drift else "pure_yaw", yaw * runs.speed_mps / runs.length_m
-    motion = motion_of(kind)
+    motion = oscillation_of(kind)
     frequencies = runs.usual_frequencies(motion) or [runs.highest_frequency(motion)]
     frequency = row.get("frequency") or frequencies[len(frequencies) // 2]
     return (runs.longest_run(kind, drift=drift, rudder=rudder, frequency=frequency, velocity=velocity),)

@@ -5,6 +5,7 @@ Angles may be given in degrees; the key is then renamed (``drift_deg`` to ``drif
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -175,7 +176,7 @@ def refuse_contradictions(
     the lowest frequency of the mechanism is above the highest.
     """
     basin, way, mechanism = tank.tank, tank.carriage.length_m, tank.mechanism
-    if basin.length_m is not None and way > basin.length_m:
+    if way > (basin.length_m or math.inf):
         assumed = "" if "length_m" in tank.carriage.model_fields_set else "assumed as "
         problem = f"is {assumed}{way:g} m, longer than the tank ([tank] length_m = {basin.length_m:g})"
         raise InputError(source, "carriage.length_m", problem, "state the way of the carriage within the tank")
@@ -187,7 +188,7 @@ def refuse_contradictions(
             problem = f"is {value:g} m, and the model of {length_m:.3g} m has a {what} of {size:.3g} m"
             raise InputError(source, f"tank.{key}", problem, "state the size of the tank, or take a shorter model")
     low, high = mechanism.lowest_frequency_radps, mechanism.highest_frequency_radps
-    if low is not None and high is not None and low > high:
+    if (low or 0.0) > (high or math.inf):
         problem = f"is {low:g} rad/s, above highest_frequency_radps = {high:g}"
         raise InputError(source, "mechanism.lowest_frequency_radps", problem, "give the lower of both")
 

@@ -72,6 +72,12 @@ class TrialState:
     wind_from_rad: float | None
 
     @property
+    def wind(self) -> tuple[float, float] | None:
+        """Speed, m/s, and where it comes from, rad; None where one of both is unknown."""
+        speed, origin = self.wind_speed_mps, self.wind_from_rad
+        return None if speed is None or origin is None else (speed, origin)
+
+    @property
     def draughts_at_ends_m(self) -> tuple[float, float]:
         """Draughts forward and aft."""
         return self.draught_m - self.trim_m / 2, self.draught_m + self.trim_m / 2

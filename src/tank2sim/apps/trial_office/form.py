@@ -112,9 +112,9 @@ def _remarks(study: TrialOffice) -> list[Row]:
     state, current = study.state, study.current
     fore, aft = (format_number(draught, 4) for draught in state.draughts_at_ends_m)
     wind = ""
-    if state.wind_speed_mps is not None and state.wind_from_rad is not None:
-        origin = math.degrees(state.wind_from_rad) % 360
-        wind = f"{state.wind_speed_mps:.1f} m/s from {origin:.0f} deg, taken off by the model"
+    if state.wind is not None:
+        speed, origin = state.wind
+        wind = f"{speed:.1f} m/s from {math.degrees(origin) % 360:.0f} deg, taken off by the model"
     said = {
         "Draughts of the trial": f"{fore} m forward, {aft} m aft" * state.draughts_recorded,
         "Conditions not met": study.conditions_not_met,

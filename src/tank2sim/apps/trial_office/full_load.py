@@ -50,7 +50,7 @@ def tried_ships(card: ManoeuvringCard, state: TrialState, count: int) -> tuple[T
     own = model_particular(card, "draught_m")
     full = state.full_load_draught_m, 0.0
     loadings = {"tried": full if state.at_full_load else (state.draught_m, state.trim_m), "full": full}
-    windy = bool(state.wind_speed_mps) and state.wind_from_rad is not None
+    windy = state.wind is not None and state.wind[0] > 0
     cards = {
         name: _loaded(card, draught, trim, own, wind=windy and name == "tried")
         for name, (draught, trim) in loadings.items()

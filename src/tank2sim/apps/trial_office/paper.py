@@ -15,7 +15,7 @@ from tank2sim.version import __version__
 if TYPE_CHECKING:
     from fpdf import FPDF
 
-    from tank2sim.answer.parts import Section
+    from tank2sim.answer.parts import Cell, Section
     from tank2sim.answer.result import Result
     from tank2sim.apps.trial_office.study import TrialOffice
 
@@ -46,18 +46,15 @@ def report_pdf(result: Result[TrialOffice]) -> bytes:
     for box in form.tables:
         _heading(pdf, box.caption, 10)
         width = max(1, len(box.heads) - 1)
-        rows = [[str(cell or "") for cell in row] for row in box.rows]
-        _table(pdf, box.heads, rows, [0.55] + [0.45 / width] * width)
+        _table(pdf, box.heads, box.rows, [0.55] + [0.45 / width] * width)
     pdf.add_page()
     _heading(pdf, "Annex: methods, corrections, and uncertainty", 14)
-    for line in (*(notice.line for notice in result.cautions), *result.headline):
-        _text(pdf, line)
+    _text(pdf, *(notice.line for notice in result.cautions), *result.headline)
     for section in annex:
         _section(pdf, section)
     if result.notices:
         _heading(pdf, "Notices", 11)
-        for notice in result.notices:
-            _text(pdf, notice.line)
+        _text(pdf, *(notice.line for notice in result.notices))
     return bytes(pdf.output())
 
 
@@ -84,13 +81,13 @@ def _heading(pdf: FPDF, text: str, size: float) -> None:
     pdf.multi_cell(0, 0.5 * size, _latin(text), new_x="LMARGIN", new_y="NEXT")
 
 
-def _text(pdf: FPDF, text: str) -> None:
-    if text:
+def _text(pdf: FPDF, *texts: str) -> None:
+    for text in filter(None, texts):
         pdf.set_font("Helvetica", size=8.5)
         pdf.multi_cell(0, 4, _latin(text), align="L", new_x="LMARGIN", new_y="NEXT")
 
 
-def _table(pdf: FPDF, heads: Sequence[str], rows: Sequence[Sequence[str]], shares: Sequence[float] = ()) -> None:
+def _table(pdf: FPDF, heads: Sequence[str], rows: Sequence[Sequence[Cell]], shares: Sequence[float] = ()) -> None:
     pdf.set_font("Helvetica", size=7.5)
     columns = max(len(heads), *(len(row) for row in rows)) if rows else len(heads)
     widths = tuple(shares) or None
@@ -98,7 +95,7 @@ def _table(pdf: FPDF, heads: Sequence[str], rows: Sequence[Sequence[str]], share
         width=_WIDTH_MM, col_widths=widths, line_height=4, first_row_as_headings=any(heads), text_align="LEFT"
     ) as drawn:
         for cells in ([heads] if any(heads) else []) + list(rows):
-            drawn.row([_latin(cell) for cell in (*cells, *[""] * (columns - len(cells)))])
+            drawn.row([_latin(str(cell or "")) for cell in (*cells, *[""] * (columns - len(cells)))])
 
 
 def _latin(text: str) -> str:

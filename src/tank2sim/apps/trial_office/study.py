@@ -297,9 +297,8 @@ def _wind(one: Tried, state: TrialState, integrator: Integrator) -> dict[str, fl
     """Inputs of the wind in a trial, by its record or else the mean of all; empty without one."""
     if "wind.speed" not in integrator.model.input_names:
         return {}
-    recorded = mean_wind([one.trial]) if one.trial is not None else None
-    speed, direction = recorded or (state.wind_speed_mps, state.wind_from_rad)
-    return {} if speed is None or direction is None else {"wind.speed": speed, "wind.direction": direction}
+    wind = (mean_wind([one.trial]) if one.trial is not None else None) or state.wind
+    return {} if wind is None else dict(zip(("wind.speed", "wind.direction"), wind, strict=True))
 
 
 def _drift(one: Tried, wind: Mapping[str, float], integrator: Integrator) -> TurnDrift | None:

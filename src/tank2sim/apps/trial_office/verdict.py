@@ -92,10 +92,10 @@ def judge_criteria(
         chosen = [
             group
             for group in zip(raw, still, found, strict=True)
-            if all(figure in one.figures for one in group[:2]) and _is_trial(trial.manoeuvres[0], group[0].manoeuvre)
+            if _shows(figure, *group[:2]) and _is_trial(trial.manoeuvres[0], group[0].manoeuvre)
         ]
         verdict = CriterionVerdict(name=name, unit=unit, allowed=allowed)
-        holds = validity if overshoots_hold or unit == "L" else 0.0
+        holds = validity * (overshoots_hold or unit == "L")
         verdicts.append(_judged(verdict, figure, scale, chosen, holds) if chosen else verdict)
     return tuple(verdicts)
 
@@ -155,6 +155,10 @@ def _worse_side(
         worst = np.max([draw[:shortest] for draw in draws], axis=0)
         return float(np.median(worst)), robust_deviation(worst)
     return max((math.log(centre), error) for centre, error in known)
+
+
+def _shows(figure: str, *manoeuvres: Tried) -> bool:
+    return all(figure in one.figures for one in manoeuvres)
 
 
 def _is_trial(asked: Turn | Zigzag | Stop, manoeuvre: Turn | Zigzag | Stop) -> bool:
