@@ -224,7 +224,7 @@ def _unknown_in_words(study: GapStudy) -> str:
 
 
 def _no_effect(study: GapStudy) -> str:
-    """That no effect shows beyond the coefficients, or one that the trials cannot distinguish from a coefficient that is far off."""
+    """That no effect shows beyond the coefficients, or which one it may be instead."""
     names = " or ".join(_together(effects_of(text)) for text in study.alternatives)
     unless = f", unless it is {names}, which these trials cannot distinguish from an error of the card"
     return f"no effect shows beyond them{unless if names else ''}"

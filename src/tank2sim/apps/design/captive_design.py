@@ -15,7 +15,7 @@ from tank2sim.apps.design.captive_information import PlannedCampaign
 from tank2sim.apps.design.captive_runs import PlannedRun, RunGroup, TankRuns, time_of
 from tank2sim.apps.design.figure_slopes import FigureSlopes, figure_slopes, hydrodynamic_derivatives, range_of_figures
 from tank2sim.apps.design.study import Certainty, GaugeStudy, PlannedCoefficient
-from tank2sim.apps.design.tank_form import TankFile, refuse_contradictions
+from tank2sim.apps.design.tank_form import GAUGE_UNITS, TankFile, refuse_contradictions
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.cards.writing import TestedRange
@@ -36,8 +36,11 @@ _LEAST_ERROR = 1e-4
 """Least noise and zero error of a gauge together, over its range. Project choice: the best gauges have as much; with a
 tenth of it runs without force have so much more information than others that the sums lose their digits."""
 
-_HOURS = (0.4, 0.6, 0.8, 1.0)
-"""Shares of the hours at which certainty is drawn."""
+_HOURS = (0.4, 0.6, 0.8)
+"""Shares of the hours at which certainty is drawn, next to all of them."""
+
+_TERMS = [term.name for force in FORCE_COLUMNS for term in candidate_terms(force) if not term.u]
+"""Terms that may become known."""
 
 _NOT_IN_CARD = ("X0",)
 """Terms that the tank measures and that a card does not take: the resistance of a towed model."""
@@ -45,14 +48,9 @@ _NOT_IN_CARD = ("X0",)
 
 @dataclass(frozen=True, kw_only=True)
 class PlannedTest:
-    """A group of runs of the plan.
+    """A group of runs of the plan: a run, or one to either side.
 
-    Parameters
-    ----------
-    runs : tuple of PlannedRun
-        A run, or one to either side.
-    check : bool
-        It is there to show whether the polynomial holds.
+    `check`: it is there to show whether the polynomial holds.
     """
 
     runs: RunGroup
@@ -64,32 +62,14 @@ class PlannedTest:
 class CaptiveDesign:
     """A designed campaign.
 
-    Parameters
-    ----------
-    hours : float
-        In the tank at most.
-    tests : tuple of PlannedTest
-        The plan.
-    usual : tuple of RunGroup
-        The usual matrix, once.
-    standard_errors, usual_standard_errors : array (m,)
-        Errors of each figure, by the plan and by the usual matrix in the same hours, but at least once.
-    gauge_shares : mapping
-        Gauge (X, Y, N) to the share (m,) of each figure's variance by the plan that is in its coefficients.
-    beyond_use : mapping
-        Gauge to its stated range over the largest force of the usual matrix.
-    ratios : array (m,)
-        Variance of each figure by the plan over that by the usual matrix, mean over the ships that the card may be.
-    curve : mapping
-        ``hours``, and of each figure ``design`` and ``usual``: standard errors over the time in the tank.
-    hours_needed : float or None
-        Least hours in which a plan has every figure as certain as the usual matrix in `hours`.
-    coefficients : mapping
-        Coefficient to its standard errors (prime) ``design`` and ``usual``, and its share of each figure's variance.
-    not_excited : tuple of str
-        Coefficients that move a figure and that no run of this tank excites.
-    too_strong : int
-        Candidates left out because a force exceeds the range of its gauge.
+    `hours`: in the tank at most; `tests`: the plan; `usual`: the usual matrix, once; `standard_errors`,
+    `usual_standard_errors` (m,): errors of each figure, by the plan and by the usual matrix in the same hours, but at
+    least once; `gauge_shares`: gauge (X, Y, N) to the share (m,) of each figure's variance by the plan that is in its
+    coefficients; `beyond_use`: gauge to its stated range over the largest force of the usual matrix; `ratios` (m,):
+    variance of each figure by the plan over its variance by the usual matrix, mean over the ships that the card may be;
+    `hours_needed`: least hours in which a plan has every figure as certain as the usual matrix in `hours`;
+    `not_excited`: coefficients that move a figure and that no run of this tank excites; `too_strong`: candidates left
+    out because a force exceeds the range of its gauge.
     """
 
     card: ManoeuvringCard
@@ -136,22 +116,10 @@ class CaptiveDesign:
 class CaptiveDesignSettings:
     """Requirements of a design.
 
-    Parameters
-    ----------
-    hours : float or None
-        In the tank; by default the time of the usual matrix.
-    usual : tuple of RunGroup or None
-        In place of the usual matrix.
-    largest : TestedRange or None
-        To which the tests go; by default as far as the manoeuvres of the figures.
-    check_runs : bool
-        Whether the plan has runs that check the polynomial.
-    one_side : bool
-        Figures to the side of the given rudder, in place of the mean over both sides.
-    draws, seed : int
-        Ships drawn from the errors of the card.
-    source : str
-        File of the tank, which messages name.
+    `hours`: in the tank, by default the time of the usual matrix; `usual`: in place of the usual matrix; `largest`: to
+    which the tests go, by default as far as the manoeuvres of the figures; `check_runs`: whether the plan has runs that
+    check the polynomial; `one_side`: figures to the side of the given rudder, in place of the mean over both sides;
+    `draws`, `seed`: ships drawn from the errors of the card; `source`: file of the tank, which messages name.
     """
 
     hours: float | None = None
@@ -165,17 +133,9 @@ class CaptiveDesignSettings:
 
 
 class CaptiveDesigner:
-    """Plans for a ship in a tank.
+    """Plans for a ship in a tank; the ship does not show a figure, or the tank cannot make the runs: InputError.
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-        Polynomial; its values are the prior mean, its errors the spread of ships for which the plan is to be good.
-
-    Raises
-    ------
-    InputError
-        The ship does not show a figure, or the tank cannot make the runs.
+    `card`: polynomial; its values are the prior mean, its errors the spread of ships for which the plan is to be good.
     """
 
     def __init__(
@@ -186,17 +146,17 @@ class CaptiveDesigner:
         settings: CaptiveDesignSettings,
     ) -> None:
         self.card, self.settings = card, settings
-        terms = [term.name for force in FORCE_COLUMNS for term in candidate_terms(force) if not term.u]
         self.slopes = figure_slopes(
-            card, figures, terms, draws=settings.draws, seed=settings.seed, one_side=settings.one_side
+            card, figures, _TERMS, draws=settings.draws, seed=settings.seed, one_side=settings.one_side
         )
         reach = settings.largest or range_of_figures(card, figures)
         self.tank_runs = tank_runs(card, tank, reach, settings.source)
-        usual = self.tank_runs.usual_matrix() if settings.usual is None else settings.usual
-        if not any(run.oscillates for group in usual for run in group) and settings.usual is None:
-            raise InputError(
-                settings.source, "mechanism", "allows no oscillation", "widen its limits of amplitude or frequency"
-            )
+        usual = settings.usual
+        if usual is None:
+            usual = self.tank_runs.usual_matrix()
+            if not any(group[0].oscillates for group in usual):
+                remedy = "widen its limits of amplitude or frequency"
+                raise InputError(settings.source, "mechanism", "allows no oscillation", remedy)
         self.planned = self._with_gauges(usual)
         self.usual = self._within_gauges(usual)
         every = self.tank_runs.candidates(settings.usual or ())
@@ -205,12 +165,10 @@ class CaptiveDesigner:
         # Every check that a plan may need, as without any plan.
         checks = self._within_gauges(self.tank_runs.check_runs(())) if settings.check_runs else ()
         self.groups = (*candidates, *checks, *self.usual)
-        self.places = {
-            "candidates": np.arange(len(candidates)),
-            "checks": len(candidates) + np.arange(len(checks)),
-            "usual": len(candidates) + len(checks) + np.arange(len(self.usual)),
-        }
-        if not len(candidates) or not self.usual:
+        ends = len(candidates), len(candidates) + len(checks)
+        parts = np.split(np.arange(len(self.groups)), ends)
+        self.places = dict(zip(("candidates", "checks", "usual"), parts, strict=True))
+        if not candidates or not self.usual:
             remedy = "state wider ranges"
             raise InputError(settings.source, "gauges", "allow no run: every force exceeds their ranges", remedy)
         self.information = self.planned.information(self.groups)
@@ -237,36 +195,31 @@ class CaptiveDesigner:
             rate_hz=tank.gauges.rate_hz,
         )
         largest = [bare.largest_forces(run) for group in usual for run in group]
-        gauges, self.beyond_use = {}, {}
-        for force, unit in (("X", "N"), ("Y", "N"), ("N", "Nm")):
-            stated = getattr(tank.gauges, f"{force}_range_{unit}")
-            used = max(forces[force] for forces in largest)
-            span = stated or _BEYOND * used
-            self.beyond_use[force] = span / used if stated and used > 0 else 1.0
-            noise = getattr(tank.gauges, f"{force}_noise_{unit}") or tank.gauges.noise_share * span
-            zero = getattr(tank.gauges, f"{force}_zero_{unit}") or tank.gauges.zero_share * span
-            if math.hypot(noise, zero) < _LEAST_ERROR * span:
-                problem = (
-                    f"states no error of {force}: noise {noise:.2g} and zero {zero:.2g} {unit} of {span:.3g} {unit}"
-                )
-                remedy = f"give noise or zero of at least {_LEAST_ERROR:g} of the range"
-                raise InputError(self.settings.source, "gauges", problem, remedy)
-            gauges[force] = GaugeStudy(noise=max(noise, 1e-9 * span), zero=zero, range=span if stated else math.inf)
-        return replace(bare, gauges=gauges)
+        self.beyond_use: dict[str, float] = {}
+        used = {force: max(forces[force] for forces in largest) for force in GAUGE_UNITS}
+        return replace(bare, gauges={force: self._gauge(force, most) for force, most in used.items()})
+
+    def _gauge(self, force: str, used: float) -> GaugeStudy:
+        """A gauge with its errors; `used` is the largest force of the usual matrix."""
+        gauges, unit = self.tank_runs.tank.gauges, GAUGE_UNITS[force]
+        stated, noise, zero = (gauges.stated(what, force) for what in ("range", "noise", "zero"))
+        span = stated or _BEYOND * used
+        self.beyond_use[force] = span / used if stated and used > 0 else 1.0
+        noise, zero = noise or gauges.noise_share * span, zero or gauges.zero_share * span
+        if math.hypot(noise, zero) < _LEAST_ERROR * span:
+            problem = f"states no error of {force}: noise {noise:.2g} and zero {zero:.2g} {unit} of {span:.3g} {unit}"
+            remedy = f"give noise or zero of at least {_LEAST_ERROR:g} of the range"
+            raise InputError(self.settings.source, "gauges", problem, remedy)
+        return GaugeStudy(noise=max(noise, 1e-9 * span), zero=zero, range=span if stated else math.inf)
 
     def _within_gauges(self, groups: Sequence[RunGroup]) -> tuple[RunGroup, ...]:
-        gauges = self.planned.gauges
-        if all(math.isinf(gauge.range) for gauge in gauges.values()):
-            return tuple(groups)
-        return tuple(
-            group
-            for group in groups
-            if all(
-                value <= gauges[force].range
-                for run in group
-                for force, value in self.planned.largest_forces(run).items()
-            )
-        )
+        limits = {force: gauge.range for force, gauge in self.planned.gauges.items() if math.isfinite(gauge.range)}
+
+        def fits(run: PlannedRun) -> bool:
+            forces = self.planned.largest_forces(run) if limits else {}
+            return all(forces[force] <= limit for force, limit in limits.items())
+
+        return tuple(group for group in groups if all(map(fits, group)))
 
     @cached_property
     def usual_counts(self) -> Array:
@@ -355,13 +308,18 @@ class CaptiveDesigner:
         """The plan and what it is worth."""
         usual = self._usual
         counts, relaxed = self.plan(self._budget)
-        plans = {1.0: counts}
-        for share in _HOURS[:-1]:
+
+        def plan(share: float) -> Array | None:
+            nonlocal relaxed
             try:
-                plans[share], relaxed = self.plan(share * self._budget, relaxed)
+                made, relaxed = self.plan(share * self._budget, relaxed)
             except InputError:
-                continue
-        figures = [figure.text for figure in self.slopes.figures]
+                return None
+            return made
+
+        plans = {1.0: counts} | {share: made for share in _HOURS if (made := plan(share)) is not None}
+        needed = least_time(self._targets, plans, plan, None)
+        figures = self.slopes.texts
         usual_s = sorted({max(share * self._budget, self.usual_s) for share in plans})
         checks = set(self.places["checks"].tolist())
         return CaptiveDesign(
@@ -381,7 +339,7 @@ class CaptiveDesigner:
             beyond_use=self.beyond_use,
             ratios=self._targets.variances(counts)[len(figures) :],
             curve=certainty(figures, self._at_card, plans, self.usual_counts, usual_s),
-            hours_needed=self._needed(plans, relaxed),
+            hours_needed=None if needed is None else needed / 3600,
             coefficients=self._coefficients(counts, usual),
             not_excited=self._not_excited(),
             too_strong=self.too_strong,
@@ -393,39 +351,21 @@ class CaptiveDesigner:
         blocks = zip(self.information, self._at_card.blocks, strict=True)
         return {force: Allocation((block,), self._at_card.cost).variances(counts) / total for force, block in blocks}
 
-    def _needed(self, plans: Mapping[float, Array], relaxed: Array) -> float | None:
-        """Least hours of a plan with every figure as certain as by the usual matrix."""
-
-        def plan(share: float) -> Array | None:
-            nonlocal relaxed
-            try:
-                counts, relaxed = self.plan(share * self._budget, relaxed)
-            except InputError:
-                return None
-            return counts
-
-        found = least_time(self._targets, plans, plan, None)
-        return None if found is None else found / 3600
-
     def _coefficients(self, counts: Array, usual: Array) -> dict[str, PlannedCoefficient]:
         """Standard errors of the coefficients, and the share of each figure's variance that each would take along."""
         found: dict[str, PlannedCoefficient] = {}
         totals = self._at_card.variances(counts)
         for (names, _), block in zip(self.information.values(), self._at_card.blocks, strict=True):
             by_plan, by_usual = block.covariance(counts), block.covariance(usual)
+            together = by_plan @ self.slopes.of(names, self.slopes.at_card).T
+            shares = together**2 / np.outer(np.diag(by_plan), totals)
             for place, name in enumerate(names):
-                shares = {}
-                for row, figure in enumerate(self.slopes.figures):
-                    slope = self.slopes.of(names, self.slopes.at_card[row])
-                    if name not in _NOT_IN_CARD:
-                        shares[figure.text] = float(
-                            (by_plan[place] @ slope) ** 2 / (by_plan[place, place] * totals[row])
-                        )
+                of_figures = zip(self.slopes.texts, shares[place].tolist(), strict=True)
                 found[name] = PlannedCoefficient(
                     value=self.planned.derivatives.get(name, 0.0),
                     design=math.sqrt(by_plan[place, place]),
                     usual=math.sqrt(by_usual[place, place]),
-                    share_of_variance=shares,
+                    share_of_variance={} if name in _NOT_IN_CARD else dict(of_figures),
                 )
         return found
 
@@ -433,35 +373,21 @@ class CaptiveDesigner:
         """Derivatives of the card that move a figure and are in no regression."""
         measured = {name for names, _ in self.information.values() for name in names}
         moving = np.abs(self.slopes.at_card).max(axis=0) > 0
-        return tuple(
-            parameter.short
-            for parameter, moves in zip(self.slopes.parameters, moving, strict=True)
-            if moves
-            and parameter.name.startswith("derivatives.")
-            and parameter.short not in measured
-            and self.card.derivatives.get(parameter.short)
-        )
+        shown = [one for one, moves in zip(self.slopes.parameters, moving, strict=True) if moves]
+        names = [one.short for one in shown if one.name.startswith("derivatives.") and one.short not in measured]
+        return tuple(name for name in names if self.card.derivatives.get(name))
 
 
 def tank_runs(card: ManoeuvringCard, tank: TankFile, largest: TestedRange, source: str = "tank") -> TankRuns:
     """The runs of a ship's model in a tank, at the stated length and speed, or at the card's Froude number.
 
-    Raises
-    ------
-    InputError
-        The carriage is too slow or too short, or the tank contradicts itself (then `source` is named).
+    Raises InputError: the carriage is too slow or too short, or the tank contradicts itself (then `source` is named).
     """
     model = tank.model
     length = model.length_m or min(SHORTEST_MODEL_M, card.ship.length_m)
     ratio = length / card.ship.length_m * model.gravity_mps2 / card.environment.gravity_mps2
     speed = model.speed_mps or card.model.speed_mps * math.sqrt(ratio)
-    beam, draught = card.ship.beam_m, card.ship.draught_m
     scale = length / card.ship.length_m
-    refuse_contradictions(
-        tank,
-        source,
-        length,
-        None if beam is None else beam * scale,
-        None if draught is None else draught * scale,
-    )
+    beam, draught = (None if size is None else size * scale for size in (card.ship.beam_m, card.ship.draught_m))
+    refuse_contradictions(tank, source, length, beam, draught)
     return TankRuns(tank=tank, length_m=length, speed_mps=speed, largest=largest)

@@ -108,18 +108,15 @@ class PlannedCampaign:
         count = _READINGS * cycles
         time = np.arange(count) * length / count
         phase, ones = run.frequency_radps * time, np.ones(count)
-        sway = (
-            run.velocity * np.cos(phase) if run.type == "pure_sway" else -run.speed_mps * math.sin(run.drift_rad) * ones
-        )
-        yaws = run.oscillates and run.type != "pure_sway"
+        swing, drifting = run.velocity * np.cos(phase), -run.speed_mps * math.sin(run.drift_rad) * ones
         made = forces or dict.fromkeys(FORCE_COLUMNS, 0.0 * ones)
         return CaptiveRun(
             name=run.type,
             type=run.type,
             sheet=RunSheet(file=run.type, type=run.type),
             time_s=time,
-            v_mps=sway,
-            r_radps=run.velocity * np.cos(phase) if yaws else 0.0 * ones,
+            v_mps=swing if run.motion == "sway" else drifting,
+            r_radps=swing if run.motion == "yaw" else 0.0 * ones,
             speed_mps=run.speed_mps * ones,
             delta_rad=run.rudder_rad * ones,
             X_N=made["X"],
@@ -160,12 +157,11 @@ class PlannedCampaign:
 
     def prior(self, names: Sequence[str]) -> Array:
         """Information (k, k) before the tests: the ratios of known ships that `reduce` takes, others unknown."""
-        linear = [abs(self.derivatives.get(name, 0.0)) for name in ("Yv", "Yr", "Yd", "Nv", "Nr", "Nd")]
+        sizes = {name: abs(value) for name, value in self.derivatives.items() if name[0] in "YN"}
+        unknown = _UNKNOWN * max(sizes.get(name, 0.0) for name in ("Yv", "Yr", "Yd", "Nv", "Nr", "Nd"))
         widths = []
         for name in names:
             reference, ratio = RATIOS.get(name[1:], ("", 0.0))
-            size = abs(self.derivatives.get(name[0] + reference, 0.0)) if name[0] in "YN" else 0.0
-            term = parse_term(name)
-            free = ratio * size == 0.0 or term is None
-            widths.append(_UNKNOWN * max(linear) if free else ratio * size)
+            width = ratio * sizes.get(name[0] + reference, 0.0)
+            widths.append(width if width and parse_term(name) else unknown)
         return np.diag(np.array(widths) ** -2.0)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, product
 
 import numpy as np
 
@@ -53,9 +54,14 @@ class PlannedRun:
     tank_s: float
 
     @property
+    def motion(self) -> str:
+        """``sway`` or ``yaw``; empty in a steady run."""
+        return oscillation_of(self.type)
+
+    @property
     def oscillates(self) -> bool:
         """The model oscillates in it."""
-        return self.type in OSCILLATING
+        return bool(self.motion)
 
     @property
     def cycles(self) -> int:
@@ -65,20 +71,26 @@ class PlannedRun:
     @property
     def sway_amplitude_m(self) -> float:
         """Sideways amplitude of the mechanism, m: of the sway, or of the path of the yaw, U r_a/omega^2."""
-        if not self.oscillates:
-            return 0.0
-        if self.type == "pure_sway":
+        if self.motion == "sway":
             return self.velocity / self.frequency_radps
-        return self.speed_mps * self.velocity / self.frequency_radps**2
+        return self.speed_mps * self.heading_amplitude_rad / self.frequency_radps if self.motion else 0.0
 
     @property
     def heading_amplitude_rad(self) -> float:
         """Amplitude of the heading, rad."""
-        return self.velocity / self.frequency_radps if self.oscillates and self.type != "pure_sway" else 0.0
+        return self.velocity / self.frequency_radps if self.motion == "yaw" else 0.0
 
-    def mirrored(self) -> PlannedRun:
-        """The run to the other side."""
-        return replace(self, drift_rad=-self.drift_rad + 0.0, rudder_rad=-self.rudder_rad + 0.0)
+    @property
+    def to_both_sides(self) -> RunGroup:
+        """The run, and its mirror image if that is another run."""
+        if not (self.drift_rad or self.rudder_rad):
+            return (self,)
+        return self, replace(self, drift_rad=-self.drift_rad + 0.0, rudder_rad=-self.rudder_rad + 0.0)
+
+
+def oscillation_of(kind: RunType) -> str:
+    """``sway`` or ``yaw``, in which the model oscillates in runs of a type; empty for steady ones."""
+    return ("sway" if kind == "pure_sway" else "yaw") if kind in OSCILLATING else ""
 
 
 RunGroup = tuple[PlannedRun, ...]
@@ -132,6 +144,10 @@ class TankRuns:
         """Largest yaw rate."""
         return self.largest.yaw_rate_prime * self.speed_mps / self.length_m
 
+    def largest_velocity(self, motion: str) -> float:
+        """Largest amplitude of v (m/s) in ``sway``, of r (rad/s) in ``yaw``."""
+        return self.speed_mps * math.sin(self.drift_rad) if motion == "sway" else self.yaw_rate_radps
+
     def highest_frequency(self, motion: str) -> float:
         """Highest frequency of ``sway`` or ``yaw``, rad/s."""
         mechanism, model = self.tank.mechanism, self.tank.model
@@ -167,8 +183,7 @@ class TankRuns:
 
     def steady(self, kind: RunType, drift: float = 0.0, rudder: float = 0.0, share: float = 1.0) -> RunGroup:
         """A steady run and its mirror image."""
-        run = self.run(kind, share * self.longest_s, drift=drift, rudder=rudder)
-        return (run, run.mirrored()) if drift or rudder else (run,)
+        return self.run(kind, share * self.longest_s, drift=drift, rudder=rudder).to_both_sides
 
     def oscillating(
         self,
@@ -185,14 +200,22 @@ class TankRuns:
         mechanism, period = self.tank.mechanism, 2 * math.pi / frequency
         cycles = math.floor(share * self.longest_s / period + 1e-9)
         run = self.run(kind, cycles * period, drift=drift, rudder=rudder, frequency=frequency, velocity=velocity)
-        too_large = (
-            run.sway_amplitude_m > (mechanism.sway_amplitude_m or math.inf)
-            or run.heading_amplitude_rad > (mechanism.heading_amplitude_rad or math.inf)
-            or cycles < mechanism.cycles
+        possible = (
+            run.sway_amplitude_m <= (mechanism.sway_amplitude_m or math.inf)
+            and run.heading_amplitude_rad <= (mechanism.heading_amplitude_rad or math.inf)
+            and cycles >= mechanism.cycles
         )
-        if too_large:
-            return ()
-        return (run, run.mirrored()) if drift or rudder else (run,)
+        return run.to_both_sides if possible else ()
+
+    def longest_run(
+        self, kind: RunType, *, drift: float, rudder: float, frequency: float = 0.0, velocity: float = 0.0
+    ) -> PlannedRun:
+        """A run with the longest record; of whole cycles, at least one, if it oscillates."""
+        record = self.longest_s
+        if frequency:
+            period = 2 * math.pi / frequency
+            record = max(math.floor(record / period + 1e-9), 1) * period
+        return self.run(kind, record, drift=drift, rudder=rudder, frequency=frequency, velocity=velocity)
 
     def run(
         self,
@@ -226,34 +249,35 @@ class TankRuns:
         more = self._yaw_with_rudder() if with_rudder else ()
         return tuple(group for group in (*self._candidates(), *more, *own) if group)
 
+    def _steady_runs(self, mixed_drifts: int, mixed_rudders: int, share: float = 1.0) -> Iterator[RunGroup]:
+        """A straight run, runs with drift, with rudder, and with so many levels of both."""
+        yield self.steady("static_drift", share=share)
+        yield from (self.steady("static_drift", drift, share=share) for drift in _levels(self.drift_rad, _DRIFTS))
+        yield from (self.steady("static_rudder", 0.0, rudder, share) for rudder in _levels(self.rudder_rad, _RUDDERS))
+        drifts, rudders = _levels(self.drift_rad, mixed_drifts), _levels(self.rudder_rad, mixed_rudders)
+        for drift, rudder, side in product(drifts, rudders, (1, -1)):
+            yield self.steady("drift_and_rudder", drift, side * rudder, share)
+
+    def _swaying(self, frequencies: Sequence[float], share: float = 1.0) -> Iterator[RunGroup]:
+        for frequency, v in product(frequencies, _levels(self.largest_velocity("sway"), _AMPLITUDES)):
+            yield self.oscillating("pure_sway", frequency, v, share=share)
+
     def _candidates(self) -> Iterator[RunGroup]:
-        drifts, rudders = _levels(self.drift_rad, _DRIFTS), _levels(self.rudder_rad, _RUDDERS)
-        sways = self.frequencies("sway", _FREQUENCIES, _FREQUENCY_RATIO)
-        yaws = self.frequencies("yaw", _FREQUENCIES, _FREQUENCY_RATIO)
-        velocities = _levels(self.speed_mps * math.sin(self.drift_rad), _AMPLITUDES)
-        rates = _levels(self.yaw_rate_radps, _AMPLITUDES)
+        sways, yaws = (self.frequencies(motion, _FREQUENCIES, _FREQUENCY_RATIO) for motion in ("sway", "yaw"))
         for share in _STEADY_RECORDS:
-            yield self.steady("static_drift", share=share)
-            yield from (self.steady("static_drift", drift, share=share) for drift in drifts)
-            yield from (self.steady("static_rudder", rudder=rudder, share=share) for rudder in rudders)
-            for drift in _levels(self.drift_rad, _MIXED):
-                for rudder in _levels(self.rudder_rad, _MIXED):
-                    yield from (self.steady("drift_and_rudder", drift, side * rudder, share) for side in (1, -1))
+            yield from self._steady_runs(_MIXED, _MIXED, share)
         for share in _OSCILLATING_RECORDS:
-            for frequency in sways:
-                yield from (self.oscillating("pure_sway", frequency, v, share=share) for v in velocities)
-            for frequency in yaws:
-                for rate in rates:
-                    yield self.oscillating("pure_yaw", frequency, rate, share=share)
-                    for drift in _levels(self.drift_rad, _MIXED):
-                        yield self.oscillating("yaw_with_drift", frequency, rate, drift, share)
+            yield from self._swaying(sways, share)
+            for frequency, rate in product(yaws, _levels(self.yaw_rate_radps, _AMPLITUDES)):
+                yield self.oscillating("pure_yaw", frequency, rate, share=share)
+                for drift in _levels(self.drift_rad, _MIXED):
+                    yield self.oscillating("yaw_with_drift", frequency, rate, drift, share)
 
     def _yaw_with_rudder(self) -> Iterator[RunGroup]:
-        for share in _OSCILLATING_RECORDS:
-            for frequency in self.frequencies("yaw", _FREQUENCIES, _FREQUENCY_RATIO):
-                for rate in _levels(self.yaw_rate_radps, _AMPLITUDES):
-                    for rudder in _levels(self.rudder_rad, _MIXED):
-                        yield self.oscillating("pure_yaw", frequency, rate, share=share, rudder=rudder)
+        yaws = self.frequencies("yaw", _FREQUENCIES, _FREQUENCY_RATIO)
+        rates, rudders = _levels(self.yaw_rate_radps, _AMPLITUDES), _levels(self.rudder_rad, _MIXED)
+        for share, frequency, rate, rudder in product(_OSCILLATING_RECORDS, yaws, rates, rudders):
+            yield self.oscillating("pure_yaw", frequency, rate, share=share, rudder=rudder)
 
     def usual_matrix(self) -> tuple[RunGroup, ...]:
         """The usual matrix: all types of test of ITTC 7.5-02-06-02, in even steps to the same limits.
@@ -262,26 +286,18 @@ class TankRuns:
         angles to either side; three drift angles with two rudder angles to either side; sway and yaw with four
         amplitudes at three frequencies; yaw with three drift angles to either side and three amplitudes.
         """
-        sways, yaws = self.frequencies("sway", 3, 2.0), self.frequencies("yaw", 3, 2.0)
-        groups: list[RunGroup] = [self.steady("static_drift")]
-        groups += [self.steady("static_drift", drift) for drift in _levels(self.drift_rad, 6)]
-        groups += [self.steady("static_rudder", rudder=rudder) for rudder in _levels(self.rudder_rad, 7)]
-        groups += [
-            self.steady("drift_and_rudder", drift, side * rudder)
-            for drift in _levels(self.drift_rad, 3)
-            for rudder in _levels(self.rudder_rad, 2)
-            for side in (1, -1)
-        ]
-        velocities, rates = _levels(self.speed_mps * math.sin(self.drift_rad), 4), _levels(self.yaw_rate_radps, 4)
-        groups += [self.oscillating("pure_sway", frequency, v) for frequency in sways for v in velocities]
-        groups += [self.oscillating("pure_yaw", frequency, rate) for frequency in yaws for rate in rates]
-        groups += [
-            self.oscillating("yaw_with_drift", yaws[len(yaws) // 2], rate, drift)
-            for drift in _levels(self.drift_rad, 3)
-            for rate in _levels(self.yaw_rate_radps, 3)
-            if yaws
-        ]
+        sways, yaws = self.usual_frequencies("sway"), self.usual_frequencies("yaw")
+        groups = [*self._steady_runs(3, 2), *self._swaying(sways)]
+        rates = _levels(self.yaw_rate_radps, _AMPLITUDES)
+        groups += [self.oscillating("pure_yaw", frequency, rate) for frequency, rate in product(yaws, rates)]
+        middle = yaws[len(yaws) // 2 :][:1]
+        with_drift = product(middle, _levels(self.drift_rad, 3), _levels(self.yaw_rate_radps, 3))
+        groups += [self.oscillating("yaw_with_drift", frequency, rate, drift) for frequency, drift, rate in with_drift]
         return tuple(group for group in groups if group)
+
+    def usual_frequencies(self, motion: str) -> list[float]:
+        """Frequencies of a motion in the usual matrix, rising."""
+        return self.frequencies(motion, 3, 2.0)
 
     def check_runs(self, planned: Sequence[RunGroup]) -> tuple[RunGroup, ...]:
         """Runs that the planned ones lack to show whether the polynomial holds, and whether the forces are delayed.
@@ -290,40 +306,37 @@ class TankRuns:
         each motion between a fifth and four fifths of its range; and two frequencies of sway and of yaw, by which
         `reduce` distinguishes a delay of the forces from added mass.
         """
-        runs = [run for group in planned for run in group]
+        runs = list(chain.from_iterable(planned))
+        steady, share = [run for run in runs if not run.oscillates], _STEADY_RECORDS[-1]
         groups: list[RunGroup] = []
-        if not any(not (run.oscillates or run.drift_rad or run.rudder_rad) for run in runs):
-            groups.append(self.steady("static_drift", share=_STEADY_RECORDS[-1]))
-        if not any(_between(run.drift_rad, self.drift_rad) for run in runs if not run.oscillates):
-            groups.append(self.steady("static_drift", self.drift_rad / 2, share=_STEADY_RECORDS[-1]))
-        if not any(_between(run.rudder_rad, self.rudder_rad) for run in runs):
-            groups.append(self.steady("static_rudder", rudder=self.rudder_rad / 2, share=_STEADY_RECORDS[-1]))
-        swaying = [run for run in runs if run.type == "pure_sway"]
-        yawing = [run for run in runs if run.oscillates and run.type != "pure_sway"]
-        groups += self._oscillating_checks("pure_sway", swaying, self.speed_mps * math.sin(self.drift_rad))
-        groups += self._oscillating_checks("pure_yaw", yawing, self.yaw_rate_radps)
-        return tuple(groups)
+        if all(run.drift_rad or run.rudder_rad for run in steady):
+            groups.append(self.steady("static_drift", share=share))
+        if not _any_between((run.drift_rad for run in steady), self.drift_rad):
+            groups.append(self.steady("static_drift", self.drift_rad / 2, share=share))
+        if not _any_between((run.rudder_rad for run in runs), self.rudder_rad):
+            groups.append(self.steady("static_rudder", 0.0, self.rudder_rad / 2, share))
+        return (*groups, *self._oscillating_checks("pure_sway", runs), *self._oscillating_checks("pure_yaw", runs))
 
-    def _oscillating_checks(self, kind: RunType, runs: Sequence[PlannedRun], largest: float) -> list[RunGroup]:
-        """Runs at half the largest velocity, highest and lowest frequency, unless `runs` have such ones."""
-        motion = "sway" if kind == "pure_sway" else "yaw"
+    def _oscillating_checks(self, kind: RunType, planned: Sequence[PlannedRun]) -> Sequence[RunGroup]:
+        """Runs at half the largest velocity, highest and lowest frequency, unless there are such ones."""
+        motion = oscillation_of(kind)
+        largest, runs = self.largest_velocity(motion), [run for run in planned if run.motion == motion]
         used = {run.frequency_radps for run in runs}
-        between = any(_between(run.velocity, largest) for run in runs)
-        fitting = [
-            group
-            for frequency in self.frequencies(motion, 3, 2.0)
-            if (group := self.oscillating(kind, frequency, largest / 2, share=_OSCILLATING_RECORDS[1]))
-        ]
-        if not fitting or (between and len(used) > 1):
+        every = (
+            self.oscillating(kind, frequency, largest / 2, share=_OSCILLATING_RECORDS[1])
+            for frequency in self.usual_frequencies(motion)
+        )
+        fitting = [group for group in every if group]
+        if _any_between((run.velocity for run in runs), largest) and len(used) > 1:
             return []
-        if not used:
-            return [fitting[0], fitting[-1]] if len(fitting) > 1 else fitting
-        extremes = (fitting[0], fitting[-1])
+        extremes = fitting[:: max(len(fitting) - 1, 1)]
+        if not used or not fitting:
+            return extremes
         return [max(extremes, key=lambda group: min(abs(group[0].frequency_radps - other) for other in used))]
 
 
-def _between(value: float, largest: float) -> bool:
-    return 0.2 * largest <= abs(value) <= 0.8 * largest
+def _any_between(values: Iterable[float], largest: float) -> bool:
+    return any(0.2 * largest <= abs(value) <= 0.8 * largest for value in values)
 
 
 def _levels(largest: float, count: int) -> list[float]:

@@ -47,17 +47,14 @@ class FigureSlopes:
     notices: tuple[Notice, ...]
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Short names of the coefficients, (k,)."""
-        return tuple(parameter.short for parameter in self.parameters)
+    def texts(self) -> tuple[str, ...]:
+        """The figures as they are asked for, (m,)."""
+        return tuple(figure.text for figure in self.figures)
 
     def of(self, names: Sequence[str], slopes: Array) -> Array:
         """Columns (..., len(names)) of slopes (..., k): 0 for a coefficient that does not move the figures."""
-        places = {name: place for place, name in enumerate(self.names)}
-        found = np.zeros((*slopes.shape[:-1], len(names)))
-        for column, name in enumerate(names):
-            if name in places:
-                found[..., column] = slopes[..., places[name]]
+        short = np.array([parameter.short for parameter in self.parameters])
+        found: Array = slopes @ (short[:, None] == np.array(names)).astype(float)
         return found
 
 
@@ -66,6 +63,12 @@ def both_sides(figure: InfluenceFigure) -> tuple[InfluenceFigure, ...]:
     if not figure.angles:
         return (figure,)
     return figure, replace(figure, angles=(-figure.angles[0], *figure.angles[1:]))
+
+
+def assumed_errors(card: ManoeuvringCard) -> dict[str, float]:
+    """Standard errors of the derivatives of a card; :data:`.RELATIVE_ERROR` of the value where it states none."""
+    assumed = {name: RELATIVE_ERROR * abs(value) for name, value in card.derivatives.items() if value}
+    return assumed | dict(card.uncertainty)
 
 
 def figure_slopes(
@@ -83,20 +86,19 @@ def figure_slopes(
     derivative without a stated one has :data:`.RELATIVE_ERROR`. Ships that do not show all figures are left out.
     `one_side`: figures to the side of the given rudder, in place of the mean over both sides.
     """
-    stated = {name: RELATIVE_ERROR * abs(value) for name, value in card.derivatives.items() if value}
-    known = {f"derivatives.{name}" for name in stated} | {f"derivatives.{name}" for name in card.uncertainty}
-    absent = {name: _UNLISTED for name in terms if name not in card.derivatives and name not in card.uncertainty}
+    stated = assumed_errors(card)
+    absent = dict.fromkeys((name for name in terms if name not in {*card.derivatives, *stated}), _UNLISTED)
     sides = [(figure,) if one_side else both_sides(figure) for figure in figures]
     every = [figure for each in sides for figure in each]
     mean = np.array([[(figure in each) / len(each) for figure in every] for each in sides])
-    study = Study(replace(card, uncertainty={**stated, **absent, **card.uncertainty}), every)
+    study = Study(replace(card, uncertainty=stated | absent), every)
     errors = joint_errors(study.card, study.parameters)
     at_card = mean @ study.slopes_at(study.values)[1]
     if not np.isfinite(at_card).all():
         bad = figures[int(np.flatnonzero(~np.isfinite(at_card).all(axis=1))[0])]
         problem = f"{card.ship.name} shows it without a clean event: it has no slopes"
         raise ArgumentError("figures", bad.text, problem, "ask for another figure, or for another rudder")
-    free = np.array([parameter.name in known for parameter in study.parameters])
+    free = np.isin([parameter.name for parameter in study.parameters], [f"derivatives.{name}" for name in stated])
     covariance = np.where(np.outer(free, free), errors.covariance, 0.0)
     ships = np.random.default_rng(seed).multivariate_normal(study.values, covariance, size=draws, method="eigh")
     found = np.stack([at_card, *_slopes_of_ships(study, ships, mean)])
@@ -126,18 +128,13 @@ def range_of_figures(card: ManoeuvringCard, figures: Sequence[InfluenceFigure]) 
     """Largest drift, rudder and r' of the manoeuvres of the figures, rounded up to 1 deg, 1 deg and 0.05."""
     model = build(card)
     length = card.ship.length_m
-    drift, rudder, rate = _LEAST_RANGE
+    reached = np.array(_LEAST_RANGE)
     for manoeuvre in dict.fromkeys(figure.manoeuvre for figure in figures):
         if not isinstance(manoeuvre, Turn | Zigzag):
             continue
         run = simulate(model, manoeuvre).trajectory
-        speed = np.maximum(run["motion.speed"], 1e-6)
-        drift = max(drift, float(np.max(np.abs(run["motion.beta"]))))
-        rate = max(rate, float(np.max(np.abs(run["motion.r"]) * length / speed)))
-        rudder = max(rudder, abs(manoeuvre.rudder))
-    degree = np.radians(1.0)
-    return TestedRange(
-        float(np.ceil(drift / degree - 1e-9) * degree),
-        float(np.ceil(rudder / degree - 1e-9) * degree),
-        float(np.ceil(rate / 0.05 - 1e-9) * 0.05),
-    )
+        rate = np.abs(run["motion.r"]) * length / np.maximum(run["motion.speed"], 1e-6)
+        visited = np.abs(run["motion.beta"]).max(), abs(manoeuvre.rudder), rate.max()
+        reached = np.maximum(reached, visited)
+    steps = np.array([np.radians(1.0), np.radians(1.0), 0.05])
+    return TestedRange(*(np.ceil(reached / steps - 1e-9) * steps).tolist())

@@ -13,7 +13,7 @@ from pathlib import Path
 import tomlkit
 
 from tank2sim.apps.design.captive_design import CaptiveDesign
-from tank2sim.apps.design.captive_runs import PlannedRun, RunGroup, TankRuns
+from tank2sim.apps.design.captive_runs import RunGroup, TankRuns, oscillation_of
 from tank2sim.apps.design.study import PlannedManoeuvre, PlannedRow
 from tank2sim.errors import InputError
 from tank2sim.files import read_text
@@ -27,7 +27,7 @@ def run_rows(design: CaptiveDesign) -> tuple[PlannedRow, ...]:
     rows = []
     checks = {id(run): test.check for test in design.tests for run in test.runs}
     for number, run in enumerate(design.runs, start=1):
-        swings, yaws = run.oscillates, run.oscillates and run.type != "pure_sway"
+        swings, yaws = bool(run.motion), run.motion == "yaw"
         row = PlannedRow(
             run=number,
             file=f"run_{number:03d}.csv",
@@ -35,12 +35,12 @@ def run_rows(design: CaptiveDesign) -> tuple[PlannedRow, ...]:
             speed_mps=_rounded(run.speed_mps),
             drift_deg=_rounded(math.degrees(run.drift_rad)),
             rudder_deg=_rounded(math.degrees(run.rudder_rad)),
-            frequency_radps=_rounded(run.frequency_radps) if swings else None,
-            period_s=_rounded(2 * math.pi / run.frequency_radps) if swings else None,
+            frequency_radps=_rounded_if(swings, run.frequency_radps),
+            period_s=_rounded_if(swings, 2 * math.pi / (run.frequency_radps or math.inf)),
             cycles=run.cycles if swings else None,
-            sway_amplitude_m=_rounded(run.sway_amplitude_m) if swings else None,
-            yaw_rate_amplitude_degps=_rounded(math.degrees(run.velocity)) if yaws else None,
-            heading_amplitude_deg=_rounded(math.degrees(run.heading_amplitude_rad)) if yaws else None,
+            sway_amplitude_m=_rounded_if(swings, run.sway_amplitude_m),
+            yaw_rate_amplitude_degps=_rounded_if(yaws, math.degrees(run.velocity)),
+            heading_amplitude_deg=_rounded_if(yaws, math.degrees(run.heading_amplitude_rad)),
             record_s=_rounded(run.record_s),
             tank_min=_rounded(run.tank_s / 60),
             purpose="check" if checks[id(run)] else "figures",
@@ -51,6 +51,10 @@ def run_rows(design: CaptiveDesign) -> tuple[PlannedRow, ...]:
 
 def _rounded(value: float) -> float:
     return float(f"{value:.6g}") + 0.0
+
+
+def _rounded_if(meant: bool, value: float) -> float | None:
+    return _rounded(value) if meant else None
 
 
 def plan_csv(rows: Sequence[PlannedRow | PlannedManoeuvre]) -> str:
@@ -72,10 +76,8 @@ def campaign_template(design: CaptiveDesign, rows: Sequence[PlannedRow]) -> str:
     for key in ("beam_m", "draught_m"):
         if (size := getattr(ship, key, None)) is not None:
             model[key] = _rounded(size * scale)
-    body = planned.model
-    inertia = None if body.yaw_inertia_kgm2 is None else _rounded(body.yaw_inertia_kgm2)
-    model |= {"mass_kg": _rounded(body.mass_kg), "yaw_inertia_kgm2": inertia}
-    model["x_G_m"] = _rounded(body.x_G_m)
+    for key in ("mass_kg", "yaw_inertia_kgm2", "x_G_m"):
+        model[key] = _rounded(getattr(planned.model, key))
     if scale < 1:
         model["scale"] = _rounded(1 / scale)
     document["model"] = model
@@ -122,20 +124,16 @@ def runs_of_campaign(path: Path, runs: TankRuns) -> tuple[RunGroup, ...]:
     for number, sheet in enumerate(form.runs):
         drift, rudder = sheet.drift_rad or 0.0, sign * (sheet.rudder_rad or 0.0)
         if sheet.type in ("static_drift", "static_rudder", "drift_and_rudder"):
-            found.append((runs.run(sheet.type, runs.longest_s, drift=drift, rudder=rudder),))
+            found.append((runs.longest_run(sheet.type, drift=drift, rudder=rudder),))
             continue
-        key = "amplitude_m" if sheet.type == "pure_sway" else "yaw_rate_amplitude_radps"
-        amplitude = getattr(sheet, key)
-        if sheet.frequency_radps is None or amplitude is None:
-            lacking = "frequency_radps" if sheet.frequency_radps is None else key
-            raise InputError(path, f"runs.{number}.{lacking}", "is missing", "add it: the sheet is all that is read")
-        frequency = sheet.frequency_radps * speeds / scale
-        velocity = (
-            amplitude * sheet.frequency_radps * speeds if sheet.type == "pure_sway" else amplitude * speeds / scale
-        )
-        period = 2 * math.pi / frequency
-        cycles = max(math.floor(runs.longest_s / period + 1e-9), 1)
-        run: PlannedRun = runs.run(sheet.type, cycles * period, drift=drift, frequency=frequency, velocity=velocity)
+        sways = sheet.type == "pure_sway"
+        needed = ("frequency_radps", "amplitude_m" if sways else "yaw_rate_amplitude_radps")
+        for key in needed:
+            if getattr(sheet, key) is None:
+                raise InputError(path, f"runs.{number}.{key}", "is missing", "add it: the sheet is all that is read")
+        frequency, amplitude = (getattr(sheet, key) * speeds for key in needed)
+        velocity = amplitude * sheet.frequency_radps if sways else amplitude / scale
+        run = runs.longest_run(sheet.type, drift=drift, rudder=0.0, frequency=frequency / scale, velocity=velocity)
         found.append((run,))
     return tuple(found)
 
@@ -153,8 +151,6 @@ _COLUMNS = {
 """Names of the columns, without units in brackets."""
 
 _MOST_REPEATS = 100
-_FREQUENCIES, _FREQUENCY_RATIO = 3, 2.0
-"""As of :meth:`.TankRuns.usual_matrix`: the middle one is taken for runs without a frequency."""
 
 
 def runs_of_matrix(path: Path, runs: TankRuns) -> tuple[tuple[RunGroup, ...], list[Notice]]:
@@ -214,16 +210,16 @@ def _number(path: Path, number: int, key: str, cells: list[str], place: int) -> 
 
 
 def _run(row: Mapping[str, float], runs: TankRuns) -> RunGroup:
+    """The run of a row; without a frequency it has the middle one of the usual matrix."""
     drift, rudder = (math.radians(row.get(key, 0.0)) for key in ("drift", "rudder"))
     sway, yaw = (abs(row.get(key, 0.0)) for key in ("sway", "yaw"))
     if not sway and not yaw:
         kind: RunType = "static_rudder" if rudder and not drift else "drift_and_rudder" if rudder else "static_drift"
-        return (runs.run(kind, runs.longest_s, drift=drift, rudder=rudder),)
-    motion = "yaw" if yaw else "sway"
-    frequencies = runs.frequencies(motion, _FREQUENCIES, _FREQUENCY_RATIO) or [runs.highest_frequency(motion)]
+        return (runs.longest_run(kind, drift=drift, rudder=rudder),)
+    kind, velocity = "pure_sway", sway * runs.speed_mps
+    if yaw:
+        kind, velocity = "yaw_with_drift" if drift else "pure_yaw", yaw * runs.speed_mps / runs.length_m
+    motion = oscillation_of(kind)
+    frequencies = runs.usual_frequencies(motion) or [runs.highest_frequency(motion)]
     frequency = row.get("frequency") or frequencies[len(frequencies) // 2]
-    velocity = yaw * runs.speed_mps / runs.length_m if yaw else sway * runs.speed_mps
-    period = 2 * math.pi / frequency
-    cycles = max(math.floor(runs.longest_s / period + 1e-9), 1)
-    oscillating: RunType = "pure_sway" if not yaw else "yaw_with_drift" if drift else "pure_yaw"
-    return (runs.run(oscillating, cycles * period, drift=drift, rudder=rudder, frequency=frequency, velocity=velocity),)
+    return (runs.longest_run(kind, drift=drift, rudder=rudder, frequency=frequency, velocity=velocity),)

@@ -21,7 +21,7 @@ from tank2sim.apps.design.study import (
     UsualMatrix,
     UsualSet,
 )
-from tank2sim.apps.design.tank_form import TankFile
+from tank2sim.apps.design.tank_form import GAUGE_UNITS, TankFile
 from tank2sim.apps.design.trial_design import SENSORS, TrialDesign, design_of_trial
 from tank2sim.apps.programs.conventions import Conventions
 from tank2sim.apps.programs.languages import converted as converted_card
@@ -30,6 +30,7 @@ from tank2sim.cards import ManoeuvringCard
 from tank2sim.cards.card import MmgCard
 from tank2sim.cards.estimates import RELATIVE_ERROR
 from tank2sim.cards.examination import doubts
+from tank2sim.cards.form import CardSection
 from tank2sim.cards.writing import TestedRange
 from tank2sim.errors import ArgumentError
 from tank2sim.notices import Notice, caution
@@ -60,14 +61,7 @@ def planned_campaign(
 ) -> tuple[CampaignStudy, CaptiveDesign]:
     """The campaign as numbers, and its design. Arguments and errors as in :func:`.design_campaign`.
 
-    Parameters
-    ----------
-    card, figures, usual, largest
-        As of :func:`.design_campaign`.
-    limits : TankFile
-        Of the tank.
-    settings : CaptiveDesignSettings
-        Without `usual` and `largest`, which are read here.
+    `limits`: the tank's; `settings`: without `usual` and `largest`, which are read here.
     """
     polynomial, converted = _polynomial(card)
     asked = _figures_of(figures)
@@ -154,35 +148,23 @@ def planned_trial(
     sensors: Mapping[str, float] | None,
     one_side: bool,
 ) -> tuple[TrialStudy, TrialDesign]:
-    """The trial as numbers, and its design. Raises as :func:`.design_trial`.
-
-    Parameters
-    ----------
-    card, figures, minutes, sensors, one_side
-        As of :func:`.design_trial`.
-    """
+    """The trial as numbers, and its design. Arguments and errors as in :func:`.design_trial`."""
     polynomial, converted = _polynomial(card)
     found = SENSORS if sensors is None else _sensors(sensors)
     asked = _figures_of(figures)
     design = design_of_trial(polynomial, asked, minutes=minutes, sensors=found, one_side=one_side)
-    notices = list(design.slopes.notices)
-    if sensors is None:
-        notices.insert(
-            0,
-            caution(
-                "ASSUMED standard errors of the sensors, because none are stated: "
-                + ", ".join(f"{column} {size:g}" for column, size in _by_column(found).items())
-            ),
-        )
-    notices = [*_assumed_of_card(polynomial), *notices]
+    notices = list(doubts(card))
     if design.unstable:
-        notices.insert(
-            0,
+        notices.append(
             caution(
                 f"LINEARISED standard errors: {card.ship.name} is unstable on a straight course, so its manoeuvres are "
                 "not linear in the coefficients, and errors after a fit may be many times those predicted here"
-            ),
+            )
         )
+    notices += _assumed_of_card(polynomial)
+    if sensors is None:
+        sizes = ", ".join(f"{column} {size:g}" for column, size in _by_column(found).items())
+        notices.append(caution(f"ASSUMED standard errors of the sensors, because none are stated: {sizes}"))
     manoeuvres = tuple(
         PlannedManoeuvre(
             manoeuvre=each.name,
@@ -208,19 +190,13 @@ def planned_trial(
         coefficients=design.coefficients,
         certainty=design.curve,
         manoeuvres=manoeuvres,
-        notices=tuple(dict.fromkeys((*doubts(card), *notices, *converted))),
+        notices=tuple(dict.fromkeys((*notices, *design.slopes.notices, *converted))),
     )
     return study, design
 
 
 def counted(count: int, word: str) -> str:
-    """A number of things: ``1 run``, ``2 runs``.
-
-    Parameters
-    ----------
-    count, word
-        The number, and the word for one of them.
-    """
+    """A number of things: ``1 run``, ``2 runs``."""
     return f"{count} {word}" if count == 1 else f"{count} {word}s"
 
 
@@ -339,20 +315,13 @@ def _checks(design: CaptiveDesign) -> list[Notice]:
 def _assumptions(design: CaptiveDesign, draws: int) -> list[Notice]:
     """Data stated neither by the tank's file, nor an option, nor the card."""
     tank, runs = design.tank_runs.tank, design.tank_runs
-    gauges, stated = tank.gauges, tank.gauges.model_fields_set
-    lacking = []
+    gauges, of_gauges = tank.gauges, {}
     for kind, share in (("noise", gauges.noise_share), ("zero", gauges.zero_share)):
-        forces = [
-            force for force, unit in (("X", "N"), ("Y", "N"), ("N", "Nm")) if f"{force}_{kind}_{unit}" not in stated
-        ]
-        if forces and f"{kind}_share" not in stated:
-            lacking.append(f"{kind} of {', '.join(forces)} {100 * share:g} % of the range")
-    others = {
-        "gain_relative": f"gain {100 * gauges.gain_relative:g} %",
-        "rate_hz": f"{gauges.rate_hz:g} independent readings a second",
-    }
-    lacking += [text for key, text in others.items() if key not in stated]
-    found = []
+        if forces := [force for force in GAUGE_UNITS if gauges.stated(kind, force) is None]:
+            of_gauges[f"{kind}_share"] = f"{kind} of {', '.join(forces)} {100 * share:g} % of the range"
+    of_gauges["gain_relative"] = f"gain {100 * gauges.gain_relative:g} %"
+    of_gauges["rate_hz"] = f"{gauges.rate_hz:g} independent readings a second"
+    lacking, found = _unstated(gauges, of_gauges), []
     if lacking:
         found.append(
             caution(f"ASSUMED standard errors of the gauges ([gauges] of the tank states none): {', '.join(lacking)}")
@@ -364,11 +333,15 @@ def _assumptions(design: CaptiveDesign, draws: int) -> list[Notice]:
         "acceleration_mps2": f"acceleration {carriage.acceleration_mps2:g} m/s2",
         "waiting_s": f"waiting time {carriage.waiting_s:g} s",
     }
-    missing = [] if "length_m" in tank.model.model_fields_set else [f"model of {runs.length_m:.3g} m"]
-    missing += [text for key, text in of_carriage.items() if key not in carriage.model_fields_set]
-    if missing:
+    of_model = {"length_m": f"model of {runs.length_m:.3g} m"}
+    if missing := [*_unstated(tank.model, of_model), *_unstated(carriage, of_carriage)]:
         found.append(caution(f"ASSUMED of the tank, because it is not stated: {', '.join(missing)}"))
     return found
+
+
+def _unstated(section: CardSection, words: Mapping[str, str]) -> list[str]:
+    """The words of the keys that a section of the tank's file does not state."""
+    return [text for key, text in words.items() if key not in section.model_fields_set]
 
 
 def _assumed_of_card(card: ManoeuvringCard) -> list[Notice]:

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, ClassVar, TypeVar
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -38,6 +38,18 @@ _ON_SCREEN = 12
 """Coefficients in the printed table. Project choice: the page and JSON have all."""
 
 
+class _Programme(NamedTuple):
+    """A plan, and the time of a plan that is as good as the usual programme in the `whole` time (None if none is)."""
+
+    word: str
+    tests: int
+    used: float
+    needed: float | None
+    whole: float
+    unit: str
+    usual: str
+
+
 class DesignResult(Result[_S]):
     """A plan that makes figures most certain, and the usual programme in the same time."""
 
@@ -51,18 +63,10 @@ class DesignResult(Result[_S]):
 
     def _certainty(self, text: str, seconds: float, unit: str) -> Section:
         charts = _certainty_charts(self.study.certainty, seconds, unit)
-        rows: list[list[Cell]] = [
-            [
-                figure_label(name),
-                one.value,
-                one.before,
-                one.design,
-                one.usual,
-                one.design / one.usual,
-                one.variance_ratio,
-            ]
-            for name, one in self.study.figures.items()
-        ]
+        rows: list[list[Cell]] = []
+        for name, one in self.study.figures.items():
+            sizes: list[Cell] = [one.before, one.design, one.usual, one.design / one.usual]
+            rows.append([figure_label(name), one.value, *sizes, one.variance_ratio])
         heads = ["figure", "value", "before", "design", "usual", "ratio", "ratio of variances"]
         known = [place for place in range(len(heads)) if any(row[place] is not None for row in rows)]
         figures = table(
@@ -77,31 +81,37 @@ class DesignResult(Result[_S]):
             tables=[figures],
         )
 
-    def _cards(self, first: KeyFigure, needed: float | None, whole: float, unit: str, usual: str) -> list[KeyFigure]:
-        cards = [
-            first,
-            KeyFigure(
-                f"Time for the certainty of the {usual}",
-                "none found" if needed is None else 100 * needed / whole,
-                "" if needed is None else "%",
-                note="" if needed is None else f"{needed:.3g} {unit} in place of {whole:.3g} {unit}",
-            ),
-        ]
+    @property
+    def _programme(self) -> _Programme:
+        raise NotImplementedError
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """Number of tests and their time, and the time in which a plan is as good as the usual programme."""
+        word, count, used, needed, whole, unit, usual = self._programme
+        first = f"{self.study.ship}: {counted(count, word)} in {used:.3g} {unit}."
+        if needed is None:
+            return first, f"No plan was found that has every figure as certain as the {usual} in {whole:.3g} {unit}."
+        return first, (
+            f"{needed:.3g} {unit} of this plan are as accurate as {whole:.3g} {unit} of the {usual} "
+            f"({100 * needed / whole:.0f} %)."
+        )
+
+    @property
+    def key_figures(self) -> Sequence[KeyFigure]:
+        """Number of tests, their time, and each figure."""
+        word, count, used, needed, whole, unit, usual = self._programme
+        time = KeyFigure(f"Time for the certainty of the {usual}", "none found")
+        if needed is not None:
+            note = f"{needed:.3g} {unit} in place of {whole:.3g} {unit}"
+            time = KeyFigure(time.label, 100 * needed / whole, "%", note=note)
+        cards = [KeyFigure(f"{word.capitalize()}s", count, note=f"in {used:.3g} {unit}"), time]
         for name, one in self.study.figures.items():
             label = figure_label(name)
             note = f"± {one.design:.2g}; usual programme ± {one.usual:.2g}"
             figure_unit = in_words(name.partition("@")[0])[1]
             cards.append(KeyFigure(label[:1].upper() + label[1:], one.value, figure_unit, note=note))
         return cards
-
-
-def _time_words(needed: float | None, whole: float, unit: str, usual: str) -> str:
-    if needed is None:
-        return f"No plan was found that has every figure as certain as the {usual} in {whole:.3g} {unit}."
-    return (
-        f"{needed:.3g} {unit} of this plan are as accurate as {whole:.3g} {unit} of the {usual} "
-        f"({100 * needed / whole:.0f} %)."
-    )
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -157,24 +167,10 @@ class CampaignDesignResult(DesignResult[CampaignStudy]):
         return campaign_template(self.design, self.study.runs)
 
     @property
-    def _compared_h(self) -> float:
-        return self.study.usual_matrix.hours * self.study.usual_matrix.repeats
-
-    @property
-    def headline(self) -> tuple[str, ...]:
-        """Number of runs and hours, and the hours in which a plan is as good as the usual matrix."""
-        study = self.study
-        return (
-            f"{study.ship}: {counted(len(study.runs), 'run')} in {study.hours_used:.3g} h.",
-            _time_words(study.hours_for_usual_certainty, self._compared_h, "h", "usual matrix"),
-        )
-
-    @property
-    def key_figures(self) -> Sequence[KeyFigure]:
-        """Runs, hours, and each figure."""
-        study = self.study
-        first = KeyFigure("Runs", len(study.runs), note=f"in {study.hours_used:.3g} h")
-        return self._cards(first, study.hours_for_usual_certainty, self._compared_h, "h", "usual matrix")
+    def _programme(self) -> _Programme:
+        study, usual = self.study, self.study.usual_matrix
+        needed, compared = study.hours_for_usual_certainty, usual.hours * usual.repeats
+        return _Programme("run", len(study.runs), study.hours_used, needed, compared, "h", "usual matrix")
 
     @property
     def sections(self) -> Sequence[Section]:
@@ -267,22 +263,10 @@ class TrialDesignResult(DesignResult[TrialStudy]):
         return {row.orders: manoeuvre.orders for row, (manoeuvre, _) in pairs}
 
     @property
-    def headline(self) -> tuple[str, ...]:
-        """Number of manoeuvres and time, and the time in which a plan is as good as the usual set."""
-        study = self.study
-        count = sum(one.repeats for one in study.manoeuvres)
-        return (
-            f"{study.ship}: {counted(count, 'manoeuvre')} in {study.minutes_used:.3g} min.",
-            _time_words(study.minutes_for_usual_certainty, study.minutes, "min", "usual set"),
-        )
-
-    @property
-    def key_figures(self) -> Sequence[KeyFigure]:
-        """Manoeuvres, time, and each figure."""
-        study = self.study
-        count = sum(one.repeats for one in study.manoeuvres)
-        first = KeyFigure("Manoeuvres", count, note=f"in {study.minutes_used:.3g} min")
-        return self._cards(first, study.minutes_for_usual_certainty, study.minutes, "min", "usual set")
+    def _programme(self) -> _Programme:
+        study, count = self.study, sum(one.repeats for one in self.study.manoeuvres)
+        needed = study.minutes_for_usual_certainty
+        return _Programme("manoeuvre", count, study.minutes_used, needed, study.minutes, "min", "usual set")
 
     @property
     def sections(self) -> Sequence[Section]:

@@ -5,6 +5,7 @@ Angles may be given in degrees; the key is then renamed (``drift_deg`` to ``drif
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -16,11 +17,7 @@ from tank2sim.cards.reading import parsed_toml
 from tank2sim.errors import InputError
 from tank2sim.files import read_text
 from tank2sim.quantities import Speed, TankModelLength, TankSize, WaterDensity
-from tank2sim.records.campaign_form import (
-    Angle,
-    TankSection,
-    section_in_si,
-)
+from tank2sim.records.campaign_form import Angle, TankSection, section_in_si
 
 _Share = Annotated[float, Field(ge=0, lt=1)]
 _Seconds = Annotated[float, Field(ge=0, le=1e5)]
@@ -80,6 +77,10 @@ class MechanismSection(CardSection):
     cycles: Annotated[int, Field(ge=1, le=100)] = 3
 
 
+GAUGE_UNITS = {"X": "N", "Y": "N", "N": "Nm"}
+"""Gauge to the unit in the names of its keys."""
+
+
 class GaugesSection(CardSection):
     """``[gauges]``: ranges and errors (one standard deviation).
 
@@ -113,6 +114,11 @@ class GaugesSection(CardSection):
     gain_relative: _Share = 0.003
     rate_hz: Annotated[float, Field(ge=0.01, le=1e5)] = 20.0
 
+    def stated(self, what: str, force: str) -> float | None:
+        """``range``, ``noise`` or ``zero`` of the gauge of a force, N or N m; None where no key has it."""
+        value: float | None = getattr(self, f"{force}_{what}_{GAUGE_UNITS[force]}")
+        return value
+
 
 class TestedModelSection(CardSection):
     """``[model]``: the ship model.
@@ -145,10 +151,7 @@ class TankFile(CardSection):
 def read_tank(path: Path | str) -> TankFile:
     """Read a tank's file.
 
-    Raises
-    ------
-    InputError
-        It is missing, not TOML, or has a key that is unknown, given twice, or out of its bounds.
+    Raises InputError: it is missing, not TOML, or has a key that is unknown, given twice, or out of its bounds.
     """
     path = Path(path)
     content = parsed_toml(read_text(path), path)
@@ -168,14 +171,11 @@ def refuse_contradictions(
 ) -> None:
     """Refuse a tank that contradicts itself or does not take a model of this length, beam and draught, m.
 
-    Raises
-    ------
-    InputError
-        The carriage's way is longer than the tank, the tank is not broader and deeper than the model, or the lowest
-        frequency of the mechanism is above the highest.
+    Raises InputError: the carriage's way is longer than the tank, the tank is not broader and deeper than the model, or
+    the lowest frequency of the mechanism is above the highest.
     """
     basin, way, mechanism = tank.tank, tank.carriage.length_m, tank.mechanism
-    if basin.length_m is not None and way > basin.length_m:
+    if way > (basin.length_m or math.inf):
         assumed = "" if "length_m" in tank.carriage.model_fields_set else "assumed as "
         problem = f"is {assumed}{way:g} m, longer than the tank ([tank] length_m = {basin.length_m:g})"
         raise InputError(source, "carriage.length_m", problem, "state the way of the carriage within the tank")
@@ -187,7 +187,7 @@ def refuse_contradictions(
             problem = f"is {value:g} m, and the model of {length_m:.3g} m has a {what} of {size:.3g} m"
             raise InputError(source, f"tank.{key}", problem, "state the size of the tank, or take a shorter model")
     low, high = mechanism.lowest_frequency_radps, mechanism.highest_frequency_radps
-    if low is not None and high is not None and low > high:
+    if (low or 0.0) > (high or math.inf):
         problem = f"is {low:g} rad/s, above highest_frequency_radps = {high:g}"
         raise InputError(source, "mechanism.lowest_frequency_radps", problem, "give the lower of both")
 
@@ -195,8 +195,6 @@ def refuse_contradictions(
 def with_tank_values(tank: TankFile, section: str, **values: float | None) -> TankFile:
     """The tank with other values, of the types of their keys, in one section; None leaves a value as it is."""
     changed = {key: value for key, value in values.items() if value is not None}
-    if not changed:
-        return tank
     content = tank.model_dump(exclude_unset=True)
     content[section] = {**content.get(section, {}), **changed}
     return TankFile.model_validate(content)

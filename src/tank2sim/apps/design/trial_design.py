@@ -15,11 +15,10 @@ import numpy as np
 from tank2sim.analysis.influence.figures import InfluenceFigure, parse_figure
 from tank2sim.analysis.influence.study import Study
 from tank2sim.apps.design.allocation import Allocation, InformationBlock, certainty, least_time, target_matrices
-from tank2sim.apps.design.figure_slopes import FigureSlopes, figure_slopes
+from tank2sim.apps.design.figure_slopes import FigureSlopes, assumed_errors, figure_slopes
 from tank2sim.apps.design.study import Certainty, PlannedCoefficient
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
-from tank2sim.cards.estimates import RELATIVE_ERROR
 from tank2sim.dynamics.card_parameters import CardParameter, JointErrors, card_parameters, joint_errors, study_model
 from tank2sim.errors import ArgumentError
 from tank2sim.gap.outcome.next_test import Explanation, SailedShip
@@ -44,6 +43,9 @@ four executes (:data:`tank2sim.gap.outcome.next_test.LENGTH`). Project choice.""
 TRIAL_APPROACH = 6.0
 """Time before each manoeuvre until the ship is steady on course and speed, L/u0. Project choice: a fast ship has its
 speed again after some six lengths; a tanker needs more."""
+
+_SHARES = (0.25, 0.4, 0.6, 0.8, 1.0)
+"""Shares of the time at which certainty is drawn."""
 
 _USUAL = ("turn:35", "turn:-35", "zigzag:10/10", "zigzag:20/20")
 
@@ -140,7 +142,7 @@ def design_of_trial(
     def plan(share: float) -> Array:
         return targets.whole(share * budget, targets.relaxed(share * budget)[0]).astype(float)
 
-    plans = {share: plan(share) for share in (0.25, 0.4, 0.6, 0.8, 1.0) if share * budget >= cost.min()}
+    plans = {share: plan(share) for share in _SHARES if share * budget >= cost.min()}
     counts, needed = plans[1.0], least_time(targets, plans, plan, float(cost.min()) / budget)
     return TrialDesign(
         card=card,
@@ -151,9 +153,7 @@ def design_of_trial(
         prior_errors=np.sqrt(every.variances(np.zeros(len(of)))),
         standard_errors=np.sqrt(every.variances(counts)),
         usual_standard_errors=np.sqrt(by_usual),
-        curve=certainty(
-            [each.text for each in figures], every, plans, usual, [share * budget for share in sorted(plans)]
-        ),
+        curve=certainty(slopes.texts, every, plans, usual, [share * budget for share in sorted(plans)]),
         unstable=bool(Study(card, [parse_figure("criterion_C")]).base[0] <= 0),
         minutes_needed=None if needed is None else needed / 60,
         coefficients=_coefficients(ship.axes, block, counts, usual * budget / usual_s, free, errors.covariance),
@@ -163,8 +163,7 @@ def design_of_trial(
 
 def _prior(card: ManoeuvringCard) -> tuple[list[CardParameter], JointErrors]:
     """Parameters that :func:`.identify` estimates (no accelerations), and their errors before the trial."""
-    assumed = {name: RELATIVE_ERROR * abs(value) for name, value in card.derivatives.items() if value}
-    known = replace(card, uncertainty={**assumed, **card.uncertainty})
+    known = replace(card, uncertainty=assumed_errors(card))
     estimated = free_parameters(known)
     parameters = [each for each in card_parameters(known, study_model(known)) if each.name in estimated]
     return parameters, joint_errors(known, parameters)
@@ -191,17 +190,14 @@ def _candidates(card: ManoeuvringCard, ship: SailedShip) -> tuple[list[TrialMano
             if not np.isfinite(each[place]).all():
                 continue
             own = {name: values[place] for name, values in orders.items()}
-            text = orders_csv(ship.step_s, own, f"{candidate.name} of {card.ship.name}, by its card")
-            total = duration + TRIAL_APPROACH * ship.ship_time
-            found.append(
-                TrialManoeuvre(
-                    name=candidate.name,
-                    manoeuvre=candidate.manoeuvre,
-                    duration_s=duration,
-                    total_s=total,
-                    orders=text,
-                )
+            manoeuvre = TrialManoeuvre(
+                name=candidate.name,
+                manoeuvre=candidate.manoeuvre,
+                duration_s=duration,
+                total_s=duration + TRIAL_APPROACH * ship.ship_time,
+                orders=orders_csv(ship.step_s, own, f"{candidate.name} of {card.ship.name}, by its card"),
             )
+            found.append(manoeuvre)
             information.append(each[place])
     if not any(each.manoeuvre in _USUAL for each in found):
         problem = "leaves all bounds in every manoeuvre of the usual set"

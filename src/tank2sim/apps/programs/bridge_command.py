@@ -12,7 +12,6 @@ and in turns by a difference, by least squares that keep them positive.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from itertools import product
 
 import numpy as np
@@ -175,7 +174,7 @@ def _seen(length_m: float, draught_m: float) -> dict[str, float]:
 
 def _across(model: Model) -> dict[str, float]:
     """Drag across, from the card's at 0.5 and 1 m/s."""
-    slow, fast = (-force_at(model, "force.Y", {"motion.v": v}, {}) / v for v in (0.5, 1.0))
+    slow, fast = (-force_at(model, "force.Y", {"motion.v": v}) / v for v in (0.5, 1.0))
     quadratic = max(0.0, 2 * (fast - slow))
     return {
         "DynamicsLateralDragA": max(_LEAST_DRAG, quadratic),
@@ -274,39 +273,36 @@ def _of_craft(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[F
     def lever(revolutions: float) -> float:
         return math.copysign((revolutions / most) ** 2, revolutions)
 
-    def moment(port: float, starboard: float) -> float:
-        return force * (port - starboard) * spacing / 2
-
-    straight = [(StraightRun(share * most), lever(share * most)) for share in _SHARES]
-    spins = [
-        (Spin(n), moment(lever(n), -thruster.astern_Ns2 / thruster.ahead_Ns2 * lever(n)))
-        for n in (share * min(most, least) for share in _SHARES)
+    # Levers (port, starboard) of each run; a spin turns the starboard thruster astern.
+    reversed_thrust = -thruster.astern_Ns2 / thruster.ahead_Ns2
+    levers: dict[StraightRun | Spin | DifferenceTurn, tuple[float, float]] = {}
+    ahead, spins, differences = (np.array(_SHARES) * largest for largest in (most, min(most, least), left))
+    levers |= {StraightRun(n): (lever(n), lever(n)) for n in ahead.tolist()}
+    levers |= {Spin(n): (lever(n), reversed_thrust * lever(n)) for n in spins.tolist()}
+    levers |= {DifferenceTurn(d): (lever(cruise + d / 2), lever(cruise - d / 2)) for d in differences.tolist()}
+    found = {run: _figures(model, run) for run in levers}
+    moments = {run: force * (port - starboard) * spacing / 2 for run, (port, starboard) in levers.items()}
+    A, B = _drag([(2 * force * levers[run][0], found[run]["final_speed_mps"]) for run in map(StraightRun, ahead)])
+    rates = [
+        (moments[run], math.radians(abs(rate)))
+        for run, figures in found.items()
+        if (rate := figures.get(_RATES.get(type(run), "")))
     ]
-    turns = [
-        (DifferenceTurn(d), (lever(cruise + d / 2), lever(cruise - d / 2))) for d in (share * left for share in _SHARES)
-    ]
-    made: list[StraightRun | Spin | DifferenceTurn] = [run for run, _ in straight]
-    made += [*(run for run, _ in spins), *(run for run, _ in turns)]
-    found = {run.words: _figures(model, run) for run in made}
-    turning = [(moved, found[run.words].get("final_rate_degps")) for run, moved in spins]
-    turning += [(moment(*ends), found[run.words].get("steady_rate_degps")) for run, ends in turns]
-    rates = [(moved, math.radians(abs(rate))) for moved, rate in turning if rate]
-    A, B = _drag([(2 * force * ahead, found[run.words]["final_speed_mps"]) for run, ahead in straight])
     if not rates:
         raise card.fault("thrusters", "turn the craft in no spin and no turn", "check the card with simulate")
     turn_A, turn_B = _drag(rates)
     surge = SurgeNumbers(A, B, 2 * force, astern, card.rigid_body.mass - card.derivatives.get("Xudot", 0.0))
-
-    after: dict[str, dict[str, float]] = {}
-    for run, ahead in straight:
-        speed = surge.speed(ahead)
-        time, way = surge.run(ahead, 0.0, 0.9 * speed)
-        after[run.words] = {"final_speed_mps": speed, "time_to_90_percent_s": time, "distance_to_90_percent_m": way}
-    for spin, moved in spins:
-        after[spin.words] = {"final_rate_degps": math.degrees(speed_against_drag(moved, turn_A, turn_B))}
-    for turn, ends in turns:
-        rate, speed = speed_against_drag(moment(*ends), turn_A, turn_B), surge.speed(sum(ends) / 2)
-        after[turn.words] = {"steady_rate_degps": math.degrees(rate), "steady_diameter_m": 2 * speed / rate}
+    changes = []
+    for run, ends in levers.items():
+        speed, rate = surge.speed(sum(ends) / 2), speed_against_drag(moments[run], turn_A, turn_B)
+        after = {"final_rate_degps": math.degrees(rate)}
+        if isinstance(run, StraightRun):
+            time, way = surge.run(ends[0], 0.0, 0.9 * speed)
+            after = {"final_speed_mps": speed, "time_to_90_percent_s": time, "distance_to_90_percent_m": way}
+        elif isinstance(run, DifferenceTurn):
+            after = {"steady_rate_degps": math.degrees(rate), "steady_diameter_m": 2 * speed / rate}
+        known = found[run]
+        changes += [FigureChange(run.words, name, known[name], value) for name, value in after.items() if name in known]
     numbers = {
         **surge.keys,
         "Inertia": card.rigid_body.yaw_inertia - card.derivatives.get("Nrdot", 0.0),
@@ -316,16 +312,11 @@ def _of_craft(card: SteeredCard, model: Model) -> tuple[dict[str, float], list[F
         "DynamicsTurnDragA": turn_A,
         "DynamicsTurnDragB": turn_B,
     }
-    return numbers, _compared(found, after), ["a turning craft neither drifts nor loses speed"]
+    return numbers, changes, ["a turning craft neither drifts nor loses speed"]
 
 
-def _compared(before: Mapping[str, dict[str, float]], after: Mapping[str, dict[str, float]]) -> list[FigureChange]:
-    return [
-        FigureChange(words, name, before[words][name], value)
-        for words, figures in after.items()
-        for name, value in figures.items()
-        if name in before[words]
-    ]
+# The rate of turn of a manoeuvre
+_RATES: dict[type, str] = {Spin: "final_rate_degps", DifferenceTurn: "steady_rate_degps"}
 
 
 def _spacing(card: SteeredCard) -> float:

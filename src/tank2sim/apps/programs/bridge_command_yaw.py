@@ -15,10 +15,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
-import casadi as ca
 import numpy as np
 
 from tank2sim.apps.programs.bridge_command_surge import SurgeNumbers, full_ahead_order
+from tank2sim.apps.programs.program_files import value_at
 from tank2sim.arrays import Array
 from tank2sim.dynamics.model import Model
 from tank2sim.simulation.card_range import single_figures
@@ -215,15 +215,7 @@ def _share_of_card(model: Model, speed: float) -> float:
     return min(1.0, max(0.0, stopped / ahead)) if ahead else _SHARE
 
 
-def force_at(model: Model, name: str, motion: Mapping[str, float], orders: Mapping[str, float]) -> float:
-    """A force of a card (N, N m) at a motion.
-
-    `motion`: ``motion.u``, ``motion.v``, ``motion.r``, ``rudder.angle``, SI; zero where not given; `orders`: Inputs
-    that are not as at the start.
-    """
-    x = np.array(model.initial(model.parameter_values())).ravel()
-    for place, state in enumerate(model.state_names):
-        if state in ("motion.u", "motion.v", "motion.r", "rudder.angle"):
-            x[place] = motion.get(state, 0.0)
-    function = ca.Function("force", [model.x, model.u, model.p], [model.expand(model.symbol(name))])
-    return float(function(x, model.input_values(orders), model.parameter_values()))
+def force_at(model: Model, name: str, motion: Mapping[str, float], orders: Mapping[str, float] | None = None) -> float:
+    """A force of a card (N, N m) at a motion, which is zero where it is not given, with other `orders` (inputs)."""
+    still = {name: 0.0 for name in ("motion.u", "motion.v", "motion.r", "rudder.angle") if name in model.state_names}
+    return value_at(model, name, still | dict(motion), orders)

@@ -95,13 +95,12 @@ class ConventionResult(Result[ConventionStudy]):
     def headline(self) -> tuple[str, ...]:
         """The first reading with its probability, and the conventions that the numbers do not settle."""
         first, name = self.readings[0], Path(self.study.source).name
-        open_keys = [key for key in _WORDS if len({getattr(entry, key) for entry in self.readings}) > 1]
-        if not open_keys:
+        if len(self.readings) == 1:
             return (f"{name}: every convention is stated",)
         read = ", ".join(_WORDS[key][getattr(first, key)] for key in _WORDS)
         mark = "" if first.probability >= SURE_READING else "UNCERTAIN: "
         lines = [f"{mark}{name}: {read}: probability {first.probability:.2g}"]
-        if doubtful := [key for key in open_keys if self._share(key) < SURE_READING]:
+        if doubtful := [key for key in _WORDS if self._share(key) < SURE_READING]:
             shares = [f"{_WORDS[key][getattr(first, key)]} by {100 * self._share(key):.0f} %" for key in doubtful]
             lines.append(f"Not settled by the numbers: {', '.join(shares)}")
         return tuple(lines)
@@ -109,26 +108,23 @@ class ConventionResult(Result[ConventionStudy]):
     @property
     def notices(self) -> tuple[Notice, ...]:
         """Assumed sizes, doubts about the first reading, and what was not read."""
-        study, first, found = self.study, self.readings[0], []
-        if study.assumed:
-            sizes = ", ".join(f"{key} = {value:.4g}" for key, value in study.assumed.items())
-            found.append(f"ASSUMED, because the table lacks them: {sizes}")
-        if first.against:
-            found.append(f"even the first reading is unlike a ship of these dimensions: {'; '.join(first.against)}")
-        if study.left_out:
-            found.append(f"not read, and not on the card of a reading: {', '.join(study.left_out)}")
-        if study.scaled_with_nominal_speed:
-            found.append(
-                "terms by Du' are forces by u v, u r and u^2 delta scaled with u0 (Yvu = Yv, Ydu = 2 Yd): "
-                'speed_scale = "nominal", by which speed counts once'
-            )
-            if study.speed_scale == "instantaneous":
-                found.append('the file states speed_scale = "instantaneous", by which speed counts twice')
-        if len(self.readings) > 1 and same_in_practice(first, self.readings[1]) and first.probability < SURE_READING:
-            found.append("the first two readings are one ship in practice: their figures differ by less than 5 %")
-        if first.vanished:
-            found.append(f"by the first reading {', '.join(first.vanished)} vanish to the printed digits")
-        return tuple(map(Notice, found))
+        study, first = self.study, self.readings[0]
+        sizes = ", ".join(f"{key} = {value:.4g}" for key, value in study.assumed.items())
+        nominal = study.scaled_with_nominal_speed
+        unsure = len(self.readings) > 1 and first.probability < SURE_READING
+        said = {
+            f"ASSUMED, because the table lacks them: {sizes}": study.assumed,
+            f"even the first reading is unlike a ship of these dimensions: {'; '.join(first.against)}": first.against,
+            f"not read, and not on the card of a reading: {', '.join(study.left_out)}": study.left_out,
+            "terms by Du' are forces by u v, u r and u^2 delta scaled with u0 (Yvu = Yv, Ydu = 2 Yd): "
+            'speed_scale = "nominal", by which speed counts once': nominal,
+            'the file states speed_scale = "instantaneous", by which speed counts twice': nominal
+            and study.speed_scale == "instantaneous",
+            "the first two readings are one ship in practice: their figures differ by less than 5 %": unsure
+            and same_in_practice(first, self.readings[1]),
+            f"by the first reading {', '.join(first.vanished)} vanish to the printed digits": first.vanished,
+        }
+        return tuple(Notice(words) for words, holds in said.items() if holds)
 
     @property
     def key_figures(self) -> Sequence[KeyFigure]:

@@ -29,9 +29,15 @@ class Conventions:
     origin_m: float = 0.0  # The new origin forward of the old one, m
 
     @property
+    def stated(self) -> dict[str, str]:
+        """Keys of ``[model]`` that are asked for."""
+        keys = {"scaling": self.scaling, "rudder_sign": self.rudder_sign}
+        return {key: value for key, value in keys.items() if value is not None}
+
+    @property
     def unchanged(self) -> bool:
         """True if nothing is asked for."""
-        return self.scaling is None and self.rudder_sign is None and not self.origin_m
+        return not self.stated and not self.origin_m
 
 
 def in_conventions(card: ManoeuvringCard, wanted: Conventions) -> ManoeuvringCard:
@@ -49,12 +55,7 @@ def in_conventions(card: ManoeuvringCard, wanted: Conventions) -> ManoeuvringCar
     if wanted.origin_m and card.effects:
         names = ", ".join(entry.name for entry in card.effects)
         raise card.fault("effects", f"are about midships ({names})", "leave the origin, or the effects out")
-    model = card.model.model_copy(
-        update={
-            "scaling": wanted.scaling or card.model.scaling,
-            "rudder_sign": wanted.rudder_sign or card.model.rudder_sign,
-        }
-    )
+    model = card.model.model_copy(update=wanted.stated)
     try:
         scales = scales_of_file(card.ship, card.environment, model)
     except KeyError as error:
@@ -78,8 +79,7 @@ def _rewritten(
         sign = OPPOSITE.get(card.places.get(name, name), (name, 1.0))[1]
         return sign * file_factor(known_term(name), scales, rudder_to_port=to_port)
 
-    stated_conventions = {"model.scaling": wanted.scaling, "model.rudder_sign": wanted.rudder_sign}
-    changes: dict[str, object] = {key: value for key, value in stated_conventions.items() if value}
+    changes: dict[str, object] = {f"model.{key}": value for key, value in wanted.stated.items()}
     changes |= _body_in_file(card, scales, ahead)
     errors = np.sqrt(np.diag(covariance))
     for name, value, error in zip(names, values, errors, strict=True):

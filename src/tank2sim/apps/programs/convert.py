@@ -92,25 +92,17 @@ def convert(
     from tank2sim.notices import Notice
 
     made = converted(ship.card, to, Conventions(scaling, rudder_sign, origin_m), scatter, added_mass)
-    fit = (
-        None
-        if made.fit is None
-        else PolynomialRange(
-            residuals_percent={name: 100 * value for name, value in made.fit.residuals.items()},
-            ranges={name: (low, high) for name, (low, high) in made.fit.ranges.items()},
-        )
-    )
-    figures = []
-    for one in made.changes:
-        error = 100 * (one.after / one.before - 1) if one.before and one.after is not None else None
-        figures.append(ConvertedFigure(one.manoeuvre, one.figure, one.before, one.after, error))
+    fit = None
+    if made.fit is not None:
+        residuals = {name: 100 * value for name, value in made.fit.residuals.items()}
+        fit = PolynomialRange(residuals, dict(made.fit.ranges))
     study = ConversionStudy(
         ship=ship.name,
         from_kind=ship.card.model.kind,
         to=to,
         made=FORMS[to].words,
         fit=fit,
-        figures=tuple(figures),
+        figures=tuple(ConvertedFigure(**vars(one), error_percent=one.error_percent) for one in made.changes),
         notices=(*doubts(ship.card), *map(Notice, made.losses)),
     )
     return ConversionResult(study, made, made.card, str(ship.card.source))

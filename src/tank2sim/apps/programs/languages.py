@@ -18,21 +18,20 @@ from tank2sim.apps.programs.polynomial_fit import (
 from tank2sim.apps.programs.program_code import mss_function, pvs_class
 from tank2sim.apps.programs.program_files import ProgramFiles, figure_changes
 from tank2sim.apps.programs.robotics import (
-    VRX_MASSES,
-    VRX_TERMS,
     AddedMass,
     gazebo_text,
     growth_per_step,
     place_of_added_mass,
     vrx_model,
+    vrx_terms,
     vrx_text,
 )
 from tank2sim.cards import Card, ManoeuvringCard, SteeredBy, SteeredCard
 from tank2sim.cards.card import MmgCard
-from tank2sim.cards.craft_terms import CRAFT_ADDED_MASSES
 from tank2sim.cards.reading import changed_text, craft_in_scaling, parse_card
 from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS
+from tank2sim.dynamics.model import Model
 from tank2sim.errors import ArgumentError
 
 _OF_CRAFT = ("small_craft", "gazebo", "vrx")
@@ -51,18 +50,30 @@ def converted(
     Raises InputError: The card cannot be had in that language.
     """
     if FORMS[to].writer:
-        return _of_several_files(card, to, wanted, scatter, added_mass)
+        if not wanted.unchanged or scatter is not None or added_mass is not None:
+            remedy = "leave scaling, rudder sign, origin, scatter and added mass out"
+            raise ArgumentError("to", to, "has conventions of its own", remedy)
+        made = FORMS[to].files(card.steered())
+        return replace(made, losses=(*made.losses, *_lost_sensors(card.steered())))
     if card.steered().steered_by is SteeredBy.THRUSTERS:
         return _of_craft(card.steered(), to, wanted, added_mass)
     if added_mass is not None:
         raise ArgumentError("added_mass", added_mass, "is of craft in gazebo and vrx alone", "leave it out")
-    given = _of_ship(card, to)
+    if to in _OF_CRAFT:
+        problem = f"is {card.model.kind}, and {to} takes cards of small craft"
+        raise card.fault("model.kind", problem, f"convert it to {_FOLDERS}, mss or pvs")
+    given = card.manoeuvring()
     if abs(wanted.origin_m) > given.ship.length_m:
         raise ArgumentError("origin_m", f"{wanted.origin_m:g}", "is more than a length from midships", "give it in m")
     if to not in ("abkowitz", "mmg"):
         if not wanted.unchanged:
             raise ArgumentError("to", to, "has conventions of its own", "leave scaling, rudder sign and origin out")
         return _program(given, to)
+    return _as_card(given, to, wanted, SCATTER if scatter is None else scatter)
+
+
+def _as_card(given: ManoeuvringCard, to: str, wanted: Conventions, scatter: float) -> ProgramFiles:
+    """A polynomial or an MMG card."""
     if to == "mmg" and not isinstance(given, MmgCard):
         problem = f"is {given.model.kind}: without thrust and rudder force its terms cannot be split into MMG's"
         raise given.fault("model.kind", problem, "convert an MMG card to abkowitz, not the other way")
@@ -73,7 +84,7 @@ def converted(
             "figures, positions and speeds of the new card refer to its own origin",
         )
     if to == "abkowitz" and isinstance(given, MmgCard):
-        return _fitted(given, wanted, SCATTER if scatter is None else scatter, losses)
+        return _fitted(given, wanted, scatter, losses)
     if to == "abkowitz" and given.model.kind == "linear":
         changed = parse_card(changed_text(given.text, given.source, {"model.kind": "abkowitz"}), given.source)
         assert isinstance(changed, ManoeuvringCard)
@@ -83,29 +94,14 @@ def converted(
     return ProgramFiles(text=made.text, card=made, losses=losses)
 
 
-def _of_several_files(
-    card: Card, to: str, wanted: Conventions, scatter: float | None, added_mass: AddedMass | None
-) -> ProgramFiles:
-    """A form that is a folder of files."""
-    if not wanted.unchanged or scatter is not None or added_mass is not None:
-        remedy = "leave scaling, rudder sign, origin, scatter and added mass out"
-        raise ArgumentError("to", to, "has conventions of its own", remedy)
-    made = FORMS[to].files(card.steered())
-    return replace(made, losses=(*made.losses, *_lost_sensors(card.steered())))
-
-
 def _lost_sensors(card: SteeredCard) -> list[str]:
     """Notices on sensors of a card, which no program has."""
     names = [entry.name for entry in card.effects if EFFECTS[entry.name].acts_on == "sensor"]
     return [f"faults of sensors are left out: {', '.join(names)}"] if names else []
 
 
-def _of_ship(card: Card, to: str) -> ManoeuvringCard:
-    """The card of a ship; raises InputError if it is none, or the language is one of small craft."""
-    if to in _OF_CRAFT:
-        problem = f"is {card.model.kind}, and {to} takes cards of small craft"
-        raise card.fault("model.kind", problem, f"convert it to {_FOLDERS}, mss or pvs")
-    return card.manoeuvring()
+def _lost_effects(card: SteeredCard) -> list[str]:
+    return [f"effects are left out: {', '.join(entry.name for entry in card.effects)}"] if card.effects else []
 
 
 def _of_craft(card: SteeredCard, to: str, wanted: Conventions, added_mass: AddedMass | None) -> ProgramFiles:
@@ -117,55 +113,56 @@ def _of_craft(card: SteeredCard, to: str, wanted: Conventions, added_mass: Added
     if to == "small_craft":
         if added_mass is not None:
             raise ArgumentError("added_mass", added_mass, "is of gazebo and vrx alone", "leave it out")
-        if wanted.scaling not in (None, "dimensional", "prime"):
-            raise ArgumentError("scaling", wanted.scaling or "", "is not of a small craft", "give dimensional or prime")
-        made = craft_in_scaling(card, wanted.scaling or card.model.scaling)
+        scaling = wanted.scaling or card.model.scaling
+        if scaling not in ("dimensional", "prime"):
+            raise ArgumentError("scaling", scaling, "is not of a small craft", "give dimensional or prime")
+        made = craft_in_scaling(card, scaling)
         return ProgramFiles(text=made.text, card=made)
     if wanted.scaling is not None:
         raise ArgumentError("to", to, "has conventions of its own", "leave the scaling out")
     place = place_of_added_mass(card, added_mass)
-    after = build(replace(card, effects=())) if to == "gazebo" else vrx_model(card, place)  # Gazebo has the whole hull
-    return ProgramFiles(
-        text=gazebo_text(card, place) if to == "gazebo" else vrx_text(card, place),
-        losses=tuple(_lost_by(card, to, place)),
-        changes=figure_changes(card, build(card), after),
-    )
-
-
-def _lost_by(card: SteeredCard, to: str, place: AddedMass) -> list[str]:
-    """Parts of a craft that the plugin of a simulator lacks, in sentences."""
-    notices = []
-    if card.effects:
-        notices.append(f"effects are left out: {', '.join(entry.name for entry in card.effects)}")
-    if to == "gazebo":
-        notices.append(
-            "the hull is whole; the thruster plugin takes a thrust in N and has neither the loss by speed, nor the "
-            "dead band, nor the lag of the card"
-        )
-        turning = [
-            f"{thruster.name} by {math.degrees(thruster.max_azimuth_rad):.3g} deg"
-            for thruster in card.thrusters
-            if thruster.max_azimuth_rad is not None
-        ]
-        if turning:
-            notices.append(
-                f"thrusters do not turn in the file, where the card's do ({', '.join(turning)} to either side)"
-            )
-    else:
-        kept = {*VRX_TERMS, *VRX_MASSES}
-        if place == "inertial":
-            kept |= set(CRAFT_ADDED_MASSES)
-        lost = [name for name, value in card.derivatives.items() if value and name not in kept]
-        if place == "plugin":
-            lost.insert(0, "the Coriolis terms of the added mass (the moment of Munk)")
-        if lost:
-            notices.append(f"SimpleHydrodynamics does not have {', '.join(lost)}")
+    text, model, lost = _SIMULATORS[to]
+    losses = [*_lost_effects(card), *lost(card, place)]
     if place == "inertial":
-        notices.append(
+        losses.append(
             f"the added mass is in <fluid_added_mass> of the link, which the engine DART has: as a force of the plugin "
             f"it would let an error of the velocity grow {growth_per_step(card):.4g} times in each step"
         )
+    changes = figure_changes(card, build(card), model(card, place))
+    return ProgramFiles(text=text(card, place), losses=tuple(losses), changes=changes)
+
+
+def _whole_hull(card: SteeredCard, _: AddedMass) -> Model:
+    return build(replace(card, effects=()))
+
+
+def _lost_by_gazebo(card: SteeredCard, _: AddedMass) -> list[str]:
+    notices = [
+        "the hull is whole; the thruster plugin takes a thrust in N and has neither the loss by speed, nor the "
+        "dead band, nor the lag of the card"
+    ]
+    turning = [
+        f"{thruster.name} by {math.degrees(thruster.max_azimuth_rad):.3g} deg"
+        for thruster in card.thrusters
+        if thruster.max_azimuth_rad is not None
+    ]
+    if turning:
+        notices.append(f"thrusters do not turn in the file, where the card's do ({', '.join(turning)} to either side)")
     return notices
+
+
+def _lost_by_vrx(card: SteeredCard, place: AddedMass) -> list[str]:
+    kept = vrx_terms(place)
+    lost = ["the Coriolis terms of the added mass (the moment of Munk)"] if place == "plugin" else []
+    lost += [name for name, value in card.derivatives.items() if value and name not in kept]
+    return [f"SimpleHydrodynamics does not have {', '.join(lost)}"] if lost else []
+
+
+# Simulator of robots to its text, the model that it has, and what it lacks, in sentences
+_SIMULATORS = {
+    "gazebo": (gazebo_text, _whole_hull, _lost_by_gazebo),
+    "vrx": (vrx_text, vrx_model, _lost_by_vrx),
+}
 
 
 def _fitted(card: MmgCard, wanted: Conventions, scatter: float, losses: tuple[str, ...]) -> ProgramFiles:
@@ -186,13 +183,10 @@ def _program(card: ManoeuvringCard, to: str) -> ProgramFiles:
         if not isinstance(card, MmgCard):
             raise card.fault("model.kind", f"is {card.model.kind}, and {to} is a program of the MMG method", "use mss")
         notices = [
-            (
-                f"{to} has the wake w_P0 exp(-4 beta_P^2) in place of C_1, C_2, and U and beta of v - x_G r: it turns "
-                "more tightly than the card"
-            )
+            f"{to} has the wake w_P0 exp(-4 beta_P^2) in place of C_1, C_2, and U and beta of v - x_G r: it turns "
+            "more tightly than the card"
         ]
-        if card.effects:
-            notices.append(f"effects are left out: {', '.join(entry.name for entry in card.effects)}")
+        notices += _lost_effects(card)
         if card.ship.beam_m is None:
             notices.append("the card states no beam_m: B is nan (shipmmg does not use it)")
         return ProgramFiles(text=_OF_MMG[to](card), losses=tuple(notices))

@@ -17,44 +17,57 @@ from tank2sim.escaping import python_text
 _OTHER_PROGRAMS = 'convert it with to="mss" or to="pvs"'
 
 
+def _shared_values(card: MmgCard, program: str) -> dict[str, float]:
+    """Numbers that both programs have, SI, by their names in mmgdynamics.
+
+    Raises InputError: The ship has what the programs lack.
+    """
+    _refuse_what_others_lack(card, program)
+    ship, body, rudder, interaction = card.ship, card.rigid_body, card.rudder, card.interaction
+    return {
+        "Lpp": ship.length_m,
+        "B": math.nan if ship.beam_m is None else ship.beam_m,
+        "d": ship.draught_m,
+        "m": body.mass * card.scales.mass,
+        "x_G": body.x_G * ship.length_m,
+        "I_zG": (body.yaw_inertia - body.mass * body.x_G**2) * card.scales.inertia,
+        "D_p": ship.propeller_diameter_m,
+        "w_P0": card.propeller.w_P0,
+        "t_P": card.propeller.t_P,
+        "A_R": ship.rudder_area_m2,
+        "eta": ship.propeller_diameter_m / rudder.height_m,
+        "epsilon": rudder.eps,
+        "kappa": rudder.kappa,
+        "t_R": rudder.t_R,
+        "a_H": rudder.a_H,
+        **{key: interaction(key) for key in ("f_alpha", "l_R", "gamma_R_plus", "gamma_R_minus")},
+    }
+
+
+_OF_SHIPMMG = {
+    "Lpp": "L_pp",
+    "eta": "η",
+    "f_alpha": "f_α",
+    "epsilon": "ϵ",
+    "kappa": "κ",
+    "gamma_R_minus": "γ_R_minus",
+    "gamma_R_plus": "γ_R_plus",
+}
+"""Names of mmgdynamics to other names in shipmmg."""
+
+
 def shipmmg_values(card: MmgCard) -> tuple[dict[str, float], dict[str, float]]:
     """Keyword arguments of ``Mmg3DofBasicParams`` and ``Mmg3DofManeuveringParams``.
 
     Raises InputError: The ship has two propellers, or an asymmetric hull (Y0, N0).
     """
-    _refuse_what_others_lack(card, "shipmmg")
-    length, scales, body = card.ship.length_m, card.scales, card.rigid_body
-    mass = body.mass * scales.mass
-    known = card.derivatives
-    basic = {
-        "L_pp": length,
-        "B": card.ship.beam_m if card.ship.beam_m is not None else math.nan,
-        "d": card.ship.draught_m,
-        "x_G": body.x_G * length,
-        "D_p": card.ship.propeller_diameter_m,
-        "m": mass,
-        "I_zG": (body.yaw_inertia - body.mass * body.x_G**2) * scales.inertia,
-        "A_R": card.ship.rudder_area_m2,
-        "η": card.ship.propeller_diameter_m / card.rudder.height_m,
-        "m_x": -known.get("Xudot", 0.0) * scales.mass,
-        "m_y": -known.get("Yvdot", 0.0) * scales.mass,
-        "J_z": -known.get("Nrdot", 0.0) * scales.inertia,
-        "f_α": card.interaction("f_alpha"),
-        "ϵ": card.rudder.eps,
-        "t_R": card.rudder.t_R,
-        "x_R": card.rudder.x_R * length,
-        "a_H": card.rudder.a_H,
-        "x_H": card.rudder.x_H * length,
-        "γ_R_minus": card.interaction("gamma_R_minus"),
-        "γ_R_plus": card.interaction("gamma_R_plus"),
-        "l_R": card.interaction("l_R"),
-        "κ": card.rudder.kappa,
-        "t_P": card.propeller.t_P,
-        "w_P0": card.propeller.w_P0,
-        "x_P": card.propeller.x_P,
-    }
-    hull = _hull_in_prime_ii(card)
-    return {key: float(value) for key, value in basic.items()}, {key: float(value) for key, value in hull.items()}
+    length, scales, rudder = card.ship.length_m, card.scales, card.rudder
+    basic = {_OF_SHIPMMG.get(key, key): value for key, value in _shared_values(card, "shipmmg").items()}
+    added = {name: -card.derivatives.get(name, 0.0) for name in ("Xudot", "Yvdot", "Nrdot")}
+    basic |= {"m_x": added["Xudot"] * scales.mass, "m_y": added["Yvdot"] * scales.mass}
+    basic |= {"J_z": added["Nrdot"] * scales.inertia, "x_R": rudder.x_R * length, "x_H": rudder.x_H * length}
+    basic["x_P"] = card.propeller.x_P
+    return {key: float(value) for key, value in basic.items()}, _hull_in_prime_ii(card)
 
 
 def mmgdynamics_values(card: MmgCard) -> dict[str, float]:
@@ -64,43 +77,22 @@ def mmgdynamics_values(card: MmgCard) -> dict[str, float]:
 
     Raises InputError: As :func:`shipmmg_values`, or the card has no beam, or x_R is not -0.5 and a_H is 0.
     """
-    _refuse_what_others_lack(card, "mmgdynamics")
-    ship, rudder, length, scales = card.ship, card.rudder, card.ship.length_m, card.scales
+    shared = _shared_values(card, "mmgdynamics")
+    ship, rudder, density = card.ship, card.rudder, card.environment.water_density_kgpm3
     if ship.beam_m is None:
         raise card.fault("ship.beam_m", "is missing, and mmgdynamics needs it", "add it")
     arm = rudder.x_R + rudder.a_H * rudder.x_H
     if not rudder.a_H and rudder.x_R != -0.5:
         raise card.fault("rudder.x_R", f"is {rudder.x_R:g}, and mmgdynamics has -0.5", _OTHER_PROGRAMS)
-    mass = card.rigid_body.mass * scales.mass
-    ratio = length / ship.draught_m
-    added = {name: -card.derivatives.get(name, 0.0) * ratio for name in ("Xudot", "Yvdot", "Nrdot")}
+    ratio = ship.length_m / ship.draught_m
+    added = (("m_x_dash", "Xudot"), ("m_y_dash", "Yvdot"), ("J_z_dash", "Nrdot"))
     values = {
-        "rho": card.environment.water_density_kgpm3,
-        "C_b": mass / card.environment.water_density_kgpm3 / (length * ship.beam_m * ship.draught_m),
-        "Lpp": length,
-        "B": ship.beam_m,
-        "d": ship.draught_m,
-        "m": mass,
-        "x_G": card.rigid_body.x_G * length,
-        "I_zG": (card.rigid_body.yaw_inertia - card.rigid_body.mass * card.rigid_body.x_G**2) * scales.inertia,
-        "D_p": ship.propeller_diameter_m,
-        "x_P": card.propeller.x_P * length,
-        "w_P0": card.propeller.w_P0,
-        "t_P": card.propeller.t_P,
-        "A_R": ship.rudder_area_m2,
-        "eta": ship.propeller_diameter_m / rudder.height_m,
-        "f_alpha": card.interaction("f_alpha"),
-        "epsilon": rudder.eps,
-        "kappa": rudder.kappa,
-        "t_R": rudder.t_R,
-        "a_H": rudder.a_H,
+        "rho": density,
+        "C_b": shared["m"] / density / (ship.length_m * ship.beam_m * ship.draught_m),
+        **shared,
+        "x_P": card.propeller.x_P * ship.length_m,
         "x_H_dash": (arm + 0.5) / rudder.a_H if rudder.a_H else rudder.x_H,
-        "l_R": card.interaction("l_R"),
-        "gamma_R_plus": card.interaction("gamma_R_plus"),
-        "gamma_R_minus": card.interaction("gamma_R_minus"),
-        "m_x_dash": added["Xudot"],
-        "m_y_dash": added["Yvdot"],
-        "J_z_dash": added["Nrdot"],
+        **{key: -card.derivatives.get(name, 0.0) * ratio for key, name in added},
         **_hull_in_prime_ii(card),
     }
     return {key: float(value) for key, value in values.items()}
@@ -124,7 +116,7 @@ def _refuse_what_others_lack(card: MmgCard, program: str) -> None:
 def _hull_in_prime_ii(card: MmgCard) -> dict[str, float]:
     """``k_0`` to ``k_2``, ``R_0_dash``, ``Y_v_dash`` and so on."""
     ratio = card.ship.length_m / card.ship.draught_m
-    hull = {key: card.interaction(key) for key in ("k_0", "k_1", "k_2")}
+    hull = {key: float(card.interaction(key)) for key in ("k_0", "k_1", "k_2")}
     hull["R_0_dash"] = -card.derivatives.get("X0", 0.0) * ratio
     for force, names in HULL_TERMS.items():
         for name in names:
@@ -139,17 +131,11 @@ def mmgdynamics_text(card: MmgCard) -> str:
     Raises InputError: As :func:`mmgdynamics_values`.
     """
     entries = "".join(f'    "{key}": {_number_text(value)},\n' for key, value in mmgdynamics_values(card).items())
-    n = card.propulsion.nominal_radps / (2 * math.pi) if card.propulsion else 0.0
-    title = f"{card.ship.name}: a vessel of mmgdynamics, written by tank2sim convert."
-    return (
-        f'"""{python_text(title)}\n\n'
+    about = (
         "SI, and Prime II where a name ends in _dash; rudder positive to starboard. C_1 and C_2 of the wake are left\n"
         "out: the wake is w_P0 exp(-4 beta_P^2), as in shipmmg.\n"
-        f'Source of the coefficients: {python_text(card.ship.source)}\n"""\n\n'
-        f"u0 = {card.model.speed_mps!r}  # m/s, the approach\n"
-        f"nps = {n!r}  # 1/s, revolutions of the approach\n\n"
-        f"vessel = {{\n{entries}}}\n"
     )
+    return f"{_head(card, 'a vessel of mmgdynamics', about)}{_approach(card)}\nvessel = {{\n{entries}}}\n"
 
 
 def shipmmg_text(card: MmgCard) -> str:
@@ -157,24 +143,32 @@ def shipmmg_text(card: MmgCard) -> str:
 
     Raises InputError: As :func:`shipmmg_values`.
     """
-    basic, hull = shipmmg_values(card)
-
-    def call(values: dict[str, float]) -> str:
-        return "".join(f"    {key}={_number_text(value)},\n" for key, value in values.items())
-
-    n = card.propulsion.nominal_radps / (2 * math.pi) if card.propulsion else 0.0
-    title = f"{card.ship.name}: parameters for shipmmg, written by tank2sim convert."
-    return (
-        f'"""{python_text(title)}\n\n'
-        "SI; rudder positive to starboard. shipmmg has another wake than the card: w_P0 exp(-4 beta_P^2), no C_1\n"
-        f'and C_2. Source of the coefficients: {python_text(card.ship.source)}\n"""\n\n'
-        "from shipmmg.mmg_3dof import Mmg3DofBasicParams, Mmg3DofManeuveringParams\n\n"
-        f"u0 = {card.model.speed_mps!r}  # m/s, the approach\n"
-        f"nps = {n!r}  # 1/s, revolutions of the approach\n"
-        f"rho = {card.environment.water_density_kgpm3!r}  # kg/m3\n\n"
-        f"basic_params = Mmg3DofBasicParams(\n{call(basic)})\n\n"
-        f"maneuvering_params = Mmg3DofManeuveringParams(\n{call(hull)})\n"
+    basic, hull = (
+        "".join(f"    {key}={_number_text(value)},\n" for key, value in values.items())
+        for values in shipmmg_values(card)
     )
+    about = (
+        "SI; rudder positive to starboard. shipmmg has another wake than the card: w_P0 exp(-4 beta_P^2), no C_1\n"
+        "and C_2. "
+    )
+    return (
+        f"{_head(card, 'parameters for shipmmg', about)}"
+        "from shipmmg.mmg_3dof import Mmg3DofBasicParams, Mmg3DofManeuveringParams\n\n"
+        f"{_approach(card)}rho = {card.environment.water_density_kgpm3!r}  # kg/m3\n\n"
+        f"basic_params = Mmg3DofBasicParams(\n{basic})\n\n"
+        f"maneuvering_params = Mmg3DofManeuveringParams(\n{hull})\n"
+    )
+
+
+def _head(card: MmgCard, what: str, about: str) -> str:
+    """The docstring of the file."""
+    title = python_text(f"{card.ship.name}: {what}, written by tank2sim convert.")
+    return f'"""{title}\n\n{about}Source of the coefficients: {python_text(card.ship.source)}\n"""\n\n'
+
+
+def _approach(card: MmgCard) -> str:
+    n = card.propulsion.nominal_radps / (2 * math.pi) if card.propulsion else 0.0
+    return f"u0 = {card.model.speed_mps!r}  # m/s, the approach\nnps = {n!r}  # 1/s, revolutions of the approach\n"
 
 
 def _number_text(value: float) -> str:

@@ -18,16 +18,14 @@ the ground.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from itertools import product
-from typing import Any
 
 import casadi as ca
-import numpy as np
 
-from tank2sim.apps.programs.program_files import ProgramFiles
+from tank2sim.apps.programs.program_files import ProgramFiles, to_digits, value_at
 from tank2sim.cards.card import Card, SteeredCard
 from tank2sim.dynamics.build import build
 from tank2sim.dynamics.effects.forces import with_forces
@@ -89,32 +87,34 @@ def case_system(
     thrust = {name: value * max(by_mass, by_inertia / length) for name, value in _LIMITS.items()}
     allocation = {name: value * length for name, value in places.items()} | thrust
     parts = [
-        CasePart("DP Controller", "DPController.fmu", _rounded(gains)),
+        CasePart("DP Controller", "DPController.fmu", to_digits(gains, 6)),
         CasePart("Observer", "NLPobserver.fmu"),
         CasePart("Reference Generator", "ReferenceGenerator.fmu"),
-        CasePart("Thrust Allocation", "ThMPC.fmu", _rounded(allocation)),
+        CasePart("Thrust Allocation", "ThMPC.fmu", to_digits(allocation, 6)),
         CasePart("Ship", hull),
     ]
-    axes = ("x", "y", "psi")
-    joints = []
-    for ends, names in (
-        (("Thrust Allocation", "Ship"), [(f"F{place}c", f"Thrust_d[{place}]") for place in (1, 2, 3)]),
-        (("Thrust Allocation", "Ship"), [(f"alpha{place}", f"input[{place}]") for place in (1, 2)]),
-        (("Ship", "Observer"), [(f"q[{place}]", f"y[{place}]") for place in (1, 2, 3)]),
-        (("Observer", "DP Controller"), [(f"y_hat[{place}]", axis) for place, axis in enumerate(axes, 1)]),
-        (("Observer", "DP Controller"), [(f"v_hat[{place}]", f"d{axis}") for place, axis in enumerate(axes, 1)]),
-        (("Reference Generator", "DP Controller"), [(f"{d}{axis}_ref",) * 2 for d, axis in product(("", "d"), axes)]),
-        (("DP Controller", "Thrust Allocation"), [(f"Control{axis}", f"ref{axis}") for axis in ("x", "y", "Mz")]),
-    ):
-        joints += [CaseJoint(ends[0], start, ends[1], end) for start, end in names]
-    ratios = _rounded({"Fxg": 1 / by_mass, "Fyg": 1 / by_mass, "Mzg": 1 / by_inertia})
+    joints = [
+        CaseJoint(start, name, end, other)
+        for start, names, end, others in _JOINTS
+        for name, other in zip(names.split(), others.split(), strict=True)
+    ]
+    ratios = to_digits({"Fxg": 1 / by_mass, "Fyg": 1 / by_mass, "Mzg": 1 / by_inertia}, 6)
     for place, (name, factor) in enumerate(ratios.items(), 1):
         joints.append(CaseJoint("Thrust Allocation", name, "Observer", f"tau[{place}]", factor))
     return parts, joints
 
 
-def _rounded(values: Mapping[str, float]) -> dict[str, float]:
-    return {name: float(f"{value:.6g}") for name, value in values.items()}
+_REFERENCES = "x_ref y_ref psi_ref dx_ref dy_ref dpsi_ref"
+# Simulator, its variables, another simulator, and the variables that hear them
+_JOINTS = (
+    ("Thrust Allocation", "F1c F2c F3c", "Ship", "Thrust_d[1] Thrust_d[2] Thrust_d[3]"),
+    ("Thrust Allocation", "alpha1 alpha2", "Ship", "input[1] input[2]"),
+    ("Ship", "q[1] q[2] q[3]", "Observer", "y[1] y[2] y[3]"),
+    ("Observer", "y_hat[1] y_hat[2] y_hat[3]", "DP Controller", "x y psi"),
+    ("Observer", "v_hat[1] v_hat[2] v_hat[3]", "DP Controller", "dx dy dpsi"),
+    ("Reference Generator", _REFERENCES, "DP Controller", _REFERENCES),
+    ("DP Controller", "Controlx Controly ControlMz", "Thrust Allocation", "refx refy refMz"),
+)
 
 
 HULL = "hull"
@@ -135,15 +135,13 @@ def osp_files(card: Card) -> ProgramFiles:
     compiler is missing.
     """
     ship = card.steered()
-    model, (mass, inertia) = hull_model(ship), _inertia(ship)
-    sway, yaw = low_speed_damping(ship, model)
-    made = make_fmu(model, fmi=2, documents=replace(documents_of(ship), card_text=None))
+    mass, inertia = _inertia(ship)
+    files, damping = _hull_files(ship, hull_model(ship), _groups)
     parts, joints = case_system(f"{HULL}.fmu", ship.ship.length_m, mass, inertia)
     values = {"parts": parts, "joints": joints, "step": CASE_STEP_S, "version": version("tank2sim")}
     return ProgramFiles(
         files={
-            f"{HULL}.fmu": made.content,
-            f"{HULL}_OspModelDescription.xml": render("OspModelDescription.xml", {"groups": _groups(interface(model))}),
+            **files,
             "OspSystemStructure.xml": render("OspCaseStructure.xml", values),
             "SystemStructure.ssd": render("OspCase.ssd.xml", values),
         },
@@ -151,12 +149,23 @@ def osp_files(card: Card) -> ProgramFiles:
         losses=(
             f"gains and limits of the case are scaled, to {mass / CASE_INERTIA[0]:.3g} times its mass and "
             f"{ship.ship.length_m:.4g} m; this was not run with the FMUs of the case",
-            f"the hull damps sway at 0.3 m/s by {sway:.2g} 1/s, and yaw by {yaw:.2g} 1/s with that at its ends; a hull "
-            "of 2365 t with 0.18 and 0.46 1/s stayed within 2 m, and with a sixth it swung by 20 to 40 m",
+            f"{damping}; a hull of 2365 t with 0.18 and 0.46 1/s stayed within 2 m, and with a sixth it swung by 20 to "
+            "40 m",
             "rudder and propellers of the card stay as inputs, at zero: the case's thrusters move the ship",
             "waves and current of the case are in its own hull: give them to this one by effects of the card",
         ),
     )
+
+
+def _hull_files(
+    card: SteeredCard, model: Model, groups: Callable[[Interface], tuple[Group, ...]]
+) -> tuple[dict[str, str | bytes], str]:
+    """The FMU of a hull and its groups, by file, and how it damps low speeds, in words."""
+    sway, yaw = low_speed_damping(card, model)
+    made = make_fmu(model, fmi=2, documents=replace(documents_of(card), card_text=None))
+    described = render("OspModelDescription.xml", {"groups": groups(interface(model))})
+    damping = f"the hull damps sway at 0.3 m/s by {sway:.2g} 1/s, and yaw by {yaw:.2g} 1/s with that at its ends"
+    return {f"{model.name}.fmu": made.content, f"{model.name}_OspModelDescription.xml": described}, damping
 
 
 def resting_model(card: SteeredCard, name: str) -> Model:
@@ -174,14 +183,15 @@ def hull_model(card: SteeredCard) -> Model:
     model = resting_model(card, HULL)
     scale = card.ship.length_m / CASE_LENGTH_M
     force = card.scales.mass * 1e-3
-    words = ("port azimuth thruster", "starboard azimuth thruster", "bow tunnel thruster, positive to starboard")
+    words = {1: "port azimuth thruster", 2: "starboard azimuth thruster"}
+    words[3] = "bow tunnel thruster, positive to starboard"
     thrusts = [
         Input(name=f"Thrust_d[{place}]", unit="N", description=f"Force of the {text}", nominal=force)
-        for place, text in enumerate(words, 1)
+        for place, text in words.items()
     ]
     angles = [
-        Input(name=f"input[{place}]", unit="rad", description=f"Angle of the {text}, from ahead to starboard")
-        for place, text in enumerate(words[:2], 1)
+        Input(name=f"input[{place}]", unit="rad", description=f"Angle of the {words[place]}, from ahead to starboard")
+        for place in (1, 2)
     ]
     forces = [
         (one.symbol * ca.cos(angle.symbol), one.symbol * ca.sin(angle.symbol))
@@ -190,14 +200,11 @@ def hull_model(card: SteeredCard) -> Model:
     forces.append((ca.SX(0), thrusts[2].symbol))
     moments = [scale * (x * Y - y * X) for (x, y), (X, Y) in zip(CASE_PLACES_M, forces, strict=True)]
     outputs = [
-        Quantity(name=f"q[{place}]", unit=unit, description=text, value=model.symbol(name))
-        for place, (name, unit, text) in enumerate(
-            (
-                ("motion.x", "m", "North position"),
-                ("motion.y", "m", "East position"),
-                ("motion.psi", "rad", "Heading, not wrapped"),
-            ),
-            1,
+        Quantity(name=name, unit=unit, description=text, value=model.symbol(f"motion.{state}"))
+        for name, state, unit, text in (
+            ("q[1]", "x", "m", "North position"),
+            ("q[2]", "y", "m", "East position"),
+            ("q[3]", "psi", "rad", "Heading, not wrapped"),
         )
     ]
     model = model.extend(*thrusts, *angles, *outputs, outputs=[one.name for one in outputs])
@@ -224,25 +231,14 @@ def low_speed_damping(card: SteeredCard, model: Model) -> tuple[float, float]:
     if draught is None:
         raise card.fault("ship.draught_m", "is missing, and damping at low speed is judged by it", "add it")
     pressure = 0.5 * card.environment.water_density_kgpm3 * length * draught
-    names = [f"force.{letter}" for letter in "XYN"]
-    function = ca.Function(
-        "forces", [model.x, model.u, model.p], [model.expand(ca.vcat([model.symbol(name) for name in names]))]
-    )
-
-    def forces(**motion: float) -> Any:
-        x = np.array(model.initial(model.parameter_values())).ravel()
-        for letter, value in motion.items():
-            x[model.state_names.index(f"motion.{letter}")] = value
-        return np.array(function(x, model.input_values(), model.parameter_values())).ravel()
-
-    still = abs(forces()[0])
+    still = abs(value_at(model, "force.X", {}))
     weight = card.body_si["mass"] * card.environment.gravity_mps2
     if "propeller.speed" not in model.input_names and still > _STILL_PUSH * weight / 100:
         problem = f"is missing, and the ship pushes itself with {still:.3g} N at rest: its engine cannot be stopped"
         raise card.fault("propulsion", problem, "add [propulsion] to the card")
     sizes = tuple(product((0.3, 1.0), (1, -1)))
-    sway = {(v, side): -side * forces(v=side * v)[1] for v, side in sizes}
-    yaw = {(v, side): -side * forces(r=side * 2 * v / length)[2] for v, side in sizes}
+    sway = {(v, side): -side * value_at(model, "force.Y", {"motion.v": side * v}) for v, side in sizes}
+    yaw = {(v, side): -side * value_at(model, "force.N", {"motion.r": side * 2 * v / length}) for v, side in sizes}
     for words, found, lever in (("sway", sway, 1.0), ("yaw", yaw, length / 8)):
         drag = [force / (pressure * lever * v**2) for (v, _), force in found.items()]
         if not all(_LEAST_DRAG <= value <= _LARGEST_DRAG for value in drag):
@@ -318,60 +314,47 @@ def gunnerus_files(card: Card) -> ProgramFiles:
     Raises InputError: As :func:`.osp_files`.
     """
     ship = card.steered()
-    model = gunnerus_model(ship)
-    sway, yaw = low_speed_damping(ship, model)
-    made = make_fmu(model, fmi=2, documents=replace(documents_of(ship), card_text=None))
+    files, damping = _hull_files(ship, gunnerus_model(ship), gunnerus_groups)
     return ProgramFiles(
-        files={
-            f"{VESSEL}.fmu": made.content,
-            f"{VESSEL}_OspModelDescription.xml": render(
-                "OspModelDescription.xml", {"groups": gunnerus_groups(interface(model))}
-            ),
-        },
+        files=files,
         use=f"""Put both files into `gunnerus-dp/fmus` of the demo cases of the Open Simulation Platform, in place of
 `{VESSEL}.fmu` and its description. Steps are of 0.1 s; all variables start at zero.""",
         losses=(
             "gains of the case belong to the R/V Gunnerus: set the controller's for this ship",
             "heave, roll and pitch are zero",
             "the current is taken in the ship's axes, because the case calls its first member surge",
-            f"the hull damps sway at 0.3 m/s by {sway:.2g} 1/s, and yaw by {yaw:.2g} 1/s with that at its ends",
+            damping,
         ),
     )
+
+
+def _members(variable: str, linear: str, _: str, angular: str) -> Iterator[tuple[str, str, str]]:
+    """Names, units and descriptions of the six members of a variable of the case, by its units."""
+    for place, axis in enumerate(_AXES, 1):
+        yield f"{variable}[{place}]", linear if place < 4 else angular, f"{variable} in {axis}"
 
 
 def gunnerus_model(card: SteeredCard) -> Model:
     """The model of a card at rest with the names of the case."""
     model = resting_model(card, VESSEL)
     inputs = {
-        f"{name}[{place}]": Input(
-            name=f"{name}[{place}]", unit=first if place < 4 else second, description=f"{name} in {axis}"
-        )
-        for name, (_, _, first, _, second) in _INPUTS.items()
-        for place, axis in enumerate(_AXES, 1)
+        name: Input(name=name, unit=unit, description=text)
+        for variable, (_, _, *units) in _INPUTS.items()
+        for name, unit, text in _members(variable, *units)
     }
     along, across = (inputs[f"Current_Velocity[{place}]"].symbol for place in (1, 2))
-    shown = {
-        "Vessel_Position": [model.symbol(f"motion.{name}") for name in ("x", "y", "psi")],
-        "Vessel_Velocity": [
-            model.symbol("motion.u") + along,
-            model.symbol("motion.v") + across,
-            model.symbol("motion.r"),
-        ],
-        "Vessel_Acceleration": [model.symbol(f"motion.{name}") for name in ("udot", "vdot", "rdot")],
-    }
+    place = model.symbols(["motion.x", "motion.y", "motion.psi"])
+    velocity = model.symbols(["motion.u", "motion.v", "motion.r"]) + ca.vertcat(along, across, 0)
+    acceleration = model.symbols(["motion.udot", "motion.vdot", "motion.rdot"])
     outputs = []
-    for name, (_, _, first, _, second) in _OUTPUTS.items():
-        values = dict(zip(_PLANE, shown[name], strict=True))
+    for (variable, (_, _, *units)), values in zip(_OUTPUTS.items(), (place, velocity, acceleration), strict=True):
+        six = ca.SX.zeros(6)
+        six[[axis - 1 for axis in _PLANE]] = values
         outputs += [
-            Quantity(
-                name=f"{name}[{place}]",
-                unit=first if place < 4 else second,
-                description=f"{name} in {axis}",
-                value=ca.SX(values.get(place, 0.0)),
-            )
-            for place, axis in enumerate(_AXES, 1)
+            Quantity(name=name, unit=unit, description=text, value=ca.SX(value))
+            for (name, unit, text), value in zip(_members(variable, *units), ca.vertsplit(six), strict=True)
         ]
-    X, Y, N = (sum(inputs[f"{name}[{place}]"].symbol for name in ("Thrust", "Wave_Forces")) for place in _PLANE)
+    X, Y, N = (inputs[f"Thrust[{axis}]"].symbol + inputs[f"Wave_Forces[{axis}]"].symbol for axis in _PLANE)
     psi = model.symbol("motion.psi")
     moved = (
         model.extend(*inputs.values(), *outputs, outputs=[one.name for one in outputs])

@@ -13,7 +13,7 @@ Cov(theta) = S Cov(p) S^T, S = A dF/dp, at held revolutions.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import casadi as ca
@@ -21,7 +21,7 @@ import numpy as np
 import tomlkit
 
 from tank2sim.apps.programs.conventions import roll_in_file
-from tank2sim.apps.programs.program_files import PolynomialFit, standard_manoeuvres
+from tank2sim.apps.programs.program_files import PolynomialFit, standard_manoeuvres, to_digits
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard, MmgCard
 from tank2sim.cards.covariance import Covariance, not_referring
@@ -96,8 +96,7 @@ def fit_polynomial(card: MmgCard, model: Model, motions: Array) -> PolynomialFit
     forces, primes = _hydrodynamic_primes(card, model, motions)
     kept = [*ACCELERATION_TERMS, *(name for name in card.derivatives if _of_heeling(name))]
     derivatives = {name: card.derivatives[name] for name in kept if name in card.derivatives}
-    states_errors = card.uncertainty or card.interaction_errors or read_covariance(card) is not None
-    errors = joint_errors(card, card_parameters(card, study_model(card))) if states_errors else None
+    errors = _stated_errors(card)
     numbers = [] if errors is None else [p.name for p in errors.parameters if p.name in model.parameter_names]
     slopes = _force_slopes(card, model, motions, numbers)
     sensitivity = [[float(number == f"derivatives.{name}") for number in numbers] for name in derivatives]
@@ -117,6 +116,12 @@ def fit_polynomial(card: MmgCard, model: Model, motions: Array) -> PolynomialFit
     covariance = None if errors is None else _carried(np.array(sensitivity), errors, numbers)
     revolutions = _effect_of_revolutions(card, model)
     return PolynomialFit(derivatives, revolutions, residuals, _ranges(card, motions), covariance)
+
+
+def _stated_errors(card: MmgCard) -> JointErrors | None:
+    """Errors of the numbers of a card; None if it states none."""
+    stated = card.uncertainty or card.interaction_errors or read_covariance(card) is not None
+    return joint_errors(card, card_parameters(card, study_model(card))) if stated else None
 
 
 def _terms_of(force: str, *, symmetric: bool) -> list[str]:
@@ -193,8 +198,8 @@ def _force_slopes(card: MmgCard, model: Model, motions: Array, numbers: Sequence
 def _forces_at(model: Model, motions: Array, inputs: Array, numbers: Sequence[str] = ()) -> Array:
     """Forces of an upright ship (X, Y, N, and K if it rolls), SI, and slopes by k parameters: (3 or 4, 1 + k, n)."""
     names = [name for name in ("force.X", "force.Y", "force.N", "force.K") if name in model]
-    forces = model.expand(ca.vcat([model.symbol(name) for name in names]))
-    slopes = ca.jacobian(forces, ca.vcat([model.symbol(number) for number in numbers]))
+    forces = model.expand(model.symbols(names))
+    slopes = ca.jacobian(forces, model.symbols(numbers))
     function = ca.Function("forces", [model.x, model.u, model.p], [ca.densify(ca.vec(ca.horzcat(forces, slopes)))])
     p, count = model.parameter_values(), len(motions)
     states = np.tile(np.array(model.initial(p)), (1, count))
@@ -207,14 +212,13 @@ def _forces_at(model: Model, motions: Array, inputs: Array, numbers: Sequence[st
 
 def _effect_of_revolutions(card: MmgCard, model: Model) -> float:
     """Xnn: half of the slope of X' by n/n0 on the straight course."""
-    place, change = model.input_names.index("propeller.speed"), 1e-4
-    straight = np.array([[card.model.speed_mps, 0.0, 0.0, 0.0]])
-    at = []
-    for side in (1, -1):
-        inputs = model.input_values()
-        inputs[place] *= 1 + side * change
-        at.append(float(_forces_at(model, straight, inputs)[0, 0, 0]))
-    return (at[0] - at[1]) / (4 * change) / float(card.scales.force)
+    change, straight = 1e-4, np.array([[card.model.speed_mps, 0.0, 0.0, 0.0]])
+    nominal = float(model.input_values()[model.input_names.index("propeller.speed")])
+    faster, slower = (
+        _forces_at(model, straight, model.input_values({"propeller.speed": nominal * (1 + side * change)}))[0, 0, 0]
+        for side in (1, -1)
+    )
+    return float((faster - slower) / (4 * change) / card.scales.force)
 
 
 def polynomial_card(card: MmgCard, fit: PolynomialFit) -> ManoeuvringCard:
@@ -225,9 +229,7 @@ def polynomial_card(card: MmgCard, fit: PolynomialFit) -> ManoeuvringCard:
     document = tomlkit.parse(card.text.lstrip("\ufeff"))
     for section in ("model", "rigid_body", "derivatives", "uncertainty", "propeller", "rudder", "propulsion"):
         document.pop(section, None)
-    low, high = card.model.speed_range_mps
-    reach = {name: float(f"{max(map(abs, fit.ranges[name])):.3g}") for name in fit.ranges}
-    tables: dict[str, dict[str, object]] = {
+    tables: dict[str, Mapping[str, object]] = {
         "model": {
             "kind": "abkowitz",
             "speed_mps": card.model.speed_mps,
@@ -235,23 +237,19 @@ def polynomial_card(card: MmgCard, fit: PolynomialFit) -> ManoeuvringCard:
             "speed_scale": "instantaneous",
             "yaw_rate_terms": "hydrodynamic",
             "rudder_sign": "starboard",
-            "valid_speed_mps": [round(max(low, fit.ranges["u"][0] * card.model.speed_mps), 4), round(high, 4)],
-            "low_speed_below_mps": card.model.low_speed_bound_mps,
-            "valid_drift_deg": reach["drift_deg"],
-            "valid_rudder_deg": reach["rudder_deg"],
-            "valid_yaw_rate_prime": reach["yaw_rate_prime"],
+            **_valid_ranges(card, fit),
         },
-        "rigid_body": {key: float(f"{getattr(card.rigid_body, key):.12g}") for key in ("mass", "yaw_inertia", "x_G")},
+        "rigid_body": to_digits({key: getattr(card.rigid_body, key) for key in ("mass", "yaw_inertia", "x_G")}, 12),
         "propulsion": {
             "nominal_radps": card.propulsion.nominal_radps if card.propulsion else 1.0,
-            "Xnn": float(f"{fit.Xnn:.10g}"),
+            **to_digits({"Xnn": fit.Xnn}, 10),
         },
-        "derivatives": {name: float(f"{value:.10g}") for name, value in fit.derivatives.items()},
+        "derivatives": to_digits(fit.derivatives, 10),
     }
-    errors = {} if fit.covariance is None else dict(zip(fit.derivatives, np.sqrt(np.diag(fit.covariance)), strict=True))
-    uncertain = [name for name, error in errors.items() if error > 0]
+    errors = np.zeros(len(fit.derivatives)) if fit.covariance is None else np.sqrt(np.diag(fit.covariance))
+    uncertain = {name: error for name, error in zip(fit.derivatives, errors.tolist(), strict=True) if error > 0}
     if uncertain:
-        tables["uncertainty"] = {name: float(f"{errors[name]:.3g}") for name in uncertain}
+        tables["uncertainty"] = to_digits(uncertain, 3)
     if card.roll is not None:
         # The rudder's moment about the longitudinal axis is in the terms of K.
         document.pop("roll", None)
@@ -270,6 +268,17 @@ def polynomial_card(card: MmgCard, fit: PolynomialFit) -> ManoeuvringCard:
     build(new)
     if fit.covariance is None:
         return new
-    rows = [list(errors).index(name) for name in uncertain]
+    known = np.flatnonzero(errors > 0)
     names = tuple(f"derivatives.{name}" for name in uncertain)
-    return replace(new, covariance=Covariance(names, fit.covariance[np.ix_(rows, rows)]))
+    return replace(new, covariance=Covariance(names, fit.covariance[np.ix_(known, known)]))
+
+
+def _valid_ranges(card: MmgCard, fit: PolynomialFit) -> dict[str, object]:
+    """Keys of ``[model]`` with the range of a fit."""
+    low, high = card.model.speed_range_mps
+    reach = {f"valid_{name}": max(map(abs, fit.ranges[name])) for name in ("drift_deg", "rudder_deg", "yaw_rate_prime")}
+    return {
+        "valid_speed_mps": [round(max(low, fit.ranges["u"][0] * card.model.speed_mps), 4), round(high, 4)],
+        "low_speed_below_mps": card.model.low_speed_bound_mps,
+        **to_digits(reach, 3),
+    }

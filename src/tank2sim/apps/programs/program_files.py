@@ -7,6 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
+import casadi as ca
+import numpy as np
+
 from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredBy, SteeredCard
 from tank2sim.cards.small_craft import cruising_revolutions
@@ -24,8 +27,12 @@ TURNS_DEG, ZIGZAGS_DEG = (10.0, 20.0, 35.0), (10.0, 20.0)
 _DIFFERENCE, _SPIN = 0.3, 0.7
 """Difference of a turn and revolutions of a spin, over the cruising revolutions, with which forms are compared: a wide
 turn and a spin within the reach of any craft (project choice)."""
-_OF_TURN = ("advance_m", "transfer_m", "tactical_diameter_m", "steady_diameter_m")
-_OVERSHOOTS = ("overshoot_1_deg", "overshoot_2_deg")
+# Figures that are compared, by manoeuvre; for all others the figures that are not relative
+_COMPARED: Mapping[type, Sequence[str]] = {
+    Turn: ("advance_m", "transfer_m", "tactical_diameter_m", "steady_diameter_m"),
+    Zigzag: ("overshoot_1_deg", "overshoot_2_deg"),
+}
+_RELATIVE = ("_lengths", "_percent")
 
 
 @dataclass(frozen=True)
@@ -36,6 +43,11 @@ class FigureChange:
     figure: str
     before: float | None
     after: float | None
+
+    @property
+    def error_percent(self) -> float | None:
+        """Difference over the figure before; None where either is unknown, or it is 0."""
+        return 100 * (self.after / self.before - 1) if self.before and self.after is not None else None
 
 
 @dataclass(frozen=True)
@@ -62,6 +74,20 @@ class ProgramFiles:
     changes: tuple[FigureChange, ...] = ()  # Figures of standard manoeuvres by the card and in the other language
     card: SteeredCard | None = None  # If it is a card
     fit: PolynomialFit | None = None  # Where a polynomial replaces an MMG ship
+
+
+def to_digits(values: Mapping[str, float], digits: int) -> dict[str, float]:
+    """The values, rounded to significant digits."""
+    return {name: float(f"{value:.{digits}g}") for name, value in values.items()}
+
+
+def value_at(model: Model, name: str, states: Mapping[str, float], orders: Mapping[str, float] | None = None) -> float:
+    """A variable of a model at its start with other `states` and `orders` (inputs), SI."""
+    x = np.array(model.initial(model.parameter_values())).ravel()
+    for state, value in states.items():
+        x[model.state_names.index(state)] = value
+    function = ca.Function("value", [model.x, model.u, model.p], [model.expand(model.symbol(name))])
+    return float(function(x, model.input_values(orders), model.parameter_values()))
 
 
 def standard_manoeuvres(model: Model) -> Iterator[Turn | Zigzag]:
@@ -95,8 +121,6 @@ def figure_changes(
             if craft:
                 continue  # thrusters that are not on both sides, or do not reverse as far
             raise
-        names: Sequence[str] = _OF_TURN if isinstance(manoeuvre, Turn) else _OVERSHOOTS
-        if craft:
-            names = [name for name in first if not name.endswith(("_lengths", "_percent"))]
+        names = _COMPARED.get(type(manoeuvre)) or [name for name in first if not name.endswith(_RELATIVE)]
         found += [FigureChange(manoeuvre.words, name, first.get(name), second.get(name)) for name in names]
     return tuple(found)

@@ -32,6 +32,7 @@ from scipy.stats import t as student
 
 from tank2sim.apps.guess.prior import rudder_by_rules
 from tank2sim.apps.programs.conventions import shift_matrix, shifted_body
+from tank2sim.apps.programs.program_files import to_digits
 from tank2sim.cards.card import ManoeuvringCard, scales_of_file
 from tank2sim.cards.coefficient_table import STATED_CONVENTIONS, CoefficientTable
 from tank2sim.cards.estimates import Particulars, estimate
@@ -423,7 +424,7 @@ def read_card_text(table: CoefficientTable, ranked: RankedReading) -> str:
     if table.rudder_area_m2 is not None:
         sizes["rudder_area_m2"] = table.rudder_area_m2
     source = f"{Path(table.source).name}, read as: {read} (probability {ranked.probability:.2g})"
-    derivatives = {name: tomlkit.item(float(f"{value:.8g}")) for name, value in filled.items() if value}
+    derivatives = {name: tomlkit.item(value) for name, value in to_digits(filled, 8).items() if value}
     for name in derivatives.keys() - table.derivatives.keys() - ship.derivatives.keys():
         derivatives[name].comment("ESTIMATED: the table has none")
     document = tomlkit.document()
@@ -439,7 +440,7 @@ def read_card_text(table: CoefficientTable, ranked: RankedReading) -> str:
             "yaw_rate_terms": "hydrodynamic",
             "rudder_sign": "starboard",
         },
-        "rigid_body": {key: float(f"{value:.8g}") for key, value in ship.body.model_dump().items()},
+        "rigid_body": to_digits(ship.body.model_dump(), 8),
         "derivatives": derivatives,
     }
     return tomlkit.dumps(document)

@@ -18,7 +18,7 @@ The mass, the inertia and the centre of gravity belong into ``<inertial>``.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations_with_replacement
 from typing import Literal
@@ -39,7 +39,13 @@ VRX_TERMS = {"Xu": "xU", "Xuabsu": "xUU", "Yv": "yV", "Yvabsv": "yVV", "Nr": "nR
 
 VRX_MASSES = {"Xudot": "xDotU", "Yvdot": "yDotV", "Nrdot": "nDotR"}
 
-_NUMBER = "{:.10g}"
+
+def _element(name: str, value: float) -> str:
+    return f"<{name}>{value:.10g}</{name}>"
+
+
+def _elements(values: Mapping[str, float]) -> list[str]:
+    return [f"  {_element(name, value)}" for name, value in values.items()]
 
 
 def gazebo_name(name: str) -> str:
@@ -129,49 +135,41 @@ def _inertial(card: SteeredCard) -> list[str]:
     return [
         "<!-- put this into the <inertial> of base_link (SDF 1.10, engine DART); zz, pp and qq are not on the card -->",
         "<fluid_added_mass>",
-        *(
-            "  " + " ".join(f"<{key}>{_NUMBER.format(given.get(key, 0.0))}</{key}>" for key in row.split())
-            for row in rows
-        ),
+        *("  " + " ".join(_element(key, given.get(key, 0.0)) for key in row.split()) for row in rows),
         "</fluid_added_mass>",
     ]
 
 
 def gazebo_text(card: SteeredCard, place: AddedMass) -> str:
     """SDF of the plugins of a craft for Gazebo: hydrodynamics, and one thruster each."""
-    derivatives, in_plugin = card.derivatives, place == "plugin"
-    hull = {
-        gazebo_name(name): value
-        for name, value in derivatives.items()
-        if value and (in_plugin or name not in CRAFT_ADDED_MASSES)
-    }
-    products = coriolis_products(derivatives) if in_plugin else {}
-    about = "C_A is in the products xVR to nUR" if in_plugin else "C_A comes with <fluid_added_mass>"
+    density = card.environment.water_density_kgpm3
+    left_out: Sequence[str] = CRAFT_ADDED_MASSES
+    products: dict[str, float] = {}
+    about, disabled = "C_A comes with <fluid_added_mass>", ["  <disable_added_mass>true</disable_added_mass>"]
+    if place == "plugin":
+        left_out, products = (), coriolis_products(card.derivatives)
+        about, disabled = "C_A is in the products xVR to nUR", []
+    hull = {gazebo_name(name): value for name, value in card.derivatives.items() if value and name not in left_out}
     lines = [
-        *_head(card, "Gazebo (gz-sim 7 or later): put it into <model>"),
-        *([] if in_plugin else _inertial(card)),
+        *_head(card, "Gazebo (gz-sim 7 or later)", place),
         '<plugin filename="gz-sim-hydrodynamics-system" name="gz::sim::systems::Hydrodynamics">',
         "  <link_name>base_link</link_name>",
-        f"  <water_density>{_NUMBER.format(card.environment.water_density_kgpm3)}</water_density>",
-        *([] if in_plugin else ["  <disable_added_mass>true</disable_added_mass>"]),
+        *_elements({"water_density": density}),
+        *disabled,
         f"  <disable_coriolis>true</disable_coriolis> <!-- {about} -->",
-        *(f"  <{name}>{_NUMBER.format(value)}</{name}>" for name, value in hull.items()),
-        *(f"  <{name}>{_NUMBER.format(value)}</{name}>" for name, value in products.items()),
+        *_elements(hull | products),
         "</plugin>",
     ]
     for thruster in card.thrusters:
-        most = thruster.largest_thrust_N
+        coefficient = thruster.ahead_Ns2 / density  # of T = rho C_T n^2 D^4, n in rad/s
         least = -thruster.astern_Ns2 * thruster.lowest_radps**2
-        coefficient = thruster.ahead_Ns2 / card.environment.water_density_kgpm3  # of T = rho C_T n^2 D^4, n in rad/s
         lines += [
             f"<!-- {thruster.name}: {_joint(thruster)}; command in N -->",
             '<plugin filename="gz-sim-thruster-system" name="gz::sim::systems::Thruster">',
             f"  <joint_name>{thruster.name}_joint</joint_name>",
-            f"  <thrust_coefficient>{_NUMBER.format(coefficient)}</thrust_coefficient>",
-            f"  <fluid_density>{_NUMBER.format(card.environment.water_density_kgpm3)}</fluid_density>",
+            *_elements({"thrust_coefficient": coefficient, "fluid_density": density}),
             "  <propeller_diameter>1</propeller_diameter> <!-- only its product with the coefficient acts -->",
-            f"  <max_thrust_cmd>{_NUMBER.format(most)}</max_thrust_cmd>",
-            f"  <min_thrust_cmd>{_NUMBER.format(least)}</min_thrust_cmd>",
+            *_elements({"max_thrust_cmd": thruster.largest_thrust_N, "min_thrust_cmd": least}),
             "</plugin>",
         ]
     return "\n".join(lines) + "\n"
@@ -186,36 +184,43 @@ def _joint(thruster: ThrusterSection) -> str:
 
 def vrx_text(card: SteeredCard, place: AddedMass) -> str:
     """SDF of VRX's SimpleHydrodynamics for a craft."""
-    in_plugin = place == "plugin"
-    masses = {VRX_MASSES[name]: -card.derivatives.get(name, 0.0) if in_plugin else 0.0 for name in VRX_MASSES}
-    damping = {VRX_TERMS[name]: 0.0 - card.derivatives.get(name, 0.0) for name in VRX_TERMS}
+    known = dict(card.derivatives)
+    if place == "inertial":
+        known |= dict.fromkeys(VRX_MASSES, -0.0)
+    values = {key: -known.get(name, 0.0) for name, key in VRX_MASSES.items()}
+    values |= {key: 0.0 - known.get(name, 0.0) for name, key in VRX_TERMS.items()}
     lines = [
-        *_head(card, "VRX: put it into <model>"),
-        *([] if in_plugin else _inertial(card)),
+        *_head(card, "VRX", place),
         '<plugin filename="libSimpleHydrodynamics.so" name="vrx::SimpleHydrodynamics">',
         "  <link_name>base_link</link_name>",
-        *(f"  <{name}>{_NUMBER.format(value)}</{name}>" for name, value in {**masses, **damping}.items()),
+        *_elements(values),
         "</plugin>",
     ]
     return "\n".join(lines) + "\n"
 
 
-def _head(card: SteeredCard, where: str) -> list[str]:
-    """Comments on a craft, and its rigid body."""
+def _head(card: SteeredCard, program: str, place: AddedMass) -> list[str]:
+    """Comments on a craft and its rigid body, and the added mass of the link."""
     body = card.rigid_body
     # About the centre of gravity, as SDF has it.
     inertia = body.yaw_inertia - body.mass * body.x_G**2
     return [
-        f"<!-- {xml_comment(card.ship.name)}, by tank2sim, for {where} -->",
-        f"<!-- <inertial>: pose {_NUMBER.format(body.x_G)} 0 0, mass {_NUMBER.format(body.mass)}, izz "
-        f"{_NUMBER.format(inertia)}; the origin of base_link is midships -->",
+        f"<!-- {xml_comment(card.ship.name)}, by tank2sim, for {program}: put it into <model> -->",
+        f"<!-- <inertial>: pose {body.x_G:.10g} 0 0, mass {body.mass:.10g}, izz {inertia:.10g}; the origin of "
+        "base_link is midships -->",
+        *(_inertial(card) if place == "inertial" else []),
     ]
+
+
+def vrx_terms(place: AddedMass) -> set[str]:
+    """Derivatives that the plugin of VRX has, or the link with it."""
+    return {*VRX_TERMS, *(CRAFT_ADDED_MASSES if place == "inertial" else VRX_MASSES)}
 
 
 def vrx_model(card: SteeredCard, place: AddedMass) -> Model:
     """The model of a craft with the terms of VRX's plugin: six of damping, no effects; C_A with the inertia alone."""
     inertial = place == "inertial"
-    kept = {*VRX_TERMS, *(CRAFT_ADDED_MASSES if inertial else VRX_MASSES)}
+    kept = vrx_terms(place)
     derivatives = {name: value for name, value in card.derivatives.items() if name in kept}
     model = build(replace(card, derivatives=derivatives, effects=()))
     if inertial:

@@ -123,7 +123,7 @@ class XdynBody:
 
 def values_at(model: Model, names: Sequence[str], run: Trajectory) -> Array:
     """Variables of a model (n, names) at the rows of a run."""
-    values = model.expand(ca.vcat([model.symbol(name) for name in names]))
+    values = model.expand(model.symbols(names))
     function = ca.Function("at", [model.x, model.u, model.p], [values])
     columns = function(run.x.T, run.u.T, ca.repmat(ca.DM(model.parameter_values()), 1, len(run.t)))
     return np.array(columns).T
@@ -172,9 +172,7 @@ def _planar_forces(model: Model, run: Trajectory, stated: Array, total: Array) -
     else:  # an effect acts on accelerations
         share, names = total, rates
     known = (model.symbol(name) for name in ("ship.mass", "ship.x_G", "motion.u", "motion.v", "motion.r"))
-    return ca.sparsify(ca.DM(share)) @ ca.vcat([model.symbol(name) for name in names]) - ca.vcat(
-        inertial_forces(*known)
-    )
+    return ca.sparsify(ca.DM(share)) @ model.symbols(names) - ca.vcat(inertial_forces(*known))
 
 
 def _needed(model: Model, names: Iterable[str]) -> tuple[list[Quantity], list[Variable]]:
@@ -226,14 +224,15 @@ def _written(
         sway, turning = found.new_name("sway"), found.new_name("turning")
         fixed |= {"motion.v": sway, "motion.r": turning}
         named = dict(zip((sway, turning), rolled_motion(states, model.symbol("motion.phi")), strict=True))
-    spelt = {one.name: fixed.get(one.name) or found.new_name(one.name) for one in (*others, *quantities)}
+    variables = (*others, *quantities)
+    spelt = {one.name: fixed.get(one.name) or found.new_name(one.name) for one in variables}
     definitions = {spelt[one.name]: one.value for one in quantities}
     named |= {spelt[name]: definitions[spelt[name]] for name in beforehand}
     named |= {found.new_name(name): value for name, value in terms.items()}
     named |= definitions
     numbers = {spelt[one.name]: values[one.name] for one in others if one.name in values}
-    every = [*(one.symbol for one in (*others, *quantities)), *states.values()]
-    spellings = [*(spelt[one.name] for one in (*others, *quantities)), *(ROLLED_STATES[name] for name in states)]
+    every = [*(one.symbol for one in variables), *states.values()]
+    spellings = [*spelt.values(), *(ROLLED_STATES[name] for name in states)]
     found.add(every, spellings, {**named, **wanted}, numbers)
     words = found.used_by(wanted)
     used = {spelt[one.name]: one for one in others if spelt[one.name] in words and one.name not in fixed}

@@ -120,7 +120,14 @@ _BINARY: Mapping[int, Callable[[XdynTerm, XdynTerm], XdynTerm]] = {
     ca.OP_CONSTPOW: _power,
     ca.OP_AND: _product,
 }
-_TRUTHS = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP_OR)  # Operations whose value is 0 or 1
+# Comparisons by the sign {0} of the difference
+_COMPARED = {
+    ca.OP_LT: "{0}*(1 + {0})/2",
+    ca.OP_LE: "1 - {0}*({0} - 1)/2",
+    ca.OP_EQ: "1 - {0}^2",
+    ca.OP_NE: "{0}^2",
+}
+_TRUTHS = (*_COMPARED, ca.OP_NOT, ca.OP_AND, ca.OP_OR)  # Operations whose value is 0 or 1
 
 
 @dataclass
@@ -192,38 +199,47 @@ class Definitions:
         both = a.text if b.text == "0" else f"{a.text} + {b.text}"
         return XdynTerm(f"({both} {mark} abs({between.text}))/2", _MUL, _INLINE + 3)
 
+    def _truth(self, stem: str, a: XdynTerm, *, truth: bool) -> XdynTerm:
+        """0 or 1, as `a` is if it is a `truth`."""
+        return a if truth else _power(self._sign(stem, a), _TWO)
+
+    def _arc(self, stem: str, a: XdynTerm, op: int) -> XdynTerm:
+        """asin(a) or acos(a)."""
+        a = self._named(stem, a)
+        other = XdynTerm(f"sqrt(1 - {a.text}^2)", _ATOM, _INLINE + 1)
+        return self._angle(stem, *((a, other) if op == ca.OP_ASIN else (other, a)))
+
+    def _tan(self, stem: str, a: XdynTerm) -> XdynTerm:
+        a = self._named(stem, a)
+        return XdynTerm(f"sin({a.text})/cos({a.text})", _MUL, _INLINE + 1)
+
+    def _tanh(self, stem: str, a: XdynTerm) -> XdynTerm:
+        a = self._named(stem, a)
+        fallen = self.define(stem, XdynTerm(f"exp(0 - 2*abs({a.text}))")).text
+        return _product(self._sign(stem, a), XdynTerm(f"(1 - {fallen})/(1 + {fallen})", _MUL, _INLINE + 1))
+
     def _composed(self, op: int, stem: str, a: XdynTerm, b: XdynTerm, *, truth: bool) -> XdynTerm:
         """An operation that the grammar does not have; `truth` where a is 0 or 1."""
-        if op in (ca.OP_FMAX, ca.OP_FMIN):
-            return self._extreme(stem, a, b, "+" if op == ca.OP_FMAX else "-")
-        if op == ca.OP_SIGN:
-            return self._sign(stem, a)
-        if op in (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE):
+        if op in _COMPARED:
             sign = self._sign(stem, _difference(b, a)).text
-            forms = {ca.OP_LT: "{0}*(1 + {0})/2", ca.OP_LE: "1 - {0}*({0} - 1)/2", ca.OP_NE: "{0}^2"}
-            return self.define(stem, XdynTerm(forms.get(op, "1 - {0}^2").format(sign)))
-        if op == ca.OP_NOT:
-            return _difference(_ONE, a if truth else _power(self._sign(stem, a), _TWO))
-        if op == ca.OP_OR:
-            return _difference(_sum(a, b), _product(a, b))
-        if op == ca.OP_IF_ELSE_ZERO:
-            return _product(a if truth else _power(self._sign(stem, a), _TWO), b)
-        if op == ca.OP_ATAN2:
-            return self._angle(stem, a, b)
-        if op == ca.OP_ATAN:
-            return self._angle(stem, a, _ONE)
-        if op in (ca.OP_ASIN, ca.OP_ACOS):
-            a = self._named(stem, a)
-            other = XdynTerm(f"sqrt(1 - {a.text}^2)", _ATOM, _INLINE + 1)
-            return self._angle(stem, *((a, other) if op == ca.OP_ASIN else (other, a)))
-        if op == ca.OP_TAN:
-            a = self._named(stem, a)
-            return XdynTerm(f"sin({a.text})/cos({a.text})", _MUL, _INLINE + 1)
-        if op == ca.OP_TANH:
-            a = self._named(stem, a)
-            fallen = self.define(stem, XdynTerm(f"exp(0 - 2*abs({a.text}))")).text
-            return _product(self._sign(stem, a), XdynTerm(f"(1 - {fallen})/(1 + {fallen})", _MUL, _INLINE + 1))
-        raise ValueError(f"operation {op} of CasADi has no spelling in xdyn")
+            return self.define(stem, XdynTerm(_COMPARED[op].format(sign)))
+        forms: Mapping[int, Callable[[], XdynTerm]] = {
+            ca.OP_FMAX: lambda: self._extreme(stem, a, b, "+"),
+            ca.OP_FMIN: lambda: self._extreme(stem, a, b, "-"),
+            ca.OP_SIGN: lambda: self._sign(stem, a),
+            ca.OP_NOT: lambda: _difference(_ONE, self._truth(stem, a, truth=truth)),
+            ca.OP_OR: lambda: _difference(_sum(a, b), _product(a, b)),
+            ca.OP_IF_ELSE_ZERO: lambda: _product(self._truth(stem, a, truth=truth), b),
+            ca.OP_ATAN2: lambda: self._angle(stem, a, b),
+            ca.OP_ATAN: lambda: self._angle(stem, a, _ONE),
+            ca.OP_ASIN: lambda: self._arc(stem, a, op),
+            ca.OP_ACOS: lambda: self._arc(stem, a, op),
+            ca.OP_TAN: lambda: self._tan(stem, a),
+            ca.OP_TANH: lambda: self._tanh(stem, a),
+        }
+        if op not in forms:
+            raise ValueError(f"operation {op} of CasADi has no spelling in xdyn")
+        return forms[op]()
 
     def add(
         self, symbols: Sequence[ca.SX], spelt: Sequence[str], wanted: Mapping[str, ca.SX], numbers: Mapping[str, float]

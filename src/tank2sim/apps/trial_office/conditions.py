@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
 
 from tank2sim.apps.trial_office.notes import TrialNotes
-from tank2sim.apps.trial_office.tried import Tried
+from tank2sim.apps.trial_office.tried import Tried, logged_speed
 from tank2sim.records.trials import straight_over_gaps
 from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag
 
@@ -58,16 +58,8 @@ class TrialCondition:
 class TrialState:
     """The ship as tried.
 
-    Parameters
-    ----------
-    draught_m, trim_m, full_load_draught_m : float
-        The trim is by the stern.
-    length_m : float
-    largest_rudder_rad : float
-    draughts_recorded : bool
-        False where nobody recorded the draughts: the card's are then taken.
-    wind_speed_mps, wind_from_rad : float or None
-        By the records, else by the notes.
+    `trim_m`: by the stern; `draughts_recorded`: false where nobody recorded the draughts (the card's are then taken);
+    `wind_speed_mps`, `wind_from_rad`: by the records, else by the notes.
     """
 
     draught_m: float
@@ -78,6 +70,12 @@ class TrialState:
     draughts_recorded: bool
     wind_speed_mps: float | None
     wind_from_rad: float | None
+
+    @property
+    def wind(self) -> tuple[float, float] | None:
+        """Speed, m/s, and where it comes from, rad; None where one of both is unknown."""
+        speed, origin = self.wind_speed_mps, self.wind_from_rad
+        return None if speed is None or origin is None else (speed, origin)
 
     @property
     def draughts_at_ends_m(self) -> tuple[float, float]:
@@ -92,63 +90,61 @@ class TrialState:
 
 
 def trial_conditions(state: TrialState, notes: TrialNotes, trials: Sequence[Tried]) -> tuple[TrialCondition, ...]:
-    """Judge each condition.
-
-    Parameters
-    ----------
-    state : TrialState
-    notes : TrialNotes
-    trials : sequence of Tried
-        Without the current: the test speed is a speed through the water.
-    """
+    """Each condition, judged by trials without the current: the test speed is a speed through the water."""
     turns = [one for one in trials if isinstance(one.manoeuvre, Turn) and one.record is not None]
-    depth = notes.depth_m and notes.depth_m / state.draught_m
-    away, trim = 100 * (state.draught_m / state.full_load_draught_m - 1), state.trim_m
-    approach = min((time for one in trials if (time := _approach(one)) is not None), default=None)
-    turned = min((angle for one in turns if (angle := one.turned_deg) is not None), default=None)
-    rudder = min((_first_rudder_deg(one) for one in turns), default=None)
-    least_rudder = _RUDDER_SHARE * math.degrees(state.largest_rudder_rad)
-    found: dict[str, tuple[float | None, Callable[[float], bool]]] = {
-        "deep water": (depth, lambda value: value > DEPTH_OVER_DRAUGHT),
-        "wind speed": (state.wind_speed_mps, lambda value: value < STRONGEST_WIND),
-        "sea state": (notes.sea_state, lambda value: value <= HIGHEST_SEA_STATE),
-        "draught": (away, lambda value: abs(value) <= 100 * DRAUGHT_SHARE),
-        "trim by the stern": (trim, lambda value: abs(value) <= DRAUGHT_SHARE * state.draught_m),
-        "test speed": (_test_speed(notes, trials), lambda value: value >= 100 * TEST_SPEED_SHARE),
-        "approach": (approach, lambda value: value >= APPROACH_S),
-        "turns": (turned, lambda value: value >= FULL_CIRCLES_DEG - 1),
-        "rudder of the turns": (rudder, lambda value: value >= least_rudder),
-        "both sides": (_both_sides(trials), bool),
-        "engine": (notes.engine_untouched, bool),
-    }
-    if not state.draughts_recorded:
-        found |= dict.fromkeys(("draught", "trim by the stern"), (None, bool))
-    return tuple(_condition(name, *found[name]) for name in _REQUIRED)
+    stated = state.draughts_recorded
+    values = (
+        notes.depth_m and notes.depth_m / state.draught_m,
+        state.wind_speed_mps,
+        notes.sea_state,
+        100 * (state.draught_m / state.full_load_draught_m - 1) if stated else None,
+        state.trim_m if stated else None,
+        _test_speed(notes, trials),
+        _least(map(_approach, trials)),
+        _least(one.turned_deg for one in turns),
+        _least(map(_first_rudder_deg, turns)),
+        _both_sides(trials),
+        notes.engine_untouched,
+    )
+    return tuple(_condition(row, value, state) for row, value in zip(_REQUIRED, values, strict=True))
 
 
-_REQUIRED = {
-    "deep water": (f"depth over {DEPTH_OVER_DRAUGHT:g} draughts", "MSC/Circ.1053", "{:.1f} draughts"),
-    "wind speed": (f"below {STRONGEST_WIND:g} m/s (Beaufort 5)", "MSC/Circ.1053", "{:.1f} m/s"),
-    "sea state": (f"up to sea state {HIGHEST_SEA_STATE}", "MSC/Circ.1053", "sea state {:d}"),
-    "draught": ("full load within 5 %", "MSC/Circ.1053", "{:+.1f} %"),
-    "trim by the stern": ("even keel", "MSC.137(76)", "{:+.2f} m"),
-    "test speed": ("at least 90 % of that at 85 % MCR", "MSC.137(76)", "{:.0f} %"),
-    "approach": (f"steady for {APPROACH_S:g} s", "ISO 13643-2", "{:.0f} s"),
-    "turns": (f"{FULL_CIRCLES_DEG:g} deg of heading", "MSC/Circ.1053", "{:.0f} deg"),
-    "rudder of the turns": ("35 deg, or the largest", "MSC.137(76)", "{:.1f} deg"),
-    "both sides": ("each manoeuvre to port and starboard", "MSC.137(76)", ""),
-    "engine": ("its setting left alone", "ISO 13643-2", ""),
-}
-"""Condition to its requirement, who asks for it, and the form of its value; a truth value has none."""
+def _least(values: Iterable[float | None]) -> float | None:
+    return min((value for value in values if value is not None), default=None)
 
 
-def _condition(name: str, value: float | None, met: Callable[[float], bool]) -> TrialCondition:
+_CIRCULAR, _RESOLUTION, _ISO = "MSC/Circ.1053", "MSC.137(76)", "ISO 13643-2"
+_Requirement = tuple[str, str, str, str, Callable[[float, TrialState], bool]]
+_REQUIRED: tuple[_Requirement, ...] = (
+    ("deep water", f"depth over {DEPTH_OVER_DRAUGHT:g} draughts", _CIRCULAR, "{:.1f} draughts",
+     lambda value, _: value > DEPTH_OVER_DRAUGHT),
+    ("wind speed", f"below {STRONGEST_WIND:g} m/s (Beaufort 5)", _CIRCULAR, "{:.1f} m/s",
+     lambda value, _: value < STRONGEST_WIND),
+    ("sea state", f"up to sea state {HIGHEST_SEA_STATE}", _CIRCULAR, "sea state {:d}",
+     lambda value, _: value <= HIGHEST_SEA_STATE),
+    ("draught", "full load within 5 %", _CIRCULAR, "{:+.1f} %", lambda value, _: abs(value) <= 100 * DRAUGHT_SHARE),
+    ("trim by the stern", "even keel", _RESOLUTION, "{:+.2f} m",
+     lambda value, state: abs(value) <= DRAUGHT_SHARE * state.draught_m),
+    ("test speed", "at least 90 % of that at 85 % MCR", _RESOLUTION, "{:.0f} %",
+     lambda value, _: value >= 100 * TEST_SPEED_SHARE),
+    ("approach", f"steady for {APPROACH_S:g} s", _ISO, "{:.0f} s", lambda value, _: value >= APPROACH_S),
+    ("turns", f"{FULL_CIRCLES_DEG:g} deg of heading", _CIRCULAR, "{:.0f} deg",
+     lambda value, _: value >= FULL_CIRCLES_DEG - 1),
+    ("rudder of the turns", "35 deg, or the largest", _RESOLUTION, "{:.1f} deg",
+     lambda value, state: value >= _RUDDER_SHARE * math.degrees(state.largest_rudder_rad)),
+    ("both sides", "each manoeuvre to port and starboard", _RESOLUTION, "", lambda value, _: bool(value)),
+    ("engine", "its setting left alone", _ISO, "", lambda value, _: bool(value)),
+)  # fmt: skip
+"""A condition, its requirement, who asks for it, the form of its value (a truth value has none), and its limit."""
+
+
+def _condition(row: _Requirement, value: float | None, state: TrialState) -> TrialCondition:
     """A condition of :data:`_REQUIRED` by its value."""
-    required, source, form = _REQUIRED[name]
+    name, required, source, form, allowed = row
     if value is None:
         return TrialCondition(name=name, required=required, found="", met=Met.UNKNOWN, source=source)
     found = form.format(value) if form else "yes" if value else "no"
-    verdict = Met.MET if met(value) else Met.NOT_MET
+    verdict = Met.MET if allowed(value, state) else Met.NOT_MET
     return TrialCondition(name=name, required=required, found=found, met=verdict, source=source)
 
 
@@ -188,7 +184,7 @@ def _approach(one: Tried) -> float | None:
     heading = np.degrees(straight_over_gaps(time, one.trial.signals["psi_rad"]))[before]
     wander = np.array([np.std(heading[row:]) for row in range(len(heading))])
     steady = wander <= _STEADY_DEG
-    if "u_mps" in one.trial.signals and not np.isnan(one.trial.signals["u_mps"]).all():
-        speed = straight_over_gaps(time, one.trial.signals["u_mps"])[before]
+    if (logged := logged_speed(one.trial)) is not None:
+        speed = logged[before]
         steady &= np.array([np.std(speed[row:]) for row in range(len(speed))]) <= _STEADY_SHARE * abs(one.speed_mps)
     return float(one.begin_s - time[before][np.argmax(steady)])

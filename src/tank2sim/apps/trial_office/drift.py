@@ -30,19 +30,10 @@ choice: 180 deg are enough in a current alone."""
 class CircleDrift:
     """Drift of a turning circle.
 
-    Parameters
-    ----------
-    north_mps, east_mps : float
-        Velocity of the circle over the ground.
-    spread_mps : float or None
-        Root mean square of the pairs about their mean; None without pairs. It shows a drift that changes; a constant
-        wind has almost none.
-    residual_m : float
-        Root mean square distance of the track from the circle in the moving frame: large in a wind.
-    method : str
-        ``pairs a full turn apart`` or ``circle in a moving frame``.
-    turned_deg : float
-        Change of heading of the record.
+    `north_mps`, `east_mps`: velocity of the circle over the ground; `spread_mps`: root mean square of the pairs about
+    their mean, None without pairs (it shows a drift that changes; a constant wind has almost none); `residual_m`: root
+    mean square distance of the track from the circle in the moving frame, large in a wind; `method`: ``pairs a full
+    turn apart`` or ``circle in a moving frame``; `turned_deg`: change of heading of the record.
     """
 
     north_mps: float
@@ -67,21 +58,15 @@ def circle_drift(time_s: Array, north_m: Array, east_m: Array, heading_rad: Arra
 
         x = c_x + V_x t + a cos(psi) + b sin(psi),   y = c_y + V_y t + a sin(psi) - b cos(psi).
 
-    Parameters
-    ----------
-    time_s, north_m, east_m, heading_rad : arrays (n,)
-        From the execute on, the heading continuous.
+    All arrays (n,) begin at the execute; the heading is continuous.
     """
     turned = np.maximum.accumulate(np.abs(heading_rad - heading_rad[0]))
     steady = turned >= STEADY_FROM
-    reached = float(turned[-1])
+    reached, spread, method = float(turned[-1]), None, "circle in a moving frame"
     if reached < STEADY_FROM + LEAST_ARC:
         return None
-    rows = np.flatnonzero(steady)
-    fitted, residual = _moving_circle(time_s[rows], north_m[rows], east_m[rows], heading_rad[rows])
-    if reached < STEADY_FROM + FULL_TURN + LEAST_PAIRS:
-        found, spread, method = fitted, None, "circle in a moving frame"
-    else:
+    found, residual = _moving_circle(*(values[steady] for values in (time_s, north_m, east_m, heading_rad)))
+    if reached >= STEADY_FROM + FULL_TURN + LEAST_PAIRS:
         # The instants at which a heading is reached; where noise makes the heading fall, the first of them.
         rising = np.concatenate([[True], np.diff(turned) > 0])
         later = turned[steady & rising & (turned >= STEADY_FROM + FULL_TURN)]

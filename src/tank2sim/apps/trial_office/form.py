@@ -32,14 +32,11 @@ _ROWS = {
     TRACK_REACH: "Stopping, full astern: track reach, ship lengths",
 }
 
+_CORRECTION = "R = T F/B (MSC/Circ.1053), F and B simulated; annex"
+
 
 def form_boxes(study: TrialOffice) -> tuple[Box, ...]:
-    """Return the blocks of the form; PORT and STBD of a zigzag are the side of the first execute.
-
-    Parameters
-    ----------
-    study : TrialOffice
-    """
+    """The blocks of the form; PORT and STBD of a zigzag are the side of the first execute."""
     words, sizes, state = study.form, study.particulars, study.state
     head = {"Administration": words.administration, "Reference no.": words.reference}
     ship: Mapping[str, str | float | None] = {
@@ -79,7 +76,7 @@ def form_boxes(study: TrialOffice) -> tuple[Box, ...]:
         Box("Trials data (environmental condition)", _rows(weather)),
         condition,
         data,
-        Box("Remarks", (Row(None if not words.remarks else words.remarks, ()), *_remarks(study))),
+        Box("Remarks", (Row(words.remarks or None, ()), *_remarks(study))),
     )
 
 
@@ -112,35 +109,26 @@ def _data_rows(study: TrialOffice) -> list[Row]:
 
 def _remarks(study: TrialOffice) -> list[Row]:
     """Data without a row in the form: current, wind, correction, and uncertainty."""
-    rows, state = [], study.state
-    if state.draughts_recorded:
-        fore, aft = (format_number(draught, 4) for draught in state.draughts_at_ends_m)
-        rows.append(Row("Draughts of the trial", (f"{fore} m forward, {aft} m aft",)))
-    if study.conditions_not_met:
-        rows.append(Row("Conditions not met", (study.conditions_not_met,)))
-    if study.current is not None:
-        text = f"{study.current.speed_mps:.2f} m/s towards {study.current.towards_deg:.0f} deg, taken off"
-        rows.append(Row("Current", (text if study.current.separated else f"{text} with any wind",)))
-    if state.wind_speed_mps is not None and state.wind_from_rad is not None:
-        origin = math.degrees(state.wind_from_rad) % 360
-        rows.append(Row("Wind", (f"{state.wind_speed_mps:.1f} m/s from {origin:.0f} deg, taken off by the model",)))
-    if not study.tested_at_full_load:
-        rows.append(Row("Correction to full load", ("R = T F/B (MSC/Circ.1053), F and B simulated; annex",)))
-    if study.not_certified:
-        names = "; ".join(one.name for one in study.not_certified)
-        rows.append(Row("Not certified: EXTRAPOLATED to full load", (names,)))
-    if not study.applies:
-        rows.append(Row("Application", ("L < 100 m: MSC.137(76) does not bind",)))
-    return rows
+    state, current = study.state, study.current
+    fore, aft = (format_number(draught, 4) for draught in state.draughts_at_ends_m)
+    wind = ""
+    if state.wind is not None:
+        speed, origin = state.wind
+        wind = f"{speed:.1f} m/s from {math.degrees(origin) % 360:.0f} deg, taken off by the model"
+    said = {
+        "Draughts of the trial": f"{fore} m forward, {aft} m aft" * state.draughts_recorded,
+        "Conditions not met": study.conditions_not_met,
+        "Current": current and f"{current.words}, taken off{'' if current.separated else ' with any wind'}",
+        "Wind": wind,
+        "Correction to full load": "" if study.tested_at_full_load else _CORRECTION,
+        "Not certified: EXTRAPOLATED to full load": "; ".join(one.name for one in study.not_certified),
+        "Application": "" if study.applies else "L < 100 m: MSC.137(76) does not bind",
+    }
+    return [Row(label, (text,)) for label, text in said.items() if text]
 
 
 def form_page(study: TrialOffice) -> str:
-    """Return the form as an HTML page that prints on A4.
-
-    Parameters
-    ----------
-    study : TrialOffice
-    """
+    """The form as an HTML page that prints on A4."""
     return filled_template(
         "apps/trial_office/form.html.j2",
         style=Markup(resource_text("apps/bridge/sheet.css")),

@@ -50,7 +50,7 @@ def tried_ships(card: ManoeuvringCard, state: TrialState, count: int) -> tuple[T
     own = model_particular(card, "draught_m")
     full = state.full_load_draught_m, 0.0
     loadings = {"tried": full if state.at_full_load else (state.draught_m, state.trim_m), "full": full}
-    windy = bool(state.wind_speed_mps) and state.wind_from_rad is not None
+    windy = state.wind is not None and state.wind[0] > 0
     cards = {
         name: _loaded(card, draught, trim, own, wind=windy and name == "tried")
         for name, (draught, trim) in loadings.items()
@@ -101,36 +101,19 @@ def _with_formula_errors(values: Mapping[str, float], model: Model, errors: Arra
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """Simulated figures of a manoeuvre: as tried with the wind (B), as tried in calm water, and at full load (F).
+    """Simulated figures of a manoeuvre: as tried with the wind (B), as tried in calm water, and at full load (F)."""
 
-    Parameters
-    ----------
-    tried, calm, full : mapping
-        By the card itself.
-    ratios : mapping
-        Logarithm of F/B of each member (n,), where it has both.
-    spreads : mapping
-        Standard deviation of the logarithm of B over the members.
-    is_full_load : bool
-        Whether the trial itself shows full load in calm water: R is T, whatever the model does.
-    """
-
-    tried: Numbers
+    tried: Numbers  # `tried`, `calm`, `full`: By the card itself
     calm: Numbers
     full: Numbers
-    ratios: Mapping[str, Array]
-    spreads: Mapping[str, float]
-    is_full_load: bool = False
+    ratios: Mapping[str, Array]  # Logarithm of F/B of each member (n,), where it has both
+    spreads: Mapping[str, float]  # Standard deviation of the logarithm of B over the members
+    is_full_load: bool = (
+        False  # Whether the trial itself shows full load in calm water: R is T, whatever the model does
+    )
 
     def at_full_load(self, one: Tried, name: str) -> tuple[float, float] | None:
-        """R = T F/B and the standard error of its logarithm; None where one is not known.
-
-        Parameters
-        ----------
-        one : Tried
-            The manoeuvre without the current.
-        name : str
-        """
+        """R = T F/B of a manoeuvre without the current and the standard error of its logarithm; None where unknown."""
         measured, before, after = one.figures.get(name), self.tried.get(name), self.full.get(name)
         if self.is_full_load and measured is not None and measured > SMALLEST:
             return measured, one.errors.get(name, 0.0) / measured
@@ -140,39 +123,23 @@ class Prediction:
         spread = robust_deviation(ratios)
         return measured * after / before, math.hypot(spread, one.errors.get(name, 0.0) / measured)
 
+    def model_agrees(self, one: Tried, name: str) -> bool | None:
+        """Whether a figure without the current is within the 95 % interval of the model's as tried; None where unknown.
 
-def model_agrees(one: Tried, found: Prediction, name: str) -> bool | None:
-    """Whether a measured figure is within the 95 % interval of the model's as tried; None where one is not known.
-
-    MSC/Circ.1053, 3.4.1, option 2: a model that agrees well in the condition of the trial may predict full load itself.
-
-    Parameters
-    ----------
-    one : Tried
-        The manoeuvre without the current.
-    found : Prediction
-        With members.
-    name : str
-    """
-    measured, simulated_figure = one.figures.get(name), found.tried.get(name)
-    if name not in found.spreads or measured is None or simulated_figure is None or measured <= SMALLEST:
-        return None
-    error = math.hypot(found.spreads[name], one.errors.get(name, 0.0) / measured)
-    return abs(math.log(measured / simulated_figure)) <= 1.96 * error
+        MSC/Circ.1053, 3.4.1, option 2: a model that agrees well in the condition of the trial may predict full load
+        itself.
+        """
+        measured, by_model = one.figures.get(name), self.tried.get(name)
+        if name not in self.spreads or measured is None or by_model is None or measured <= SMALLEST:
+            return None
+        error = math.hypot(self.spreads[name], one.errors.get(name, 0.0) / measured)
+        return abs(math.log(measured / by_model)) <= 1.96 * error
 
 
 def prediction(one: Tried, ships: TriedShips, wind: Mapping[str, float], *, at_full_load: bool) -> Prediction:
-    """Simulate a manoeuvre in both conditions, also by the members.
+    """A manoeuvre without the current, simulated in both conditions and the inputs of the `wind`, also by the members.
 
-    Parameters
-    ----------
-    one : Tried
-        Without the current.
-    ships
-    wind : mapping
-        Inputs of the wind.
-    at_full_load : bool
-        Whether the trial itself counts as at full load: F then differs from B by the wind alone.
+    `at_full_load`: The trial itself counts as at full load: F then differs from B by the wind alone.
     """
     calm_full_load = at_full_load and not wind
     speed = one.speed_mps if at_full_load else ships.full_load.model.speed_mps
@@ -185,17 +152,16 @@ def prediction(one: Tried, ships: TriedShips, wind: Mapping[str, float], *, at_f
 
     before, after = both(({}, {}))
     calm = _run(lambda: simulated(one, ships.tried, {}, {})) if wind else before
-    ratios: dict[str, list[float]] = {}
-    logarithms: dict[str, list[float]] = {}
-    for values in ships.drawn:
-        first, second = both(values)
+    logarithms: dict[str, list[tuple[float, float]]] = {}
+    for first, second in map(both, ships.drawn):
         for name in first.keys() & second.keys():
             if min(first[name], second[name]) > SMALLEST:
-                ratios.setdefault(name, []).append(math.log(second[name] / first[name]))
-                logarithms.setdefault(name, []).append(math.log(first[name]))
-    spreads = {name: robust_deviation(np.array(values)) for name, values in logarithms.items()}
-    drawn = {name: np.array(values) for name, values in ratios.items()}
-    return Prediction(before, calm, after, drawn, spreads, is_full_load=calm_full_load)
+                pair = math.log(second[name] / first[name]), math.log(first[name])
+                logarithms.setdefault(name, []).append(pair)
+    drawn = {name: np.array(pairs) for name, pairs in logarithms.items()}
+    ratios = {name: pairs[:, 0] for name, pairs in drawn.items()}
+    spreads = {name: robust_deviation(pairs[:, 1]) for name, pairs in drawn.items()}
+    return Prediction(before, calm, after, ratios, spreads, is_full_load=calm_full_load)
 
 
 def _run(simulation: Callable[[], Numbers]) -> Numbers:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, ValidationError
 
@@ -92,7 +92,29 @@ def read_notes(path: str | Path) -> TrialNotes:
     InputError
         It cannot be read, or a key is unknown or out of its bounds.
     """
-    return _checked(parsed_toml(read_text(Path(path)), path), path)
+    try:
+        notes = TrialNotes.model_validate(parsed_toml(read_text(Path(path)), path))
+    except ValidationError as fault:
+        raise form_fault(fault, path, {}, form=TrialNotes, what="notes of a trial") from None
+    for words, figures in notes.figures.items():
+        if not _is_tried(words):
+            remedy = "give turn:35, zigzag:10/10 or stop, with - before the rudder for port"
+            raise InputError(path, f"figures.{words}", "is not a turn, a zigzag or a stop", remedy)
+        for name, value in figures.items():
+            place = f"figures.{words}.{name}"
+            if name not in REPORTED:
+                raise InputError(path, place, "is not a figure", close_name(name, REPORTED))
+            if value <= 0 and name != "side_reach_m" and not (name.startswith("overshoot") and value == 0):
+                raise InputError(path, place, f"is {value:g}", "give a number above 0, for either side")
+    return notes
+
+
+def _is_tried(words: str) -> bool:
+    """Whether words mean a manoeuvre of a sea trial."""
+    try:
+        return isinstance(parse_manoeuvre(words), Turn | Zigzag | Stop)
+    except InputError:
+        return False
 
 
 def notes_with(notes: TrialNotes, source: str | Path, **options: object) -> TrialNotes:
@@ -125,28 +147,6 @@ def notes_with(notes: TrialNotes, source: str | Path, **options: object) -> Tria
                     raise ArgumentError(other, "", problem, remedy)
                 raise InputError(source, other, problem, remedy)
     return together
-
-
-def _checked(content: dict[str, Any], source: str | Path) -> TrialNotes:
-    try:
-        notes = TrialNotes.model_validate(content)
-    except ValidationError as fault:
-        raise form_fault(fault, source, {}, form=TrialNotes, what="notes of a trial") from None
-    for words in notes.figures:
-        try:
-            known = isinstance(parse_manoeuvre(words), Turn | Zigzag | Stop)
-        except InputError:
-            known = False
-        if not known:
-            remedy = "give turn:35, zigzag:10/10 or stop, with - before the rudder for port"
-            raise InputError(source, f"figures.{words}", "is not a turn, a zigzag or a stop", remedy)
-        for name, value in notes.figures[words].items():
-            place = f"figures.{words}.{name}"
-            if name not in REPORTED:
-                raise InputError(source, place, "is not a figure", close_name(name, REPORTED))
-            if value <= 0 and name != "side_reach_m" and not (name.startswith("overshoot") and value == 0):
-                raise InputError(source, place, f"is {value:g}", "give a number above 0, for either side")
-    return notes
 
 
 _PAIRS = ("draught_fore_m", "draught_aft_m"), ("wind_speed_mps", "wind_from_deg")

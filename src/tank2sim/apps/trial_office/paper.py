@@ -9,14 +9,13 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
 from tank2sim.answer.parts import cell_text
-from tank2sim.apps.trial_office.form import form_boxes
 from tank2sim.errors import InputError
 from tank2sim.version import __version__
 
 if TYPE_CHECKING:
     from fpdf import FPDF
 
-    from tank2sim.answer.parts import Section
+    from tank2sim.answer.parts import Cell, Section
     from tank2sim.answer.result import Result
     from tank2sim.apps.trial_office.study import TrialOffice
 
@@ -25,23 +24,16 @@ _PLAIN = dict(zip("–—−‘’“”≤≥…•", ["-", "-", "-", "'", "'",
 
 
 def report_pdf(result: Result[TrialOffice]) -> bytes:
-    """Return the report as PDF, A4: the form, and the sections of the page as its annex.
+    """The report as PDF, A4: the form, and the sections of the page as its annex.
 
-    Parameters
-    ----------
-    result : Result of a TrialOffice
-
-    Raises
-    ------
-    InputError
-        The library that writes PDF is not installed.
+    Raises InputError: The library that writes PDF is not installed.
     """
     try:
         from fpdf import FPDF
     except ImportError:
         remedy = "install it with: pip install 'tank2sim[paper]'"
         raise InputError("report.pdf", "", "needs the library fpdf2, which is not installed", remedy) from None
-    study = result.study
+    study, (*annex, form) = result.study, result.sections
     pdf = FPDF(format="A4")
     pdf.set_title(result.title)
     pdf.set_creator(f"tank2sim {__version__}")
@@ -51,21 +43,18 @@ def report_pdf(result: Result[TrialOffice]) -> bytes:
     pdf.add_page()
     _heading(pdf, "Form for reporting manoeuvring data to IMO", 14)
     _text(pdf, ", ".join(part for part in (study.ship, study.place, study.date) if part))
-    for box in form_boxes(study):
-        _heading(pdf, box.title, 10)
-        width = max(1, *(len(row.values) for row in box.rows), len(box.heads))
-        rows = [[row.label or "", *(str(value or "") for value in row.values)] for row in box.rows]
-        _table(pdf, ["", *box.heads], rows, [0.55] + [0.45 / width] * width)
+    for box in form.tables:
+        _heading(pdf, box.caption, 10)
+        width = max(1, len(box.heads) - 1)
+        _table(pdf, box.heads, box.rows, [0.55] + [0.45 / width] * width)
     pdf.add_page()
     _heading(pdf, "Annex: methods, corrections, and uncertainty", 14)
-    for line in (*(notice.line for notice in result.cautions), *result.headline):
-        _text(pdf, line)
-    for section in result.sections[:-1]:
+    _text(pdf, *(notice.line for notice in result.cautions), *result.headline)
+    for section in annex:
         _section(pdf, section)
     if result.notices:
         _heading(pdf, "Notices", 11)
-        for notice in result.notices:
-            _text(pdf, notice.line)
+        _text(pdf, *(notice.line for notice in result.notices))
     return bytes(pdf.output())
 
 
@@ -92,13 +81,13 @@ def _heading(pdf: FPDF, text: str, size: float) -> None:
     pdf.multi_cell(0, 0.5 * size, _latin(text), new_x="LMARGIN", new_y="NEXT")
 
 
-def _text(pdf: FPDF, text: str) -> None:
-    if text:
+def _text(pdf: FPDF, *texts: str) -> None:
+    for text in filter(None, texts):
         pdf.set_font("Helvetica", size=8.5)
         pdf.multi_cell(0, 4, _latin(text), align="L", new_x="LMARGIN", new_y="NEXT")
 
 
-def _table(pdf: FPDF, heads: Sequence[str], rows: Sequence[Sequence[str]], shares: Sequence[float] = ()) -> None:
+def _table(pdf: FPDF, heads: Sequence[str], rows: Sequence[Sequence[Cell]], shares: Sequence[float] = ()) -> None:
     pdf.set_font("Helvetica", size=7.5)
     columns = max(len(heads), *(len(row) for row in rows)) if rows else len(heads)
     widths = tuple(shares) or None
@@ -106,7 +95,7 @@ def _table(pdf: FPDF, heads: Sequence[str], rows: Sequence[Sequence[str]], share
         width=_WIDTH_MM, col_widths=widths, line_height=4, first_row_as_headings=any(heads), text_align="LEFT"
     ) as drawn:
         for cells in ([heads] if any(heads) else []) + list(rows):
-            drawn.row([_latin(cell) for cell in (*cells, *[""] * (columns - len(cells)))])
+            drawn.row([_latin(str(cell or "")) for cell in (*cells, *[""] * (columns - len(cells)))])
 
 
 def _latin(text: str) -> str:

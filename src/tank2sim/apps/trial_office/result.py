@@ -86,7 +86,7 @@ class TrialOfficeResult(Result[TrialOffice]):
             how += ", by a circle in a moving frame (a turn of less than 540 deg)"
         if (spread := current.spread_mps or 0.0) > CURRENT_CHANGES:
             how += f"; it changes during a turn (spread {spread:.3f} m/s)"
-        return [f"Current {current.speed_mps:.2f} m/s towards {current.towards_deg:.0f} deg, {how}."]
+        return [f"Current {current.words}, {how}."]
 
     @property
     def _first_line(self) -> str:
@@ -124,19 +124,11 @@ class TrialOfficeResult(Result[TrialOffice]):
         return [self._verdicts(), self._conditions(), self._current(), self._figures(), self._form()]
 
     def _verdicts(self) -> Section:
-        rows: list[list[Cell]] = [
-            [
-                *(
-                    f"{one.name} ({one.unit})",
-                    one.allowed,
-                    one.as_run,
-                    one.verdict_as_run,
-                    _share(one.probability_as_run),
-                ),
-                *(one.full_load, one.verdict, _share(one.probability)),
-            ]
-            for one in self.study.criteria
-        ]
+        rows: list[list[Cell]] = []
+        for one in self.study.criteria:
+            as_run = one.as_run, one.verdict_as_run, _share(one.probability_as_run)
+            at_load = one.full_load, one.verdict, _share(one.probability)
+            rows.append([f"{one.name} ({one.unit})", one.allowed, *as_run, *at_load])
         heads = ("criterion", "allowed", "as run", "trial as run", "P as run", "full load", "ship at full load", "P")
         return Section(
             "Verdict",
@@ -180,13 +172,12 @@ class TrialOfficeResult(Result[TrialOffice]):
                 )
             ]
             charts.append(Illustration(track_chart(tracks, title="Turning circles"), caption="From the execute."))
-        tables = [table("Drift of the turning circles", heads, rows, digits=3)] if rows else []
         return Section(
             "Current and wind",
             text="Positions one full turn apart show the drift of a circle (MSC/Circ.1053, 3.4.2). A constant wind "
             "drifts it, too, with almost no spread, and to opposite sides for turns to port and starboard: the mean "
             "of both sides is the current. A large residual of the circle shows the wind.",
-            tables=tables,
+            tables=[table("Drift of the turning circles", heads, rows, digits=3)] if rows else [],
             charts=charts,
         )
 
@@ -208,21 +199,19 @@ class TrialOfficeResult(Result[TrialOffice]):
                 agrees = None if one.model_agrees is None else "yes" if one.model_agrees else "no"
                 by_model = (one.model_as_tried, agrees, one.model_full_load, one.full_load)
                 checked.append([one.trial, name, one.without_current, *by_model])
+        tables = [
+            table("Figures as run and at full load", heads, rows),
+            table("Corrections, step by step", steps, by_step, on_screen=False),
+        ]
+        if checked:
+            tables.append(table("The model in the condition of the trial", checks, checked, on_screen=False))
         return Section(
             "Figures",
             text="The wind is taken off by the model: times its figure in calm water over that in the wind. At full "
             "load R = T F/B (MSC/Circ.1053): measured T, and simulated F at full load and B as tried, of the same "
             "member of the ensemble, so that errors of both cancel. Where the model as tried agrees with the trial, "
             "its own figures F at full load may be used instead (option 2): simulate full-load.toml.",
-            tables=[
-                table("Figures as run and at full load", heads, rows),
-                table("Corrections, step by step", steps, by_step, on_screen=False),
-                *(
-                    [table("The model in the condition of the trial", checks, checked, on_screen=False)]
-                    if checked
-                    else []
-                ),
-            ],
+            tables=tables,
         )
 
     def _form(self) -> Section:
@@ -231,25 +220,15 @@ class TrialOfficeResult(Result[TrialOffice]):
         tables: list[Table] = []
         for box in form_boxes(self.study):
             width = max(len(row.values) for row in box.rows)
-            heads = ("", *(box.heads or [""] * width))
-            rows: list[list[Cell]] = [
-                [
-                    row.label,
-                    *(None if value is None else str(value) for value in row.values),
-                    *[""] * (width - len(row.values)),
-                ]
-                for row in box.rows
+            values = [[None if value is None else str(value) for value in row.values] for row in box.rows]
+            rows = [
+                [row.label, *cells, *[""] * (width - len(cells))] for row, cells in zip(box.rows, values, strict=True)
             ]
-            tables.append(table(box.title, heads, rows, on_screen=False))
+            tables.append(table(box.title, ("", *(box.heads or [""] * width)), rows, on_screen=False))
         return Section("Form for reporting to IMO", tables=tables, folded=True)
 
     def files(self, folder: Path) -> dict[Path, str | bytes]:
-        """Return the files of the report by path: page, PDF, form, poster, pilot card, JSON, and both cards.
-
-        Parameters
-        ----------
-        folder : Path
-        """
+        """Return the files of the report by path: page, PDF, form, poster, pilot card, JSON, and both cards."""
         from tank2sim.apps.bridge.command import sheet_data
         from tank2sim.apps.bridge.result import PilotCardResult, PosterResult
         from tank2sim.apps.trial_office.form import form_page

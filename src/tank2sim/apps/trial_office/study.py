@@ -17,9 +17,7 @@ from tank2sim.apps.trial_office.drift import LEAST_ARC, STEADY_FROM, CircleDrift
 from tank2sim.apps.trial_office.full_load import (
     SMALLEST,
     Prediction,
-    TriedShips,
     loading_validity,
-    model_agrees,
     prediction,
     tried_ships,
 )
@@ -72,18 +70,10 @@ class TurnDrift:
 class SiteCurrent:
     """The current of the site.
 
-    Parameters
-    ----------
-    speed_mps, towards_deg : float
-    error_mps : float
-        Standard error of each component.
-    spread_mps : float or None
-        Largest root mean square of the pairs of a turn: a current that changes.
-    wind_share_mps : float or None
-        Half the difference of the two sides, as measured: the drift by the wind; None with one side.
-    separated : str
-        How the wind was separated: ``by both sides and the model``, ``by both sides``, ``by the model``; empty where it
-        was not.
+    `error_mps`: standard error of each component; `spread_mps`: largest root mean square of the pairs of a turn (a
+    current that changes); `wind_share_mps`: half the measured difference of the two sides, by the wind, None with one
+    side; `separated`: how the wind was separated (``by both sides and the model``, ``by both sides``, ``by the
+    model``), empty where it was not.
     """
 
     speed_mps: float
@@ -92,6 +82,11 @@ class SiteCurrent:
     spread_mps: float | None
     wind_share_mps: float | None
     separated: str
+
+    @property
+    def words(self) -> str:
+        """Speed and direction."""
+        return f"{self.speed_mps:.2f} m/s towards {self.towards_deg:.0f} deg"
 
     @property
     def vector(self) -> Array:
@@ -104,24 +99,10 @@ class SiteCurrent:
 class OfficeFigure:
     """A figure of a trial.
 
-    Parameters
-    ----------
-    trial, manoeuvre, side, name : str
-    as_run : float
-    without_current : float
-        As the track is in water that rests.
-    error : float
-        Standard error of the reading and of the current.
-    calm : float or None
-        Also without the wind, by the model: times its figure in calm water over that in the wind.
-    full_load : float or None
-        At full load, on even keel, in calm water: R = T F/B.
-    low, high : float or None
-        95 % interval of that.
-    model_as_tried, model_full_load : float or None
-        B and F.
-    model_agrees : bool or None
-        Whether the measured figure is within the 95 % interval of B; None without members.
+    `without_current`: T, as the track is in water that rests; `error`: standard error of the reading and of the
+    current; `calm`: also without the wind, by the model (times its figure in calm water over its figure in the wind);
+    `full_load`: R = T F/B, on even keel, in calm water; `low`, `high`: 95 % interval of R; `model_as_tried`,
+    `model_full_load`: B and F; `model_agrees`: whether T is within the 95 % interval of B, None without members.
     """
 
     trial: str
@@ -166,30 +147,9 @@ class OfficeTrack:
 class TrialOffice:
     """The report of a sea trial.
 
-    Parameters
-    ----------
-    ship, source : str
-    conditions : tuple of TrialCondition
-    state : TrialState
-    drifts : tuple of TurnDrift
-    current : SiteCurrent or None
-    figures : tuple of OfficeFigure
-    criteria : tuple of CriterionVerdict
-    tested_at_full_load : bool
-    loading_validity : float
-        1 where the formulas that take the ship from the trial to full load hold, 0 where they do not.
-    stable_as_tried, stable_at_full_load : float or None
-        Probability that a straight course is stable, by the members; None without them.
-    particulars : FormParticulars
-    form : FormWords
-    tracks : tuple of OfficeTrack
-    members : int
-    place, date : str
-    depth_m : float or None
-    sea_state : int or None
-    applies : bool
-        Whether MSC.137(76) is for a ship of this length.
-    notices : tuple of Notice
+    `loading_validity`: 1 where the formulas that take the ship from the trial to full load hold, 0 where they do not;
+    `stable_as_tried`, `stable_at_full_load`: probability that a straight course is stable, by the members, None without
+    them; `applies`: whether MSC.137(76) is for a ship of this length.
     """
 
     ship: str
@@ -235,33 +195,18 @@ class TrialOffice:
 def study_trials(
     card: ManoeuvringCard, trials: Sequence[Trial], notes: TrialNotes, count: int
 ) -> tuple[TrialOffice, ManoeuvringCard, ManoeuvringCard]:
-    """Study the records of a sea trial; return the report, and the cards of the ship as tried and at full load.
+    """The report of the records of a sea trial by `count` members, and the ship's cards as tried and at full load.
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-    trials : sequence of Trial
-    notes : TrialNotes
-    count : int
-        Members of the ensemble.
-
-    Raises
-    ------
-    InputError
-        There is nothing to report, or the card lacks something that a loading condition needs.
+    Raises InputError: There is nothing to report, or the card lacks something that a loading condition needs.
     """
     plain = build(steerable(card))
     given, as_run, messages = _manoeuvres(card, trials, notes, plain)
     state = _state(card, given.trials, notes)
     ships, more = tried_ships(card, state, count)
     winds = [_wind(one, state, ships.tried) for one in as_run]
-    drifts = tuple(
-        drift for one, wind in zip(as_run, winds, strict=True) if (drift := _drift(one, ships.tried, wind)) is not None
-    )
+    drifts = tuple(filter(None, (_drift(*pair, ships.tried) for pair in zip(as_run, winds, strict=True))))
     current = site_current(drifts) if drifts else None
-    still = as_run
-    if current is not None:
-        still = [current_removed(one, current.vector, current.error_mps, plain) for one in as_run]
+    still = [current_removed(one, current.vector, current.error_mps, plain) for one in as_run] if current else as_run
     predicted = [
         prediction(one, ships, wind, at_full_load=state.at_full_load) for one, wind in zip(still, winds, strict=True)
     ]
@@ -269,7 +214,8 @@ def study_trials(
     validity = 1.0 if state.at_full_load else loading_validity(ships)
     stable = [stability_chance(one, count) for one in (ships.as_tried, ships.full_load)]
     unstable = _of_stability(*stable)
-    messages += _of_other_ship(ships, given)
+    if evidence := evidence_of_other_ship(ships.as_tried, given) if given.trials else ():
+        messages.append(caution(f"these look like trials of another ship: {'; '.join(evidence)}"))
     doubts = [*_of_records(given), *messages, *more, *_cautions(state, current, as_run, validity, count), *unstable]
     study = TrialOffice(
         ship=card.ship.name,
@@ -312,21 +258,11 @@ def _manoeuvres(
     return given, as_run, messages
 
 
-def _of_other_ship(ships: TriedShips, given: Measured) -> list[Notice]:
-    """A caution where the records are not of the ship as tried."""
-    evidence = evidence_of_other_ship(ships.as_tried, given) if given.trials else ()
-    return [caution(f"these look like trials of another ship: {'; '.join(evidence)}")] if evidence else []
-
-
 def _recognised(trials: Sequence[Trial], notes: TrialNotes, model: Model) -> tuple[list[Tried], dict[str, str]]:
     """The manoeuvres of records and of notes, and by name why other records hold none."""
-    found, unknown = [], {}
-    for trial in trials:
-        one = tried(trial, model)
-        if isinstance(one, str):
-            unknown[trial.name] = one
-        else:
-            found.append(one)
+    recognised = {trial.name: tried(trial, model) for trial in trials}
+    found = [one for one in recognised.values() if isinstance(one, Tried)]
+    unknown = {name: reason for name, reason in recognised.items() if isinstance(reason, str)}
     speed = model.defaults["ship.speed"]
     for words, figures in notes.figures.items():
         manoeuvre = parse_manoeuvre(words)
@@ -342,14 +278,12 @@ def _recognised(trials: Sequence[Trial], notes: TrialNotes, model: Model) -> tup
 def _state(card: ManoeuvringCard, trials: Sequence[Trial], notes: TrialNotes) -> TrialState:
     own = model_particular(card, "draught_m")
     fore, aft = notes.draught_fore_m, notes.draught_aft_m
-    draught, trim = (own, 0.0) if fore is None or aft is None else ((fore + aft) / 2, aft - fore)
-    speed = notes.wind_speed_mps
+    draughts = (own, own) if fore is None or aft is None else (fore, aft)
     direction = None if notes.wind_from_deg is None else math.radians(notes.wind_from_deg)
-    if recorded := mean_wind(trials):
-        speed, direction = recorded
+    speed, direction = mean_wind(trials) or (notes.wind_speed_mps, direction)
     return TrialState(
-        draught_m=draught,
-        trim_m=trim,
+        draught_m=sum(draughts) / 2,
+        trim_m=draughts[1] - draughts[0],
         full_load_draught_m=own if notes.full_load_draught_m is None else notes.full_load_draught_m,
         length_m=card.ship.length_m,
         largest_rudder_rad=hard_rudder(card),
@@ -363,21 +297,17 @@ def _wind(one: Tried, state: TrialState, integrator: Integrator) -> dict[str, fl
     """Inputs of the wind in a trial, by its record or else the mean of all; empty without one."""
     if "wind.speed" not in integrator.model.input_names:
         return {}
-    recorded = mean_wind([one.trial]) if one.trial is not None else None
-    speed, direction = recorded or (state.wind_speed_mps, state.wind_from_rad)
-    return {} if speed is None or direction is None else {"wind.speed": speed, "wind.direction": direction}
+    wind = (mean_wind([one.trial]) if one.trial is not None else None) or state.wind
+    return {} if wind is None else dict(zip(("wind.speed", "wind.direction"), wind, strict=True))
 
 
-def _drift(one: Tried, integrator: Integrator, wind: Mapping[str, float]) -> TurnDrift | None:
+def _drift(one: Tried, wind: Mapping[str, float], integrator: Integrator) -> TurnDrift | None:
     """The drift of a turn, and the drift of the model in the wind alone."""
-    measured = one.drift
-    if measured is None or one.record is None or one.trial is None:
+    measured, record, by_wind = one.drift, one.record, None
+    if measured is None or record is None:
         return None
-    by_wind = None
     if wind:
-        record = one.record
-        longer = replace(record, figures={}, inputs={**record.inputs, **wind})
-        run = repeat(longer, integrator).trajectory
+        run = repeat(replace(record, figures={}, inputs={**record.inputs, **wind}), integrator).trajectory
         by_wind = circle_drift(run.t, run["motion.x"], run["motion.y"], run["motion.psi"])
     return TurnDrift(
         trial=one.name,
@@ -388,43 +318,43 @@ def _drift(one: Tried, integrator: Integrator, wind: Mapping[str, float]) -> Tur
     )
 
 
+_WAYS = {
+    (True, True): "by both sides and the model",
+    (True, False): "by both sides",
+    (False, True): "by the model",
+    (False, False): "",
+}
+"""Whether turns go to both sides, and whether the model's drift in the wind is known, to how the wind was separated."""
+
+
 def site_current(drifts: Sequence[TurnDrift]) -> SiteCurrent:
     """The current from the drifts of turns: their mean over both sides, without the wind's part.
 
     A constant wind drifts the circles of the two sides apart, to opposite sides across itself: half their difference
     is its part. With a measured wind the model's drift is taken off first, which is small against the mean of both.
-
-    Parameters
-    ----------
-    drifts : sequence of TurnDrift
     """
     modelled = all(drift.by_wind_north_mps is not None for drift in drifts)
     measured = np.array([drift.measured.vector for drift in drifts])
-    left = measured - np.array([drift.by_wind if modelled else (0.0, 0.0) for drift in drifts])
-    sides = [[row for row, drift in enumerate(drifts) if drift.side == side] for side in _sides(drifts)]
-    both = len(sides) > 1
-    found = np.mean([left[rows].mean(axis=0) for rows in sides], axis=0)
-    apart = 0.5 * (measured[sides[0]].mean(axis=0) - measured[sides[-1]].mean(axis=0))
+    left = measured - modelled * np.array([drift.by_wind for drift in drifts])
+    sides = np.array([drift.side for drift in drifts])
+    # Means of each side, in the order of the drifts: as measured, and less the model's.
+    means = [[part[sides == side].mean(axis=0) for part in (measured, left)] for side in dict.fromkeys(sides)]
+    both = len(means) > 1
+    found = np.mean([rest for _, rest in means], axis=0)
     spreads = [drift.measured.spread_mps for drift in drifts if drift.measured.spread_mps is not None]
     # What is left is not understood: the scatter of turns to one side, and the difference of the sides after the part
     # of the model. Without a model the two sides differ by the wind, which the mean does not hold.
     unexplained = 0.0
     if len(drifts) > 1 and (modelled or not both):
         unexplained = float(np.sqrt(np.mean((left - found) ** 2) / (len(drifts) - 1)))
-    ways = {(True, True): "by both sides and the model", (True, False): "by both sides", (False, True): "by the model"}
     return SiteCurrent(
         speed_mps=float(np.hypot(*found)),
         towards_deg=math.degrees(math.atan2(found[1], found[0])) % 360.0,
         error_mps=math.hypot(max(spreads, default=0.0) / math.sqrt(2), unexplained),
         spread_mps=max(spreads, default=None),
-        wind_share_mps=float(np.hypot(*apart)) if both else None,
-        separated=ways.get((both, modelled), ""),
+        wind_share_mps=float(np.hypot(*(means[0][0] - means[-1][0])) / 2) if both else None,
+        separated=_WAYS[both, modelled],
     )
-
-
-def _sides(drifts: Sequence[TurnDrift]) -> list[str]:
-    """Sides to which there are turns, in the order of the drifts."""
-    return list(dict.fromkeys(drift.side for drift in drifts))
 
 
 def _figures(raw: Tried, still: Tried, found: Prediction) -> list[OfficeFigure]:
@@ -440,11 +370,8 @@ def _figures(raw: Tried, still: Tried, found: Prediction) -> list[OfficeFigure]:
             shown["calm"] = value * found.calm[name] / found.tried[name]
         if (at_load := found.at_full_load(still, name)) is not None:
             centre, error = at_load
-            shown |= {
-                "full_load": centre,
-                "low": centre * math.exp(-1.96 * error),
-                "high": centre * math.exp(1.96 * error),
-            }
+            low, high = (centre * math.exp(side * 1.96 * error) for side in (-1, 1))
+            shown |= {"full_load": centre, "low": low, "high": high}
         rows.append(
             OfficeFigure(
                 trial=raw.name,
@@ -456,7 +383,7 @@ def _figures(raw: Tried, still: Tried, found: Prediction) -> list[OfficeFigure]:
                 error=still.errors.get(name, 0.0),
                 model_as_tried=found.tried.get(name),
                 model_full_load=found.full.get(name),
-                model_agrees=model_agrees(still, found, name),
+                model_agrees=found.model_agrees(still, name),
                 **shown,
             )
         )
@@ -472,14 +399,9 @@ def _words(manoeuvre: Turn | Zigzag | Stop) -> str:
 
 
 def stability_chance(card: ManoeuvringCard, count: int) -> float | None:
-    """Probability that a straight course is stable (C' > 0), by members drawn within the errors of a card.
+    """Probability that a straight course is stable (C' > 0), by `count` members drawn within the errors of a card.
 
-    None without members, and of a ship that cannot be linearised.
-
-    Parameters
-    ----------
-    card : ManoeuvringCard
-    count : int
+    None without members, and for a ship that cannot be linearised.
     """
     if not count:
         return None

@@ -35,32 +35,15 @@ REVERSED = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Tried:
-    """A manoeuvre of a trial.
+    """A manoeuvre of a trial."""
 
-    Parameters
-    ----------
-    trial : Trial
-        The record; of a manoeuvre whose figures alone are known there is none.
-    manoeuvre : Turn, Zigzag or Stop
-    record : Recorded or None
-        The recognised turn or zigzag.
-    begin_s : float
-        Time of the execute.
-    speed_mps : float
-        Speed of the approach.
-    figures : mapping
-        Figures by name with unit.
-    errors : mapping
-        Their standard errors by the reading of the record.
-    """
-
-    trial: Trial | None
+    trial: Trial | None  # None for a manoeuvre whose figures alone are known
     manoeuvre: Turn | Zigzag | Stop
-    record: Recorded | None
-    begin_s: float
-    speed_mps: float
-    figures: Numbers
-    errors: Numbers
+    record: Recorded | None  # The recognised turn or zigzag
+    begin_s: float  # Time of the execute
+    speed_mps: float  # Speed of the approach
+    figures: Numbers  # By name with unit
+    errors: Numbers  # Standard errors of the figures by the reading of the record
 
     @property
     def name(self) -> str:
@@ -78,37 +61,30 @@ class Tried:
         """Whether there is a track of a turn to draw."""
         return self.trial is not None and isinstance(self.manoeuvre, Turn)
 
-    @property
-    def turned_deg(self) -> float | None:
-        """Largest change of heading of a recorded turn; None of other manoeuvres."""
-        if self.trial is None or not isinstance(self.manoeuvre, Turn) or self.record is None:
-            return None
-        time = self.trial.time_s
-        rows = (time >= self.begin_s) & (time <= self.record.end_s)
-        psi = straight_over_gaps(time, self.trial.signals["psi_rad"])[rows]
-        return math.degrees(float(np.max(np.abs(psi - psi[0]))))
-
-    @property
-    def drift(self) -> CircleDrift | None:
-        """The drift of a turn; None of a short one, and of other manoeuvres."""
+    def _of_turn(self, *names: str) -> list[Array] | None:
+        """Times and signals of a recorded turn, without gaps; None for other manoeuvres."""
         if self.trial is None or not isinstance(self.manoeuvre, Turn) or self.record is None:
             return None
         time, signals = self.trial.time_s, self.trial.signals
         rows = (time >= self.begin_s) & (time <= self.record.end_s)
-        values = (straight_over_gaps(time, signals[name])[rows] for name in ("x_m", "y_m", "psi_rad"))
-        return circle_drift(time[rows], *values)
+        return [time[rows], *(straight_over_gaps(time, signals[name])[rows] for name in names)]
+
+    @property
+    def turned_deg(self) -> float | None:
+        """Largest change of heading of a recorded turn; None for other manoeuvres."""
+        if (found := self._of_turn("psi_rad")) is None:
+            return None
+        return math.degrees(float(np.max(np.abs(found[1] - found[1][0]))))
+
+    @property
+    def drift(self) -> CircleDrift | None:
+        """The drift of a turn; None for a short one, and for other manoeuvres."""
+        found = self._of_turn("x_m", "y_m", "psi_rad")
+        return None if found is None else circle_drift(*found)
 
 
 def tried(trial: Trial, model: Model) -> Tried | str:
-    """Recognise a turn, a zigzag or a stop in a record, or say why it is none.
-
-    Parameters
-    ----------
-    trial : Trial
-        At the size of the ship.
-    model : Model
-        Model of the ship.
-    """
+    """The turn, the zigzag or the stop in a record at the size of the ship, or why it is none."""
     stop = _stop(trial, model)
     if isinstance(stop, Tried):
         return stop
@@ -116,28 +92,19 @@ def tried(trial: Trial, model: Model) -> Tried | str:
     if isinstance(found, str):
         return stop or found
     figures, noise = single_figures(found.figures), record_noise(trial)
-    errors = {}
-    for name in figures:
-        read = from_si(name, found.reading_errors.get(name, 0.0))
-        white = noise.get("x_m", 0.0) if name.endswith("_m") else 0.0
-        if name.endswith("_deg"):
-            white = math.degrees(noise.get("psi_rad", 0.0))
-        errors[name] = math.hypot(read, white)
+    white = {"m": noise.get("x_m", 0.0), "deg": math.degrees(noise.get("psi_rad", 0.0))}
+    errors = {
+        name: math.hypot(from_si(name, found.reading_errors.get(name, 0.0)), white.get(name.rpartition("_")[2], 0.0))
+        for name in figures
+    }
     return Tried(trial, found.manoeuvre, found, found.begin_s, found.start["initial.u"], figures, errors)
 
 
 def current_removed(one: Tried, current: Array, error_mps: float, model: Model) -> Tried:
     """The manoeuvre in water that rests: ``x'(t) = x(t) - V_c t`` from the execute on (MSC/Circ.1053, 3.4.2).
 
-    Parameters
-    ----------
-    one : Tried
-    current : array (2,)
-        North and east, m/s.
-    error_mps : float
-        Standard error of each component; it widens the errors of distances by its time.
-    model : Model
-        Model of the ship.
+    `current` (2,): North and east, m/s; `error_mps`: Standard error of each component; it widens the errors of
+    distances by its time.
     """
     if one.trial is None or not {"x_m", "y_m"} <= set(one.trial.signals):
         return one
@@ -147,32 +114,28 @@ def current_removed(one: Tried, current: Array, error_mps: float, model: Model) 
     if isinstance(again, str) or type(again.manoeuvre) is not type(one.manoeuvre):
         return one
     errors = {
-        name: math.hypot(again.errors.get(name, 0.0), error_mps * _known_after(name, again.figures))
+        name: math.hypot(again.errors.get(name, 0.0), error_mps * again.figures.get(_READ_AT.get(name, _STOPPED), 0.0))
         for name in again.figures
         if name.endswith("_m")
     }
     return replace(again, errors={**again.errors, **errors})
 
 
-def _known_after(name: str, figures: Mapping[str, float]) -> float:
-    """Time from the execute at which a distance is read, s."""
-    by = {"advance_m": "time_90_s", "transfer_m": "time_90_s", "tactical_diameter_m": "time_180_s"}
-    by["initial_turning_distance_m"] = "initial_turning_time_s"
-    return figures.get(by.get(name, "time_to_stop_s"), 0.0)
+# Distance to the time from the execute at which it is read
+_READ_AT = {
+    "advance_m": "time_90_s",
+    "transfer_m": "time_90_s",
+    "tactical_diameter_m": "time_180_s",
+    "initial_turning_distance_m": "initial_turning_time_s",
+}
+_STOPPED = "time_to_stop_s"
 
 
 def simulated(one: Tried, integrator: Integrator, weather: Mapping[str, float], values: Mapping[str, float]) -> Numbers:
     """Figures of the manoeuvre by a model from the same approach: in closed loop where it was recorded.
 
-    Parameters
-    ----------
-    one : Tried
-    integrator : Integrator
-        With a :func:`.steerable` ship.
-    weather : mapping
-        Inputs of the model; without any, a calm approach.
-    values : mapping
-        Parameters of the model in place of its own.
+    `integrator`: Of a :func:`.steerable` ship; `weather`: Inputs of the model; without any, a calm approach; `values`:
+    Parameters of the model in place of its own.
     """
     if one.record is not None and weather:
         record = replace(one.record, inputs={**one.record.inputs, **weather})
@@ -181,24 +144,20 @@ def simulated(one: Tried, integrator: Integrator, weather: Mapping[str, float], 
 
 
 def calm_run(one: Tried, integrator: Integrator, speed_mps: float, values: Mapping[str, float]) -> Run:
-    """The same manoeuvre in calm water, from a straight approach at a speed.
-
-    Parameters
-    ----------
-    one : Tried
-    integrator : Integrator
-    speed_mps : float
-    values : mapping
-    """
-    start = {"initial.u": speed_mps}
-    gear = {}
-    if one.record is not None and one.record.rudder_rate_radps is not None:
-        gear = {"steering.max_rate": one.record.rudder_rate_radps}
-    known = {name: value for name, value in {**gear, **values, **start}.items() if name in integrator.model}
+    """The same manoeuvre in calm water, from a straight approach at a speed, with the recorded rate of the rudder."""
+    rate = None if one.record is None else one.record.rudder_rate_radps
+    given = {**({} if rate is None else {"steering.max_rate": rate}), **values, "initial.u": speed_mps}
+    known = {name: value for name, value in given.items() if name in integrator.model}
     manoeuvre = one.manoeuvre
     if isinstance(manoeuvre, Zigzag):
         manoeuvre = replace(manoeuvre, course=None)
     return simulate(integrator.model, manoeuvre, parameters=known, integrator=integrator)
+
+
+def logged_speed(trial: Trial) -> Array | None:
+    """Speed ahead as recorded, m/s, without gaps; None where no row has it."""
+    speed = trial.signals.get("u_mps")
+    return None if speed is None or np.isnan(speed).all() else straight_over_gaps(trial.time_s, speed)
 
 
 def _stop(trial: Trial, model: Model) -> Tried | str:
@@ -214,16 +173,16 @@ def _stop(trial: Trial, model: Model) -> Tried | str:
         straight_over_gaps(time, signals[name]) for name in ("n_radps", "psi_rad", "x_m", "y_m")
     )
     approach = float(np.median(revolutions[: max(3, len(revolutions) // 50)]))
-    slow = np.flatnonzero(revolutions < REVERSED * approach)
-    if approach <= 0 or (len(slow) and slow[0] == 0):
+    slow = revolutions < REVERSED * approach
+    if approach <= 0 or slow[0]:
         return "the engine is stopped or astern in its first rows, before which an approach is needed"
-    if not len(slow):
+    if not slow.any():
         return ""
-    begin = int(slow[0])
+    begin = int(np.argmax(slow))
     velocity = [np.gradient(values, time) for values in place]
     ahead = velocity[0] * np.cos(psi) + velocity[1] * np.sin(psi)
-    if "u_mps" in signals and not np.isnan(signals["u_mps"]).all():
-        ahead = straight_over_gaps(time, signals["u_mps"])
+    if (logged := logged_speed(trial)) is not None:
+        ahead = logged
     steps = max(1, (len(time) - begin) // _SMOOTH)
     speed = float(np.median(ahead[max(0, begin - 5) : begin + 1]))
     still = np.flatnonzero(uniform_filter1d(ahead, steps)[begin:] <= _AT_REST * speed)

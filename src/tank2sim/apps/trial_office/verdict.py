@@ -51,19 +51,9 @@ class CriterionSide:
 class CriterionVerdict:
     """A criterion of MSC.137(76), as run and at full load; values are of the worse side.
 
-    Parameters
-    ----------
-    name, unit : str
-    sides : tuple of CriterionSide
-        Both sides.
-    allowed : float
-        Limit for the ship at full load.
-    as_run, full_load : float or None
-    probability_as_run, probability : float or None
-        Chance of meeting it.
-    verdict_as_run, verdict : str
-        ``pass``, ``fail`` or ``undecided``; ``not tried``; ``undecided, EXTRAPOLATED`` where the formulas for the
-        loading do not hold.
+    `allowed`: limit for the ship at full load; `probability_as_run`, `probability`: chance of meeting it;
+    `verdict_as_run`, `verdict`: ``pass``, ``fail``, ``undecided`` or ``not tried``; ``undecided, EXTRAPOLATED`` where
+    the formulas for the loading do not hold.
     """
 
     name: str
@@ -87,34 +77,25 @@ def judge_criteria(
     *,
     overshoots_hold: bool = True,
 ) -> tuple[CriterionVerdict, ...]:
-    """Verdicts on all criteria of MSC.137(76).
+    """Verdicts on all criteria of MSC.137(76) by manoeuvres as run, without the current, and simulated.
 
-    Parameters
-    ----------
-    card : ManoeuvringCard
-    raw, still : sequence of Tried
-        As run, and without the current.
-    found : sequence of Prediction
-    validity : float
-        Validity of the formulas for the loading.
-    overshoots_hold : bool
-        False for a ship that is stable in one condition and unstable in the other: overshoots are then extrapolated.
+    `validity`: Validity of the formulas for the loading; `overshoots_hold`: False for a ship that is stable in one
+    condition and unstable in the other: overshoots are then extrapolated.
     """
     length = card.ship.length_m
-    by_name: dict[str, str] = {}
-    for trial in manoeuvring_trials(TRIAL_RUDDER):
-        by_name |= trial.criteria
+    asked = {key: (trial, name) for trial in manoeuvring_trials(TRIAL_RUDDER) for key, name in trial.criteria.items()}
     verdicts = []
     for name, allowed in largest_allowed(length / card.model.speed_mps).items():
-        figure = _LENGTHS.get(by_name[name], by_name[name])
-        unit, scale = ("L", length) if by_name[name] in _LENGTHS else ("deg", 1.0)
+        trial, figure = asked[name]
+        unit, scale = ("L", length) if figure in _LENGTHS else ("deg", 1.0)
+        figure = _LENGTHS.get(figure, figure)
         chosen = [
             group
             for group in zip(raw, still, found, strict=True)
-            if figure in group[0].figures and figure in group[1].figures and _is_trial_of(name, group[0])
+            if _shows(figure, *group[:2]) and _is_trial(trial.manoeuvres[0], group[0].manoeuvre)
         ]
         verdict = CriterionVerdict(name=name, unit=unit, allowed=allowed)
-        holds = validity if overshoots_hold or unit == "L" else 0.0
+        holds = validity * (overshoots_hold or unit == "L")
         verdicts.append(_judged(verdict, figure, scale, chosen, holds) if chosen else verdict)
     return tuple(verdicts)
 
@@ -131,18 +112,15 @@ def _judged(
     limit = criterion.allowed * scale
     as_run = _probability(math.log(limit / value), error / value) if value > 0 else 1.0
     loads = [prediction.at_full_load(still, figure) for _, still, prediction in chosen]
-    sides = tuple(
+    sides = [
         CriterionSide(
-            trial=raw.name,
-            side=raw.side,
-            as_run=raw.figures[figure] / scale,
-            full_load=None if load is None else load[0] / scale,
+            trial=raw.name, side=raw.side, as_run=raw.figures[figure] / scale, full_load=load and load[0] / scale
         )
         for (raw, _, _), load in zip(chosen, loads, strict=True)
-    )
+    ]
     judged = replace(
         criterion,
-        sides=sides,
+        sides=tuple(sides),
         as_run=value / scale,
         probability_as_run=as_run,
         verdict_as_run=_verdict(as_run),
@@ -155,9 +133,8 @@ def _judged(
     probability = _probability(math.log(limit) - middle, spread)
     words = _verdict(probability)
     if validity < LOADING_HOLDS:
-        words = f"{'undecided' if words == 'pass' else words}, {EXTRAPOLATED}"
-    at_load = max(centre for centre, _ in known) / scale
-    return replace(judged, full_load=at_load, probability=probability, verdict=words)
+        words = f"{words.replace('pass', 'undecided')}, {EXTRAPOLATED}"
+    return replace(judged, full_load=max(known)[0] / scale, probability=probability, verdict=words)
 
 
 def _worse_side(
@@ -180,22 +157,21 @@ def _worse_side(
     return max((math.log(centre), error) for centre, error in known)
 
 
-def _is_trial_of(criterion: str, one: Tried) -> bool:
-    """Whether a manoeuvre is one of the trials of a criterion, to a degree."""
-    manoeuvre = one.manoeuvre
-    for trial in manoeuvring_trials(TRIAL_RUDDER):
-        if criterion not in trial.criteria:
-            continue
-        asked = trial.manoeuvres[0]
-        if isinstance(asked, Turn):
-            return isinstance(manoeuvre, Turn) and abs(manoeuvre.rudder) >= _NEARLY_OVER
-        if isinstance(asked, Stop):
-            return isinstance(manoeuvre, Stop) and manoeuvre.revolutions != 0
-        close = math.radians(1.5)
-        return isinstance(manoeuvre, Zigzag) and (
-            abs(abs(manoeuvre.rudder) - asked.rudder) < close and abs(manoeuvre.heading - asked.heading) < close
-        )
-    return False
+def _shows(figure: str, *manoeuvres: Tried) -> bool:
+    return all(figure in one.figures for one in manoeuvres)
+
+
+def _is_trial(asked: Turn | Zigzag | Stop, manoeuvre: Turn | Zigzag | Stop) -> bool:
+    """Whether a manoeuvre is the one that a criterion asks for, to a degree."""
+    if type(manoeuvre) is not type(asked):
+        return False
+    if isinstance(manoeuvre, Turn):
+        return abs(manoeuvre.rudder) >= _NEARLY_OVER
+    if isinstance(manoeuvre, Stop):
+        return manoeuvre.revolutions != 0
+    assert isinstance(asked, Zigzag)
+    apart = abs(manoeuvre.rudder) - asked.rudder, manoeuvre.heading - asked.heading
+    return max(map(abs, apart)) < math.radians(1.5)
 
 
 def _probability(distance: float, spread: float) -> float:
