@@ -21,18 +21,10 @@ CONTRADICTED = 4.0
 
 @dataclass(frozen=True)
 class Kinematics:
-    """Contradictions of records in standard errors: root mean square over trials, about 1 if there is none.
+    """Contradictions of records in standard errors: root mean square over trials, about 1 if there is none."""
 
-    Parameters
-    ----------
-    turning : float
-        Integrated yaw rate against the change of heading.
-    track : float
-        Integrated velocities through the water against the change of position.
-    """
-
-    turning: float
-    track: float
+    turning: float  # Integrated yaw rate against the change of heading
+    track: float  # Integrated velocities through the water against the change of position
 
 
 def kinematic_consistency(passed: Sequence[Passed]) -> Kinematics:

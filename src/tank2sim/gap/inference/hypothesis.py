@@ -41,26 +41,13 @@ step of 2.78 time constants (Hairer and Wanner 1996, IV.2), or 2.83/(2 pi) of a 
 
 @dataclass(frozen=True)
 class EstimatedParameter:
-    """A parameter that is estimated.
+    """A parameter that is estimated."""
 
-    Parameters
-    ----------
-    effect : str
-        Name of its effect.
-    parameter : EffectParameter
-    variable : str
-        Variable of the model that holds it.
-    run : int, optional
-        Place of the only trial in which it acts; None for a parameter of all trials.
-    axis : int
-        Part of one trial's wind or current, as `direction_rad` counts: 0 along north, 1 along east, m/s.
-    """
-
-    effect: str
+    effect: str  # Name of its effect
     parameter: EffectParameter
-    variable: str
-    run: int | None = None
-    axis: int = 0
+    variable: str  # Variable of the model that holds it
+    run: int | None = None  # Place of the only trial in which it acts; None for a parameter of all trials
+    axis: int = 0  # Part of one trial's wind or current, as `direction_rad` counts: 0 along north, 1 along east, m/s
 
     @property
     def is_amplitude(self) -> bool:
@@ -70,22 +57,13 @@ class EstimatedParameter:
 
 @dataclass(frozen=True)
 class TrialSurroundings:
-    """Effects whose wind or current is a matter of each trial.
+    """Effects whose wind or current is a matter of each trial."""
 
-    Parameters
-    ----------
-    each : tuple of str
-        Those that differ from trial to trial: two unknowns for each trial, normal about zero with the typical speed of
-        the effect as standard deviation.
-    recorded : tuple of str
-        Those that every trial recorded.
-    runs : int
-        Number of trials, for `each`.
-    """
-
+    # Effects that differ from trial to trial: two unknowns for each trial, normal about zero with the typical speed of
+    # the effect as standard deviation.
     each: tuple[str, ...] = ()
-    recorded: tuple[str, ...] = ()
-    runs: int = 0
+    recorded: tuple[str, ...] = ()  # Effects whose wind or current every trial recorded
+    runs: int = 0  # Number of trials, for `each`
 
 
 @dataclass(frozen=True, eq=False)

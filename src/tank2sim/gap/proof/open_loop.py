@@ -46,33 +46,17 @@ ASTERN = 0.2
 
 @dataclass(frozen=True, eq=False)
 class InputRecord:
-    """A trial on its own rows, thinned to :data:`COARSEST` steps of the model.
+    """A trial on its own rows, thinned to :data:`COARSEST` steps of the model."""
 
-    Parameters
-    ----------
-    name : str
-        Name of the trial.
-    time_s : array (n,)
-        Times of the rows, s, in the trial's own time, however uneven.
-    inputs : array (n, nu)
-        Inputs from each row to the next: means of measured ones, and the order that the row shows. The mean of two
-        orders was never ordered, and a gear at its largest rate responds differently to it.
-    compared : array (m,) of int
-        Rows at which simulated and measured are compared.
-    readings : array (m, ny)
-        Single readings at those rows; nan where there is none.
-    late_s : float
-        Delay of the order by the card, s.
-    instants : array (n,), optional
-        Share of the interval before each row at which the order of the row was given; without it, half.
-    """
-
-    name: str
-    time_s: Array
+    name: str  # Name of the trial
+    time_s: Array  # (n,): Times of the rows, s, in the trial's own time, however uneven
+    # (n, nu): Inputs from each row to the next: means of measured inputs, and the order that the row shows. The mean
+    # of two orders was never ordered, and a gear at its largest rate responds differently to it.
     inputs: Array
-    compared: NDArray[np.intp]
-    readings: Array
-    late_s: float = 0.0
+    compared: NDArray[np.intp]  # (m,): Rows at which simulated and measured are compared
+    readings: Array  # (m, ny): Single readings at those rows; nan where there is none
+    late_s: float = 0.0  # Delay of the order by the card, s
+    # (n,): Share of the interval before each row at which the order of the row was given; without it, half.
     instants: Array | None = None
 
     @property
