@@ -142,9 +142,9 @@ def fit_craft(problem: Problem, progress: SearchReport = silent) -> CraftFit:
     """Estimate the free parameters of a craft with the noise levels.
 
     The compass has a deviation where the estimate by velocities shows one. The search begins at that estimate, which is
-    taken itself where the model does not hold (:attr:`CraftFit.holds`), or where the filter loses a trial. With :data:`FEWEST_TRIALS` the filter searches
-    twice: the second time current, wind and bias of each trial are known beforehand as well as they agreed between
-    trials the first time (empirical Bayes), for they change slowly.
+    taken itself where the model does not hold (:attr:`CraftFit.holds`), or where the filter loses a trial. With
+    :data:`FEWEST_TRIALS` the filter searches twice: the second time current, wind and bias of each trial are known
+    beforehand as well as they agreed between trials the first time (empirical Bayes), for they change slowly.
 
     `problem`: By :func:`.craft_problem`. `progress`: Called with each better estimate.
     """
