@@ -29,6 +29,7 @@ from tank2sim.gap.diagnosis.residuals import (
 from tank2sim.gap.improve_card import Found, at_rest
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.fit_all import StageReport
+from tank2sim.gap.inference.hypothesis import parameter_places
 from tank2sim.gap.inference.prior import candidate_explanations, likelihood_from_card
 from tank2sim.gap.outcome.next_test import Explanation, next_test
 from tank2sim.gap.outcome.notices import gap_notices, of_tried_effects
@@ -349,7 +350,7 @@ def _explanation(card: SteeredCard, found: Search, fit: ExplanationFit) -> Expla
     coefficients = found.likelihood.coefficients
     # An effect may take the place of a parameter: of the gear's time constant, for a lag.
     kept = [place for place, name in enumerate(coefficients.names) if name in fit.hypothesis.model]
-    shared_by_trials = [place for place, estimate in enumerate(fit.hypothesis.estimated) if estimate.run is None]
+    shared_by_trials = parameter_places(fit.hypothesis.estimated)
     variables = [fit.hypothesis.estimated[place].variable for place in shared_by_trials]
     names = (*variables, *(coefficients.names[place] for place in kept))
     shared = coefficients.spread(fit.width)[kept]

@@ -63,7 +63,7 @@ def _contradiction(time: Array, signal: Array, noise: float, rate: Array, rate_n
 
 def readable(replay: Passed) -> tuple[dict[str, Array], dict[str, float]]:
     """The measured signals of a trial, with gaps interpolated, and their noise; names without ``motion.``."""
-    names = {name.removeprefix("motion."): name for name in replay.noise if np.isfinite(replay.measured[name]).any()}
+    names = {name.removeprefix("motion."): name for name in replay.seen}
     return (
         {short: filled(replay.measured[name]) for short, name in names.items()},
         {short: replay.noise[name] for short, name in names.items()},

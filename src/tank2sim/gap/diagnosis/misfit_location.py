@@ -113,9 +113,8 @@ def _misfit_runs(replay: Passed, signal: str) -> list[tuple[int, int, float]]:
 
 def _rates(replay: Passed, columns: Mapping[str, Array]) -> dict[str, Array]:
     """Rates of positions and heading (n,) from velocities and yaw rate, where all of these are measured."""
-    measured_names = {name for name in replay.noise if np.isfinite(replay.measured[name]).any()}
-    rates = {"motion.psi": columns["motion.r"]} if "motion.r" in measured_names else {}
-    if {"motion.u", "motion.v", "motion.psi"} <= measured_names:
+    rates = {"motion.psi": columns["motion.r"]} if "motion.r" in replay.seen else {}
+    if {"motion.u", "motion.v", "motion.psi"} <= set(replay.seen):
         velocity = recorded_earth_velocity(columns["motion.u"], columns["motion.v"], columns["motion.psi"])
         rates |= dict(zip(("motion.x", "motion.y"), velocity, strict=True))
     return rates

@@ -55,6 +55,14 @@ class EstimatedParameter:
         return self.parameter.absent is not None and self.parameter.default is None
 
 
+def parameter_places(
+    estimated: Sequence[EstimatedParameter], effect: str | None = None, *, by_trial: bool = False
+) -> list[int]:
+    """Places of the parameters of an effect, or of all, that act in all trials (`by_trial`: in a single one)."""
+    of_effect = [(place, each) for place, each in enumerate(estimated) if effect is None or each.effect == effect]
+    return [place for place, each in of_effect if (each.run is not None) == by_trial]
+
+
 @dataclass(frozen=True)
 class TrialSurroundings:
     """Effects whose wind or current is a matter of each trial."""
@@ -214,10 +222,8 @@ class Hypothesis:
         return self.model.parameter_values(self._chosen(theta, self.model.parameter_names))
 
     def _chosen(self, theta: Array, names: Sequence[str]) -> dict[str, float]:
-        values = [
-            (estimate, value) for estimate, value in zip(self.estimated, theta, strict=True) if estimate.run is None
-        ]
-        return {estimate.variable: float(value) for estimate, value in values if estimate.variable in names}
+        values = {self.estimated[place].variable: float(theta[place]) for place in parameter_places(self.estimated)}
+        return {variable: value for variable, value in values.items() if variable in names}
 
     @property
     def _given(self) -> tuple[str, ...]:
@@ -235,15 +241,8 @@ class Hypothesis:
 
     def of_each_trial(self, theta: Array) -> dict[str, Array]:
         """Parts along north and east (R, 2), m/s, of each wind or current that differs from trial to trial."""
-        found = {}
-        for name in self.each:
-            places = [
-                place
-                for place, estimate in enumerate(self.estimated)
-                if estimate.effect == name and estimate.run is not None
-            ]
-            found[name] = np.asarray(theta)[places].reshape(-1, 2)
-        return found
+        places = {name: parameter_places(self.estimated, name, by_trial=True) for name in self.each}
+        return {name: np.asarray(theta)[places[name]].reshape(-1, 2) for name in self.each}
 
     def inputs(self, motion: MeasuredBatch, theta: Array, late_s: float = 0.0) -> Array:
         """Inputs of this model at every fine step (R, n - 1, nu), the rudder's order later by `late_s`."""

@@ -179,10 +179,8 @@ def closes_gap(passed: Sequence[Passed], limit: float = CLOSES) -> bool:
     changed = [
         _ratio(replay.misfit("before", name), replay.misfit("after", name))
         for replay in passed
-        for name in replay.noise
-        if np.isfinite(replay.measured[name]).any()
-        and max(replay.misfit("before", name), replay.misfit("after", name)) > REMAINS
-        and _differs(replay, name)
+        for name in replay.seen
+        if max(replay.misfit("before", name), replay.misfit("after", name)) > REMAINS and _differs(replay, name)
     ]
     return bool(changed and np.median(changed) < limit)
 
