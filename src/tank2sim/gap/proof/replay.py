@@ -135,7 +135,7 @@ _REPLAYERS: dict[tuple[str, str, tuple[tuple[str, float], ...]], Replayer] = {}
 
 
 def replayer_of(card: SteeredCard, driven_by: str, noise: Mapping[str, float]) -> Replayer:
-    """The replayer of a card, kept for the next trial; arguments as of :class:`.open_loop.Replayer`."""
+    """The replayer of a card, kept for the next trial; `driven_by` and `noise` as in :class:`.open_loop.Replayer`."""
     key = card.text, driven_by, tuple(noise.items())
     if key not in _REPLAYERS:
         _REPLAYERS.clear()
