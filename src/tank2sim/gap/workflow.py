@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -26,7 +26,7 @@ from tank2sim.gap.diagnosis.residuals import (
     estimates,
     force_lacking,
 )
-from tank2sim.gap.improve_card import at_rest
+from tank2sim.gap.improve_card import Found, at_rest
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.fit_all import StageReport
 from tank2sim.gap.inference.hypothesis import parameter_places
@@ -62,6 +62,7 @@ from tank2sim.identification.trials.problem.problem_from_card import (
     polynomial_over_trials,
 )
 from tank2sim.notices import Notice
+from tank2sim.records.trials import Trial
 from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 
 _Result = TypeVar("_Result")
@@ -230,8 +231,7 @@ def _assemble_gap(prover: Prover, found: Search, judged: Judged, options: GapOpt
     estimated = proof.named.estimated
     box = _begin_black_box(card, proof, replays) if options.black_box else None
     figures_before = _begun(replays, figures, card, (*fitted.trials, *held.trials), proof.results, "before")
-    groups = (corrected(group, sensor_faults(estimated)) or group for group in (fitted, held))
-    faultless = [trial for group in groups for trial in group.trials]
+    faultless = _without_sensor_faults(prover.trials, sensor_faults(estimated))
     figures_after = _begun(replays, figures, proof.improved, faultless, proof.results, "after")
     hidden = could_hide(found, decision.best, enough_to_name(options.false_discovery))
     force = force_lacking(found.likelihood, found.none)
@@ -291,6 +291,11 @@ def _with_black_box(proof: Proof, box: SteeredCard, replays: TrialReplays) -> li
         of_group = [result for result in proof.results if result.held_out == held_out]
         boxed += replays.with_black_box(of_group, box, group) if of_group else []
     return boxed
+
+
+def _without_sensor_faults(groups: Sequence[Measured], sensors: Sequence[Found]) -> list[Trial]:
+    """All trials, without the faults of their sensors."""
+    return [trial for group in groups for trial in (corrected(group, sensors) or group).trials]
 
 
 def _noise(found: Search, best: ExplanationFit, fitted: Measured) -> dict[str, tuple[float, str]]:

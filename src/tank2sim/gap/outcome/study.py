@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -336,7 +337,10 @@ class GapStudy:
         """
         trials = [trial for trial in self.trials if trial.held_out == held_out]
         sets = [trial.misfit if signal is None else trial.signals.get(signal, {}) for trial in trials]
-        measured = [misfits for misfits in sets if misfits]
-        if not measured or not all(version in misfits for misfits in measured):
-            return None
-        return float(np.sqrt(np.mean([misfits[version] ** 2 for misfits in measured])))
+        return _mean_misfit([misfits for misfits in sets if misfits], version)
+
+
+def _mean_misfit(sets: Sequence[Misfits], version: str) -> float | None:
+    if not sets or not all(version in misfits for misfits in sets):
+        return None
+    return float(np.sqrt(np.mean([misfits[version] ** 2 for misfits in sets])))
