@@ -64,11 +64,11 @@ def test_a_right_model_follows_zigzags_of_a_record_of_one_row_a_second(tmp_path:
 def test_the_instants_of_orders_are_found(tmp_path: Path) -> None:
     card, trials, given = written(tmp_path, "model", 1)
     noise = noise_of("model")
-    replayer = Replayer(card, trials.driven_by, list(noise))
-    p, sigma = replayer.model.parameter_values(), np.array(list(noise.values()))
+    replayer = Replayer(card, trials.driven_by, noise)
+    p = replayer.model.parameter_values()
     found, middle = [], []
     for trial in trials.trials:
-        record, _ = replayer.fit_record(input_record(replayer, trial), sigma, p)
+        record, _ = replayer.fit_record(input_record(replayer, trial), p)
         assert record.instants is not None
         order = record.inputs[:, replayer.model.input_names.index("rudder.command")]
         rows = np.flatnonzero(np.abs(np.diff(order)) > 0.01) + 1
@@ -89,14 +89,13 @@ def test_a_beginning_that_the_first_search_loses_is_found_without_steps_of_the_o
     assert isinstance(given, ManoeuvringCard)
     trials = measured([tmp_path / "accel.csv"], given)
     card, noise = polynomial_over_trials(given, trials.trials), noise_of("tanker")
-    replayer = Replayer(card, trials.driven_by, list(noise))
-    p, sigma = replayer.model.parameter_values(), np.array(list(noise.values()))
+    replayer = Replayer(card, trials.driven_by, noise)
+    p = replayer.model.parameter_values()
     record = input_record(replayer, trials.trials[0])
-    lost = replayer.guess_initial_state(record, sigma, p) + 0.01
+    lost = replayer.guess_initial_state(record, p) + 0.01
     monkeypatch.setattr(Replayer, "_least_squares_start", lambda *arguments, **options: (lost, 75.0))
-    found, start = replayer.fit_record(record, sigma, p)
-    away = ((replayer.motion(found, start, p) - record.readings) / sigma)[~np.isnan(record.readings)]
-    assert np.sqrt(np.mean(away**2)) < 1.3
+    found, start = replayer.fit_record(record, p)
+    assert np.sqrt(np.mean(replayer.away(found, start, p) ** 2)) < 1.3
 
 
 def test_many_orders_of_unknown_instant_are_found_where_the_record_as_it_is_misses_the_motion_by_far(
@@ -113,9 +112,9 @@ def test_many_orders_of_unknown_instant_are_found_where_the_record_as_it_is_miss
         polynomial_over_trials(given, trials.trials), [("rudder_backlash", {"width_rad": width}, {})]
     )
     noise = noise_of("model")
-    replayer = Replayer(card, trials.driven_by, list(noise))
-    p, sigma = replayer.model.parameter_values(), np.array(list(noise.values()))
-    _, misfit = replayer._least_squares_start(input_record(replayer, trials.trials[0]), sigma, p, wrong=False)
+    replayer = Replayer(card, trials.driven_by, noise)
+    p = replayer.model.parameter_values()
+    _, misfit = replayer._least_squares_start(input_record(replayer, trials.trials[0]), p, wrong=False)
     assert misfit > 10
     (replay,) = replay_trials(card, card, trials, noise, held_out=False)
     assert replay.misfit("after") < 1.5
@@ -123,11 +122,11 @@ def test_many_orders_of_unknown_instant_are_found_where_the_record_as_it_is_miss
 
 def test_slopes_in_start_and_instants_are_difference_quotients_of_the_whole_motion(tmp_path: Path) -> None:
     card, trials, _ = written(tmp_path, "model", 1)
-    replayer = Replayer(card, trials.driven_by, list(noise_of("model")))
+    replayer = Replayer(card, trials.driven_by, noise_of("model"))
     p, record = replayer.model.parameter_values(), input_record(replayer, trials.trials[0])
     order = record.inputs[:, replayer.model.input_names.index("rudder.command")]
     rows = np.flatnonzero(np.abs(np.diff(order)) > 0.01) + 1
-    start = replayer.guess_initial_state(record, np.array(list(noise_of("model").values())), p)
+    start = replayer.guess_initial_state(record, p)
     shares, reach = np.linspace(0.3, 0.7, len(rows)), np.append(np.full(len(start), 1e-6), np.full(len(rows), 1e-5))
 
     def moved(place: int) -> np.ndarray:
@@ -149,9 +148,9 @@ def test_slopes_in_start_and_instants_are_difference_quotients_of_the_whole_moti
 
 def test_a_motion_that_exceeds_all_bounds_counts_as_one_without_change(tmp_path: Path) -> None:
     card, trials, _ = written(tmp_path, "model", 1)
-    replayer = Replayer(card, trials.driven_by, list(noise_of("model")))
+    replayer = Replayer(card, trials.driven_by, noise_of("model"))
     p, record = replayer.model.parameter_values(), input_record(replayer, trials.trials[0])
-    start = replayer.guess_initial_state(record, np.array(list(noise_of("model").values())), p)
+    start = replayer.guess_initial_state(record, p)
     turning = start + 1e9 * (np.arange(len(start)) == replayer.model.state_names.index("motion.r"))
     found = replayer.slopes_of_motion(record, turning, p)
     assert np.isnan(replayer.motion(record, turning, p)).any()
@@ -182,7 +181,7 @@ def test_a_delay_of_the_record_does_not_hide_the_instants(tmp_path: Path, hertz:
 def test_fine_records_are_taken_as_they_are(tmp_path: Path) -> None:
     card, trials, _ = written(tmp_path, "tanker", 10)
     noise = noise_of("tanker")
-    replayer = Replayer(card, trials.driven_by, list(noise))
-    p, sigma = replayer.model.parameter_values(), np.array(list(noise.values()))
-    record, _ = replayer.fit_record(input_record(replayer, replace(trials.trials[0])), sigma, p)
+    replayer = Replayer(card, trials.driven_by, noise)
+    p = replayer.model.parameter_values()
+    record, _ = replayer.fit_record(input_record(replayer, replace(trials.trials[0])), p)
     assert record.instants is None

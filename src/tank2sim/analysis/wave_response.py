@@ -45,19 +45,16 @@ _SOLVER_FORCES = {"X": ("drift_force_surge", 1.0), "Y": ("drift_force_sway", -1.
 
 @dataclass(frozen=True)
 class HullInWaves:
-    """What the mesh does not show of a hull, and what is to be computed.
+    """What the mesh does not show of a hull, and what is to be computed."""
 
-    `metacentric_height_m`: GM, m; `roll_gyradius_m`, `pitch_gyradius_m`: radii of gyration about the centre of gravity,
-    m; the yaw radius is taken as the pitch radius; `roll_damping`: damping of roll over the critical one, in addition
-    to that by waves; `frequencies_radps`: rising; by default :data:`FREQUENCIES` of them; `directions_deg`: from 0 to
-    180 in equal steps, the direction from which the waves come, clockwise from the bow.
-    """
-
-    metacentric_height_m: float
+    metacentric_height_m: float  # GM, m
+    # `roll_gyradius_m`, `pitch_gyradius_m`: Radii of gyration about the centre of gravity, m; the yaw radius is taken
+    # as the pitch radius.
     roll_gyradius_m: float
     pitch_gyradius_m: float
-    roll_damping: float = ROLL_DAMPING
-    frequencies_radps: Sequence[float] | None = None
+    roll_damping: float = ROLL_DAMPING  # Damping of roll over the critical one, in addition to that by waves
+    frequencies_radps: Sequence[float] | None = None  # Rising; by default :data:`FREQUENCIES` of them
+    # From 0 to 180 in equal steps, the direction from which the waves come, clockwise from the bow.
     directions_deg: Sequence[float] = DIRECTIONS_DEG
 
 

@@ -28,14 +28,11 @@ _WHOLE_LINE = re.compile(REFERENCE_LINE.pattern + r"\n?", re.MULTILINE)
 
 @dataclass(frozen=True, eq=False)
 class Covariance:
-    """Covariance of numbers of a card.
+    """Covariance of numbers of a card."""
 
-    `names`: their k dotted keys in the card's file. `matrix` (k, k): in the conventions of that file. `samples` (n, k):
-    samples of the numbers' joint distribution, in the same conventions; normal without any.
-    """
-
-    names: tuple[str, ...]
-    matrix: Array
+    names: tuple[str, ...]  # Their k dotted keys in the card's file
+    matrix: Array  # (k, k): In the conventions of that file
+    # (n, k): Samples of the numbers' joint distribution, in the same conventions; normal without any.
     samples: Array | None = None
 
     def as_text(self) -> str:

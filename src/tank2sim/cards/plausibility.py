@@ -59,18 +59,13 @@ N_vdot, are not listed."""
 
 @dataclass(frozen=True)
 class Caution:
-    """A warning.
+    """A warning."""
 
-    `kind`: subject, such as ``"frequency parameter"``. `fact`: one sentence, with figures and source. `runs`: the runs
-    concerned; empty for the whole campaign. `missing`: the missing key that prevents the check; empty if the check was
-    made. `remedy`: what to check in the campaign that the numbers are from.
-    """
-
-    kind: str
-    fact: str
-    runs: tuple[str, ...] = ()
-    missing: str = ""
-    remedy: str = ""
+    kind: str  # Subject, such as ``"frequency parameter"``
+    fact: str  # One sentence, with figures and source
+    runs: tuple[str, ...] = ()  # The runs concerned; empty for the whole campaign
+    missing: str = ""  # The missing key that prevents the check; empty if the check was made
+    remedy: str = ""  # What to check in the campaign that the numbers are from
 
     @property
     def message(self) -> str:

@@ -42,17 +42,14 @@ def motion_columns(motion: str) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class WaveTable:
-    """The table by frequency and direction.
+    """The table by frequency and direction."""
 
-    `frequencies` (nf,): rising, rad/s. `directions` (nd,): 0 to pi, rad, evenly spaced. `motions`: motion to complex
-    amplitude (nf, nd) over the wave amplitude: the real part is in phase with the surface at midships, a positive
-    imaginary one leads it. `drift`: ``X``, ``Y``, ``N`` to mean force over the square of the wave's amplitude, (nf,
-    nd), N/m^2 and N/m.
-    """
-
-    frequencies: Array
-    directions: Array
+    frequencies: Array  # (nf,): Rising, rad/s
+    directions: Array  # (nd,): 0 to pi, rad, evenly spaced
+    # Motion to complex amplitude (nf, nd) over the wave amplitude: the real part is in phase with the surface at
+    # midships, a positive imaginary one leads it.
     motions: Mapping[str, Array]
+    # ``X``, ``Y``, ``N`` to mean force over the square of the wave's amplitude, (nf, nd), N/m^2 and N/m.
     drift: Mapping[str, Array]
 
 

@@ -47,23 +47,18 @@ class DerivativeEntry(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class ManoeuvringResult:
-    """Contents of a card of a manoeuvring ship: prime, instantaneous, "hydrodynamic", starboard-positive.
+    """Contents of a card of a manoeuvring ship: prime, instantaneous, "hydrodynamic", starboard-positive."""
 
-    `particulars`: keys of ``[ship]`` but source and notes; SI. `source`, `notes`: where the numbers come from, and what
-    a reader should know. `environment`: keys of ``[environment]``, SI. `speed_mps`: u0, about which the forces are
-    expanded. `largest`: how far the tests went. `rigid_body`: ``mass``, ``yaw_inertia``, ``x_G``. `inertia_source`:
-    where the yaw inertia is from. `derivatives`: canonical name to entry, in the order of the card.
-    """
-
-    particulars: Mapping[str, float | str]
+    particulars: Mapping[str, float | str]  # Keys of ``[ship]`` but source and notes; SI
+    # `source`, `notes`: Where the numbers come from, and what a reader should know.
     source: str
     notes: str
-    environment: Mapping[str, float]
-    speed_mps: float
-    largest: TestedRange
-    rigid_body: Mapping[str, float]
-    inertia_source: str
-    derivatives: Mapping[str, DerivativeEntry]
+    environment: Mapping[str, float]  # Keys of ``[environment]``, SI
+    speed_mps: float  # U0, about which the forces are expanded
+    largest: TestedRange  # Largest motions that were tested
+    rigid_body: Mapping[str, float]  # ``mass``, ``yaw_inertia``, ``x_G``
+    inertia_source: str  # Where the yaw inertia is from
+    derivatives: Mapping[str, DerivativeEntry]  # Canonical name to entry, in the order of the card
 
 
 def manoeuvring_card_text(result: ManoeuvringResult) -> str:

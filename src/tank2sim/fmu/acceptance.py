@@ -32,14 +32,11 @@ _TITLES = {"zigzag_20_20": "Zigzag 20/20", "turn_35": "Turning circle, rudder 35
 
 @dataclass(frozen=True)
 class AcceptanceResult:
-    """The model's own answers to standard manoeuvres.
-
-    `reference`: None if the motion leaves all bounds. `manoeuvres`: standard manoeuvres of a ship, by name.
-    """
+    """The model's own answers to standard manoeuvres."""
 
     model: Model
-    reference: ReferenceRun | None
-    manoeuvres: Mapping[str, Run]
+    reference: ReferenceRun | None  # The reference run; None if the motion leaves all bounds
+    manoeuvres: Mapping[str, Run]  # Standard manoeuvres of a ship, by name
 
     def reference_files(self) -> dict[str, str]:
         """Name in the FMU to text of the reference result."""

@@ -39,21 +39,14 @@ other mathematical libraries make of the last bits; float loses 6e-6 on the bund
 
 @dataclass(frozen=True, kw_only=True)
 class PlainShip:
-    """A ship in plain C99.
+    """A ship in plain C99."""
 
-    `prefix`: with which each public name begins; macros and enumerators have it in capitals. `files`: name to text of
-    ``ship.h``, ``ship.c`` and ``self_test.c``. `counts`: ``states``, ``inputs``, ``outputs``, ``parameters``,
-    ``constants`` to their number. `operations`: kind of operation to how many of them an internal step has. `work`:
-    local numbers of the function that has most. `use`: how the files are compiled and called, and what they need, in
-    Markdown.
-    """
-
-    prefix: str
-    files: dict[str, str]
-    counts: dict[str, int]
-    operations: dict[str, int]
-    work: int
-    use: str
+    prefix: str  # Beginning of each public name; macros and enumerators have it in capitals
+    files: dict[str, str]  # Name to text of ``ship.h``, ``ship.c`` and ``self_test.c``
+    counts: dict[str, int]  # ``states``, ``inputs``, ``outputs``, ``parameters``, ``constants`` to their number
+    operations: dict[str, int]  # Kind of operation to its number in an internal step
+    work: int  # Largest number of local numbers in a function
+    use: str  # How the files are compiled and called, and what they need, in Markdown
 
     def instance_bytes(self, *, single: bool = False) -> int:
         """Size of an instance."""

@@ -19,15 +19,12 @@ Pattern = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Unknown:
-    """A variable and those it depends on.
+    """A variable and those it depends on."""
 
-    `reference`: value reference of the variable. `dependencies`: value references of what it depends on, ascending.
-    `kinds`: for each, FMI's dependenciesKind: ``constant`` (a constant factor), ``fixed`` and ``tunable`` (a factor
-    that only parameters determine), else ``dependent``.
-    """
-
-    reference: int
-    dependencies: tuple[int, ...]
+    reference: int  # Value reference of the variable
+    dependencies: tuple[int, ...]  # Value references of what it depends on, ascending
+    # For each, FMI's dependenciesKind: ``constant`` (a constant factor), ``fixed`` and ``tunable`` (a factor that only
+    # parameters determine), else ``dependent``.
     kinds: tuple[str, ...]
 
 

@@ -27,17 +27,12 @@ _STRUCTURED_NAME = re.compile(r"[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\
 
 @dataclass(frozen=True, kw_only=True)
 class FmuVariable:
-    """A variable of the FMU.
-
-    `reference`: value reference, which is also its place in the list of all variables. `causality`, `variability`,
-    `initial`: as FMI defines them; `initial` empty where FMI wants none. `start`: start value in `unit`; None where it
-    is calculated. `derivative_of`: value reference of the state whose time derivative this is. `accepted`:
-    lowest and highest value that an input may be set to; None: minimum and maximum.
-    """
+    """A variable of the FMU."""
 
     name: str
-    reference: int
+    reference: int  # Value reference, which is also its place in the list of all variables
     description: str
+    # `causality`, `variability`, `initial`: As FMI defines them; `initial` empty where FMI wants none.
     causality: str
     variability: str
     initial: str = ""
@@ -46,9 +41,10 @@ class FmuVariable:
     nominal: float = 1.0
     minimum: float | None = None
     maximum: float | None = None
-    start: float | None = None
+    start: float | None = None  # Start value in `unit`; None where it is calculated
     boolean: bool = False
-    derivative_of: int | None = None
+    derivative_of: int | None = None  # Value reference of the state whose time derivative this is
+    # Lowest and highest value that an input may be set to; None: minimum and maximum.
     accepted: tuple[float, float] | None = None
 
     @property

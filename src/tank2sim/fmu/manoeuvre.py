@@ -27,13 +27,10 @@ _STAGGER = 0.02
 
 @dataclass(frozen=True)
 class InputSequence:
-    """Inputs at communication points.
+    """Inputs at communication points."""
 
-    `times` (K + 1,): communication points from 0, s. `inputs` (K, nu): inputs held from each point to the next.
-    """
-
-    times: Array
-    inputs: Array
+    times: Array  # (K + 1,): Communication points from 0, s
+    inputs: Array  # (K, nu): Inputs held from each point to the next
 
     def pieces(self) -> list[tuple[int, int]]:
         """Stretches of communication steps, first and behind last, over which no input changes."""

@@ -42,18 +42,14 @@ class PassportCoefficient:
 
 @dataclass(frozen=True, kw_only=True)
 class Replay:
-    """Answer of the FMU's library to its own reference run, in Co-Simulation on the machine that wrote it.
+    """Answer of the FMU's library to its own reference run, in Co-Simulation on the machine that wrote it."""
 
-    `run`: what was done; empty if there is no reference run. `platform`: folder of the library that was run; empty if
-    it was not run. `max_error`: largest error of an output, relative to the larger of its range in the run and its
-    nominal value. `output`: the output with that error. `problem`: why there is no error to show.
-    """
-
-    run: str = ""
-    platform: str = ""
+    run: str = ""  # What was done; empty if there is no reference run
+    platform: str = ""  # Folder of the library that was run; empty if it was not run
+    # Largest error of an output, relative to the larger of its range in the run and its nominal value.
     max_error: float | None = None
-    output: str = ""
-    problem: str = ""
+    output: str = ""  # The output with that error
+    problem: str = ""  # Why there is no error to show
 
 
 @dataclass(frozen=True, kw_only=True)

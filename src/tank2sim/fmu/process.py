@@ -37,15 +37,11 @@ class Drive:
 
 @dataclass(frozen=True, kw_only=True)
 class ProcessResult:
-    """Results of such a run.
+    """Results of such a run."""
 
-    `parameters` (np,): their values after instantiation, None if it did not come so far. `outputs` (K + 1, ny): at the
-    communication points, None if it did not come so far. `problem`: what went wrong, in one line; empty if nothing.
-    """
-
-    parameters: Array | None = None
-    outputs: Array | None = None
-    problem: str = ""
+    parameters: Array | None = None  # (np,): Values after instantiation; None if it did not come so far
+    outputs: Array | None = None  # (K + 1, ny): Values at the communication points; None if it did not come so far
+    problem: str = ""  # What went wrong, in one line; empty if nothing
 
 
 def drive_apart(unpacked: UnpackedFmu, drive: Drive) -> ProcessResult:

@@ -44,17 +44,14 @@ _SHIP = ("rudder.command", "motion.psi", "ship.length", "ship.speed", "ship.slow
 
 @dataclass(frozen=True)
 class ReferenceRun:
-    """A run, and the answer to it.
+    """A run, and the answer to it."""
 
-    `title`: what is done. `run`: communication points and inputs. `input_names`, `output_names`: the columns of the
-    inputs and outputs. `outputs` (K + 1, ny): at the communication points.
-    """
-
-    title: str
-    run: InputSequence
+    title: str  # What is done
+    run: InputSequence  # Communication points and inputs
+    # `input_names`, `output_names`: Names of the columns of the inputs and outputs.
     input_names: tuple[str, ...]
     output_names: tuple[str, ...]
-    outputs: Array
+    outputs: Array  # (K + 1, ny): Values at the communication points
 
     def files(self) -> dict[str, str]:
         """Name in the FMU to the text of its CSV files; 13 digits, so that what is read back differs by 1e-13."""

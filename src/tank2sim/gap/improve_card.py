@@ -141,16 +141,11 @@ def _changed(card: SteeredCard, changes: Mapping[str, Change]) -> SteeredCard:
     text = card.text
     for comment, group in groupby(sorted(changes.items(), key=_comment), key=_comment):
         text = changed_text(text, card.source, {key: value for key, (value, _) in group}, comment=comment)
-    return _parsed(card, text)
+    return parse_card(text, card.source).steered()
 
 
 def _comment(change: tuple[str, Change]) -> str:
     return change[1][1]
-
-
-def _parsed(card: SteeredCard, text: str) -> SteeredCard:
-    new = parse_card(text, card.source)
-    return new.steered()
 
 
 def _document(card: SteeredCard) -> tomlkit.TOMLDocument:
@@ -269,7 +264,7 @@ def _with_entry(card: SteeredCard, name: str, values: Mapping[str, float], error
     else:  # effects = [{...}]
         document["effects"].append(entry.unwrap())
     mark = BYTE_ORDER_MARK if card.text.startswith(BYTE_ORDER_MARK) else ""
-    return _parsed(card, mark + tomlkit.dumps(document))
+    return parse_card(mark + tomlkit.dumps(document), card.source).steered()
 
 
 def _with_particulars(card: SteeredCard, name: str, values: Mapping[str, float]) -> SteeredCard:

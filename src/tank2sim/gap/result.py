@@ -204,6 +204,11 @@ class Passed:
     after: Mapping[str, Array]
     black_box: Mapping[str, Array] = field(default_factory=dict)
 
+    @property
+    def seen(self) -> tuple[str, ...]:
+        """The variables of which at least one reading was measured."""
+        return tuple(name for name in self.noise if np.isfinite(self.measured[name]).any())
+
     def misfit(self, version: str, variable: str | None = None) -> float:
         """Root mean square of (simulated - measured)/noise of one variable, or of all: 1 is noise.
 

@@ -29,6 +29,7 @@ from tank2sim.gap.diagnosis.residuals import (
 from tank2sim.gap.improve_card import Found, at_rest
 from tank2sim.gap.inference.fit import ExplanationFit
 from tank2sim.gap.inference.fit_all import StageReport
+from tank2sim.gap.inference.hypothesis import parameter_places
 from tank2sim.gap.inference.prior import candidate_explanations, likelihood_from_card
 from tank2sim.gap.outcome.next_test import Explanation, next_test
 from tank2sim.gap.outcome.notices import gap_notices, of_tried_effects
@@ -229,10 +230,9 @@ def _assemble_gap(prover: Prover, found: Search, judged: Judged, options: GapOpt
     decision, proof = judged.decision, judged.proof
     estimated = proof.named.estimated
     box = _begin_black_box(card, proof, replays) if options.black_box else None
-    sensors, every = sensor_faults(estimated), (*fitted.trials, *held.trials)
-    figures_before = _begun(replays, figures, card, every, proof.results, "before")
-    corrected_trials = _after(every, fitted, held, sensors)
-    figures_after = _begun(replays, figures, proof.improved, corrected_trials, proof.results, "after")
+    figures_before = _begun(replays, figures, card, (*fitted.trials, *held.trials), proof.results, "before")
+    faultless = _without_sensor_faults(prover.trials, sensor_faults(estimated))
+    figures_after = _begun(replays, figures, proof.improved, faultless, proof.results, "after")
     hidden = could_hide(found, decision.best, enough_to_name(options.false_discovery))
     force = force_lacking(found.likelihood, found.none)
     agreement = each_trial(found.likelihood, decision.best) if estimated else {}
@@ -293,9 +293,9 @@ def _with_black_box(proof: Proof, box: SteeredCard, replays: TrialReplays) -> li
     return boxed
 
 
-def _after(every: Sequence[Trial], fitted: Measured, held: Measured, sensors: Sequence[Found]) -> Sequence[Trial]:
-    groups = (corrected(group, sensors) or group for group in (fitted, held))
-    return [trial for group in groups for trial in group.trials] if sensors else every
+def _without_sensor_faults(groups: Sequence[Measured], sensors: Sequence[Found]) -> list[Trial]:
+    """All trials, without the faults of their sensors."""
+    return [trial for group in groups for trial in (corrected(group, sensors) or group).trials]
 
 
 def _noise(found: Search, best: ExplanationFit, fitted: Measured) -> dict[str, tuple[float, str]]:
@@ -349,7 +349,7 @@ def _explanation(card: SteeredCard, found: Search, fit: ExplanationFit) -> Expla
     coefficients = found.likelihood.coefficients
     # An effect may take the place of a parameter: of the gear's time constant, for a lag.
     kept = [place for place, name in enumerate(coefficients.names) if name in fit.hypothesis.model]
-    shared_by_trials = [place for place, estimate in enumerate(fit.hypothesis.estimated) if estimate.run is None]
+    shared_by_trials = parameter_places(fit.hypothesis.estimated)
     variables = [fit.hypothesis.estimated[place].variable for place in shared_by_trials]
     names = (*variables, *(coefficients.names[place] for place in kept))
     shared = coefficients.spread(fit.width)[kept]

@@ -31,18 +31,12 @@ _FIRST_HEADING = ("initial_turning_time_s", "initial_turning_distance_m", "initi
 
 @dataclass(frozen=True)
 class CardRangeReading:
-    """Figures of a run, with their times and the exit from the card's range.
+    """Figures of a run, with their times and the exit from the card's range."""
 
-    `figures`: Figure by name with unit; entries of a list have separate names (``overshoot_1_deg``). `read_s`: Time at
-    which each is known, s from the order; the end of the run for absent names. `exit_s`: Time at which the output
-    ``validity`` first falls below 1; None if it does not. `how`: The quantities that leave the range, with both ranges,
-    or else what effects do not hold for.
-    """
-
-    figures: Numbers
-    read_s: Numbers
-    exit_s: float | None = None
-    how: str = ""
+    figures: Numbers  # Figure by name with unit; entries of a list have separate names (``overshoot_1_deg``)
+    read_s: Numbers  # Time at which each figure is known, s from the order; the end of the run for absent names
+    exit_s: float | None = None  # Time at which the output ``validity`` first falls below 1; None if it does not
+    how: str = ""  # The quantities that leave the range, with both ranges, or else what effects do not hold for
 
     def outside(self, name: str) -> bool:
         """True if the run had left the card's range before this figure was known."""

@@ -47,25 +47,20 @@ class Events:
 
 @dataclass(frozen=True, eq=False)
 class KeptRuns:
-    """What the figures of n runs need: one run with all its samples, or many with few samples kept.
+    """What the figures of n runs need: one run with all its samples, or many with few samples kept."""
 
-    `length`, `end`, `way` (n,): lengths of the ships, m; times of the ends, s; lengths of the tracks, m.
-    `speeds` (n, 4): first, lowest, highest and last, m/s.
-    `then` (n, 2): yaw rate and speed two lengths before the end, nan in shorter runs.
-    `first`, `last`: a state (n,) at the execute; a state or ``motion.beta`` (n,) at the end.
-    `crossings`: of a level (n,) by a state with this time derivative, the first or second that is watched (0, 1).
-    `executes`: orders of the rudder to the other side, this time (s) before it moves.
-    """
-
+    # `length`, `end`, `way` (n,): Lengths of the ships, m; times of the ends, s; lengths of the tracks, m.
     length: Array
     end: Array
     way: Array
-    speeds: Array
-    then: Array
+    speeds: Array  # (n, 4): First, lowest, highest and last, m/s
+    then: Array  # (n, 2): Yaw rate and speed two lengths before the end, nan in shorter runs
+    # `first`, `last`: A state (n,) at the execute; a state or ``motion.beta`` (n,) at the end.
     first: Callable[[str], Array]
     last: Callable[[str], Array]
+    # Crossings of a level (n,) by a state with this time derivative, the first or second that is watched (0, 1).
     crossings: Callable[[str, str, Array, int], Events]
-    executes: Callable[[float], Events]
+    executes: Callable[[float], Events]  # Orders of the rudder to the other side, this time (s) before it moves
 
 
 def whole_run(run: Trajectory, length: float, end_s: float | None = None) -> KeptRuns:

@@ -67,19 +67,15 @@ LEAVING = 0.05
 
 @dataclass(frozen=True)
 class HeldAngle:
-    """A rudder angle that was held.
+    """A rudder angle that was held."""
 
-    `angle`: The angle reached, rad, positive to starboard. `execute_s`: Time of the order where the record has it,
-    before the first row that shows it (:func:`.order_instants`), else the start of the rudder's motion.
-    `moves_s`: Start of the rudder's motion; the execute where only the order is known. `rate`: Rate of the rudder,
-    rad/s; None where only the order is known. `end_s`: Time until which it was held.
-    """
-
-    angle: float
+    angle: float  # The angle reached, rad, positive to starboard
+    # Time of the order where the record has it, before the first row that shows it (:func:`.order_instants`), else the
+    # start of the rudder's motion.
     execute_s: float
-    moves_s: float
-    rate: float | None
-    end_s: float
+    moves_s: float  # Start of the rudder's motion; the execute where only the order is known
+    rate: float | None  # Rate of the rudder, rad/s; None where only the order is known
+    end_s: float  # Time until which it was held
 
 
 def held_rudders(trial: Trial) -> list[HeldAngle]:

@@ -23,23 +23,18 @@ _CHUNK = 256  # steps between searches for an event: long enough for efficient m
 
 @dataclass(frozen=True)
 class SwitchingPlan:
-    """Two orders that take turns, each until a state reaches its level.
+    """Two orders that take turns, each until a state reaches its level."""
 
-    `orders` (mapping, mapping): Inputs by name at the execute, and after the first change. `state`: The state at a
-    level of which the order changes. `levels`: Levels at which the orders end, beyond `of_start` times the state at the
-    start. `side`: 1 or -1: whether the state rises or falls to its first level; then it falls or rises to the other,
-    and so on. `changes`: Changes of order at which a run ends; 0: the first order is held to the end; None: no limit.
-    `longest`: Longest run without a given duration, L/u0. `wait_s`, `lag_s`: Time from each order to the movement of
-    the rudder, and from reaching a level to the order.
-    """
-
+    # Inputs by name at the execute, and after the first change.
     orders: tuple[Mapping[str, float], Mapping[str, float]]
-    state: str
-    levels: tuple[float, float]
+    state: str  # The state at a level of which the order changes
+    levels: tuple[float, float]  # Levels at which the orders end, beyond `of_start` times the state at the start
+    # 1 or -1: whether the state rises or falls to its first level; then it falls or rises to the other, and so on.
     side: float
-    changes: int | None
-    longest: float
+    changes: int | None  # Changes of order at which a run ends; 0: the first order is held to the end; None: no limit
+    longest: float  # Longest run without a given duration, L/u0
     of_start: float = 1.0
+    # `wait_s`, `lag_s`: Time from each order to the movement of the rudder, and from reaching a level to the order.
     wait_s: float = 0.0
     lag_s: float = 0.0
 

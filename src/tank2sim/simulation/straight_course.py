@@ -16,11 +16,9 @@ _TRIM_ACCURACY = 1e-13  # of the change in a Newton step, relative to the nomina
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """Operating point of a linearisation.
+    """Operating point of a linearisation."""
 
-    `x`, `u`, `p` (nx,), (nu,), (np,): States, inputs and parameters of the model.
-    """
-
+    # `x`, `u`, `p` (nx,), (nu,), (np,): States, inputs and parameters of the model.
     x: Array
     u: Array
     p: Array

@@ -83,17 +83,13 @@ class EventSamples:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """A simulated motion, sampled at every integration step and at every event.
+    """A simulated motion, sampled at every integration step and at every event."""
 
-    `model`: The simulated model. `t` (n,): Time, s, rising. `x` (n, nx): States. `u` (n, nu): Inputs; a row is valid
-    from its time until the next. `y` (n, ny): Outputs.
-    """
-
-    model: Model
-    t: Array
-    x: Array
-    u: Array
-    y: Array
+    model: Model  # The simulated model
+    t: Array  # (n,): Time, s, rising
+    x: Array  # (n, nx): States
+    u: Array  # (n, nu): Inputs; a row is valid from its time until the next
+    y: Array  # (n, ny): Outputs
 
     def __getitem__(self, name: str) -> Array:
         """A state, output or input (n,), by its name."""

@@ -44,16 +44,14 @@ ASTRAY = 0.2
 
 @dataclass(frozen=True, eq=False)
 class FittedZigzag:
-    """A zigzag as it fits the reversals of a record.
-
-    `errors`: Standard errors of the fit: ``heading_rad``, ``course_rad``, ``lag_s``. `reading_errors`: Standard errors
-    of figures by that of the course and of the reversals: rad for overshoots, s for times. `late_by` (k,): Heading
-    beyond the manoeuvre's at which each reversal was made, rad: 0 for a controller, a helmsman's scatter.
-    """
+    """A zigzag as it fits the reversals of a record."""
 
     manoeuvre: Zigzag
-    errors: dict[str, float]
+    errors: dict[str, float]  # Standard errors of the fit: ``heading_rad``, ``course_rad``, ``lag_s``
+    # Standard errors of figures by that of the course and of the reversals: rad for overshoots, s for times.
     reading_errors: dict[str, float]
+    # (k,): Heading beyond the manoeuvre's at which each reversal was made, rad: 0 for a controller, a helmsman's
+    # scatter.
     late_by: Array
 
     def from_reversals(self, figures: Figures) -> Figures:
@@ -128,18 +126,16 @@ class _Fit:
 
 @dataclass(frozen=True, eq=False)
 class _Reversals:
-    """Least-squares problem of the reversals of a zigzag.
+    """Least-squares problem of the reversals of a zigzag."""
 
-    `time`, `heading` (n,): s, rad. `times`, `sides` (k,): Time of each reversal's order, and the side of the rudder
-    before it. `approach`: Course by the approach, and its standard error, rad. `lag_scale`: Prior scale of lags, s.
-    """
-
+    # `time`, `heading` (n,): Instants, s, and headings, rad.
     time: Array
     heading: Array
+    # `times`, `sides` (k,): Time of each reversal's order, and the side of the rudder before it.
     times: Array
     sides: Array
-    approach: tuple[float, float]
-    lag_scale: float
+    approach: tuple[float, float]  # Course by the approach, and its standard error, rad
+    lag_scale: float  # Prior scale of lags, s
 
     def late_by(self, manoeuvre: Zigzag, noise: float) -> tuple[Array, float]:
         """Headings beyond a zigzag's at which the reversals were made (k,), rad, and their share of what was read.

@@ -22,20 +22,19 @@ class Weather:
 
     The defaults are project choices for a ship of 160 m on a northerly course: a fresh breeze (Beaufort 5) and its sea
     on the bow, and a knot of current across.
-
-    `wave_yaw_rad`: standard deviation of the heading that the waves alone give the ship at their frequency;
-    `wave_radps`, `wave_damping`: frequency of encounter, and relative damping of the shaping filter: 0.1 for a narrow
-    band (Fossen 2011, 8.2); `seed`: seed of the noise that drives the filter.
     """
 
     current_mps: float = 0.5
     current_towards_rad: float = math.radians(90.0)
     wind_mps: float = 10.0
     wind_from_rad: float = math.radians(45.0)
+    # Standard deviation of the heading that the waves alone give the ship at their frequency.
     wave_yaw_rad: float = math.radians(0.2)
+    # `wave_radps`, `wave_damping`: Frequency of encounter, and relative damping of the shaping filter: 0.1 for a narrow
+    # band (Fossen 2011, 8.2).
     wave_radps: float = 0.6
     wave_damping: float = 0.1
-    seed: int = 1
+    seed: int = 1  # Seed of the noise that drives the filter
 
 
 def weather_for(length_m: float, **given: float | None) -> Weather:

@@ -46,25 +46,21 @@ class AutopilotExport:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PilotStudy:
-    """A controller and its runs, by rudder or by thrusters.
+    """A controller and its runs, by rudder or by thrusters."""
 
-    `ship`, `source`: name of the ship, and how the controller was found, in a sentence; `gains`: figures of the
-    controller by name with their unit; `weather`: fields of :class:`.Weather`, angles in degrees; `track`: figures of
-    the track by guidance (``line of sight``, ``with integral``); empty without waypoints; `waypoints_m` (n, 2): north
-    and east; empty without a track; `histories`, `track_histories`: columns to draw by run, and by guidance; `export`:
-    the controller as an FMU, if one was made.
-    """
-
+    # `ship`, `source`: Name of the ship, and how the controller was found, in a sentence.
     ship: str
     source: str
-    gains: dict[str, float]
-    weather: dict[str, float]
+    gains: dict[str, float]  # Figures of the controller by name with their unit
+    weather: dict[str, float]  # Fields of :class:`.Weather`, angles in degrees
+    # Figures of the track by guidance (``line of sight``, ``with integral``); empty without waypoints.
     track: dict[str, TrackKeeping]
-    waypoints_m: Array
+    waypoints_m: Array  # (n, 2): North and east; empty without a track
+    # `histories`, `track_histories`: Columns to draw by run, and by guidance.
     histories: dict[str, Columns]
     track_histories: dict[str, Columns]
     notices: tuple[Notice, ...]
-    export: AutopilotExport | None = None
+    export: AutopilotExport | None = None  # The controller as an FMU, if one was made
 
 
 @dataclass(frozen=True, eq=False)

@@ -82,15 +82,11 @@ class CoefficientRow:
 
 @dataclass(frozen=True)
 class Expansion:
-    """A card's coefficients in the convention of another.
+    """A card's coefficients in the convention of another."""
 
-    `coefficients`: name to coefficient; terms that the model lacks are absent; `refused`: name to the reason that
-    prevents a comparison; `notes`: what was converted.
-    """
-
-    coefficients: Mapping[str, CardCoefficient]
-    refused: Mapping[str, str]
-    notes: tuple[Notice, ...]
+    coefficients: Mapping[str, CardCoefficient]  # Name to coefficient; terms that the model lacks are absent
+    refused: Mapping[str, str]  # Name to the reason that prevents a comparison
+    notes: tuple[Notice, ...]  # What was converted
 
 
 def compare_coefficients(cards: Sequence[SteeredCard]) -> tuple[tuple[CoefficientRow, ...], tuple[Notice, ...]]:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tank2sim.apps.logs.voyage import Voyage
-from tank2sim.arrays import Array, Number
+from tank2sim.arrays import Array, Number, true_runs
 
 _BLOCKS = 8
 """Parts of a record for the jackknife (project choice: each has movements of its own in a minute or two)."""
@@ -223,10 +223,9 @@ def _limit(time_s: Array, angle: Array, side: float) -> GearLimit | None:
         if largest <= _MOVE:
             return None
         there = np.abs(sided - largest) <= _STOP
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], there.astype(int), [0]])))
-        for begin, end in zip(edges[::2], edges[1::2], strict=True):
-            if time_s[end - 1] - time_s[begin] >= _STOP_S:
-                held = angle[begin:end]
+        for run in true_runs(there):
+            if time_s[run.stop - 1] - time_s[run.start] >= _STOP_S:
+                held = angle[run]
                 return GearLimit(
                     angle_deg=math.degrees(float(np.median(held))),
                     standard_error_deg=max(math.degrees(float(np.std(held))), _resolution_deg(angle)),

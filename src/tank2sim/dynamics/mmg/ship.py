@@ -123,14 +123,11 @@ def is_symmetric(card: MmgCard) -> bool:
 
 @dataclass(frozen=True)
 class Side:
-    """One propeller with its rudder.
+    """One propeller with its rudder."""
 
-    `suffix`: ending of its quantities: empty, or ``_right`` and ``_left`` if there are two. `mirror`: 1, or -1 for the
-    left one. `y_P`, `y_R`: their places over L, positive to starboard.
-    """
-
-    suffix: str
-    mirror: float
+    suffix: str  # Ending of its quantities: empty, or ``_right`` and ``_left`` if there are two
+    mirror: float  # 1, or -1 for the left one
+    # `y_P`, `y_R`: Places of propeller and rudder over L, positive to starboard.
     y_P: float
     y_R: float
 
@@ -145,12 +142,9 @@ def sides(card: MmgCard) -> tuple[Side, ...]:
 
 @dataclass(frozen=True)
 class MmgShip:
-    """The symbols of a ship by the method.
+    """The symbols of a ship by the method."""
 
-    `hull`: symbols of all variables, scales and speed.
-    """
-
-    hull: Hull
+    hull: Hull  # Symbols of all variables, scales and speed
     sides: tuple[Side, ...]
 
     @cached_property

@@ -22,33 +22,25 @@ Rates = Callable[[Mapping[str, ca.SX], ca.SX, ca.SX, ca.SX], tuple[ca.SX, ca.SX]
 
 @dataclass(frozen=True, kw_only=True)
 class SteeringCoefficient:
-    """A coefficient of a steering model, without unit.
+    """A coefficient of a steering model, without unit."""
 
-    `name`: as in a card: ``C_y_b`` for the paper's C_y^beta. `description`: what it multiplies, and with which sign.
-    `default`: its value where a card gives none; without one the card must give it.
-    """
-
-    name: str
-    description: str
-    default: float | None = None
+    name: str  # As in a card: ``C_y_b`` for the paper's C_y^beta
+    description: str  # What it multiplies, and with which sign
+    default: float | None = None  # Its value where a card gives none; without one the card must give it
 
 
 @dataclass(frozen=True, kw_only=True)
 class SteeringForm:
-    """The equations of one steering model, and what of it is not published.
+    """The equations of one steering model, and what of it is not published."""
 
-    `name`, `title`: key in the catalogue; words for a reader. `source`: the source of the equations. `coefficients`: in
-    the order of the paper's tables, Y first. `rates`: the equations (:data:`Rates`). `static_moment`,
-    `damping`: coefficients of the hull's linear static yaw moment and of its linear yaw damping. `rudder`: coefficients
-    that are proportional to the force of the rudder. `missing`: what the paper does not print of it; empty if nothing.
-    """
-
+    # `name`, `title`: Key in the catalogue; words for a reader.
     name: str
     title: str
-    source: str
-    coefficients: tuple[SteeringCoefficient, ...]
-    rates: Rates
+    source: str  # The source of the equations
+    coefficients: tuple[SteeringCoefficient, ...]  # In the order of the paper's tables, Y first
+    rates: Rates  # The equations (:data:`Rates`)
+    # `static_moment`, `damping`: Coefficients of the hull's linear static yaw moment and of its linear yaw damping.
     static_moment: tuple[str, ...] = ("C_m_b",)
     damping: tuple[str, ...] = ("C_m_w",)
-    rudder: tuple[str, ...] = ("C_y_d", "C_m_d")
-    missing: tuple[str, ...] = ()
+    rudder: tuple[str, ...] = ("C_y_d", "C_m_d")  # Coefficients that are proportional to the force of the rudder
+    missing: tuple[str, ...] = ()  # What the paper does not print of it; empty if nothing

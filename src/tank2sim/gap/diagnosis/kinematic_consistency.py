@@ -21,18 +21,10 @@ CONTRADICTED = 4.0
 
 @dataclass(frozen=True)
 class Kinematics:
-    """Contradictions of records in standard errors: root mean square over trials, about 1 if there is none.
+    """Contradictions of records in standard errors: root mean square over trials, about 1 if there is none."""
 
-    Parameters
-    ----------
-    turning : float
-        Integrated yaw rate against the change of heading.
-    track : float
-        Integrated velocities through the water against the change of position.
-    """
-
-    turning: float
-    track: float
+    turning: float  # Integrated yaw rate against the change of heading
+    track: float  # Integrated velocities through the water against the change of position
 
 
 def kinematic_consistency(passed: Sequence[Passed]) -> Kinematics:
@@ -71,7 +63,7 @@ def _contradiction(time: Array, signal: Array, noise: float, rate: Array, rate_n
 
 def readable(replay: Passed) -> tuple[dict[str, Array], dict[str, float]]:
     """The measured signals of a trial, with gaps interpolated, and their noise; names without ``motion.``."""
-    names = {name.removeprefix("motion."): name for name in replay.noise if np.isfinite(replay.measured[name]).any()}
+    names = {name.removeprefix("motion."): name for name in replay.seen}
     return (
         {short: filled(replay.measured[name]) for short, name in names.items()},
         {short: replay.noise[name] for short, name in names.items()},

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 
-from tank2sim.arrays import Array
+from tank2sim.arrays import Array, true_runs
 from tank2sim.cards.card import SteeredBy, SteeredCard
 from tank2sim.dynamics import build
 from tank2sim.dynamics.effects import EFFECTS
@@ -113,9 +113,8 @@ def _misfit_runs(replay: Passed, signal: str) -> list[tuple[int, int, float]]:
 
 def _rates(replay: Passed, columns: Mapping[str, Array]) -> dict[str, Array]:
     """Rates of positions and heading (n,) from velocities and yaw rate, where all of these are measured."""
-    measured_names = {name for name in replay.noise if np.isfinite(replay.measured[name]).any()}
-    rates = {"motion.psi": columns["motion.r"]} if "motion.r" in measured_names else {}
-    if {"motion.u", "motion.v", "motion.psi"} <= measured_names:
+    rates = {"motion.psi": columns["motion.r"]} if "motion.r" in replay.seen else {}
+    if {"motion.u", "motion.v", "motion.psi"} <= set(replay.seen):
         velocity = recorded_earth_velocity(columns["motion.u"], columns["motion.v"], columns["motion.psi"])
         rates |= dict(zip(("motion.x", "motion.y"), velocity, strict=True))
     return rates
@@ -276,9 +275,8 @@ def effect_passages(trials: Sequence[str], time_s: Array, force: Array, errors: 
         for trial in dict.fromkeys(names):
             rows = np.flatnonzero(names == trial)
             high = uniform_filter1d(square[rows], min(_SHORT, len(rows))) > USUAL * usual
-            edges = np.flatnonzero(np.diff(np.concatenate([[0], high.astype(int), [0]])))
-            for begin, end in zip(edges[::2], edges[1::2], strict=True):
-                part = rows[begin:end]
+            for run in true_runs(high):
+                part = rows[run]
                 size = float(np.sqrt(np.mean(square[part] / errors[part, axis] ** 2)))
                 times, rms = time_s[part[[0, -1]]], float(np.sqrt(np.mean(square[part])))
                 found.append(Acting(str(trial), equation, float(times[0]), float(times[1]), size, rms))
@@ -402,13 +400,11 @@ def exceedance_intervals(
     # a squared normal has variance 2
     least = BEYOND * math.sqrt(2 / width) if limit is None else limit
     high = uniform_filter1d(excess, width) > least
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], high.astype(int), [0]])))
-    pairs = [[int(begin), int(end)] for begin, end in zip(edges[::2], edges[1::2], strict=True)]
     joined: list[list[int]] = []
-    for pair in pairs:
-        if joined and pair[0] - joined[-1][1] < width:
-            joined[-1][1] = pair[1]
+    for run in true_runs(high):
+        if joined and run.start - joined[-1][1] < width:
+            joined[-1][1] = run.stop
         else:
-            joined.append(pair)
+            joined.append([run.start, run.stop])
     sums = [(begin, end, float(excess[begin:end].sum())) for begin, end in joined]
     return [run for run in sums if run[2] > 0]

@@ -13,7 +13,7 @@ from tank2sim.dynamics.model import Parameter
 from tank2sim.gap.diagnosis.misfit_location import effect_passages, missing_force_by_state
 from tank2sim.gap.improve_card import Found
 from tank2sim.gap.inference.fit import ExplanationFit
-from tank2sim.gap.inference.hypothesis import Hypothesis
+from tank2sim.gap.inference.hypothesis import Hypothesis, parameter_places
 from tank2sim.gap.inference.kalman_filter import FORCE_STATES
 from tank2sim.gap.inference.likelihood import Likelihood
 from tank2sim.gap.result import Acting, MissingForce, Surroundings
@@ -26,9 +26,7 @@ def force_lacking(likelihood: Likelihood, fit: ExplanationFit) -> MissingForce |
     inertia = _inertia(hypothesis)
     force = np.einsum("ij,rtj->rti", inertia, states[..., 6 : 6 + FORCE_STATES])
     errors = np.sqrt(np.einsum("ij,rtjk,ik->rti", inertia, spread, inertia))
-    inside = motion.inside
-    inside[:, -1] = False  # inputs and states between the blocks
-    part = inside[:, :-1]
+    part = motion.inside[:, :-1]  # inputs and states between the blocks
     u, v, r, psi, _, _ = np.moveaxis(motion.block_states, -1, 0)
     columns = {
         "rudder": hypothesis.steered(motion.block_inputs),
@@ -81,7 +79,7 @@ def each_trial(likelihood: Likelihood, fit: ExplanationFit) -> dict[str, dict[st
     whitened, _ = likelihood.whiten(fit)
     k = len(fit.theta)
     estimated = fit.hypothesis.estimated
-    shared = [place for place, estimate in enumerate(estimated) if estimate.run is None]
+    shared = parameter_places(estimated)
     by_trial: dict[str, dict[str, tuple[float, float]]] = {estimated[place].variable: {} for place in shared}
     for run, name in enumerate(likelihood.motion.names):
         flat = whitened[run].reshape(-1, whitened.shape[-1])
@@ -111,25 +109,21 @@ def estimates(fit: ExplanationFit) -> list[Found]:
     errors = np.minimum(np.sqrt(np.maximum(np.diag(fit.covariance), 0.0)), (high - low) / np.sqrt(12))
     found: list[Found] = []
     for effect in fit.hypothesis.effects:
-        places = [
-            place
-            for place, estimate in enumerate(fit.hypothesis.estimated)
-            if estimate.effect == effect and estimate.run is None
-        ]
-        names: Sequence[str] = [fit.hypothesis.estimated[place].parameter.name for place in places]
-        values = {name: float(fit.theta[place]) for name, place in zip(names, places, strict=True)}
-        found.append((effect, values, {name: float(errors[p]) for name, p in zip(names, places, strict=True)}))
+        places = parameter_places(fit.hypothesis.estimated, effect)
+        names = [fit.hypothesis.estimated[place].parameter.name for place in places]
+        values, spread = (map(float, numbers[places]) for numbers in (fit.theta, errors))
+        found.append((effect, dict(zip(names, values, strict=True)), dict(zip(names, spread, strict=True))))
     return found
 
 
 def surroundings_by_trial(fit: ExplanationFit, trials: Sequence[str]) -> dict[str, dict[str, Surroundings]]:
     """Each wind or current that differs from trial to trial: effect to the name of each of the `trials` to its own."""
     errors = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
-    variances = fit.hypothesis.of_each_trial(errors)
+    spread = fit.hypothesis.of_each_trial(errors)
     return {
         effect: {
             name: Surroundings.of_parts(part, error)
-            for name, part, error in zip(trials, parts, variances[effect], strict=True)
+            for name, part, error in zip(trials, parts, spread[effect], strict=True)
         }
         for effect, parts in fit.hypothesis.of_each_trial(fit.theta).items()
     }

@@ -73,6 +73,11 @@ def _log_chance(statistic: Array, degrees: Array | float) -> Array:
     return logarithm
 
 
+def _window_sums(rows: Array, length: int) -> Array:
+    """Sums over each window of a length (R, T - length + 1) of rows (R, T)."""
+    return np.array([np.convolve(row, np.ones(length), "valid") for row in rows])
+
+
 def _passages(likelihood: Likelihood, e: Array) -> list[Strange]:
     """The strangest passage of each trial: sums of squares over windows, against chi squared.
 
@@ -83,9 +88,7 @@ def _passages(likelihood: Likelihood, e: Array) -> list[Strange]:
     squares, counts = (e**2).sum(axis=2), likelihood.known.sum(axis=2)
     strangest = {name: Strange("passage", name, 0.0, 0.0, -np.inf) for name in motion.names}
     for length in (window for window in _WINDOWS if window <= motion.blocks):
-        sums, degrees = (
-            np.array([np.convolve(run, np.ones(length), "valid") for run in rows]) for rows in (squares, counts)
-        )
+        sums, degrees = _window_sums(squares, length), _window_sums(counts, length)
         whole = degrees > 0
         deviation = float(np.median(np.abs(sums[whole] - degrees[whole]))) / NORMAL_MEDIAN
         excess_spread = max(1.0, deviation**2 / (2 * float(np.mean(degrees[whole]))))
@@ -112,14 +115,13 @@ def _pushes(likelihood: Likelihood, fit: ExplanationFit) -> list[Strange]:
     for axis, time in enumerate(fit.noise.force_s):
         squares = np.where(inside, states[..., 6 + axis] ** 2, 0.0)
         for length in (window for window in _WINDOWS[1:] if window <= motion.blocks):
-            window = np.ones(length)
-            sums = np.array([np.convolve(run, window, "valid") for run in squares])
-            whole = np.array([np.convolve(run, window, "valid") for run in inside.astype(float)]) > length - 0.5
+            sums = _window_sums(squares, length)
+            whole = _window_sums(inside.astype(float), length) > length - 0.5
             if not whole.any():
                 continue
             count = max(1.0, length * motion.block_s / (2 * time))
-            known = np.array([np.convolve(run, window, "valid") for run in spread[..., axis, axis]])
-            seen = whole & (sums > SEEN**2 * known)  # beyond the error of the smoother
+            known = SEEN**2 * _window_sums(spread[..., axis, axis], length)
+            seen = whole & (sums > known)  # beyond the error of the smoother
             ratio = np.where(seen, sums / max(float(np.median(sums[whole])), 1e-300) * chdtri(count, 0.5), 0.0)
             run, place = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
             log_p = _log_chance(ratio[run, place], count) + np.log(FORCE_STATES * inside.sum() / length)

@@ -53,56 +53,30 @@ choice)."""
 
 @dataclass(frozen=True, eq=False)
 class MeasuredBatch:
-    """Trials side by side, padded to one length.
+    """Trials side by side, padded to one length."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        Names of the R runs.
-    seen : tuple of str
-        The ny variables that are measured.
-    step_s : float
-        Fine step, s: over these the rates are integrated.
-    fine : int
-        Fine steps in a block, over which measurements are averaged; odd, so that an instant is the middle of a block.
-    begin_s : array (R,)
-        Time of the first fine instant in each trial's own time.
-    lengths : array (R,)
-        Number of blocks of each run.
-    states : array (R, n, 6)
-        Smoothed motion at the fine instants, in the order of KNOWN.
-    inputs : array (R, n - 1, nu)
-        Mean of each input from an instant to the next.
-    measured : array (R, T, ny)
-        Mean over each block, nan where nothing was measured.
-    noise : array (ny,)
-        Standard deviation of the mean over a block, of the part that is too fast for a ship, in a run that reads as
-        often as the median.
-    unsure_s : array (R,)
-        Time from one reading of the rudder's order to the next, s: within it the order changed, at an unknown instant.
-        0 where the rudder's angle was measured.
-    at_execute : array (R,)
-        True for a run that begins at its execute: its rudder was amidships until the first reading.
-    recorded : mapping
-        Input of an effect (``wind.speed``) to its record (R, n - 1), SI, of those that every trial recorded and that
-        `inputs` does not hold; directions without jumps of a full turn.
-    averaged : array (R,)
-        Readings of a sensor in a fine step, 1 or more; the measured values are their means.
-    """
-
-    names: tuple[str, ...]
-    seen: tuple[str, ...]
-    step_s: float
+    names: tuple[str, ...]  # Names of the R runs
+    seen: tuple[str, ...]  # The ny variables that are measured
+    step_s: float  # Fine step, s: over these the rates are integrated
+    # Fine steps in a block, over which measurements are averaged; odd, so that an instant is the middle of a block.
     fine: int
-    begin_s: Array
-    lengths: NDArray[np.int64]
-    states: Array
-    inputs: Array
-    measured: Array
+    begin_s: Array  # (R,): Time of the first fine instant in each trial's own time
+    lengths: NDArray[np.int64]  # (R,): Number of blocks of each run
+    states: Array  # (R, n, 6): Smoothed motion at the fine instants, in the order of KNOWN
+    inputs: Array  # (R, n - 1, nu): Mean of each input from an instant to the next
+    measured: Array  # (R, T, ny): Mean over each block, nan where nothing was measured
+    # (ny,): Standard deviation of the mean over a block, of the part that is too fast for a ship, in a run that reads
+    # as often as the median.
     noise: Array
+    # (R,): Time from one reading of the rudder's order to the next, s: within it the order changed, at an unknown
+    # instant. 0 where the rudder's angle was measured.
     unsure_s: Array
+    # (R,): True for a run that begins at its execute: its rudder was amidships until the first reading.
     at_execute: _Truths
+    # Input of an effect (``wind.speed``) to its record (R, n - 1), SI, of those that every trial recorded and that
+    # `inputs` does not hold; directions without jumps of a full turn.
     recorded: Mapping[str, Array] = field(default_factory=dict)
+    # (R,): Readings of a sensor in a fine step, 1 or more; the measured values are their means.
     averaged: Array = field(default_factory=lambda: np.ones(1))
 
     @property

@@ -18,22 +18,14 @@ the standard errors of a card, 2 % where it states none, are oftener far too lar
 
 @dataclass(frozen=True, eq=False)
 class NuisanceParameters:
-    """Parameters that may be in error next to the effects: the card's coefficients, the clock of the rudder's record.
+    """Parameters that may be in error next to the effects: the card's coefficients, the clock of the record."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        The n parameters of the model, and :data:`.hypothesis.CLOCK`.
-    mixing : array (n, nc)
-        Change of each by one standard deviation of each of nc independent causes: its individual error, and errors
-        that it shares with other parameters.
-    scaled : int
-        The first causes, whose standard errors the trials may widen or narrow by a common factor: those of the
-        coefficients. What is known of gear and clock does not depend on how well the hull is known.
-    """
-
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # The n parameters of the model, and :data:`.hypothesis.CLOCK`
+    # (n, nc): Change of each by one standard deviation of each of nc independent causes: its individual error, and
+    # errors that it shares with other parameters.
     mixing: Array
+    # Number of the first causes, whose standard errors the trials may widen or narrow by a common factor: those of the
+    # coefficients. What is known of gear and clock does not depend on how well the hull is known.
     scaled: int
 
     def spread(self, width: float) -> Array:
@@ -49,42 +41,25 @@ class NuisanceParameters:
 
 @dataclass(frozen=True, eq=False)
 class CoefficientEstimates:
-    """Coefficients of the card as trials determine them together with an explanation.
+    """Coefficients of the card as trials determine them together with an explanation."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        Names of n parameters, as in :class:`NuisanceParameters`.
-    change : array (n,)
-        Most probable value less the card's.
-    covariance : array (n, n)
-    """
-
-    names: tuple[str, ...]
-    change: Array
-    covariance: Array
+    names: tuple[str, ...]  # Names of n parameters, as in :class:`NuisanceParameters`
+    change: Array  # (n,): Most probable value less the card's
+    covariance: Array  # (n, n): Covariance of the changes
 
 
 @dataclass(frozen=True, eq=False)
 class Belief:
-    """Prior of the noise, and of the first state of a run.
+    """Prior of the noise, and of the first state of a run."""
 
-    Parameters
-    ----------
-    logs, spread : array
-        Mean and standard deviation of each logarithm (:attr:`.kalman_filter.NoiseLevels.logs`, and the width's,
-        for which the deviation below the mean is :data:`NARROWER` times as large).
-    wide : array (6,), optional
-        Standard deviation of each state at the beginning of a run about the measured one: wide, for a sensor may be at
-        fault; by default :data:`.likelihood.WIDE_PRIOR` times its noise.
-    waves : WaveBand, optional
-        Unmodelled accelerations by waves, the same for every explanation.
-    """
-
+    # `logs`, `spread`: Mean and standard deviation of each logarithm (:attr:`.kalman_filter.NoiseLevels.logs`, and the
+    # width's, for which the deviation below the mean is :data:`NARROWER` times as large).
     logs: Array
     spread: Array
+    # (6,): Standard deviation of each state at the beginning of a run about the measured one: wide, for a sensor may
+    # be at fault; by default :data:`.likelihood.WIDE_PRIOR` times its noise.
     wide: Array | None = None
-    waves: WaveBand | None = None
+    waves: WaveBand | None = None  # Unmodelled accelerations by waves, the same for every explanation
 
     @property
     def bounds(self) -> tuple[Array, Array]:
@@ -102,22 +77,12 @@ class Belief:
 
 @dataclass(frozen=True, eq=False)
 class FilterColumns:
-    """Columns of the filter: the residual, the effects' parameters, the coefficients (per standard error).
+    """Columns of the filter: the residual, the effects' parameters, the coefficients (per standard error)."""
 
-    Parameters
-    ----------
-    driving : array (R, T - 1, 6, 1 + k + nc)
-    shown : array (R, T, ny, 1 + k)
-        No sensor shows a coefficient itself.
-    parameter_count : int
-        k.
-    coefficient_count : int
-        Of the causes whose errors are scaled; the columns after them are of other causes and of the effects' form.
-    """
-
-    driving: Array
-    shown: Array
-    parameter_count: int
+    driving: Array  # (R, T - 1, 6, 1 + k + nc)
+    shown: Array  # (R, T, ny, 1 + k): No sensor shows a coefficient itself
+    parameter_count: int  # Number k of parameters of the effects
+    # Number of the causes whose errors are scaled; the columns after them are of other causes and of the effects' form.
     coefficient_count: int
 
     def factors(self, width: float) -> Array:
@@ -133,29 +98,16 @@ class FilterColumns:
 
 @dataclass(frozen=True, eq=False)
 class ExplanationFit:
-    """A hypothesis with its most probable parameters.
-
-    Parameters
-    ----------
-    hypothesis : Hypothesis
-    theta : array (k,)
-        Its parameters.
-    covariance : array (k, k)
-    logs : array
-        Of the noise (:attr:`.kalman_filter.NoiseLevels.logs`), and of the width of the coefficients' prior as the last
-        element.
-    score : float
-        T.
-    change : array (nc,)
-        Most probable change of the coefficients, in their standard errors beforehand.
-    """
+    """A hypothesis with its most probable parameters."""
 
     hypothesis: Hypothesis
-    theta: Array
-    covariance: Array
+    theta: Array  # (k,): Its parameters, SI
+    covariance: Array  # (k, k): Their covariance
+    # Logarithms of the noise (:attr:`.kalman_filter.NoiseLevels.logs`); the last one is of the width of the
+    # coefficients' prior.
     logs: Array
-    score: float
-    change: Array
+    score: float  # T
+    change: Array  # (nc,): Most probable change of the coefficients, in their standard errors beforehand
 
     @property
     def noise(self) -> NoiseLevels:

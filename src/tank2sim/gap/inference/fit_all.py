@@ -36,7 +36,7 @@ class Proposal:
     limit : float
         See :meth:`.likelihood.Likelihood.at_best`.
     each : tuple of str
-        The effects whose wind or current differs from trial to trial.
+        Effects whose wind or current differs from trial to trial; names that are not in `thetas` have no meaning.
     """
 
     thetas: dict[str, Array]
@@ -83,7 +83,7 @@ class HypothesisCache:
 
     def __call__(self, *effects: str, each: tuple[str, ...] = ()) -> Hypothesis:
         """The card with these effects; the wind or current of those in `each` differs from trial to trial."""
-        key = effects, each
+        key = effects, (each := tuple(name for name in each if name in effects))
         if key not in self._made:
             none, recorded = self.none, tuple(name for name in effects if name in self.recorded)
             given = TrialSurroundings(each, recorded, self.runs)

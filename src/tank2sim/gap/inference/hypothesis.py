@@ -41,26 +41,13 @@ step of 2.78 time constants (Hairer and Wanner 1996, IV.2), or 2.83/(2 pi) of a 
 
 @dataclass(frozen=True)
 class EstimatedParameter:
-    """A parameter that is estimated.
+    """A parameter that is estimated."""
 
-    Parameters
-    ----------
-    effect : str
-        Name of its effect.
-    parameter : EffectParameter
-    variable : str
-        Variable of the model that holds it.
-    run : int, optional
-        Place of the only trial in which it acts; None for a parameter of all trials.
-    axis : int
-        Part of one trial's wind or current, as `direction_rad` counts: 0 along north, 1 along east, m/s.
-    """
-
-    effect: str
+    effect: str  # Name of its effect
     parameter: EffectParameter
-    variable: str
-    run: int | None = None
-    axis: int = 0
+    variable: str  # Variable of the model that holds it
+    run: int | None = None  # Place of the only trial in which it acts; None for a parameter of all trials
+    axis: int = 0  # Part of one trial's wind or current, as `direction_rad` counts: 0 along north, 1 along east, m/s
 
     @property
     def is_amplitude(self) -> bool:
@@ -68,24 +55,23 @@ class EstimatedParameter:
         return self.parameter.absent is not None and self.parameter.default is None
 
 
+def parameter_places(
+    estimated: Sequence[EstimatedParameter], effect: str | None = None, *, by_trial: bool = False
+) -> list[int]:
+    """Places of the parameters of an effect, or of all, that act in all trials (`by_trial`: in a single one)."""
+    of_effect = [(place, each) for place, each in enumerate(estimated) if effect is None or each.effect == effect]
+    return [place for place, each in of_effect if (each.run is not None) == by_trial]
+
+
 @dataclass(frozen=True)
 class TrialSurroundings:
-    """Effects whose wind or current is a matter of each trial.
+    """Effects whose wind or current is a matter of each trial."""
 
-    Parameters
-    ----------
-    each : tuple of str
-        Those that differ from trial to trial: two unknowns for each trial, normal about zero with the typical speed of
-        the effect as standard deviation.
-    recorded : tuple of str
-        Those that every trial recorded.
-    runs : int
-        Number of trials, for `each`.
-    """
-
+    # Effects that differ from trial to trial: two unknowns for each trial, normal about zero with the typical speed of
+    # the effect as standard deviation.
     each: tuple[str, ...] = ()
-    recorded: tuple[str, ...] = ()
-    runs: int = 0
+    recorded: tuple[str, ...] = ()  # Effects whose wind or current every trial recorded
+    runs: int = 0  # Number of trials, for `each`
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,10 +222,8 @@ class Hypothesis:
         return self.model.parameter_values(self._chosen(theta, self.model.parameter_names))
 
     def _chosen(self, theta: Array, names: Sequence[str]) -> dict[str, float]:
-        values = [
-            (estimate, value) for estimate, value in zip(self.estimated, theta, strict=True) if estimate.run is None
-        ]
-        return {estimate.variable: float(value) for estimate, value in values if estimate.variable in names}
+        values = {self.estimated[place].variable: float(theta[place]) for place in parameter_places(self.estimated)}
+        return {variable: value for variable, value in values.items() if variable in names}
 
     @property
     def _given(self) -> tuple[str, ...]:
@@ -257,15 +241,8 @@ class Hypothesis:
 
     def of_each_trial(self, theta: Array) -> dict[str, Array]:
         """Parts along north and east (R, 2), m/s, of each wind or current that differs from trial to trial."""
-        found = {}
-        for name in self.each:
-            places = [
-                place
-                for place, estimate in enumerate(self.estimated)
-                if estimate.effect == name and estimate.run is not None
-            ]
-            found[name] = np.asarray(theta)[places].reshape(-1, 2)
-        return found
+        places = {name: parameter_places(self.estimated, name, by_trial=True) for name in self.each}
+        return {name: np.asarray(theta)[places[name]].reshape(-1, 2) for name in self.each}
 
     def inputs(self, motion: MeasuredBatch, theta: Array, late_s: float = 0.0) -> Array:
         """Inputs of this model at every fine step (R, n - 1, nu), the rudder's order later by `late_s`."""

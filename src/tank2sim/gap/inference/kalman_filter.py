@@ -36,19 +36,15 @@ FORCE_STATES = 3
 
 @dataclass(frozen=True, eq=False)
 class NoiseLevels:
-    """Levels and times of the noise.
+    """Levels and times of the noise."""
 
-    Parameters
-    ----------
-    white, slow, slow_s : array (ny,)
-        For each sensor: standard deviation of a block's mean by white noise, of the slow error, its time constant.
-    force, force_s : array (3,)
-        Standard deviation (m/s2, m/s2, rad/s2) and time constant of the unmodelled accelerations.
-    """
-
+    # `white`, `slow`, `slow_s` (ny,), for each sensor: Standard deviation of a block's mean by white noise, standard
+    # deviation of the slow error, and its time constant.
     white: Array
     slow: Array
     slow_s: Array
+    # `force`, `force_s` (3,): Standard deviation (m/s2, m/s2, rad/s2) and time constant of the unmodelled
+    # accelerations.
     force: Array
     force_s: Array
 
@@ -69,32 +65,17 @@ class NoiseLevels:
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """The motion about which the filter is linear.
+    """The motion about which the filter is linear."""
 
-    Parameters
-    ----------
-    transition : array (R, T - 1, 6, 6)
-        From the middle of each block to the middle of the next.
-    spreading : array (R, T - 1, 6, 6)
-        Change of the states at the end of that time by rates added during it, relative to a motion with zero slopes.
-    reading : array (R, T, ny, 6)
-        Readings by states.
-    known : array (R, T, ny)
-        Where something was measured.
-    block_s : float
-    wide : array (6,)
-        Standard deviation of the error of the smoothed motion at the beginning: generous.
-    noise_shares : array (R,)
-        Variance of the white noise of each run over the variance in :class:`NoiseLevels`.
-    """
-
-    transition: Array
+    transition: Array  # (R, T - 1, 6, 6): From the middle of each block to the middle of the next
+    # (R, T - 1, 6, 6): Change of the states at the end of that time by rates added during it, relative to a motion
+    # with zero slopes.
     spreading: Array
-    reading: Array
-    known: _Truths
-    block_s: float
-    wide: Array
-    noise_shares: Array
+    reading: Array  # (R, T, ny, 6): Readings by states
+    known: _Truths  # (R, T, ny): Where something was measured
+    block_s: float  # Length of a block, s
+    wide: Array  # (6,): Standard deviation of the error of the smoothed motion at the beginning: generous
+    noise_shares: Array  # (R,): Variance of the white noise of each run over the variance in :class:`NoiseLevels`
 
     @property
     def arrays(self) -> kalman_kernels.MotionArrays:
@@ -131,30 +112,16 @@ def linear_filter(
 
 @dataclass(frozen=True, eq=False)
 class Observer:
-    """The filter for one noise: gains, and the covariances of the backward pass.
-
-    Parameters
-    ----------
-    linear : Linear
-    noise : NoiseLevels
-    process : arrays
-        What accelerations and sensor errors do over a block (:data:`.kalman_kernels.ProcessArrays`).
-    gain : array (R, T, nz, ny)
-    white : array (R, T, ny, ny)
-        Inverse of the lower Cholesky factor of the innovations' covariance.
-    filtered : array (R, T, nz, nz)
-        Covariance after each measurement.
-    log_det : float
-        Sum of log det of the innovations' covariance, over the measurements.
-    """
+    """The filter for one noise: gains, and the covariances of the backward pass."""
 
     linear: Linear
     noise: NoiseLevels
+    # What accelerations and sensor errors do over a block (:data:`.kalman_kernels.ProcessArrays`).
     process: kalman_kernels.ProcessArrays
-    gain: Array
-    white: Array
-    filtered: Array
-    log_det: float
+    gain: Array  # (R, T, nz, ny): Gains of the filter
+    white: Array  # (R, T, ny, ny): Inverse of the lower Cholesky factor of the innovations' covariance
+    filtered: Array  # (R, T, nz, nz): Covariance after each measurement
+    log_det: float  # Sum of log det of the innovations' covariance, over the measurements
 
     def whiten(self, driving: Array, shown: Array) -> Array:
         """Innovations in units of their standard deviation, of several columns at once.

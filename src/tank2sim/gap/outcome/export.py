@@ -154,11 +154,6 @@ def effect_parameter_name(variable: str) -> EffectParameterName:
     return EffectParameterName(effect_name, parameter)
 
 
-def measured_in(trial: Passed) -> tuple[str, ...]:
-    """The measured variables of a trial."""
-    return tuple(name for name in trial.noise if np.isfinite(trial.measured[name]).any())
-
-
 def _place(place: MisfitPlace, names: Mapping[str, str]) -> MisfitPlace:
     """A place with its file, its column and rounded times."""
     return replace(
@@ -252,14 +247,13 @@ def _waves(waves: WaveBand) -> WaveMotion:
 
 def _trial(replay: Passed, file: str) -> TrialMisfit:
     versions = ("before", "after", *(("black_box",) if replay.black_box else ()))
-    signals = measured_in(replay)
     return TrialMisfit(
         trial=file,
         held_out=replay.held_out,
-        misfit={version: replay.misfit(version) for version in versions} if signals else {},
+        misfit={version: replay.misfit(version) for version in versions} if replay.seen else {},
         signals={
             signal_display_name(variable).file: {version: replay.misfit(version, variable) for version in versions}
-            for variable in signals
+            for variable in replay.seen
         },
     )
 
@@ -279,7 +273,7 @@ def _agreement(gap: Gap, names: Mapping[str, str]) -> dict[str, dict[str, TrialE
 
 def _replay(replay: Passed, file: str) -> GapReplay:
     """Columns of what was measured and of both simulations at the same instants, thinned to draw."""
-    names = {variable: signal_display_name(variable) for variable in measured_in(replay)}
+    names = {variable: signal_display_name(variable) for variable in replay.seen}
     kept = _drawn_rows(replay)
     measured, before, found = (
         drawn_columns(
@@ -295,7 +289,7 @@ def _replay(replay: Passed, file: str) -> GapReplay:
 def _drawn_rows(replay: Passed) -> Indices:
     """Instants of a trial that are kept: evenly spread ones, instants of seldom measured signals, and all extremes."""
     kept = even = thin_points([replay.time_s], _REPLAY_SAMPLES)
-    for variable in measured_in(replay):
+    for variable in replay.seen:
         measured = replay.measured[variable]
         known = np.flatnonzero(np.isfinite(measured))
         columns = [measured, *(version[variable] - measured for version in (replay.before, replay.after))]

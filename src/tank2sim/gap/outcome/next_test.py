@@ -66,43 +66,25 @@ _ROUNDED = 1
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """A possible explanation.
+    """A possible explanation."""
 
-    Parameters
-    ----------
-    name : str
-        For people: the effect, or ``none``.
-    card : SteeredCard
-        With the effect at its most probable parameters; for ``none`` the card as it is.
-    free : tuple of str
-        k names of the model's parameters and inputs that are not known exactly: the effect's, and derivatives.
-    covariance : array (k, k)
-        Their covariance, SI (derivatives prime); may be singular.
-    """
-
-    name: str
-    card: SteeredCard
+    name: str  # For people: the effect, or ``none``
+    card: SteeredCard  # With the effect at its most probable parameters; for ``none`` the card as it is
+    # The k names of the model's parameters and inputs that are not known exactly: the effect's, and derivatives.
     free: tuple[str, ...]
-    covariance: Array
+    covariance: Array  # (k, k): Their covariance, SI (derivatives prime); may be singular
 
 
 @dataclass(frozen=True, eq=False)
 class WindowPrediction:
-    """Prediction of one explanation for c manoeuvres in w windows each, in noise units.
+    """Prediction of one explanation for c manoeuvres in w windows each, in noise units."""
 
-    Parameters
-    ----------
-    readings : array (c, w, m)
-    slopes : array (c, w, m, k)
-        By the unknowns of the explanation, each column per standard deviation; the last is the clock of the orders,
-        where that is unknown.
-    passing : array (c, w, m, j)
-        By the unknowns of the window: the instants of its orders, where these are unknown; its first state, and
-        disturbances.
-    """
-
-    readings: Array
+    readings: Array  # (c, w, m): The m readings of each window
+    # (c, w, m, k): By the unknowns of the explanation, each column per standard deviation; the last is the clock of the
+    # orders, where that is unknown.
     slopes: Array
+    # (c, w, m, j): By the unknowns of the window: the instants of its orders, where these are unknown; its first state,
+    # and disturbances.
     passing: Array
 
     def with_known_instants(self) -> WindowPrediction:

@@ -31,30 +31,14 @@ Helmsman = Callable[[float, float, float], float]
 
 @dataclass(frozen=True)
 class Candidate:
-    """A manoeuvre to be compared.
+    """A manoeuvre to be compared."""
 
-    Parameters
-    ----------
-    name : str
-        Display name, and the key of its score in the report.
-    manoeuvre : str
-        As ``simulate --manoeuvre`` takes it; "" for those that only a file can state.
-    helmsman : callable
-        ``helmsman()`` gives a new :data:`Helmsman`.
-    revolutions : callable
-        Share of the nominal revolutions at a time in L/u0.
-    heading : float
-        First heading, rad.
-    on_course : bool
-        It keeps near its first heading, so that another heading may give other information.
-    """
-
-    name: str
-    manoeuvre: str
-    helmsman: Callable[[], Helmsman]
-    revolutions: Callable[[float], float] = lambda time: 1.0
-    heading: float = 0.0
-    on_course: bool = False
+    name: str  # Display name, and the key of its score in the report
+    manoeuvre: str  # As ``simulate --manoeuvre`` takes it; "" for those that only a file can state
+    helmsman: Callable[[], Helmsman]  # ``helmsman()`` gives a new :data:`Helmsman`
+    revolutions: Callable[[float], float] = lambda time: 1.0  # Share of the nominal revolutions at a time in L/u0
+    heading: float = 0.0  # First heading, rad
+    on_course: bool = False  # It keeps near its first heading, so that another heading may give other information
 
 
 def candidate_manoeuvres(card: SteeredCard, length: float) -> tuple[Candidate, ...]:

@@ -16,7 +16,6 @@ from tank2sim.gap.result import AMBIGUOUS, MISSING, Gap, Passed, misfit_of
 from tank2sim.identification.trials.methods.gauss_newton import least_squares_steps
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.notices import Notice, caution
-from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 
 _LINEAR = ("Yv", "Yr", "Yd", "Nv", "Nr", "Nd", "Xu")
 """Terms of the linear black box: sway velocity, yaw rate and rudder in Y and N, speed in X."""
@@ -84,8 +83,8 @@ def black_box(card: SteeredCard, measured: Measured, noise: Mapping[str, float],
     count : int
         Number of terms, at most as in :data:`_LINEAR`.
     """
-    replayer = Replayer(card, measured.driven_by, [name for name in OBSERVED_SIGNALS.values() if name in noise])
-    fit = _Fit(replayer, [input_record(replayer, trial) for trial in measured.trials], noise)
+    replayer = Replayer(card, measured.driven_by, noise)
+    fit = _Fit(replayer, [input_record(replayer, trial) for trial in measured.trials])
     linear = tuple(name for name in _LINEAR if f"derivatives.{name}" in replayer.model)
     reach = REACH * max(abs(card.derivatives.get(name, 0.0)) for name in linear)
     if count <= 0 or not np.isfinite(fit.misfit((), np.zeros(0))).all():
@@ -126,27 +125,23 @@ def _add_term(
 class _Fit:
     """Residuals of all trials, in noise units, by changes of derivatives."""
 
-    def __init__(self, replayer: Replayer, records: Sequence[InputRecord], noise: Mapping[str, float]):
+    def __init__(self, replayer: Replayer, records: Sequence[InputRecord]):
         self.replayer, self.records = replayer, records
-        self.sigma = np.array([noise[name] for name in replayer.seen])
         # From the first seconds: an initial state fitted with a wrong model would compensate its errors.
         p = replayer.model.parameter_values()
-        self.starts = [replayer.guess_initial_state(record, self.sigma, p) for record in records]
+        self.starts = [replayer.guess_initial_state(record, p) for record in records]
 
     def update_starts(self, names: Sequence[str], changes: Array) -> None:
         """Find the initial states and the instants of the orders again."""
         p = self._parameters(names, changes)
-        fits = [self.replayer.fit_record(record, self.sigma, p) for record in self.records]
+        fits = [self.replayer.fit_record(record, p) for record in self.records]
         self.records, self.starts = [record for record, _ in fits], [start for _, start in fits]
 
     def misfit(self, names: Sequence[str], changes: Array) -> Array:
         """(Simulated less measured)/noise of all measurements."""
         p = self._parameters(names, changes)
-        parts = []
-        for record, start in zip(self.records, self.starts, strict=True):
-            residual = (self.replayer.motion(record, start, p) - record.readings) / self.sigma
-            parts.append(residual[~np.isnan(record.readings)])
-        return np.concatenate(parts)
+        pairs = zip(self.records, self.starts, strict=True)
+        return np.concatenate([self.replayer.away(record, start, p) for record, start in pairs])
 
     def minimise(self, names: Sequence[str], start: Array, reach: float) -> tuple[Array, float]:
         """Changes of least misfit, and its sum of squares."""
@@ -184,10 +179,8 @@ def closes_gap(passed: Sequence[Passed], limit: float = CLOSES) -> bool:
     changed = [
         _ratio(replay.misfit("before", name), replay.misfit("after", name))
         for replay in passed
-        for name in replay.noise
-        if np.isfinite(replay.measured[name]).any()
-        and max(replay.misfit("before", name), replay.misfit("after", name)) > REMAINS
-        and _differs(replay, name)
+        for name in replay.seen
+        if max(replay.misfit("before", name), replay.misfit("after", name)) > REMAINS and _differs(replay, name)
     ]
     return bool(changed and np.median(changed) < limit)
 

@@ -46,33 +46,21 @@ class NamedEffects:
 
 @dataclass(frozen=True, eq=False)
 class Proof:
-    """An improved card, and the trials replayed by it and by the given one.
+    """An improved card, and the trials replayed by it and by the given one."""
 
-    Parameters
-    ----------
-    trials : tuple of Measured
-        Fitted ones and those held out, in the winds and currents that were found for them.
-    named : NamedEffects
-    base, improved : SteeredCard
-        Without the effects, coefficients refitted where this follows the fitted trials better, and with them.
-    results : list of Passed
-        Of the fitted trials; those held out follow once they are opened (:meth:`Prover.open_holdout`).
-    coefficients : tuple of Refitted
-        Coefficients of the base that differ from the given card's.
-    width : float
-        Factor on the standard errors of the given card with which the filter fitted the coefficients.
-    effect_alone : mapping
-        Misfit of the effects without refitted coefficients, noise units: ``fit``, and ``holdout`` once that is opened;
-        empty where the coefficients are the given ones.
-    """
-
+    # Fitted trials and trials held out, in the winds and currents that were found for them.
     trials: tuple[Measured, Measured]
     named: NamedEffects
+    # `base`, `improved`: Card without the effects, its coefficients refitted where the fitted trials are then followed
+    # better, and the same card with the effects.
     base: SteeredCard
     improved: SteeredCard
+    # Replays of the fitted trials; trials held out follow once they are opened (:meth:`Prover.open_holdout`).
     results: list[Passed]
-    coefficients: tuple[Refitted, ...] = ()
-    width: float = 1.0
+    coefficients: tuple[Refitted, ...] = ()  # Coefficients of the base that differ from the given card's
+    width: float = 1.0  # Factor on the standard errors of the given card with which the filter fitted the coefficients
+    # Misfit of the effects without refitted coefficients, noise units: ``fit``, and ``holdout`` once that is opened;
+    # empty where the coefficients are the given ones.
     effect_alone: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -83,25 +71,13 @@ class Proof:
 
 @dataclass(frozen=True, eq=False)
 class Prover:
-    """Proofs of explanations, by replays of the fitted trials; trials held out are opened for the last one.
+    """Proofs of explanations, by replays of the fitted trials; trials held out are opened for the last one."""
 
-    Parameters
-    ----------
-    card : SteeredCard
-        As given.
-    trials : tuple of Measured
-        Fitted ones and those held out.
-    likelihood : Likelihood
-        Likelihood of the fitted trials.
-    replays : TrialReplays
-    lowest_mps : float
-        Speed down to which the cards' polynomials are used in trials held out, m/s, where it is below their own.
-    """
-
-    card: SteeredCard
-    trials: tuple[Measured, Measured]
-    likelihood: Likelihood
+    card: SteeredCard  # The given card
+    trials: tuple[Measured, Measured]  # Fitted trials and trials held out
+    likelihood: Likelihood  # Likelihood of the fitted trials
     replays: TrialReplays
+    # Speed (m/s) down to which the cards' polynomials are used in trials held out, where it is below their own.
     lowest_mps: float = math.inf
 
     def begin(self) -> None:

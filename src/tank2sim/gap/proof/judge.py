@@ -31,23 +31,12 @@ EXPLAINED = 0.2
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A decision after the simulations with its names.
-
-    Parameters
-    ----------
-    decision : Decision
-    proof : Proof
-        Proof of the named effects.
-    withheld : str
-        Names that brought no simulation closer.
-    by_simulation : str
-        What is to be said of a name that simulations alone gave.
-    """
+    """A decision after the simulations with its names."""
 
     decision: Decision
-    proof: Proof
-    withheld: str = ""
-    by_simulation: str = ""
+    proof: Proof  # Proof of the named effects
+    withheld: str = ""  # Names withheld because they brought no simulation closer
+    by_simulation: str = ""  # Sentence about a name that simulations alone gave
 
     def alternatives(self, card: SteeredCard) -> tuple[tuple[str, ...], ...]:
         """Sets that the trials do not distinguish from what is named, or from the coefficients that explain the gap."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -18,7 +18,7 @@ from tank2sim.dynamics.model import Model
 from tank2sim.identification.trials.methods.gauss_newton import least_squares_steps
 from tank2sim.identification.trials.problem.estimation_problem import driven_model
 from tank2sim.records.trials import ROWS_TO_SHOW_AN_ORDER, Trial, order_instants, rows_in
-from tank2sim.simulation.motion_record import motion_record, refuse_without_motion
+from tank2sim.simulation.motion_record import OBSERVED_SIGNALS, motion_record, refuse_without_motion
 from tank2sim.simulation.rows import Chain, RowFunction
 from tank2sim.simulation.scheme import step_and_constants
 from tank2sim.simulation.sensitivity import Sensitivity
@@ -46,39 +46,28 @@ ASTERN = 0.2
 
 @dataclass(frozen=True, eq=False)
 class InputRecord:
-    """A trial on its own rows, thinned to :data:`COARSEST` steps of the model.
+    """A trial on its own rows, thinned to :data:`COARSEST` steps of the model."""
 
-    Parameters
-    ----------
-    name : str
-        Name of the trial.
-    time_s : array (n,)
-        Times of the rows, s, in the trial's own time, however uneven.
-    inputs : array (n, nu)
-        Inputs from each row to the next: means of measured ones, and the order that the row shows. The mean of two
-        orders was never ordered, and a gear at its largest rate responds differently to it.
-    compared : array (m,) of int
-        Rows at which simulated and measured are compared.
-    readings : array (m, ny)
-        Single readings at those rows; nan where there is none.
-    late_s : float
-        Delay of the order by the card, s.
-    instants : array (n,), optional
-        Share of the interval before each row at which the order of the row was given; without it, half.
-    """
-
-    name: str
-    time_s: Array
+    name: str  # Name of the trial
+    time_s: Array  # (n,): Times of the rows, s, in the trial's own time, however uneven
+    # (n, nu): Inputs from each row to the next: means of measured inputs, and the order that the row shows. The mean
+    # of two orders was never ordered, and a gear at its largest rate responds differently to it.
     inputs: Array
-    compared: NDArray[np.intp]
-    readings: Array
-    late_s: float = 0.0
+    compared: NDArray[np.intp]  # (m,): Rows at which simulated and measured are compared
+    readings: Array  # (m, ny): Single readings at those rows; nan where there is none
+    late_s: float = 0.0  # Delay of the order by the card, s
+    # (n,): Share of the interval before each row at which the order of the row was given; without it, half.
     instants: Array | None = None
 
     @property
     def times(self) -> Array:
         """Compared times (m,), s."""
         return self.time_s[self.compared]
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Mask of the readings (m, ny) that were measured."""
+        return ~np.isnan(self.readings)
 
     @property
     def given_s(self) -> Array:
@@ -147,18 +136,21 @@ class Replayer:
         Its effects' inputs (a current's speed) keep the values of the card unless the trial measured them.
     driven_by : str
         ``angle`` or ``order``.
-    seen : sequence of str
-        The ny variables to compare, ``motion.*``.
+    noise : mapping
+        Variable (``motion.*``) to the standard deviation of one reading, SI. The ny variables among them that the model
+        has are compared: `seen`, with the noise `sigma` (ny,).
     model : Model, optional
         In place of the card's: with more states whose initial values are to be found.
     """
 
-    def __init__(self, card: SteeredCard, driven_by: str, seen: Sequence[str], model: Model | None = None):
-        self.card, self.seen = card, tuple(seen)
+    def __init__(self, card: SteeredCard, driven_by: str, noise: Mapping[str, float], model: Model | None = None):
+        self.card = card
         self.model = driven_model(card, driven_by) if model is None else model
+        self.seen = tuple(name for name in OBSERVED_SIGNALS.values() if name in noise and name in self.model)
+        self.sigma = np.array([noise[name] for name in self.seen])
         step, constants = step_and_constants(self.model)
         self._steps, self._constants = Chain(step), constants
-        self._shown = shown_by(self.model, seen)
+        self._shown = shown_by(self.model, self.seen)
         self._prepared: tuple[InputRecord, tuple[Array, Array, NDArray[np.intp]]] | None = None
         ordered = driven_by == "order" and _ORDER in self.model.input_names
         self._order = self.model.input_names.index(_ORDER) if ordered else None
@@ -215,9 +207,12 @@ class Replayer:
     def _readings(self, record: InputRecord, states: Array, p: Array) -> Array:
         return self._shown(states[record.compared], record.inputs[record.compared], p)[0]
 
-    def fit_record(
-        self, record: InputRecord, sigma: Array, p: Array, near: Array | None = None
-    ) -> tuple[InputRecord, Array]:
+    def away(self, record: InputRecord, start: Array, p: Array) -> Array:
+        """Simulated less measured (count,) in noise units, where something was measured; nan once out of bounds."""
+        away: Array = ((self.motion(record, start, p) - record.readings) / self.sigma)[record.known]
+        return away
+
+    def fit_record(self, record: InputRecord, p: Array, near: Array | None = None) -> tuple[InputRecord, Array]:
         """The record with the instants at which its orders were given, and its initial state, that fit it best.
 
         An order that was sampled once or twice a second was given at an unknown instant between two readings. These
@@ -226,14 +221,14 @@ class Replayer:
         follows a record that the first guess loses. With a model that is further off than they explain, as
         :meth:`fit_initial_state`.
         """
-        start, misfit = self._least_squares_start(record, sigma, p, near, wrong=False)
+        start, misfit = self._least_squares_start(record, p, near, wrong=False)
         rows = self._unsure_steps(record)
         if len(rows) or misfit >= _NEAR:
             most, explained = (np.inf, _EXPLAINED) if misfit < _FOLLOWED else (_BEGUN, 0.0)
-            found = self._least_squares_instants(record, rows, sigma, p, near, most=most)
+            found = self._least_squares_instants(record, rows, p, near, most)
             if found is not None and found[2] < max(min(_NEAR, misfit), explained * misfit):
                 return found[:2]
-        return record, start if misfit < _NEAR else self._least_squares_start(record, sigma, p, near, wrong=True)[0]
+        return record, start if misfit < _NEAR else self._least_squares_start(record, p, near, wrong=True)[0]
 
     def _unsure_steps(self, record: InputRecord) -> NDArray[np.intp]:
         """Rows (m,) at which a step of the order is seen first that was given at an unknown instant before."""
@@ -247,14 +242,7 @@ class Replayer:
         return rows if len(rows) <= _MOST_STEPS else none
 
     def _least_squares_instants(
-        self,
-        record: InputRecord,
-        rows: NDArray[np.intp],
-        sigma: Array,
-        p: Array,
-        near: Array | None = None,
-        *,
-        most: float = np.inf,
+        self, record: InputRecord, rows: NDArray[np.intp], p: Array, near: Array | None, most: float
     ) -> tuple[InputRecord, Array, float] | None:
         """The record with the instants of the steps at `rows`, the initial state, and their misfit.
 
@@ -262,51 +250,45 @@ class Replayer:
         early step of an unstable ship is a large one later, where the motion is not nearly linear in it. None where a
         beginning is missed by more than `most`, or a motion exceeds all bounds.
         """
-        guess, spread = first_state(self, record, sigma, p)
-        known, size = ~np.isnan(record.readings), len(guess)
-        unknown = np.append(guess if near is None else near, np.full(len(rows), 0.5))
+        first = first_state(self, record, p)
+        size, remaining = len(first[0]), math.inf
+        unknown = np.append(first[0] if near is None else near, np.full(len(rows), 0.5))
         steps = [2**power for power in range(len(rows).bit_length()) if 2**power < len(rows)]
         for count in [*steps, len(rows)]:
-            last = int(rows[count]) if count < len(rows) else len(record.time_s)
-            part, moved = _beginning_of(record, last), rows[:count]
-            compared = known[: len(part.readings)]
-            free = np.arange(size + count)
-
-            def misfit(
-                values: Array,
-                part: InputRecord = part,
-                moved: NDArray[np.intp] = moved,
-                compared: NDArray[np.bool_] = compared,
-            ) -> Array:
-                begun, shares = values[:size], values[size:]
-                shown = self.motion(self._given_at(part, moved, shares), begun, p)
-                away = ((shown - part.readings) / sigma)[compared]
-                return np.concatenate([away, (begun - guess) / spread, (shares - 0.5) * math.sqrt(12.0)])
-
-            def slopes(
-                values: Array,
-                part: InputRecord = part,
-                moved: NDArray[np.intp] = moved,
-                compared: NDArray[np.bool_] = compared,
-            ) -> Array:
-                begun, shares = values[:size], values[size:]
-                by_value = self.slopes_of_motion(self._given_at(part, moved, shares), begun, p, moved)
-                of_prior = np.diag(np.append(1 / spread, np.full(len(shares), math.sqrt(12.0))))
-                return np.concatenate([(by_value / sigma[:, None])[compared], of_prior])
-
-            low, high = np.full(size + count, -np.inf), np.full(size + count, np.inf)
-            low[size:], high[size:] = 0.0, 1.0
-            if not np.isfinite(misfit(unknown[free])).all():
+            part = _beginning_of(record, int(rows[count]) if count < len(rows) else len(record.time_s))
+            found = self._fit_instants(part, rows[:count], unknown[: size + count], first, p)
+            if found is None or not found[1] < most:
                 return None
-            scale = np.append(spread, np.full(count, 0.3))
-            found = least_squares(
-                misfit, unknown[free], slopes, bounds=(low, high), x_scale=scale, ftol=1e-2, max_nfev=_ROUNDS
-            )
-            unknown[free] = found.x
-            remaining = float(np.sqrt(np.mean(found.fun[: int(compared.sum())] ** 2)))
-            if not remaining < most:
-                return None
+            unknown[: size + count], remaining = found
         return self._given_at(record, rows, unknown[size:]), unknown[:size], remaining
+
+    def _fit_instants(
+        self, record: InputRecord, rows: NDArray[np.intp], begin: Array, first: tuple[Array, Array], p: Array
+    ) -> tuple[Array, float] | None:
+        """Initial state and instants of the steps at `rows` (nx + m,), from `begin`, and their misfit.
+
+        `first` is the state of the first seconds with its spread. None where the first motion exceeds all bounds.
+        """
+        (guess, spread), size, count = first, len(first[0]), len(rows)
+
+        def misfit(values: Array) -> Array:
+            begun, shares = values[:size], values[size:]
+            away = self.away(self._given_at(record, rows, shares), begun, p)
+            return np.concatenate([away, (begun - guess) / spread, (shares - 0.5) * math.sqrt(12.0)])
+
+        def slopes(values: Array) -> Array:
+            begun, shares = values[:size], values[size:]
+            by_value = self.slopes_of_motion(self._given_at(record, rows, shares), begun, p, rows)
+            of_prior = np.diag(np.append(1 / spread, np.full(count, math.sqrt(12.0))))
+            return np.concatenate([(by_value / self.sigma[:, None])[record.known], of_prior])
+
+        if not np.isfinite(misfit(begin)).all():
+            return None
+        low, high = np.full(size + count, -np.inf), np.full(size + count, np.inf)
+        low[size:], high[size:] = 0.0, 1.0
+        scale = np.append(spread, np.full(count, 0.3))
+        found = least_squares(misfit, begin, slopes, bounds=(low, high), x_scale=scale, ftol=1e-2, max_nfev=_ROUNDS)
+        return found.x, float(np.sqrt(np.mean(found.fun[: int(record.known.sum())] ** 2)))
 
     def slopes_of_motion(
         self,
@@ -351,27 +333,21 @@ class Replayer:
         instants[rows] = shares
         return replace(record, instants=instants)
 
-    def fit_initial_state(self, record: InputRecord, sigma: Array, p: Array, near: Array | None = None) -> Array:
+    def fit_initial_state(self, record: InputRecord, p: Array, near: Array | None = None) -> Array:
         """Initial state (nx,) that fits a record best, kept near the state of its first seconds.
 
-        `sigma` (ny,) is the noise of the signals; the search begins at `near` (nx,), if given. If with the least
-        squares in noise units the model follows the record to within :data:`_NEAR`, the least squares hold. Else the
-        model is wrong, and its heading and speed would be biased to correct its track: then a signal weighs less by the
-        size of its own residual beyond the noise (the likelihood of a deviation that is not known), of which only one
-        value in L/u0 counts as independent.
+        The search begins at `near` (nx,), if given. If with the least squares in noise units the model follows the
+        record to within :data:`_NEAR`, the least squares hold. Else the model is wrong, and its heading and speed would
+        be biased to correct its track: then a signal weighs less by the size of its own residual beyond the noise (the
+        likelihood of a deviation that is not known), of which only one value in L/u0 counts as independent.
         """
-        start, misfit = self._least_squares_start(record, sigma, p, near, wrong=False)
-        return start if misfit < _NEAR else self._least_squares_start(record, sigma, p, near, wrong=True)[0]
+        start, misfit = self._least_squares_start(record, p, near, wrong=False)
+        return start if misfit < _NEAR else self._least_squares_start(record, p, near, wrong=True)[0]
 
-    def guess_initial_state(self, record: InputRecord, sigma: Array, p: Array) -> Array:
+    def guess_initial_state(self, record: InputRecord, p: Array) -> Array:
         """Initial state (nx,) from the first seconds, with the rudder that fits the record better."""
-        guess, _ = first_state(self, record, sigma, p)
-        known = ~np.isnan(record.readings)
-
-        def size(start: Array) -> float:
-            return float(np.sum(((self.motion(record, start, p) - record.readings) / sigma)[known] ** 2))
-
-        return min(self._guesses(guess), key=size)
+        guess, _ = first_state(self, record, p)
+        return min(self._guesses(guess), key=lambda start: float(np.sum(self.away(record, start, p) ** 2)))
 
     def _guesses(self, guess: Array) -> list[Array]:
         """The first state, and with the rudder amidships: a record may begin at the execute."""
@@ -385,11 +361,11 @@ class Replayer:
         return [guess, amidships]
 
     def _least_squares_start(
-        self, record: InputRecord, sigma: Array, p: Array, near: Array | None = None, *, wrong: bool
+        self, record: InputRecord, p: Array, near: Array | None = None, *, wrong: bool
     ) -> tuple[Array, float]:
         """Initial state by Gauss-Newton, and its misfit: inf where the motion exceeds all bounds."""
-        guess, spread = self.guess_initial_state(record, sigma, p), first_state(self, record, sigma, p)[1]
-        known = ~np.isnan(record.readings)
+        guess, spread = self.guess_initial_state(record, p), first_state(self, record, p)[1]
+        known, sigma = record.known, self.sigma
         column = np.broadcast_to(np.arange(len(sigma)), known.shape)[known]
         number = np.maximum(np.bincount(column, minlength=len(sigma)), 1)
 
@@ -510,15 +486,13 @@ def delays_of(card: SteeredCard, model: Model, p: Array | None = None) -> dict[s
     return delays
 
 
-def first_state(replayer: Replayer, record: InputRecord, sigma: Array, p: Array) -> tuple[Array, Array]:
+def first_state(replayer: Replayer, record: InputRecord, p: Array) -> tuple[Array, Array]:
     """State read off the first :data:`FIRST` L/u0 of a record by straight lines, and how far to trust it (nx,) each.
 
     Parameters
     ----------
     replayer : Replayer
     record : InputRecord
-    sigma : array (ny,)
-        Noise of the compared signals.
     p : array (np,)
         Parameters of the model.
     """
@@ -526,7 +500,7 @@ def first_state(replayer: Replayer, record: InputRecord, sigma: Array, p: Array)
     early = times < FIRST * replayer.passage_s
     early[:3] = True
     span = float(times[early][-1]) * early.sum() / (early.sum() - 1)
-    readings = zip(replayer.seen, record.readings[early].T, sigma, strict=True)
+    readings = zip(replayer.seen, record.readings[early].T, replayer.sigma, strict=True)
     values = {name: _straight(times[early], column, error) for name, column, error in readings}
     read = {name: value[:2] for name, value in values.items() if value is not None}
     track = [values.get(f"motion.{axis}") for axis in "xy"]

@@ -157,10 +157,10 @@ def _begin(
     values: Array,
 ) -> _Begun:
     """A trial with the instants of orders and the initial state that fit it with these coefficients."""
-    replayer, sigma = _replayer(card, driven_by, noise)
+    replayer = replayer_of(card, driven_by, noise)
     p = _parameters(replayer, prior, values)
-    record, start = replayer.fit_record(input_record(replayer, trial), sigma, p)
-    return _Begun(record, start, *first_state(replayer, record, sigma, p))
+    record, start = replayer.fit_record(input_record(replayer, trial), p)
+    return _Begun(record, start, *first_state(replayer, record, p))
 
 
 def _linearised(
@@ -172,16 +172,16 @@ def _linearised(
     values: Array,
 ) -> _Linearised:
     """A trial about its present initial state and coefficients; of infinite cost without a positive mass."""
-    replayer, sigma = _replayer(card, driven_by, noise)
+    replayer = replayer_of(card, driven_by, noise)
     p = _parameters(replayer, prior, values)
     if mass_fault(replayer.model, replayer.model.parameters_by_name(p)):
         nothing, count = np.zeros((len(begun.start), len(values))), len(values)
         return _Linearised(math.inf, np.zeros(count), np.zeros((count, count)), np.zeros(len(begun.start)), nothing)
     record, start = begun.record, begun.start
-    known, free = ~np.isnan(record.readings), tuple(f"derivatives.{name}" for name in prior.names)
-    residual = ((replayer.motion(record, start, p) - record.readings) / sigma)[known]
+    free = tuple(f"derivatives.{name}" for name in prior.names)
+    residual = replayer.away(record, start, p)
     from_guess = (start - begun.guess) / begun.spread
-    slopes = (replayer.slopes_of_motion(record, start, p, free=free) / sigma[:, None])[known]
+    slopes = (replayer.slopes_of_motion(record, start, p, free=free) / replayer.sigma[:, None])[record.known]
     by_start, by_value = slopes[:, : len(start)], slopes[:, len(start) :]
     both = by_start.T @ by_value
     right = np.column_stack([np.nan_to_num(by_start.T @ residual) + from_guess / begun.spread, both])
@@ -194,11 +194,6 @@ def _linearised(
         away,
         follows,
     )
-
-
-def _replayer(card: SteeredCard, driven_by: str, noise: Mapping[str, float]) -> tuple[Replayer, Array]:
-    replayer = replayer_of(card, driven_by, tuple(noise))
-    return replayer, np.array([noise[name] for name in replayer.seen])
 
 
 def _parameters(replayer: Replayer, prior: CoefficientPrior, values: Array) -> Array:

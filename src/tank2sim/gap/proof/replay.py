@@ -13,7 +13,6 @@ from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredCard
 from tank2sim.gap.proof.open_loop import InputRecord, Replayer, input_record
 from tank2sim.gap.result import Passed
-from tank2sim.identification.trials.problem.estimation_problem import driven_model
 from tank2sim.identification.trials.problem.prepare_trials import Measured
 from tank2sim.records.audit.noise import record_noise
 from tank2sim.records.trials import Trial
@@ -125,36 +124,23 @@ class _Followed:
 
 
 def _follow(card: SteeredCard, driven_by: str, noise: Mapping[str, float], trial: Trial) -> _Followed:
-    replayer = replayer_of(card, driven_by, tuple(noise))
-    p, sigma = replayer.model.parameter_values(), np.array([noise[name] for name in replayer.seen])
-    record, start = replayer.fit_record(input_record(replayer, trial), sigma, p)
+    replayer = replayer_of(card, driven_by, noise)
+    p = replayer.model.parameter_values()
+    record, start = replayer.fit_record(input_record(replayer, trial), p)
     return _Followed(record, replayer.seen, replayer.motion(record, start, p))
 
 
-_REPLAYERS: dict[tuple[str, str, tuple[str, ...]], Replayer] = {}
-"""The last replayer of this process, by the card's text, what drives the rudder and the variables with noise."""
+_REPLAYERS: dict[tuple[str, str, tuple[tuple[str, float], ...]], Replayer] = {}
+"""The last replayer of this process, by the card's text, what drives the rudder and the noise."""
 
 
-def replayer_of(card: SteeredCard, driven_by: str, known: tuple[str, ...]) -> Replayer:
-    """The replayer of a card, kept for the next trial.
-
-    Parameters
-    ----------
-    card : SteeredCard
-    driven_by : str
-        ``angle`` or ``order``.
-    known : tuple of str
-        Variables with known noise; the model's variables among them are compared.
-    """
-    key = card.text, driven_by, known
-    found = _REPLAYERS.get(key)
-    if found is None:
-        model = driven_model(card, driven_by)
-        seen = [name for name in OBSERVED_SIGNALS.values() if name in known and name in model]
-        found = Replayer(card, driven_by, seen)
+def replayer_of(card: SteeredCard, driven_by: str, noise: Mapping[str, float]) -> Replayer:
+    """The replayer of a card, kept for the next trial; `driven_by` and `noise` as in :class:`.open_loop.Replayer`."""
+    key = card.text, driven_by, tuple(noise.items())
+    if key not in _REPLAYERS:
         _REPLAYERS.clear()
-        _REPLAYERS[key] = found
-    return found
+        _REPLAYERS[key] = Replayer(card, driven_by, noise)
+    return _REPLAYERS[key]
 
 
 def replay_by_card(card: SteeredCard, measured: Measured) -> tuple[Passed, ...]:

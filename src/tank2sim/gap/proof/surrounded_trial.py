@@ -16,7 +16,6 @@ from tank2sim.dynamics.effects.effect import EffectParameter
 from tank2sim.gap.proof.open_loop import InputRecord, Replayer, difference_slopes, input_record
 from tank2sim.gap.result import Surroundings
 from tank2sim.records.trials import Trial
-from tank2sim.simulation.motion_record import OBSERVED_SIGNALS
 
 ByTrial = Mapping[str, Mapping[str, Surroundings]]
 """Effect to the name of a trial to its wind or current."""
@@ -75,8 +74,7 @@ class SurroundedTrial:
         noise: Mapping[str, float],
     ):
         self.name, self._effects = trial.name, effects
-        self.replayer = Replayer(card, driven_by, [name for name in OBSERVED_SIGNALS.values() if name in noise])
-        self.sigma = np.array([noise[name] for name in self.replayer.seen])
+        self.replayer = Replayer(card, driven_by, noise)
         self.typical = np.repeat([typical_speed(card, name) for name in effects], 2)
         names = self.replayer.model.input_names
         self._places = [
@@ -86,9 +84,9 @@ class SurroundedTrial:
         still = self.still = input_record(
             self.replayer, with_columns(trial, self._in_trial(np.zeros(len(self.typical))))
         )
-        self._known = ~np.isnan(still.readings)
+        self._known = still.known
         self.passage = self.replayer.passage_s / float(np.median(np.diff(still.times)))
-        self._state = self.replayer.guess_initial_state(still, self.sigma, self.replayer.model.parameter_values())
+        self._state = self.replayer.guess_initial_state(still, self.replayer.model.parameter_values())
         self.compare(1.0)
 
     def compare(self, begin: float, end: float | None = None) -> None:
@@ -116,8 +114,8 @@ class SurroundedTrial:
     def away(self, parts: Array, p: Array) -> Array:
         """Simulated less measured (count,), noise units."""
         record = self._record(parts)
-        away = ((self.replayer.motion(record, self._state, p) - record.readings) / self.sigma)[self._compared]
-        bounded: Array = np.nan_to_num(away, nan=_FAR)
+        away = (self.replayer.motion(record, self._state, p) - record.readings) / self.replayer.sigma
+        bounded: Array = np.nan_to_num(away[self._compared], nan=_FAR)
         return bounded
 
     def slopes(self, parts: Array, p: Array, now: Array) -> Array:
@@ -126,7 +124,7 @@ class SurroundedTrial:
 
     def begin(self, parts: Array, p: Array) -> None:
         """Find the initial state again, in these surroundings."""
-        self._state = self.replayer.fit_initial_state(self._record(parts), self.sigma, p, self._state)
+        self._state = self.replayer.fit_initial_state(self._record(parts), p, self._state)
 
     def parts(self, p: Array) -> Array:
         """The parts that fit the compared readings best, from a search over directions and speeds: first over the

@@ -46,9 +46,8 @@ def fit_surroundings(
     trials = [SurroundedTrial(card, measured.driven_by, trial, effects, noise) for trial in measured.trials]
     if not trials:
         return found
-    known = trials[0].replayer
-    model = _with_parts_as_states(known.model, effects, trials[0].typical)
-    replayer = Replayer(card, measured.driven_by, known.seen, model)
+    model = _with_parts_as_states(trials[0].replayer.model, effects, trials[0].typical)
+    replayer = Replayer(card, measured.driven_by, noise, model)
     for trial in trials:
         for name, surroundings in _of_trial(card, trial, replayer, effects).items():
             found[name][trial.name] = surroundings
@@ -65,15 +64,14 @@ def _of_trial(
     forces, which are taken as independent: a force that is too small asks for more wind.
     """
     model = replayer.model
-    p, record, sigma = model.parameter_values(), trial.still, trial.sigma
-    near = replayer.guess_initial_state(record, sigma, p)
+    p, record = model.parameter_values(), trial.still
+    near = replayer.guess_initial_state(record, p)
     near[-len(trial.typical) :] = trial.parts(trial.replayer.model.parameter_values())
-    record, start = replayer.fit_record(record, sigma, p, near)
-    parts, known = start[-len(trial.typical) :], ~np.isnan(record.readings)
+    record, start = replayer.fit_record(record, p, near)
+    parts = start[-len(trial.typical) :]
 
     def away(start: Array, p: Array = p) -> Array:
-        residual: Array = ((replayer.motion(record, start, p) - record.readings) / sigma)[known]
-        return residual
+        return replayer.away(record, start, p)
 
     nominal = np.array([state.nominal for state in model.states])
     slopes = difference_slopes(away, start, away(start), STEP_SHARE * nominal) * nominal

@@ -25,6 +25,7 @@ from tank2sim.gap.diagnosis.residuals import estimates
 from tank2sim.gap.diagnosis.strangeness import Strange, find_strangeness
 from tank2sim.gap.improve_card import changed_derivatives
 from tank2sim.gap.inference.fit import ExplanationFit
+from tank2sim.gap.inference.hypothesis import parameter_places
 from tank2sim.gap.inference.prior import GEAR, PRICE
 from tank2sim.gap.result import AMBIGUOUS, MISSING, NO_EFFECT_MISSING, OUTSIDE_LIBRARY
 from tank2sim.gap.search.explanations import Search
@@ -144,16 +145,12 @@ def _is_effect_significant(fit: ExplanationFit, name: str) -> bool:
     values = next(values for effect, values, _ in estimates(fit) if effect == name)
     if change_of_derivatives(fit.hypothesis.card, name, values) < STANDARD_ERRORS:
         return False
-    return not (EFFECTS[name].in_place_of and _change_of_gear(fit, name) < STANDARD_ERRORS)
+    return not (EFFECTS[name].in_place_of and _change_of_gear(fit, name, values) < STANDARD_ERRORS)
 
 
 def _differs_from_zero(fit: ExplanationFit, name: str) -> bool:
     """Whether winds or currents of the single trials are together beyond :data:`STANDARD_ERRORS` (Wald's test)."""
-    places = [
-        place
-        for place, estimate in enumerate(fit.hypothesis.estimated)
-        if estimate.effect == name and estimate.run is not None
-    ]
+    places = parameter_places(fit.hypothesis.estimated, name, by_trial=True)
     sizes = fit.theta[places]
     statistic = float(sizes @ np.linalg.solve(fit.covariance[np.ix_(places, places)], sizes))
     return bool(chdtrc(len(places), statistic) < 2 * ndtr(-STANDARD_ERRORS))
@@ -181,9 +178,8 @@ def change_of_derivatives(card: SteeredCard, name: str, values: Mapping[str, flo
     return max(changes, default=0.0)
 
 
-def _change_of_gear(fit: ExplanationFit, name: str) -> float:
+def _change_of_gear(fit: ExplanationFit, name: str, values: Mapping[str, float]) -> float:
     """Change of the card's steering-gear data for the worse, in standard errors; infinite if the card states none."""
-    ((_, values, _),) = [found for found in estimates(fit) if found[0] == name]
     ((key, value),) = values.items()
     worse = next((parameter.worse for parameter in EFFECTS[name].parameters if parameter.name == key), 0)
     stated = getattr(fit.hypothesis.card.steering_gear, key, None)

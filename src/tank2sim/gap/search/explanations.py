@@ -211,12 +211,8 @@ def _let_surroundings_differ(fitting: Fitting, every: Sequence[Variant], most: i
     sets = _sets_in_surroundings(fitting, best, unknown, most)
     starts = [best.logs, fitting.likelihood.belief.logs]
     common = [fit for fit in fitting.found.values() if set(unknown) & set(fit.hypothesis.effects)]
-    fitting.fit(
-        [
-            Proposal(thetas, starts, ROUNDS, best.score + _FAR, each=tuple(name for name in unknown if name in thetas))
-            for thetas in sets
-        ]
-    )
+    limit, each = best.score + _FAR, tuple(unknown)
+    fitting.fit([Proposal(thetas, starts, ROUNDS, limit, each=each) for thetas in sets])
     # The form that is the same in all trials, at the noise of the one that took its place: a score that has converged
     # is lower than one that has not.
     fitting.fit(
@@ -274,14 +270,9 @@ def _with_one_swapped(fitting: Fitting, fit: ExplanationFit, every: Sequence[Var
     swapped = _nearly_alike(fitting, fit, every)
     for dropped in (thetas := thetas_of(fit)):
         kept = {name: theta for name, theta in thetas.items() if name != dropped}
-        each = tuple(name for name in fit.hypothesis.each if name != dropped)
         theta = np.concatenate([*kept.values(), np.zeros(0)])
-        base = replace(
-            fit,
-            hypothesis=fitting.hypotheses(*kept, each=each),
-            theta=theta,
-            covariance=np.zeros((len(theta), len(theta))),
-        )
+        without = fitting.hypotheses(*kept, each=fit.hypothesis.each)
+        base = replace(fit, hypothesis=without, theta=theta, covariance=np.zeros((len(theta), len(theta))))
         others = [variant for variant in every if variant.effect != dropped]
         swapped += _on_top_of(fitting, base, others)[:SWAPS]
     return swapped
@@ -299,10 +290,7 @@ def _fit_near(fitting: Fitting, screened: Sequence[Screened], best: ExplanationF
     """Fit proposals from the noise of the best, with the winds and currents that differ there between trials."""
     starts, limit = [best.logs, fitting.likelihood.belief.logs], best.score + _FAR
     chosen = _proposals(fitting, screened, starts, limit=limit)
-    each = best.hypothesis.each
-    fitting.fit(
-        [replace(proposal, each=tuple(name for name in each if name in proposal.thetas)) for proposal in chosen]
-    )
+    fitting.fit([replace(proposal, each=best.hypothesis.each) for proposal in chosen])
 
 
 def _still(hypothesis: Hypothesis) -> Array:
@@ -344,10 +332,7 @@ def _at_the_noise_of(best: ExplanationFit, fits: Sequence[ExplanationFit]) -> li
             alike = {name for name in thetas if (name in fit.hypothesis.each) == (name in each)}
             mixed = {name: best_thetas.get(name, theta) if name in alike else theta for name, theta in thetas.items()}
             begins.append((mixed, fit.hypothesis.each))
-    return [
-        Proposal(thetas, [best.logs], SAME_NOISE, each=tuple(name for name in differ if name in thetas))
-        for thetas, differ in begins
-    ]
+    return [Proposal(thetas, [best.logs], SAME_NOISE, each=differ) for thetas, differ in begins]
 
 
 def _fit_nearly_alike(fitting: Fitting, every: Sequence[Variant]) -> None:
