@@ -55,17 +55,33 @@ _ALMOST_KEY = re.compile(r"([A-Za-z_][\w.-]*(?:[ \t]+[A-Za-z_][\w.-]*)?)\s*[:=](
 
 @dataclass(frozen=True, eq=False)
 class CsvTable:
-    """Columns of numbers as in a file."""
+    """Columns of numbers as in a file.
 
-    path: Path  # The file, or the name of a data frame
-    columns: dict[str, Array]  # Name to values, (rows,), nan where a cell is empty
-    lines: NDArray[np.int64]  # (rows,): Line of the file (from 1) of each row; of a data frame its row (from 0)
-    # Key to text of the lines ``# key: text``; the texts of a repeated key are joined by line breaks.
+    Parameters
+    ----------
+    path : Path
+        The file, or the name of a data frame.
+    columns : dict
+        Name to values, (rows,), nan where a cell is empty.
+    lines : array of int, (rows,)
+        Line of the file (from 1) of each row; of a data frame its row (from 0).
+    comments : dict
+        Key to text of the lines ``# key: text``; the texts of a repeated key are joined by line breaks.
+    remarks : tuple of str
+        The other comment lines.
+    headings : dict
+        Name of a column to what it is called in the file, where :meth:`si` has renamed it.
+    counts : str
+        Unit of `lines` in messages.
+    """
+
+    path: Path
+    columns: dict[str, Array]
+    lines: NDArray[np.int64]
     comments: dict[str, str] = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()  # The other comment lines
-    # Name of a column to what it is called in the file, where :meth:`si` has renamed it.
+    remarks: tuple[str, ...] = ()
     headings: dict[str, str] = field(default_factory=dict)
-    counts: str = "line"  # Unit of `lines` in messages
+    counts: str = "line"
 
     def heading(self, name: str) -> str:
         """Name of a column in the file."""
@@ -311,8 +327,7 @@ def _plain_table(path: Path, text: str) -> CsvTable | None:
 def table_of_rows(path: Path, names: Sequence[str], rows: Sequence[str], lines: NDArray[np.int64]) -> CsvTable:
     """Table of rows with commas between cells and points in numbers.
 
-    `path`: For messages. `names`: Names of the columns. `rows`: Lines of values. `lines` (rows,): Line of the file of
-    each row.
+    `path`: For messages. `names`: Names of the columns. `rows`: Lines of values. `lines` (rows,): Line of the file of each row.
 
     Raises InputError: There are no rows; a row has too many or too few cells; a cell is not a finite number.
     """

@@ -63,10 +63,13 @@ class TrackBand:
     It ends (nan afterwards) where fewer than :data:`STILL_RUNNING` of the members reach the normal: they lag behind at
     the end of the run, or their distance equals the radius of the track and they would pass it backwards. Until then
     the few missing members keep their last distance.
+
+    Parameters
+    ----------
+    middle_m, low_m, high_m : array (n, 2)
+        x and y, m, of the 50, 5 and 95 % quantiles, at the times of the bands (of the leading track).
     """
 
-    # `middle_m`, `low_m`, `high_m`: (n, 2): x and y, m, of the 50, 5 and 95 % quantiles, at the times of the bands (of
-    # the leading track).
     middle_m: Array
     low_m: Array
     high_m: Array

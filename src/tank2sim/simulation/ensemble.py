@@ -118,22 +118,36 @@ def _hashed(values: NDArray[np.uint32], constant: int, factor: int) -> tuple[NDA
 
 @dataclass(frozen=True, eq=False)
 class Draws:
-    """Normal distribution of the members' parameters about the card's values."""
+    """Normal distribution of the members' parameters about the card's values.
 
-    names: tuple[str, ...]  # The k uncertain parameters of the model
-    mean: Array  # (k,)
-    root: Array  # (k, k): A root of their covariance: root @ root.T
-    # `lowest`, `highest`: (k,): Bounds of the parameters. A member beyond them is drawn again as a whole, from the same
-    # stream: this is the truncated normal distribution, which preserves correlations. Clipping at the bounds would not.
+    Parameters
+    ----------
+    names : tuple of str
+        The k uncertain parameters of the model.
+    mean : array (k,)
+    root : array (k, k)
+        A root of their covariance: root @ root.T.
+    lowest, highest : array (k,)
+        Bounds of the parameters. A member beyond them is drawn again as a whole, from the same stream: this is the
+        truncated normal distribution, which preserves correlations. Clipping at the bounds would not.
+    seed : int
+    samples : array (n, m), optional
+        Samples of the joint distribution of m of the parameters: a member has one of its rows instead of normal values.
+    sampled : array (m,)
+        Places of these parameters.
+    assumed : bool
+        Whether all standard errors are assumed.
+    """
+
+    names: tuple[str, ...]
+    mean: Array
+    root: Array
     lowest: Array
     highest: Array
     seed: int
-    # (n, m): Samples of the joint distribution of m of the parameters: a member has one of its rows instead of normal
-    # values.
     samples: Array | None = None
-    # (m,): Places of these parameters.
     sampled: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    assumed: bool = False  # Whether all standard errors are assumed
+    assumed: bool = False
 
     def member(self, number: int) -> dict[str, float]:
         """Parameters of a member, by name."""
@@ -199,12 +213,20 @@ class MixtureDraws(Draws):
     """Members about other centres than the card, for importance sampling: those beyond a bound are not drawn again.
 
     A member takes a centre with the probability in `shares`, and standard normal values about it.
+
+    Parameters
+    ----------
+    centres : array (c, k)
+        In standard normal values, zero at the card.
+    shares : array (c,)
+        They sum to 1.
+    round : int
+        Number of the sample: each has random streams of its own.
     """
 
-    # (c, k): In standard normal values, zero at the card.
     centres: Array = field(default_factory=lambda: np.zeros((1, 0)))
-    shares: Array = field(default_factory=lambda: np.ones(1))  # (c,): They sum to 1
-    round: int = 0  # Number of the sample: each has random streams of its own
+    shares: Array = field(default_factory=lambda: np.ones(1))
+    round: int = 0
 
     def members(self, first: int, count: int) -> DrawnMembers:
         """The members from `first` on, each from numpy's ``SeedSequence(seed, spawn_key=(round, number))``."""
@@ -307,15 +329,28 @@ class Redrawn:
 
 @dataclass(frozen=True, eq=False)
 class Ensemble:
-    """Results of the members of an ensemble."""
+    """Results of the members of an ensemble.
+
+    Parameters
+    ----------
+    members, seed : int
+    figures : mapping
+        Name to the figures of all members (members,); nan where a member does not show it.
+    histories : array (kept, signals, times), or None
+        Histories of the first members, at most :data:`KEPT`.
+    unusable : mapping
+        Reason of unusable members, to their number.
+    redrawn : Redrawn
+    bad : array (members,)
+        True for unusable members.
+    """
 
     members: int
     seed: int
-    figures: Mapping[str, Array]  # Name to the figures of all members (members,); nan where a member does not show it
-    histories: Histories | None = None  # (kept, signals, times): Histories of the first members, at most :data:`KEPT`
-    unusable: Mapping[str, int] = field(default_factory=dict)  # Reason of unusable members, to their number
+    figures: Mapping[str, Array]
+    histories: Histories | None = None
+    unusable: Mapping[str, int] = field(default_factory=dict)
     redrawn: Redrawn = field(default_factory=lambda: Redrawn(0, {}))
-    # (members,): True for unusable members.
     bad: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
 
     @property

@@ -225,10 +225,15 @@ class SpiralManoeuvre:
 
 @dataclass(frozen=True)
 class Stop(SwitchedManoeuvre):
-    """Crash stop (full astern stopping test), or coasting with the engine stopped, rudder amidships."""
+    """Crash stop (full astern stopping test), or coasting with the engine stopped, rudder amidships.
 
-    # Order, rad/s: negative (astern) or 0; by default :data:`FULL_ASTERN` of the nominal ones. They are reached at
-    # once, for a card states no time to reverse the engine.
+    Parameters
+    ----------
+    revolutions : float, optional
+        Order, rad/s: negative (astern) or 0; by default :data:`FULL_ASTERN` of the nominal ones. They are reached at
+        once, for a card states no time to reverse the engine.
+    """
+
     revolutions: float | None = None
 
     @property
@@ -265,11 +270,21 @@ class Stop(SwitchedManoeuvre):
 
 @dataclass(frozen=True)
 class Orders:
-    """Orders from a file, each held until the next."""
+    """Orders from a file, each held until the next.
 
-    times: Array  # (n,): s, rising from 0
-    inputs: dict[str, Array]  # Input of the model to its orders (n,), SI, rudder positive to starboard
-    source: str  # The file, for messages
+    Parameters
+    ----------
+    times : array (n,)
+        s, rising from 0.
+    inputs : dict
+        Input of the model to its orders (n,), SI, rudder positive to starboard.
+    source : str
+        The file, for messages.
+    """
+
+    times: Array
+    inputs: dict[str, Array]
+    source: str
 
     @property
     def words(self) -> str:

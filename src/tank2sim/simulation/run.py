@@ -23,13 +23,27 @@ from tank2sim.units import in_words
 
 @dataclass(frozen=True)
 class Run:
-    """A simulated manoeuvre."""
+    """A simulated manoeuvre.
 
-    trajectory: Trajectory  # The motion
-    figures: Figures  # Manoeuvring figures, units in their names; None for a figure that the run does not show
-    notices: tuple[Notice, ...]  # Messages for the user
-    reading: CardRangeReading  # The figures outside the card's range
-    missing: tuple[Notice, ...] = ()  # The notices on figures that the run does not show
+    Parameters
+    ----------
+    trajectory : Trajectory
+        The motion.
+    figures : dict
+        Manoeuvring figures, units in their names; None for a figure that the run does not show.
+    notices : tuple of Notice
+        Messages for the user.
+    reading : CardRangeReading
+        The figures outside the card's range.
+    missing : tuple of Notice
+        Of `notices` those on figures that the run does not show.
+    """
+
+    trajectory: Trajectory
+    figures: Figures
+    notices: tuple[Notice, ...]
+    reading: CardRangeReading
+    missing: tuple[Notice, ...] = ()
 
 
 def simulate(

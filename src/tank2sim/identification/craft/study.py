@@ -153,40 +153,61 @@ NOT_ITS_OWN = (
 
 @dataclass(frozen=True, kw_only=True)
 class CraftCoefficient:
-    """A coefficient of a craft, SI."""
+    """A coefficient of a craft, SI.
+
+    Parameters
+    ----------
+    value, standard_error : float
+    before, prior_standard_error : float
+        Value and standard error of the card.
+    verdict : CoefficientVerdict
+    by : str or None
+        Trial without which the standard error would grow most; None where no trial determines it.
+    """
 
     value: float
     standard_error: float
-    # `before`, `prior_standard_error`: Value and standard error of the card.
     before: float
     prior_standard_error: float
     verdict: CoefficientVerdict
-    by: str | None  # Trial without which the standard error would grow most; None where no trial determines it
+    by: str | None
 
 
 @dataclass(frozen=True, kw_only=True)
 class ThrusterResponse:
-    """Response of a thruster to its orders."""
+    """Response of a thruster to its orders.
 
-    # `lag_s`, `lag_error_s`: Time constant and its standard error.
+    Parameters
+    ----------
+    lag_s, lag_error_s : float
+        Time constant and its standard error.
+    dead_band_rpm, dead_band_error_rpm : float or None
+        None where no order left the propeller at rest.
+    rest_rpm, turning_rpm : float
+        Largest order at which the propeller rested, 0 without any, and least order at which it turned.
+    """
+
     lag_s: float
     lag_error_s: float
-    # `dead_band_rpm`, `dead_band_error_rpm`: None where no order left the propeller at rest.
     dead_band_rpm: float | None
     dead_band_error_rpm: float | None
-    # `rest_rpm`, `turning_rpm`: Largest order at which the propeller rested, 0 without any, and least order at which it
-    # turned.
     rest_rpm: float
     turning_rpm: float
 
 
 @dataclass(frozen=True, kw_only=True)
 class CompassDeviation:
-    """Deviation of the compass with which the trials were recorded: A + B sin(heading) + C cos(heading)."""
+    """Deviation of the compass with which the trials were recorded: A + B sin(heading) + C cos(heading).
 
-    # `a_deg`, `b_deg`, `c_deg`: Heading shown less heading.
+    Parameters
+    ----------
+    a_deg, b_deg, c_deg : float
+        Heading shown less heading.
+    a_error_deg, b_error_deg, c_error_deg : float
+        Standard errors.
+    """
+
     a_deg: Number
-    # `a_error_deg`, `b_error_deg`, `c_error_deg`: Standard errors.
     a_error_deg: Number
     b_deg: Number
     b_error_deg: Number
@@ -196,21 +217,40 @@ class CompassDeviation:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CraftIdentificationStudy:
-    """Coefficients and thrust curves of a craft with thrusters."""
+    """Coefficients and thrust curves of a craft with thrusters.
+
+    Parameters
+    ----------
+    ship, method : str
+    trials, held_out : tuple of str
+        Names of the trials that were fitted, and held out (also those too short to be predicted).
+    coefficients : dict
+        By name without ``derivatives.`` and ``thrusters.``.
+    compass : CompassDeviation or None
+        None where the trials show none.
+    noise : dict
+        Standard deviation of the noise by signal, SI.
+    determination : dict or None
+        R^2 of u, v and r of all predictions of held-out trials, next to the smoothed motion; None without any.
+    driven_by : str
+        ``revolutions`` of the thrusters, or their ``orders``.
+    order_responses : dict
+        By thruster, where the trials hold orders next to revolutions.
+    next_trials : tuple of CandidateTrial
+        Manoeuvres of five minutes; the first determines most of the coefficients that these trials do not.
+    notices : tuple of Notice
+    """
 
     ship: str
     method: str
-    # `trials`, `held_out`: Names of the trials that were fitted, and held out (also those too short to be predicted).
     trials: tuple[str, ...]
-    coefficients: dict[str, CraftCoefficient]  # By name without ``derivatives.`` and ``thrusters.``
-    compass: CompassDeviation | None  # None where the trials show none
-    noise: dict[str, Number]  # Standard deviation of the noise by signal, SI
-    # R^2 of u, v and r of all predictions of held-out trials, next to the smoothed motion; None without any.
+    coefficients: dict[str, CraftCoefficient]
+    compass: CompassDeviation | None
+    noise: dict[str, Number]
     determination: dict[str, Number] | None
-    driven_by: str  # ``revolutions`` of the thrusters, or their ``orders``
-    order_responses: dict[str, ThrusterResponse]  # By thruster, where the trials hold orders next to revolutions
+    driven_by: str
+    order_responses: dict[str, ThrusterResponse]
     held_out: tuple[str, ...]
-    # Manoeuvres of five minutes; the first determines most of the coefficients that these trials do not.
     next_trials: tuple[CandidateTrial, ...]
     notices: tuple[Notice, ...]
 
@@ -386,28 +426,44 @@ def prediction_r_squared(predictions: Sequence[FreePrediction]) -> dict[str, flo
 
 @dataclass(frozen=True, kw_only=True)
 class TrialPrediction:
-    """Free-running predictions of a trial."""
+    """Free-running predictions of a trial.
 
-    predictions: int  # Number of predictions
-    # `rms_u_mps`, `rms_v_mps`, `rms_r_degps`: Root mean square errors of the motion.
+    Parameters
+    ----------
+    predictions : int
+        Number of predictions.
+    rms_u_mps, rms_v_mps, rms_r_degps : float
+        Root mean square errors of the motion.
+    end_distance_m, end_heading_deg : float or None
+        Root mean square errors of position and heading at the ends of predictions; None where nothing was measured.
+    """
+
+    predictions: int
     rms_u_mps: Number
     rms_v_mps: Number
     rms_r_degps: Number
-    # `end_distance_m`, `end_heading_deg`: Root mean square errors of position and heading at the ends of predictions;
-    # None where nothing was measured.
     end_distance_m: float | None
     end_heading_deg: float | None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PredictionStudy:
-    """Free-running predictions of trials by a craft's card."""
+    """Free-running predictions of trials by a craft's card.
 
-    determination: dict[str, Number]  # R^2 of u, v and r of all predictions, next to the motion smoothed with the card
-    # `end_distance_m`, `end_heading_deg`: As of :class:`TrialPrediction`, for all trials.
+    Parameters
+    ----------
+    determination : dict
+        R^2 of u, v and r of all predictions, next to the motion smoothed with the card.
+    end_distance_m, end_heading_deg : float or None
+        As of :class:`TrialPrediction`, for all trials.
+    trials : dict
+        Predictions by trial.
+    """
+
+    determination: dict[str, Number]
     end_distance_m: float | None
     end_heading_deg: float | None
-    trials: dict[str, TrialPrediction]  # Predictions by trial
+    trials: dict[str, TrialPrediction]
 
 
 def predict_trials(card: SteeredCard, trials: Sequence[Trial]) -> tuple[PredictionStudy, tuple[Notice, ...]]:

@@ -39,19 +39,43 @@ parameters below its limit (project choice)."""
 
 @dataclass(frozen=True)
 class IdentificationOptions:
-    """Options of a fit to trials."""
+    """Options of a fit to trials.
 
-    # One of :data:`TrialMethod`; :data:`BY_RESIDUALS` fits trials at sea with the Kalman filter if they show gusts or
-    # waves, and all others by output error (:mod:`.model_selection`).
+    Parameters
+    ----------
+    method : str
+        One of :data:`TrialMethod`; :data:`BY_RESIDUALS` fits trials at sea with the Kalman filter if they show gusts
+        or waves, and all others by output error (:mod:`.model_selection`).
+    structure : str
+        One of :data:`STRUCTURE_WORDS` or of an installed package.
+    inertia : bool
+        Estimate acceleration derivatives, too.
+    piece_s : float, optional
+        Length of the pieces of output error, s; by default :data:`PIECE`.
+    scale_prior : bool
+        Widen the card's standard errors as far as the trials require.
+    members : int
+        Simulations for the prediction intervals of the figures of held-out trials; 0 for none.
+    bootstrap : int
+        Members of a parametric bootstrap of the estimates; 0 for none.
+    hold : tuple of str
+        Derivatives (``Xuuu``) and parameters of effects (``wind.yaw_coefficient``) that keep the card's values.
+    force : bool
+        Fit trials even if they look like another ship's (:mod:`.other_ship`).
+    posterior : str, optional
+        One of :data:`Sampler`.
+    draws : int
+        Draws of each chain of the posterior.
+    """
+
     method: TrialMethod = BY_RESIDUALS
-    structure: str = BY_EVIDENCE  # One of :data:`STRUCTURE_WORDS` or of an installed package
-    inertia: bool = False  # Estimate acceleration derivatives, too
-    piece_s: float | None = None  # Length of the pieces of output error, s; by default :data:`PIECE`
-    scale_prior: bool = True  # Widen the card's standard errors as far as the trials require
-    members: int = 100  # Simulations for the prediction intervals of the figures of held-out trials; 0 for none
-    bootstrap: int = 0  # Members of a parametric bootstrap of the estimates; 0 for none
-    # Derivatives (``Xuuu``) and parameters of effects (``wind.yaw_coefficient``) that keep the card's values.
+    structure: str = BY_EVIDENCE
+    inertia: bool = False
+    piece_s: float | None = None
+    scale_prior: bool = True
+    members: int = 100
+    bootstrap: int = 0
     hold: tuple[str, ...] = ()
-    force: bool = False  # Fit trials even if they look like another ship's (:mod:`.other_ship`)
-    posterior: Sampler | None = None  # One of :data:`Sampler`
-    draws: int = DRAWS_OF_CHAIN  # Draws of each chain of the posterior
+    force: bool = False
+    posterior: Sampler | None = None
+    draws: int = DRAWS_OF_CHAIN

@@ -131,28 +131,48 @@ _SAMPLES = 240
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterEstimate:
-    """A parameter identified from trials: prime or SI, rudder positive to starboard."""
+    """A parameter identified from trials: prime or SI, rudder positive to starboard.
+
+    Parameters
+    ----------
+    value, standard_error : float
+    before, before_standard_error : float
+        Those of the card given.
+    prior_standard_error : float
+        As the fit took it: widened where the trials demanded it.
+    share_from_trials : float
+        Share of the information from the trials: 1 - (variance after / variance before).
+    """
 
     value: Number
     standard_error: Unbounded
-    # `before`, `before_standard_error`: Those of the card given.
     before: Number
     before_standard_error: Unbounded
-    prior_standard_error: Unbounded  # As the fit took it: widened where the trials demanded it
-    share_from_trials: Number  # Share of the information from the trials: 1 - (variance after / variance before)
+    prior_standard_error: Unbounded
+    share_from_trials: Number
 
 
 @dataclass(frozen=True, kw_only=True)
 class EstimatedCurrent:
-    """The current of trials at sea, estimated with the coefficients."""
+    """The current of trials at sea, estimated with the coefficients.
 
-    # `speed_mps`, `direction_deg`: Towards the direction.
+    Parameters
+    ----------
+    speed_mps, direction_deg : float
+        Towards the direction.
+    speed_standard_error_mps, direction_standard_error_deg : float
+    largest_standard_error_mps : float
+        In the direction in which it is known worst.
+    determined : bool
+        Whether the trials determine it.
+    """
+
     speed_mps: Number
     direction_deg: Number
     speed_standard_error_mps: Unbounded
     direction_standard_error_deg: Unbounded
-    largest_standard_error_mps: Unbounded  # In the direction in which it is known worst
-    determined: bool  # Whether the trials determine it
+    largest_standard_error_mps: Unbounded
+    determined: bool
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,17 +215,28 @@ class TrialErrors:
 
 @dataclass(frozen=True, kw_only=True)
 class PredictedFigure:
-    """A figure of a trial."""
+    """A figure of a trial.
 
-    # `trial`, `figure`: The figure with its unit.
+    Parameters
+    ----------
+    trial, figure : str
+        The figure with its unit.
+    measured : float
+    before, predicted : float or None
+        By the card given and by the card found; None where the simulation did not reach it.
+    error : float or None
+        Predicted less measured.
+    interval_95 : (float, float) or None
+        Expected interval of the figure, for held-out trials.
+    """
+
     trial: str
     figure: str
     measured: float
-    # `before`, `predicted`: By the card given and by the card found; None where the simulation did not reach it.
     before: float | None
     predicted: float | None
-    error: float | None  # Predicted less measured
-    interval_95: tuple[Unbounded, Unbounded] | None  # Expected interval of the figure, for held-out trials
+    error: float | None
+    interval_95: tuple[Unbounded, Unbounded] | None
 
     def share_or_error(self, value: float | None) -> float:
         """A predicted value less the measured one; for distances as a share of it; NaN where not reached."""
@@ -217,12 +248,21 @@ class PredictedFigure:
 
 @dataclass(frozen=True, kw_only=True)
 class StructureErrors:
-    """Cross-validation of a structure."""
+    """Cross-validation of a structure.
 
-    # Yaw-rate error of each trial held out as a share, then of those of largest amplitude held out together.
+    Parameters
+    ----------
+    errors : tuple of float
+        Yaw-rate error of each trial held out as a share, then of those of largest amplitude held out together.
+    left_out : tuple of tuple of str
+        Trials held out for each error.
+    weight : float or None
+        Weight in the intervals; None unless structures are averaged.
+    """
+
     errors: tuple[Unbounded, ...]
-    left_out: tuple[tuple[str, ...], ...]  # Trials held out for each error
-    weight: float | None  # Weight in the intervals; None unless structures are averaged
+    left_out: tuple[tuple[str, ...], ...]
+    weight: float | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -236,16 +276,26 @@ class SampledParameter:
 
 @dataclass(frozen=True, kw_only=True)
 class PosteriorStudy:
-    """Samples of the posterior."""
+    """Samples of the posterior.
+
+    Parameters
+    ----------
+    sampler : str
+    chains, draws, simulations : int
+        Draws of all chains together.
+    converged : bool
+    quantile_levels : tuple of float
+    parameters : dict
+        By name.
+    """
 
     sampler: str
-    # `chains`, `draws`, `simulations`: Draws of all chains together.
     chains: int
     draws: int
     simulations: int
     converged: bool
     quantile_levels: tuple[float, ...]
-    parameters: dict[str, SampledParameter]  # By name
+    parameters: dict[str, SampledParameter]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -279,35 +329,72 @@ class CardReplay(TrialMotions):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class IdentificationStudy:
-    """Coefficients identified from free-running trials."""
+    """Coefficients identified from free-running trials.
+
+    Parameters
+    ----------
+    ship, method, structure : str
+    method_reason : str or None
+        None where the options name the method.
+    current : EstimatedCurrent or None
+        None where the card or a sensor states it, and in a basin.
+    forced : tuple of str
+        Evidence that the trials are not of the card's ship, where the fit was forced.
+    manoeuvres : dict
+        Trial to its recognised manoeuvre in words.
+    derivatives, effects : dict
+        Estimates by name; parameters of effects with their effect's name.
+    effects_of_card : tuple of str
+    misfit : IdentificationMisfit
+    yaw_rate_error_over_windows : dict
+        ``fit`` and ``holdout`` (None without any) to the share by trial, and of ``all``.
+    errors_over_windows : dict
+        ``fit`` and ``holdout`` to the trials.
+    figures_are : str
+        Origin of the figures.
+    figures : dict
+        ``fit`` and ``holdout`` to figures of turns and zigzags.
+    structures : dict
+        Cross-validation by structure; empty unless asked for.
+    criteria : dict or None
+        Information criteria ``aic`` and ``bic``, and the ``samples`` and ``parameters`` behind them.
+    posterior : PosteriorStudy or None
+    bootstrap : BootstrapStudy or None
+    residual_noise : dict
+        Standard deviation of the residuals by signal of the model, SI.
+    prior_scale : dict
+        Factor on the standard errors of the card by group of parameters.
+    cost : tuple of float
+    identifiability : IdentifiabilityStudy
+    notices : tuple of Notice
+        Changes to the data and marks; all that limits the result.
+    replays : tuple of CardReplay
+    """
 
     ship: str
     method: str
-    method_reason: str | None  # None where the options name the method
-    current: EstimatedCurrent | None  # None where the card or a sensor states it, and in a basin
+    method_reason: str | None
+    current: EstimatedCurrent | None
     structure: str
-    forced: tuple[str, ...]  # Evidence that the trials are not of the card's ship, where the fit was forced
-    manoeuvres: dict[str, str]  # Trial to its recognised manoeuvre in words
-    # `derivatives`, `effects`: Estimates by name; parameters of effects with their effect's name.
+    forced: tuple[str, ...]
+    manoeuvres: dict[str, str]
     derivatives: dict[str, ParameterEstimate]
     effects: dict[str, ParameterEstimate]
     effects_of_card: tuple[str, ...]
     misfit: IdentificationMisfit
-    # ``fit`` and ``holdout`` (None without any) to the share by trial, and of ``all``.
     yaw_rate_error_over_windows: dict[str, dict[str, Number] | None]
-    errors_over_windows: dict[str, tuple[TrialErrors, ...]]  # ``fit`` and ``holdout`` to the trials
-    figures_are: str  # Origin of the figures
-    figures: dict[str, tuple[PredictedFigure, ...]]  # ``fit`` and ``holdout`` to figures of turns and zigzags
-    structures: dict[str, StructureErrors]  # Cross-validation by structure; empty unless asked for
-    # Information criteria ``aic`` and ``bic``, and the ``samples`` and ``parameters`` behind them.
+    errors_over_windows: dict[str, tuple[TrialErrors, ...]]
+    figures_are: str
+    figures: dict[str, tuple[PredictedFigure, ...]]
+    structures: dict[str, StructureErrors]
     criteria: dict[str, Number] | None
     posterior: PosteriorStudy | None
     bootstrap: BootstrapStudy | None
-    residual_noise: dict[str, Number]  # Standard deviation of the residuals by signal of the model, SI
-    prior_scale: dict[str, Number]  # Factor on the standard errors of the card by group of parameters
+    residual_noise: dict[str, Number]
+    prior_scale: dict[str, Number]
     cost: tuple[Number, ...]
     identifiability: IdentifiabilityStudy
-    notices: tuple[Notice, ...]  # Changes to the data and marks; all that limits the result
+    notices: tuple[Notice, ...]
     replays: tuple[CardReplay, ...]
 
     @property

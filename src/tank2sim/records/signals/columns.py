@@ -21,9 +21,15 @@ _UNIT = {"deg": "deg", "degps": "deg/s", "rpm": "rpm", "mps": "m/s", "m": "m"}
 
 @dataclass(frozen=True)
 class SignalName:
-    """One signal of a trial."""
+    """One signal of a trial.
 
-    si: str  # Its name in SI, the key in ``Trial.signals``: ``r_radps``
+    Parameters
+    ----------
+    si : str
+        Its name in SI, the key in ``Trial.signals``: ``r_radps``.
+    """
+
+    si: str
 
     @property
     def stem(self) -> str:

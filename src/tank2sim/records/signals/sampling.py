@@ -27,15 +27,28 @@ error of phase of 4.5 deg, and of times written with two digits at 10 Hz it is t
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Evenly sampled values of one signal, without gaps."""
+    """Evenly sampled values of one signal, without gaps.
 
-    source: Path  # File of the trial
-    name: str  # Name of the signal in SI, as in ``Trial.signals``
-    # `start_s`, `step_s`: Time of the first sample, and from one to the next.
+    Parameters
+    ----------
+    source : Path
+        File of the trial.
+    name : str
+        Name of the signal in SI, as in ``Trial.signals``.
+    start_s, step_s : float
+        Time of the first sample, and from one to the next.
+    values : array (n,)
+        In SI.
+    notices : tuple of Notice
+        What was done to get here.
+    """
+
+    source: Path
+    name: str
     start_s: float
     step_s: float
-    values: Array  # (n,): In SI
-    notices: tuple[Notice, ...] = ()  # What was done to get here
+    values: Array
+    notices: tuple[Notice, ...] = ()
 
     @property
     def time_s(self) -> Array:

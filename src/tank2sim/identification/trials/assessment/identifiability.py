@@ -45,15 +45,30 @@ STILL = {"motion.u": 0.002, "motion.v": 0.002, "motion.r": 0.002, "rudder": 0.00
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class IdentifiabilityStudy:
-    """How well the trials determine the parameters (k), in units of the prior's standard errors."""
+    """How well the trials determine the parameters (k), in units of the prior's standard errors.
+
+    Parameters
+    ----------
+    parameters : tuple of str
+    condition : float
+        Largest over smallest singular value.
+    singular_values : array (k,)
+        Of the weighted sensitivities, falling; below 1 the prior has more information than the trials.
+    correlation : array (k, k)
+        By the trials alone.
+    correlated_pairs : tuple of (str, str, float)
+        The closest first.
+    unseen : tuple of tuple of str
+        Combinations of parameters that the trials do not determine.
+    notices : tuple of Notice
+    """
 
     parameters: tuple[str, ...]
-    condition: Unbounded  # Largest over smallest singular value
-    # (k,): Of the weighted sensitivities, falling; below 1 the prior has more information than the trials.
+    condition: Unbounded
     singular_values: Array
-    correlation: Array  # (k, k): By the trials alone
-    correlated_pairs: tuple[tuple[str, str, float], ...]  # The closest first
-    unseen: tuple[tuple[str, ...], ...]  # Combinations of parameters that the trials do not determine
+    correlation: Array
+    correlated_pairs: tuple[tuple[str, str, float], ...]
+    unseen: tuple[tuple[str, ...], ...]
     notices: tuple[Notice, ...]
 
 
