@@ -6,8 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field
 
 from tank2sim.analysis.validation.coefficients import (
     BEYOND_STANDARD_ERRORS,
@@ -18,7 +20,9 @@ from tank2sim.analysis.validation.coefficients import (
 )
 from tank2sim.analysis.validation.standard_trials import (
     TrialShip,
+    drawn_ships,
     figure_numbers,
+    member_spread,
     members,
     ship_of,
     standard_trials,
@@ -135,6 +139,8 @@ class CardComparison:
         Size of the ensembles behind the deviations of the figures.
     kind : str
         Always ``compare``.
+    drawn : tuple of DrawnShips or None
+        Members of each card, with figures at the size of the reference; not part of the JSON.
     """
 
     cards: tuple[ComparedCard, ...]
@@ -146,6 +152,7 @@ class CardComparison:
     members: int
     notices: tuple[Notice, ...]
     kind: str = "compare"
+    drawn: Annotated[Any, Field(exclude=True)] = ()
 
     @property
     def rows(self) -> tuple[CoefficientRow, ...]:
@@ -178,11 +185,12 @@ def compare_cards(cards: Sequence[SteeredCard], count: int = VALIDATION_MEMBERS)
     drawn = [members(ship.card, ship.model, count) for ship in ships]
     draws = [each for each, _ in drawn]
     trials = [_trial(name, one, ships, labels, draws) for name, one in standard_trials(ships).items()]
+    runs = [{trial.name: by_card[place] for trial, _, by_card in trials} for place in range(len(ships))]
     notices = [
         *_notices(cards, labels),
         *(message.of(label) for label, (_, messages) in zip(labels, drawn, strict=True) for message in messages),
         *notes,
-        *(trouble for _, troubles in trials for trouble in troubles),
+        *(trouble for _, troubles, _ in trials for trouble in troubles),
     ]
     return CardComparison(
         cards=tuple(
@@ -192,10 +200,11 @@ def compare_cards(cards: Sequence[SteeredCard], count: int = VALIDATION_MEMBERS)
         summary=tuple(_summary(label, place, (*rows, *effects)) for place, label in enumerate(labels[1:])),
         coefficients=rows,
         effects=effects,
-        trials=tuple(trial for trial, _ in trials),
+        trials=tuple(trial for trial, *_ in trials),
         craft=steered_by is SteeredBy.THRUSTERS,
         members=count,
         notices=tuple(dict.fromkeys(notices)),
+        drawn=tuple(drawn_ships(ship.card, by_trial) for ship, by_trial in zip(ships, runs, strict=True)),
     )
 
 
@@ -263,13 +272,14 @@ def scaled_number(name: str, value: float, length_ratio: float) -> float:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Sailed:
-    """A trial by one card at the reference's size: figures, their deviations, those outside the card's range, track."""
+    """A trial by one card at the reference's size: figures, deviations, those outside the range, track, members."""
 
     figures: Numbers = field(default_factory=dict)
     deviations: Numbers = field(default_factory=dict)
     outside: tuple[str, ...] = ()
     track: CardTrack | None = None
     messages: Sequence[Notice] = ()
+    drawn: Sequence[Numbers] = ()
 
 
 def _trial(
@@ -278,7 +288,7 @@ def _trial(
     ships: Sequence[TrialShip],
     labels: Sequence[str],
     drawn: Sequence[Sequence[Mapping[str, float]]],
-) -> tuple[TrialComparison, list[Notice]]:
+) -> tuple[TrialComparison, list[Notice], list[Sequence[Numbers]]]:
     reference = ships[0].card
     sailed = [
         _sailed(manoeuvre, ship, reference, label, draws)
@@ -288,7 +298,7 @@ def _trial(
     figures = {figure: _compared(figure, sailed) for figure in names}
     messages = [notice.of(name).of(label) for one, label in zip(sailed, labels, strict=True) for notice in one.messages]
     tracks = tuple(one.track for one in sailed if one.track)
-    return TrialComparison(name=name, figures=figures, tracks=tracks), messages
+    return TrialComparison(name=name, figures=figures, tracks=tracks), messages, [one.drawn for one in sailed]
 
 
 def _sailed(
@@ -298,9 +308,11 @@ def _sailed(
     run = ship.run(manoeuvre, start)
     if isinstance(run, str):
         return _Sailed(messages=[Notice(run)])
+    drawn = [_scaled(figures, ratio) for figures in ship.member_figures(manoeuvre, draws, start)]
     return _Sailed(
         figures=_scaled(figure_numbers(run.figures), ratio),
-        deviations=_scaled(ship.spread(manoeuvre, draws, start), ratio),
+        deviations=member_spread(drawn),
+        drawn=drawn,
         outside=run.reading.outside_names,
         track=_track(label, run.trajectory, ratio),
         messages=[*run.reading.notices, *run.missing],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -111,6 +111,8 @@ class Prediction:
         Logarithm of F/B of each member (n,), where it has both.
     spreads : mapping
         Standard deviation of the logarithm of B over the members.
+    runs : sequence of (mapping, mapping)
+        Figures of each member as tried and at full load.
     is_full_load : bool
         Whether the trial itself shows full load in calm water: R is T, whatever the model does.
     """
@@ -121,6 +123,7 @@ class Prediction:
     ratios: Mapping[str, Array]
     spreads: Mapping[str, float]
     is_full_load: bool = False
+    runs: Sequence[tuple[Numbers, Numbers]] = ()
 
     def at_full_load(self, one: Tried, name: str) -> tuple[float, float] | None:
         """R = T F/B and the standard error of its logarithm; None where one is not known.
@@ -187,15 +190,15 @@ def prediction(one: Tried, ships: TriedShips, wind: Mapping[str, float], *, at_f
     calm = _run(lambda: simulated(one, ships.tried, {}, {})) if wind else before
     ratios: dict[str, list[float]] = {}
     logarithms: dict[str, list[float]] = {}
-    for values in ships.drawn:
-        first, second = both(values)
+    runs = [both(values) for values in ships.drawn]
+    for first, second in runs:
         for name in first.keys() & second.keys():
             if min(first[name], second[name]) > SMALLEST:
                 ratios.setdefault(name, []).append(math.log(second[name] / first[name]))
                 logarithms.setdefault(name, []).append(math.log(first[name]))
     spreads = {name: robust_deviation(np.array(values)) for name, values in logarithms.items()}
     drawn = {name: np.array(values) for name, values in ratios.items()}
-    return Prediction(before, calm, after, drawn, spreads, is_full_load=calm_full_load)
+    return Prediction(before, calm, after, drawn, spreads, is_full_load=calm_full_load, runs=runs)
 
 
 def _run(simulation: Callable[[], Numbers]) -> Numbers:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field
 
-from tank2sim.analysis.ensemble.results import EnsembleRequest, named_bands
+from tank2sim.analysis.ensemble.results import DrawnShips, EnsembleRequest, named_bands
 from tank2sim.analysis.stability.imo import SHORTEST_SHIP_M
-from tank2sim.analysis.validation.standard_trials import SEED
+from tank2sim.analysis.validation.standard_trials import SEED, drawn_ships
 from tank2sim.apps.guess.study import OVERSHOOT_ERROR_DEG, TRIAL_ERROR
 from tank2sim.apps.trial_office.conditions import Met, TrialCondition, TrialState, trial_conditions
 from tank2sim.apps.trial_office.drift import LEAST_ARC, STEADY_FROM, CircleDrift, circle_drift
@@ -37,6 +39,7 @@ from tank2sim.identification.trials.assessment.other_ship import evidence_of_oth
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
 from tank2sim.notices import Notice, caution
 from tank2sim.records.trials import Trial, mean_wind
+from tank2sim.simulation.card_range import Numbers
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag, parse_manoeuvre
 from tank2sim.simulation.recorded import repeat, steerable
@@ -184,6 +187,8 @@ class TrialOffice:
     form : FormWords
     tracks : tuple of OfficeTrack
     members : int
+    drawn : DrawnShips or None
+        Members with their figures as tried and at full load; not part of the JSON.
     place, date : str
     depth_m : float or None
     sea_state : int or None
@@ -214,6 +219,7 @@ class TrialOffice:
     sea_state: int | None
     applies: bool
     notices: tuple[Notice, ...]
+    drawn: Annotated[Any, Field(exclude=True)] = None
 
     @property
     def tried(self) -> tuple[CriterionVerdict, ...]:
@@ -294,8 +300,18 @@ def study_trials(
         sea_state=notes.sea_state,
         applies=card.ship.length_m >= SHORTEST_SHIP_M,
         notices=tuple(dict.fromkeys(doubts)),
+        drawn=_drawn(ships, still, predicted),
     )
     return study, ships.as_tried, ships.full_load
+
+
+def _drawn(ships: TriedShips, still: Sequence[Tried], predicted: Sequence[Prediction]) -> DrawnShips | None:
+    """The members with their figures as tried and at full load."""
+    runs: dict[str, list[Numbers]] = {}
+    for one, found in zip(still, predicted, strict=True):
+        for place, condition in enumerate(("as tried", "at full load")):
+            runs[f"{one.name}, {condition}"] = [run[place] for run in found.runs]
+    return drawn_ships(ships.as_tried, runs)
 
 
 def _manoeuvres(
