@@ -150,6 +150,22 @@ def test_members_of_a_sea_trial_have_figures_in_both_conditions(tmp_path) -> Non
     assert frame["turn, as tried: advance_m"].std() > 0 and frame["turn, at full load: advance_m"].std() > 0
 
 
+def test_members_of_predictions_give_their_intervals(tmp_path) -> None:
+    ship = t2s.load("mariner")
+    for name, run in (("zigzag", ship.zigzag(20, 20)), ("turn", ship.turn(20))):
+        run.to_csv(tmp_path / f"{name}.csv")
+    found = t2s.identify("mariner", tmp_path / "zigzag.csv", holdout=tmp_path / "turn.csv", members=8)
+    frame = found.members
+    assert len(frame) == 8 and frame["derivatives.Nr"].std() > 0
+    intervals = found.figures[found.figures["set"] == "held out"].dropna(subset="low_95")
+    assert len(intervals) > 1
+    for row in intervals.itertuples():
+        low, high = np.quantile(frame[f"turn: {row.figure}"].dropna(), [0.025, 0.975])
+        assert row.low_95 <= low + 1e-9 and row.high_95 >= high - 1e-9, row.figure  # reading errors make them wider
+    with pytest.raises(t2s.InputError, match="hold out a turn"):
+        _ = t2s.identify("mariner", tmp_path / "zigzag.csv").members
+
+
 @pytest.mark.parametrize("members", [3, 20])
 def test_a_band_of_a_few_ships_is_doubted(members: int) -> None:
     found = t2s.load("mariner").turn(20, members=members)
