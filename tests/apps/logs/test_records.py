@@ -87,3 +87,14 @@ def test_a_file_of_one_of_several_records_is_refused(saved, undated) -> None:
     files = [saved(others, "a.csv"), saved(others, "b.csv"), saved(rudder, "rudder.csv")]
     with pytest.raises(InputError, match="to which of several records"):
         t2s.log(files)
+
+
+def test_runs_of_a_real_craft_in_one_command_are_all_cut(data: Path) -> None:
+    files = sorted((data / "data" / "blueboat").glob("*.csv"))
+    if not files:
+        pytest.skip("the runs of the BlueBoat are not here")
+    found = t2s.log(files)
+    assert set(found.stretches.dropna(subset="file")["log"]) == {file.name for file in files}
+    assert not any("another heading" in notice for notice in found.notices)
+    used = found.channels[found.channels["use"]].set_index("quantity")["stream"]
+    assert (used["thrust_order_port"], used["thrust_order_starboard"]) == ("thr_right", "thr_left")
