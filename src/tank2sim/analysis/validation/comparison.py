@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
+from tank2sim.analysis.ensemble.results import DrawnShips
 from tank2sim.analysis.validation.coefficients import (
     BEYOND_STANDARD_ERRORS,
     SAME,
@@ -185,7 +186,6 @@ def compare_cards(cards: Sequence[SteeredCard], count: int = VALIDATION_MEMBERS)
     drawn = [members(ship.card, ship.model, count) for ship in ships]
     draws = [each for each, _ in drawn]
     trials = [_trial(name, one, ships, labels, draws) for name, one in standard_trials(ships).items()]
-    runs = [{trial.name: by_card[place] for trial, _, by_card in trials} for place in range(len(ships))]
     notices = [
         *_notices(cards, labels),
         *(message.of(label) for label, (_, messages) in zip(labels, drawn, strict=True) for message in messages),
@@ -204,8 +204,15 @@ def compare_cards(cards: Sequence[SteeredCard], count: int = VALIDATION_MEMBERS)
         craft=steered_by is SteeredBy.THRUSTERS,
         members=count,
         notices=tuple(dict.fromkeys(notices)),
-        drawn=tuple(drawn_ships(ship.card, by_trial) for ship, by_trial in zip(ships, runs, strict=True)),
+        drawn=tuple(_drawn(card, trials, place) for place, card in enumerate(cards)),
     )
+
+
+def _drawn(
+    card: SteeredCard, trials: Sequence[tuple[TrialComparison, list[Notice], list[Sequence[Numbers]]]], place: int
+) -> DrawnShips | None:
+    """The members of a card, which has its place in each trial, with their figures; None without members."""
+    return drawn_ships(card, {trial.name: by_card[place] for trial, _, by_card in trials})
 
 
 def _summary(label: str, place: int, rows: Sequence[CoefficientRow]) -> CardSummary:

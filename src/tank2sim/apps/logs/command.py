@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from tank2sim.apps.logs.streams import VesselLog
     from tank2sim.apps.logs.stretches import Stretch
     from tank2sim.apps.logs.trial_files import TrialCut
+    from tank2sim.apps.logs.voyage import Voyage
     from tank2sim.dynamics.vessel import Vessel
     from tank2sim.results.craft_identification import CraftIdentificationResult
 
@@ -74,10 +75,8 @@ def log(
     """
     from tank2sim.api.trial import TrialRecord
     from tank2sim.apps.logs.result import LogResult
-    from tank2sim.apps.logs.stretches import find_stretches
     from tank2sim.apps.logs.study import study_log
-    from tank2sim.apps.logs.trial_files import cut_trials
-    from tank2sim.apps.logs.voyage import make_voyage, records_of
+    from tank2sim.apps.logs.voyage import make_voyage
 
     named = _named(files)
     folder = None if output is None else Path(output)
@@ -85,11 +84,7 @@ def log(
         stated = _stated(channels, folder)
         craft = None if card is None else _craft(card)
         voyage = make_voyage([_read(name, file) for name, file in named.items()], stated)
-        found: list[Stretch] = []
-        cuts: list[TrialCut] = []
-        for record in records_of(voyage):
-            found += (stretches := find_stretches(record))
-            cuts += cut_trials(record, stretches, len(cuts) + 1)
+        found, cuts = _cut(voyage)
         identified = None if craft is None else _identified(craft, cuts)
         study = replace(study_log(voyage, found, cuts), identified=identified.study if identified else None)
         trials = tuple(TrialRecord(cut.trial) for cut in cuts if cut.steered)
@@ -115,6 +110,20 @@ def _named(files: str | Path | pd.DataFrame | Sequence[str | Path | pd.DataFrame
     if not len(files):
         raise ArgumentError("files", "", "is empty", "give at least one log")
     return {f"files[{number}]": file for number, file in enumerate(files)}
+
+
+def _cut(voyage: Voyage) -> tuple[list[Stretch], list[TrialCut]]:
+    """Stretches and trials of each record; trials are numbered through."""
+    from tank2sim.apps.logs.stretches import find_stretches
+    from tank2sim.apps.logs.trial_files import cut_trials
+    from tank2sim.apps.logs.voyage import records_of
+
+    found: list[Stretch] = []
+    cuts: list[TrialCut] = []
+    for record in records_of(voyage):
+        found += (stretches := find_stretches(record))
+        cuts += cut_trials(record, stretches, len(cuts) + 1)
+    return found, cuts
 
 
 def _read(name: str, file: str | Path | pd.DataFrame) -> VesselLog:

@@ -377,11 +377,15 @@ def _gap_findings(series: Mapping[str, QuantitySeries], records: Sequence[_Recor
     words = {name: "position" if name == "x" else QUANTITIES[name].words for name in series if name != "y"}
     groups: dict[tuple[str, ...], tuple[list[tuple[float, float]], list[str]]] = {}
     for name, word in words.items():
-        time = series[name].time_s
-        gaps = gaps_of(time, max(_GAP_LEAST_S, GAP_STEPS * usual_step(time))) if len(time) > 2 else []
-        gaps = [(begin, end) for begin, end in gaps if not any(begin <= a and b <= end for a, b in between)]
+        gaps = _gaps_within(series[name].time_s, between)
         groups.setdefault(tuple(utc_text(begin)[:19] for begin, _ in gaps), (gaps, []))[1].append(word)
     return [_gap_note(gaps, names) for gaps, names in groups.values() if gaps]
+
+
+def _gaps_within(time_s: Array, between: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Gaps that are reported, without the times `between` records."""
+    gaps = gaps_of(time_s, max(_GAP_LEAST_S, GAP_STEPS * usual_step(time_s))) if len(time_s) > 2 else []
+    return [(begin, end) for begin, end in gaps if not any(begin <= a and b <= end for a, b in between)]
 
 
 def _gap_note(gaps: list[tuple[float, float]], names: list[str]) -> LogFinding:
