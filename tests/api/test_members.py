@@ -103,6 +103,69 @@ def test_the_json_has_the_bands_alone(turned, tmp_path) -> None:
         _ = read_result(json.loads(path.read_text()), str(path)).members
 
 
+def assert_deviations(deviations, frame: pd.DataFrame) -> None:
+    """Deviations of figures, by ``trial: figure``, are half the distances between quantiles of the members."""
+    assert len(deviations) > 4
+    for name, deviation in deviations.items():
+        low, high = np.quantile(frame[name].dropna(), [0.158655, 0.841345])
+        assert deviation == pytest.approx((high - low) / 2, rel=1e-9), name
+
+
+def test_members_of_a_comparison_have_their_card() -> None:
+    mariner = t2s.load("mariner")
+    other = mariner.replace({"derivatives.Yv": -0.012})
+    found = t2s.compare([mariner, other], members=6)
+    frame = found.members
+    assert list(frame["card"]) == [label for label in found.labels for _ in range(6)] and frame.usable.all()
+    figures = found.figures
+    for label in found.labels:
+        rows = figures[(figures["card"] == label) & figures["standard_deviation"].notna()]
+        names = rows["trial"] + ": " + rows["figure"]
+        assert_deviations(dict(zip(names, rows["standard_deviation"], strict=True)), frame[frame["card"] == label])
+    assert (frame["derivatives.Yv"] < 0).all()
+
+
+def test_members_of_a_validation_give_its_deviations(tmp_path) -> None:
+    ship = t2s.load("mariner")
+    ship.turn(20).to_csv(tmp_path / "turn.csv")
+    found = t2s.validate(ship, [tmp_path / "turn.csv"], members=6)
+    frame = found.members
+    assert len(frame) == 6 and frame.usable.all() and "derivatives.Nr" in frame
+    rows = found.verification.dropna(subset="deviation")
+    assert_deviations(dict(zip(rows["trial"] + ": " + rows["figure"], rows["deviation"], strict=True)), frame)
+    assert frame["turn: advance_m"].std() > 0
+    assert "drawn" not in found.to_dict()
+    with pytest.raises(t2s.InputError, match="compute the result again"):
+        _ = read_result(found.to_dict(), "validation.json").members
+    with pytest.raises(t2s.InputError, match="give members=100"):
+        _ = t2s.validate(ship, members=0).members
+
+
+def test_members_of_a_sea_trial_have_figures_in_both_conditions(tmp_path) -> None:
+    ship = t2s.load("mariner")
+    ship.turn(20).to_csv(tmp_path / "turn.csv")
+    found = t2s.trial_office(tmp_path / "turn.csv", ship=ship, members=5)
+    frame = found.members
+    assert len(frame) == 5 and frame.usable.all() and frame["derivatives.Nr"].std() > 0
+    assert frame["turn, as tried: advance_m"].std() > 0 and frame["turn, at full load: advance_m"].std() > 0
+
+
+def test_members_of_predictions_give_their_intervals(tmp_path) -> None:
+    ship = t2s.load("mariner")
+    for name, run in (("zigzag", ship.zigzag(20, 20)), ("turn", ship.turn(20))):
+        run.to_csv(tmp_path / f"{name}.csv")
+    found = t2s.identify("mariner", tmp_path / "zigzag.csv", holdout=tmp_path / "turn.csv", members=8)
+    frame = found.members
+    assert len(frame) == 8 and frame["derivatives.Nr"].std() > 0
+    intervals = found.figures[found.figures["set"] == "held out"].dropna(subset="low_95")
+    assert len(intervals) > 1
+    for row in intervals.itertuples():
+        low, high = np.quantile(frame[f"turn: {row.figure}"].dropna(), [0.025, 0.975])
+        assert row.low_95 <= low + 1e-9 and row.high_95 >= high - 1e-9, row.figure  # reading errors make them wider
+    with pytest.raises(t2s.InputError, match="hold out a turn"):
+        _ = t2s.identify("mariner", tmp_path / "zigzag.csv").members
+
+
 @pytest.mark.parametrize("members", [3, 20])
 def test_a_band_of_a_few_ships_is_doubted(members: int) -> None:
     found = t2s.load("mariner").turn(20, members=members)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import importlib
 import inspect
 import io
 import json
@@ -41,6 +42,7 @@ def run(line: str, folder: Path) -> tuple[int, str]:
     """Exit code and standard output of ``tank2sim LINE`` in a folder, in this process."""
     (script,) = entry_points(group="console_scripts", name="tank2sim")
     main, out, code = script.load(), io.StringIO(), None
+    importlib.import_module("tank2sim.cli.console")  # it reads the width of the screen once, before it is changed here
     with (
         contextlib.chdir(folder),
         mock.patch.object(sys, "argv", ["tank2sim", *shlex.split(line)]),

@@ -13,7 +13,10 @@ from __future__ import annotations
 
 import functools
 import json
+import os
 import re
+import subprocess
+import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -163,3 +166,12 @@ def test_what_is_not_there_is_seen() -> None:
     shape = next(iter(outside.shapes("simulate").values()))
     assert not outside.holds(outside.in_schema, *shape, "figures.not_there") and "--not-there" not in names_now("audit")
     assert not outside.holds(outside.in_value, {"a": [1]}, None, "a.b") and not _in_python("Ship.turn(not_there)")
+
+
+def test_a_command_run_here_leaves_the_width_of_the_screen() -> None:
+    program = "from pathlib import Path; from tests.inventory import outside; outside.run('ships', Path.cwd()); "
+    program += "from tank2sim.cli.console import screen; print(screen.width)"
+    command, environment = [sys.executable, "-c", program], {**os.environ, "COLUMNS": "80"}
+    root = Path(__file__).parents[2]
+    found = subprocess.run(command, env=environment, cwd=root, capture_output=True, text=True, check=True)
+    assert found.stdout.split()[-1] == "80"

@@ -12,7 +12,7 @@ import numpy as np
 
 from tank2sim.analysis.stability.imo import imo_criteria
 from tank2sim.analysis.validation.documentation import model_documentation
-from tank2sim.analysis.validation.standard_trials import TrialShip, ship_of
+from tank2sim.analysis.validation.standard_trials import TrialShip, drawn_ships, ship_of
 from tank2sim.analysis.validation.study import NOTHING_VALIDATED, verify
 from tank2sim.analysis.validation.study import validate_card as validate_figures
 from tank2sim.arrays import Array, Columns
@@ -45,6 +45,9 @@ def validate_ship(
     ready = ship_of(card)
     more = _of_craft(card, records) if card.thrusters else _of_ship(ready, records, members, required_percent)
     study = _documented(ready, members)
+    drawn = drawn_ships(card, more.pop("runs", {}))
+    if drawn and study.drawn:
+        more["drawn"] = replace(drawn, figures={**drawn.figures, **study.drawn.figures})
     notices = (*ready.model.notices, *more.pop("notices"), *study.notices)
     return replace(study, notices=notices, **more), card, tuple(trial.path for trial in records)
 
@@ -75,6 +78,7 @@ def _of_ship(ready: TrialShip, records: Sequence[Trial], members: int, required_
         "counts": found.counts,
         "figures": found.figures,
         "one_sided": found.one_sided,
+        "runs": found.runs,
         "imo": tuple(imo_criteria(ready.model)),
         "replays": replays,
         "notices": (*notices, *not_replayed),
@@ -84,7 +88,7 @@ def _of_ship(ready: TrialShip, records: Sequence[Trial], members: int, required_
 def _documented(ready: TrialShip, members: int) -> ValidationStudy:
     """Document and verify a ship or craft."""
     card, model = ready.card, ready.model
-    verified, troubles = verify(ready, members)
+    verified, troubles, runs = verify(ready, members)
     compiler = () if ready.integrator.compiled else (NO_COMPILER,)
     return ValidationStudy(
         ship=card.ship.name,
@@ -101,6 +105,7 @@ def _documented(ready: TrialShip, members: int) -> ValidationStudy:
         imo=(),
         replays=(),
         notices=(*troubles, *compiler),
+        drawn=drawn_ships(card, runs),
     )
 
 

@@ -327,7 +327,8 @@ def _plain_table(path: Path, text: str) -> CsvTable | None:
 def table_of_rows(path: Path, names: Sequence[str], rows: Sequence[str], lines: NDArray[np.int64]) -> CsvTable:
     """Table of rows with commas between cells and points in numbers.
 
-    `path`: For messages. `names`: Names of the columns. `rows`: Lines of values. `lines` (rows,): Line of the file of each row.
+    `path`: For messages. `names`: Names of the columns. `rows`: Lines of values. `lines` (rows,): Line of the file of
+    each row.
 
     Raises InputError: There are no rows; a row has too many or too few cells; a cell is not a finite number.
     """

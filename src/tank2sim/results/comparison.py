@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from tank2sim.analysis.validation.coefficients import BEYOND_STANDARD_ERRORS, CoefficientRow
@@ -26,6 +27,7 @@ from tank2sim.answer.parts import (
     table,
 )
 from tank2sim.answer.result import Result
+from tank2sim.results.ensembles import members_frame
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
@@ -105,6 +107,23 @@ class ComparisonResult(Result[CardComparison]):
         ]
         columns = ["card", "coefficient", "reference", "value", "difference_percent", "standard_errors"]
         return data_frame(rows, columns=columns)
+
+    @cached_property
+    def members(self) -> pd.DataFrame:
+        """The ships of the ensembles, one row each, with their ``card``: the numbers drawn, by the dotted keys of the
+        card and as its file has them; figures of the standard trials at the size of the reference, named
+        ``trial: figure``; and whether any trial could be run (``usable``).
+
+        Raises
+        ------
+        InputError
+            There are no members, or the result was read from its JSON.
+        """
+        import pandas as pd
+
+        drawn = self.study.drawn or (None,)
+        frames = [members_frame(ships, self.study.members) for ships in drawn]
+        return pd.concat(dict(zip(self.labels, frames, strict=True)), names=["card", "member"]).reset_index("card")
 
     @property
     def figures(self) -> pd.DataFrame:

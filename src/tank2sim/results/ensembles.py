@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from tank2sim.analysis.ensemble.results import ChanceOfAll, FigureBands, Members, StabilityBands
+from tank2sim.analysis.ensemble.results import ChanceOfAll, DrawnShips, FigureBands, Members, StabilityBands
 from tank2sim.analysis.ensemble.steering import BodeBands, CurveBand, SteeringBands, StepBands, TurningBands
 from tank2sim.analysis.ensemble.tails import Tail
 from tank2sim.analysis.stability.imo import ImoCriterion
@@ -89,15 +89,31 @@ class EnsembleResult(Result[_S]):
             into the memory.
         """
         found: Members | None = self.study.ensemble
-        if found is None:
-            raise ArgumentError("members", "", "is 0: this result has no ensemble", "give members=100 or more")
-        if found.drawn is None:
-            remedy = "compute the result again with the same members and seed"
-            raise ArgumentError("members", "", "the JSON of a result has the bands, not the members", remedy)
-        columns = len(found.drawn.draws.names) + len(found.drawn.figures)
-        refuse_beyond_memory("members", found.members, 2 * 8 * columns)
-        values = {**found.drawn.coefficients(), **found.drawn.figures, "usable": found.drawn.usable}
-        return data_frame(values).rename_axis("member")
+        return members_frame(found.drawn if found else None, found.members if found else 0)
+
+
+def members_frame(drawn: DrawnShips | None, members: int) -> pd.DataFrame:
+    """The ships of an ensemble, one row each: numbers drawn, figures, and whether the ship is usable.
+
+    Parameters
+    ----------
+    drawn : DrawnShips or None
+        None if the result was read from its JSON.
+    members : int
+        Size of the ensemble.
+
+    Raises
+    ------
+    InputError
+        There are no members, or the frame does not fit into the memory.
+    """
+    if not members:
+        raise ArgumentError("members", "", "is 0: this result has no ensemble", "give members=100 or more")
+    if drawn is None:
+        remedy = "compute the result again with the same members and seed"
+        raise ArgumentError("members", "", "the JSON of a result has the bands, not the members", remedy)
+    refuse_beyond_memory("members", members, 2 * 8 * (len(drawn.draws.names) + len(drawn.figures)))
+    return data_frame({**drawn.coefficients(), **drawn.figures, "usable": drawn.usable}).rename_axis("member")
 
 
 def band_table(found: Members, figures: Mapping[str, Band]) -> Table:

@@ -27,6 +27,7 @@ from tank2sim.answer.parts import Cell, Illustration, KeyFigure, Section, Table,
 from tank2sim.answer.result import Result
 from tank2sim.arrays import Array
 from tank2sim.cards import Card
+from tank2sim.errors import ArgumentError
 from tank2sim.identification.trials.assessment.evaluation import TURN_FIGURE_NAMES
 from tank2sim.identification.trials.assessment.identifiability import CLOSE_CORRELATION, IdentifiabilityStudy
 from tank2sim.identification.trials.identify import Identification
@@ -142,6 +143,28 @@ class IdentificationResult(Result[IdentificationStudy]):
             for one in self.study.figures[key]
         ]
         return data_frame(rows, columns=["trial", "set", "figure", "measured", "before", "now", "low_95", "high_95"])
+
+    @property
+    def members(self) -> pd.DataFrame:
+        """The ships behind the intervals of held-out trials, one row each: the numbers drawn, by the dotted keys of the
+        card and as its file has them, and figures named ``trial: figure``.
+
+        With an average over structures, the ships of each structure follow each other; a number that a structure does
+        not have is missing.
+
+        Raises
+        ------
+        InputError
+            There are no members or no held-out trials, or the result was read from its JSON.
+        """
+        if self.identification is None:
+            remedy = "compute the result again with the same members"
+            raise ArgumentError("members", "", "the JSON of a result has the intervals, not the members", remedy)
+        compared = self.identification.holdout
+        if compared is None or compared.members is None:
+            problem = "has no ship: figures of held-out trials are predicted with members"
+            raise ArgumentError("members", "", problem, "hold out a turn or a zigzag, with members=100")
+        return data_frame({**compared.members.coefficients, **compared.members.figures}).rename_axis("member")
 
     @property
     def samples(self) -> pd.DataFrame | None:

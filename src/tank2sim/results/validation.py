@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
+from pydantic import Field
 
 from tank2sim.analysis.stability.imo import ImoCriterion
 from tank2sim.analysis.validation.one_sided import OneSidedError
@@ -36,6 +38,7 @@ from tank2sim.cards.card import DEFAULT_RELATIVE_ERROR
 from tank2sim.identification.craft.first_values import PREDICTED_S
 from tank2sim.identification.craft.study import PredictionStudy
 from tank2sim.notices import Notice
+from tank2sim.results.ensembles import members_frame
 from tank2sim.results.imo import imo_section
 from tank2sim.units import in_words
 
@@ -130,7 +133,7 @@ class ValidationStudy:
     are prime; `propulsion`: whether the card has propulsion; `counts`: number of figures by outcome; `members`: size of
     the ensemble for u_input; `verification`: figures of standard trials; `predictions`: trials of a craft with
     thrusters; `one_sided`: figures whose errors are on one side in nearly all trials, the most significant first;
-    `kind`: always ``validate``.
+    `kind`: always ``validate``; `drawn`: the members (:class:`.DrawnShips`), not part of the JSON.
     """
 
     ship: str
@@ -150,6 +153,7 @@ class ValidationStudy:
     predictions: PredictionStudy | None = None
     one_sided: tuple[OneSidedError, ...] = ()
     kind: str = "validate"
+    drawn: Annotated[Any, Field(exclude=True)] = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -183,6 +187,19 @@ class ValidationResult(Result[ValidationStudy]):
         names = ("trial", "manoeuvre", "name", "measured", "simulated", "error", "uncertainty", "outcome")
         frame = records_frame(self.study.figures, names).rename(columns={"name": "figure"})
         return frame.assign(outcome=frame["outcome"].map(str))
+
+    @cached_property
+    def members(self) -> pd.DataFrame:
+        """The ships of the ensemble, one row each: the numbers drawn, by the dotted keys of the card and as its file
+        has them; figures of the trials and of the standard trials, named ``trial: figure``; and whether any trial could
+        be run (``usable``).
+
+        Raises
+        ------
+        InputError
+            There are no members, or the result was read from its JSON.
+        """
+        return members_frame(self.study.drawn, self.study.members)
 
     @property
     def verification(self) -> pd.DataFrame:

@@ -132,9 +132,9 @@ def test_the_validation_uncertainty_is_twice_the_root_of_the_squares() -> None:
 
 def test_the_step_hardly_matters_and_a_coarse_one_does(mariner_card) -> None:
     ship = ship_of(mariner_card)
-    fine, _ = verify(ship, 0)
+    fine, *_ = verify(ship, 0)
     coarse_model = replace(ship.model, step_s=20 * ship.model.step_s)
-    coarse, _ = verify(replace(ship, model=coarse_model, integrator=type(ship.integrator)(coarse_model)), 0)
+    coarse, *_ = verify(replace(ship, model=coarse_model, integrator=type(ship.integrator)(coarse_model)), 0)
     own, rough = ({(one.trial, one.name): one for one in rows} for rows in (fine, coarse))
     key = ("zigzag 20/20", "overshoot_1_deg")
     assert own[key].U_num < 1e-3 < rough[key].U_num

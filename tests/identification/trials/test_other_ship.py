@@ -5,8 +5,10 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
+import tank2sim as t2s
 from tank2sim.cards import read_card
 from tank2sim.identification.trials.assessment.other_ship import (
     RudderEffect,
@@ -188,3 +190,13 @@ def test_an_estimate_is_far_from_a_card_at_a_difference_of_twice_its_coefficient
     other = {"Y": "N", "N": "Y"}[letter]
     found = SimpleNamespace(prior_scale={letter: times, other: 1.0}, values=known.prior_mean, standard_errors=shares)
     assert bool(far_from_card(known, found)) == far
+
+
+def test_readings_without_noise_raise_neither_alarm_nor_fault(tmp_path) -> None:
+    ship, card = t2s.load("kvlcc2"), read_card("kvlcc2")
+    for name, run in (("zigzag", ship.zigzag(20, 20)), ("other", ship.zigzag(10, 10)), ("turn", ship.turn(25))):
+        run.to_csv(tmp_path / f"{name}.csv")
+        table = pd.read_csv(tmp_path / f"{name}.csv", comment="#")
+        table.iloc[::5].to_csv(tmp_path / f"{name}.csv", index=False)
+    given = measured(sorted(tmp_path.glob("*.csv")), card)
+    assert not other_ship(problem_from_card(card, given.trials, given.driven_by))

@@ -6,11 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
+import tank2sim as t2s
 from tank2sim.cards import ManoeuvringCard, parse_card, read_card
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.problem.prepare_trials import at_size_of, measured
+from tank2sim.identification.trials.problem.prepare_trials import at_size_of, coarse_rows, measured
+from tank2sim.notices import Level
 from tank2sim.records.reading import read_trial_file
 from tank2sim.records.trials import Trial, froude_scaled
 
@@ -160,3 +163,48 @@ def test_columns_that_are_left_out_are_named_with_their_files(card: ManoeuvringC
     given = [read_trial_file(tmp_path / f"{name}.csv") for name in ("one", "two")]
     (notice,) = [notice for notice in measured(given, card).notices if "left out" in notice]
     assert notice.startswith("one.csv, two.csv: ") and notice.endswith(": rudder")
+
+
+@pytest.fixture(scope="module")
+def zigzags(tmp_path_factory: pytest.TempPathFactory) -> dict[str, pd.DataFrame]:
+    """Trials of the Mariner with ten rows a second; L/u0 is 20.9 s, and a movement by 20 deg takes 5 s."""
+    ship, tables = t2s.load("mariner"), {}
+    for name, angle in (("a", 20), ("b", 10)):
+        path = tmp_path_factory.mktemp("zigzag") / f"{name}.csv"
+        ship.zigzag(angle, angle).to_csv(path)
+        tables[name] = pd.read_csv(path, comment="#")
+    return tables
+
+
+@pytest.mark.parametrize(("rows", "warned"), [(10, False), (16, False), (17, True), (50, True)])
+def test_rows_too_far_apart_are_a_caution_with_step_and_remedy(card, zigzags, tmp_path, rows, warned) -> None:
+    trials = []
+    for name, table in zigzags.items():
+        table.iloc[::rows].to_csv(tmp_path / f"{name}.csv", index=False)
+        trials.append(read_trial_file(tmp_path / f"{name}.csv"))
+    found = list(coarse_rows(trials, card))
+    assert bool(found) == warned
+    if warned:
+        (notice,) = found
+        assert notice.level is Level.CAUTION and notice.startswith(f"a.csv, b.csv: rows are {rows / 10:g} s apart")
+        assert "give rows at most 1.7 s apart" in notice
+
+
+def test_a_rudder_that_moves_within_a_step_asks_for_closer_rows(card, zigzags, tmp_path) -> None:
+    fast = replace(
+        card, steering_gear=card.steering_gear.model_copy(update={"max_rate_radps": 1.0, "time_constant_s": 0.1})
+    )
+    zigzags["a"].iloc[::10].to_csv(tmp_path / "a.csv", index=False)
+    trial = read_trial_file(tmp_path / "a.csv")
+    assert list(coarse_rows([trial], fast)) and not list(coarse_rows([trial], card))
+
+
+def test_an_estimate_from_coarse_rows_is_off_and_says_so(zigzags) -> None:
+    ship = t2s.load("mariner")
+    errors = {}
+    for rows in (10, 50):
+        found = t2s.identify(ship, [table.iloc[::rows].reset_index(drop=True) for table in zigzags.values()])
+        value = found.estimates.loc["derivatives.Nr", "value"]
+        errors[rows] = abs(value / ship.card.derivatives["Nr"] - 1)
+        assert any("rows are 5 s apart" in notice for notice in found.cautions) == (rows == 50)
+    assert errors[10] < 0.02 and errors[50] > 0.05

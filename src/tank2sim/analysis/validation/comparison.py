@@ -6,9 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field
 
+from tank2sim.analysis.ensemble.results import DrawnShips
 from tank2sim.analysis.validation.coefficients import (
     BEYOND_STANDARD_ERRORS,
     SAME,
@@ -18,7 +21,9 @@ from tank2sim.analysis.validation.coefficients import (
 )
 from tank2sim.analysis.validation.standard_trials import (
     TrialShip,
+    drawn_ships,
     figure_numbers,
+    member_spread,
     members,
     ship_of,
     standard_trials,
@@ -135,6 +140,8 @@ class CardComparison:
         Size of the ensembles behind the deviations of the figures.
     kind : str
         Always ``compare``.
+    drawn : tuple of DrawnShips or None
+        Members of each card, with figures at the size of the reference; not part of the JSON.
     """
 
     cards: tuple[ComparedCard, ...]
@@ -146,6 +153,7 @@ class CardComparison:
     members: int
     notices: tuple[Notice, ...]
     kind: str = "compare"
+    drawn: Annotated[Any, Field(exclude=True)] = ()
 
     @property
     def rows(self) -> tuple[CoefficientRow, ...]:
@@ -182,7 +190,7 @@ def compare_cards(cards: Sequence[SteeredCard], count: int = VALIDATION_MEMBERS)
         *_notices(cards, labels),
         *(message.of(label) for label, (_, messages) in zip(labels, drawn, strict=True) for message in messages),
         *notes,
-        *(trouble for _, troubles in trials for trouble in troubles),
+        *(trouble for _, troubles, _ in trials for trouble in troubles),
     ]
     return CardComparison(
         cards=tuple(
@@ -192,11 +200,19 @@ def compare_cards(cards: Sequence[SteeredCard], count: int = VALIDATION_MEMBERS)
         summary=tuple(_summary(label, place, (*rows, *effects)) for place, label in enumerate(labels[1:])),
         coefficients=rows,
         effects=effects,
-        trials=tuple(trial for trial, _ in trials),
+        trials=tuple(trial for trial, *_ in trials),
         craft=steered_by is SteeredBy.THRUSTERS,
         members=count,
         notices=tuple(dict.fromkeys(notices)),
+        drawn=tuple(_drawn(card, trials, place) for place, card in enumerate(cards)),
     )
+
+
+def _drawn(
+    card: SteeredCard, trials: Sequence[tuple[TrialComparison, list[Notice], list[Sequence[Numbers]]]], place: int
+) -> DrawnShips | None:
+    """The members of a card, which has its place in each trial, with their figures; None without members."""
+    return drawn_ships(card, {trial.name: by_card[place] for trial, _, by_card in trials})
 
 
 def _summary(label: str, place: int, rows: Sequence[CoefficientRow]) -> CardSummary:
@@ -263,13 +279,14 @@ def scaled_number(name: str, value: float, length_ratio: float) -> float:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Sailed:
-    """A trial by one card at the reference's size: figures, their deviations, those outside the card's range, track."""
+    """A trial by one card at the reference's size: figures, deviations, those outside the range, track, members."""
 
     figures: Numbers = field(default_factory=dict)
     deviations: Numbers = field(default_factory=dict)
     outside: tuple[str, ...] = ()
     track: CardTrack | None = None
     messages: Sequence[Notice] = ()
+    drawn: Sequence[Numbers] = ()
 
 
 def _trial(
@@ -278,7 +295,7 @@ def _trial(
     ships: Sequence[TrialShip],
     labels: Sequence[str],
     drawn: Sequence[Sequence[Mapping[str, float]]],
-) -> tuple[TrialComparison, list[Notice]]:
+) -> tuple[TrialComparison, list[Notice], list[Sequence[Numbers]]]:
     reference = ships[0].card
     sailed = [
         _sailed(manoeuvre, ship, reference, label, draws)
@@ -288,7 +305,7 @@ def _trial(
     figures = {figure: _compared(figure, sailed) for figure in names}
     messages = [notice.of(name).of(label) for one, label in zip(sailed, labels, strict=True) for notice in one.messages]
     tracks = tuple(one.track for one in sailed if one.track)
-    return TrialComparison(name=name, figures=figures, tracks=tracks), messages
+    return TrialComparison(name=name, figures=figures, tracks=tracks), messages, [one.drawn for one in sailed]
 
 
 def _sailed(
@@ -298,9 +315,11 @@ def _sailed(
     run = ship.run(manoeuvre, start)
     if isinstance(run, str):
         return _Sailed(messages=[Notice(run)])
+    drawn = [_scaled(figures, ratio) for figures in ship.member_figures(manoeuvre, draws, start)]
     return _Sailed(
         figures=_scaled(figure_numbers(run.figures), ratio),
-        deviations=_scaled(ship.spread(manoeuvre, draws, start), ratio),
+        deviations=member_spread(drawn),
+        drawn=drawn,
         outside=run.reading.outside_names,
         track=_track(label, run.trajectory, ratio),
         messages=[*run.reading.notices, *run.missing],

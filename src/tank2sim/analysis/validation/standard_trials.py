@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
 from tank2sim.analysis.ensemble.draws import draws_with
+from tank2sim.analysis.ensemble.results import DrawnShips
 from tank2sim.analysis.stability.imo import calm_trial, largest_trial_rudder
 from tank2sim.arrays import Array
 from tank2sim.cards.card import SteeredBy, SteeredCard
@@ -77,13 +79,13 @@ class TrialShip:
         """
         return calm_trial(self.model, manoeuvre, self.integrator, parameters, inputs)
 
-    def spread(
+    def member_figures(
         self,
         manoeuvre: Manoeuvre,
         drawn: Sequence[Mapping[str, float]],
         parameters: Mapping[str, float] | None = None,
-    ) -> Numbers:
-        """Standard deviation of the figures of a trial over ships with drawn parameters, by :func:`member_spread`.
+    ) -> list[Numbers]:
+        """Figures of a trial by ships with drawn parameters; none of one that cannot be run.
 
         Parameters
         ----------
@@ -95,7 +97,7 @@ class TrialShip:
         """
         # Only the numbers of each member are kept: the motions of a thousand would fill gigabytes.
         runs = (self.run(manoeuvre, {**(parameters or {}), **member}) for member in drawn)
-        return member_spread([{} if isinstance(run, str) else figure_numbers(run.figures) for run in runs])
+        return [{} if isinstance(run, str) else figure_numbers(run.figures) for run in runs]
 
 
 def ship_of(card: SteeredCard) -> TrialShip:
@@ -189,6 +191,29 @@ def members(card: SteeredCard, model: Model, count: int) -> tuple[tuple[dict[str
         return drawn, (Notice(errors.together_in_words), *words)
     alone = "no covariance is next to the card: errors are taken as independent, and deviations of figures may be too"
     return drawn, (Notice(f"{alone} large where errors go together"), *words)
+
+
+def drawn_ships(card: SteeredCard, runs: Mapping[str, Sequence[Numbers]]) -> DrawnShips | None:
+    """The members of a card with the figures of their runs, named ``trial: figure``; None without members.
+
+    Parameters
+    ----------
+    card : SteeredCard
+    runs : mapping
+        Trial to the figures of each member of :func:`members`, in the units of their names.
+    """
+    count = max(map(len, runs.values()), default=0)
+    if not count:
+        return None
+    figures = {
+        f"{trial}: {name}": np.array([numbers.get(name, math.nan) for numbers in each])
+        for trial, each in runs.items()
+        for name in dict.fromkeys(chain.from_iterable(each))
+    }
+    usable = np.array([any(each[number] for each in runs.values()) for number in range(count)])
+    return DrawnShips(
+        card, draws_with(joint_errors(card, card_parameters(card, study_model(card))), SEED), figures, usable
+    )
 
 
 def robust_deviation(values: Array) -> float:

@@ -23,8 +23,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -179,12 +180,14 @@ class Verified:
 
 @dataclass(frozen=True)
 class Validation:
-    """All figures of all trials, notices on trials that could not be compared, and errors to one side."""
+    """All figures of all trials, notices on trials that could not be compared, errors to one side, and figures of each
+    member by trial."""
 
     figures: tuple[Validated, ...]
     members: int
     notices: tuple[Notice, ...] = ()
     one_sided: tuple[OneSidedError, ...] = ()
+    runs: Mapping[str, Sequence[Numbers]] = field(default_factory=dict)
 
     @property
     def counts(self) -> dict[str, int]:
@@ -237,8 +240,9 @@ def validate_card(
     ]
     messages += [*joint_errors(card, card_parameters(card, study_model(card))).in_words, *of_errors]
     figures: list[Validated] = []
+    runs: dict[str, list[Numbers]] = {}
     for what in whats:
-        found, trouble = _validated(what, engines, drawn, between)
+        found, trouble, runs[what.trial.name] = _validated(what, engines, drawn, between)
         fitted = _fitted(card, what.trial)
         figures += [replace(figure, required_percent=required_percent, made_card=bool(fitted)) for figure in found]
         messages += [*trouble, *fitted]
@@ -253,7 +257,7 @@ def validate_card(
         messages.append(Notice("no ensemble was run: u_input and U_val are not known, and no figure can be judged"))
     one_sided = one_sided_errors(figures, (TURN_FIGURES, ZIGZAG_FIGURES))
     messages = [*(error.notice for error in one_sided), *messages]
-    return Validation(tuple(figures), count, tuple(dict.fromkeys(messages)), one_sided)
+    return Validation(tuple(figures), count, tuple(dict.fromkeys(messages)), one_sided, runs)
 
 
 def _fitted(card: ManoeuvringCard, trial: Trial) -> list[Notice]:
@@ -276,24 +280,34 @@ def made_card(card: ManoeuvringCard, trial: str) -> bool:
     return re.search(rf"(?<![\w-]){re.escape(trial)}(?![\w-])", looked) is not None
 
 
-def verify(ship: TrialShip, count: int = VALIDATION_MEMBERS) -> tuple[tuple[Verified, ...], tuple[Notice, ...]]:
-    """The standard trials with the model's step, with half of it, and by an ensemble; and notices on failed ones."""
+class Verification(NamedTuple):
+    """Figures of standard trials, notices on failed ones, and figures of each member by trial."""
+
+    rows: tuple[Verified, ...]
+    notices: tuple[Notice, ...]
+    runs: Mapping[str, Sequence[Numbers]]
+
+
+def verify(ship: TrialShip, count: int = VALIDATION_MEMBERS) -> Verification:
+    """The standard trials with the model's step, with half of it, and by an ensemble."""
     model = replace(ship.model, step_s=ship.model.step_s / 2)
     finer = TrialShip(ship.card, model, Integrator(model))
     drawn, _ = members(ship.card, ship.model, count)
     rows: list[Verified] = []
     messages: list[Notice] = []
+    runs: dict[str, list[Numbers]] = {}
     for trial, manoeuvre in standard_trials([ship]).items():
         run, fine = ship.run(manoeuvre), finer.run(manoeuvre)
         if isinstance(run, str) or isinstance(fine, str):
             messages.append(Notice(f"{trial}: {run if isinstance(run, str) else fine}"))
             continue
         messages += [notice.of(trial) for notice in (*run.reading.notices, *run.missing)]
-        deviation, halved = ship.spread(manoeuvre, drawn), figure_numbers(fine.figures)
+        runs[trial] = ship.member_figures(manoeuvre, drawn)
+        deviation, halved = member_spread(runs[trial]), figure_numbers(fine.figures)
         for name, value in figure_numbers(run.figures).items():
             halving = halved[name] - value if name in halved else None
             rows.append(Verified(trial, name, value, halving, deviation.get(name)))
-    return tuple(rows), tuple(messages)
+    return Verification(tuple(rows), tuple(messages), runs)
 
 
 def _validated(
@@ -301,10 +315,11 @@ def _validated(
     engines: tuple[Integrator, Integrator],
     drawn: Sequence[dict[str, float]],
     between: Mapping[tuple[str, str], float],
-) -> tuple[list[Validated], list[Notice]]:
+) -> tuple[list[Validated], list[Notice], list[Numbers]]:
     measured = compare_figures(what)
     (coarse, read), (fine, _) = (_repeated(what, engine) for engine in engines)
-    inputs = member_spread([_repeated(what, engines[0], member)[0] for member in drawn])
+    by_member = [_repeated(what, engines[0], member)[0] for member in drawn]
+    inputs = member_spread(by_member)
     data = _read_again(what, engines[0])
     rows = []
     for name, value in measured.items():
@@ -318,7 +333,7 @@ def _validated(
     messages = [notice.of(beyond) for notice in read.notices if beyond]
     few = [name for name in shown if drawn and name not in inputs]
     messages += [Notice(f"{name}: too few members of the ensemble reach it to determine u_input") for name in few]
-    return rows, [message.of(what.trial.name) for message in (*messages, *_late_execute(what))]
+    return rows, [message.of(what.trial.name) for message in (*messages, *_late_execute(what))], by_member
 
 
 def _late_execute(what: Recorded) -> list[Notice]:

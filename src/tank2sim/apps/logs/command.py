@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from tank2sim.apps.logs.channels import ChannelSet
     from tank2sim.apps.logs.result import LogResult
     from tank2sim.apps.logs.streams import VesselLog
+    from tank2sim.apps.logs.stretches import Stretch
     from tank2sim.apps.logs.trial_files import TrialCut
+    from tank2sim.apps.logs.voyage import Voyage
     from tank2sim.dynamics.vessel import Vessel
     from tank2sim.results.craft_identification import CraftIdentificationResult
 
@@ -32,16 +34,20 @@ def log(
     channels: str | Path | ChannelSet | None = None,
     card: Vessel | str | Path | None = None,
 ) -> LogResult:
-    """Read the logs of one voyage, find which stream is which quantity, and cut its manoeuvres into trials.
+    """Read the logs of a vessel, find which stream is which quantity, and cut its manoeuvres into trials.
 
     Formats: NMEA 0183, NMEA 2000 (candump, Actisense), ROS 1 and ROS 2 bags, MCAP, ArduPilot ``.bin`` and ``.tlog``,
     PX4 ULog, any CSV. All but CSV need the extra ``tank2sim[logs]``. Channels are written to ``channels.toml`` with
     their confidence; correct that file and run again, and it is used unchanged.
 
+    Several files are one voyage: parts that follow each other, or other instruments of the same time. Files with the
+    same columns that are apart in time, or whose clocks start again, are records of their own: channels are found from
+    all of them together, and no stretch reaches from one into another.
+
     Parameters
     ----------
     files : path, DataFrame, or sequence of them
-        Logs of one voyage; a data frame is read as a CSV file of its columns.
+        Logs of one vessel; a data frame is read as a CSV file of its columns.
     output : path, optional
         Folder for ``channels.toml`` and the trials.
     channels : path or ChannelSet, optional
@@ -69,9 +75,7 @@ def log(
     """
     from tank2sim.api.trial import TrialRecord
     from tank2sim.apps.logs.result import LogResult
-    from tank2sim.apps.logs.stretches import find_stretches
     from tank2sim.apps.logs.study import study_log
-    from tank2sim.apps.logs.trial_files import cut_trials
     from tank2sim.apps.logs.voyage import make_voyage
 
     named = _named(files)
@@ -80,12 +84,11 @@ def log(
         stated = _stated(channels, folder)
         craft = None if card is None else _craft(card)
         voyage = make_voyage([_read(name, file) for name, file in named.items()], stated)
-        found = find_stretches(voyage)
-        cuts = cut_trials(voyage, found)
+        found, cuts = _cut(voyage)
         identified = None if craft is None else _identified(craft, cuts)
         study = replace(study_log(voyage, found, cuts), identified=identified.study if identified else None)
         trials = tuple(TrialRecord(cut.trial) for cut in cuts if cut.steered)
-        result = LogResult(study, voyage, found, tuple(cuts), trials, identified)
+        result = LogResult(study, voyage, tuple(found), tuple(cuts), trials, identified)
         return result if folder is None else result.written_to(folder)
 
 
@@ -107,6 +110,20 @@ def _named(files: str | Path | pd.DataFrame | Sequence[str | Path | pd.DataFrame
     if not len(files):
         raise ArgumentError("files", "", "is empty", "give at least one log")
     return {f"files[{number}]": file for number, file in enumerate(files)}
+
+
+def _cut(voyage: Voyage) -> tuple[list[Stretch], list[TrialCut]]:
+    """Stretches and trials of each record; trials are numbered through."""
+    from tank2sim.apps.logs.stretches import find_stretches
+    from tank2sim.apps.logs.trial_files import cut_trials
+    from tank2sim.apps.logs.voyage import records_of
+
+    found: list[Stretch] = []
+    cuts: list[TrialCut] = []
+    for record in records_of(voyage):
+        found += (stretches := find_stretches(record))
+        cuts += cut_trials(record, stretches, len(cuts) + 1)
+    return found, cuts
 
 
 def _read(name: str, file: str | Path | pd.DataFrame) -> VesselLog:

@@ -47,6 +47,9 @@ _SIGNALS = tuple(
 _MOST_TRACKS = 8
 """Stretches that have a line of their own on the map. Project choice: as many colours can be distinguished."""
 
+_MOST_NAMED_LOGS = 4
+"""Files that the title and the headline name. Project choice: one line of the screen."""
+
 _UNSURE = 0.7
 """Confidence below which an unused channel is named under the table. Project choice."""
 
@@ -153,7 +156,8 @@ class LogResult(Result[LogStudy]):
     @property
     def title(self) -> str:
         """The files."""
-        return f"Log: {', '.join(PurePath(log.file).name for log in self.study.logs)}"
+        names = [PurePath(log.file).name for log in self.study.logs]
+        return f"Log: {_first_named(names)}"
 
     @property
     def subtitle(self) -> str:
@@ -165,7 +169,8 @@ class LogResult(Result[LogStudy]):
     def headline(self) -> tuple[str, ...]:
         """Length of the voyage, the trials cut out, and how many faults there are."""
         study = self.study
-        formats = ", ".join(f"{PurePath(log.file).name} ({log.format})" for log in study.logs)
+        listed = [f"{PurePath(log.file).name} ({log.format})" for log in study.logs]
+        formats = _first_named(listed)
         since = f" from {study.begins_utc}" if study.begins_utc else ""
         used, exciting = sum(one.use for one in study.channels), sum(one.excites for one in study.stretches)
         lines = [
@@ -276,6 +281,8 @@ class LogResult(Result[LogStudy]):
         fields = {"kind": "stretch", "begins_s": "", "duration_s": "lasts", "steering": "", "heading_change_deg": ""}
         fields |= {"reversals": "", "speed_mps": "speed at the start", "yaw_rate_rms_degps": "rms yaw rate"}
         fields["file"] = ""
+        if any(stretch.log for stretch in self.study.stretches):
+            fields["log"] = ""
         return replace(records_table("Stretches", self.study.stretches, fields=fields), wide=True)
 
     def _log_table(self) -> Table:
@@ -309,6 +316,12 @@ def _gear_section(gear: LoggedGear) -> Section:
     )
     heads = ("quantity", "unit", "value", Column("standard error", digits=2))
     return Section("Steering gear", text=text, tables=[table("Steering gear by this log", heads, rows)])
+
+
+def _first_named(names: Sequence[str]) -> str:
+    """The names, at most :data:`_MOST_NAMED_LOGS` of them."""
+    more = len(names) - _MOST_NAMED_LOGS
+    return ", ".join(names[:_MOST_NAMED_LOGS]) + (f" and {more} more" if more > 0 else "")
 
 
 def _cut_in_words(files: Collection[str]) -> str:

@@ -6,22 +6,19 @@ import math
 import re
 import tomllib
 from array import array
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tank2sim.apps.logs.findings import LogFinding, note
+from tank2sim.apps.logs.findings import LogFinding
 from tank2sim.apps.logs.quantities import quantity_of_name
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.files import first_bytes
 from tank2sim.records.text_layout import decoded_text
-
-OVERLAP_S = 2.0
-"""Most that a file may reach into the next one, s. Project choice: what a message is late by, recorded."""
 
 FIELDS: dict[str, dict[str, dict[str, Any]]] = tomllib.loads(
     Path(__file__).with_name("fields.toml").read_text(encoding="utf-8")
@@ -138,50 +135,3 @@ def heading_of_quaternion(w: Array, x: Array, y: Array, z: Array) -> tuple[Array
     """Roll and yaw (n,), rad, of quaternions ``w + xi + yj + zk``: rotations z, y, x (Diebel 2006, eq. 290)."""
     roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x**2 + y**2))
     return roll, np.arctan2(2 * (w * z + x * y), 1 - 2 * (y**2 + z**2))
-
-
-def joined_parts(logs: Sequence[VesselLog]) -> list[VesselLog]:
-    """The logs, with dated files of one format that follow each other as one, each at the place of its first file.
-
-    Streams of one name become one stream. A file that holds only streams that the others lack, or that lies in their
-    time, is another instrument's and stays a log of its own.
-    """
-    found: list[tuple[int, VesselLog]] = []
-    for given in sorted(range(len(logs)), key=lambda number: _span(logs[number])[0]):
-        log = logs[given]
-        place = next((place for place, (_, before) in enumerate(found) if _follows(before, log)), None)
-        if place is None:
-            found.append((given, log))
-        else:
-            first, before = found[place]
-            found[place] = min(first, given), _joined(before, log)
-    return [log for _, log in sorted(found, key=lambda entry: entry[0])]
-
-
-def _span(log: VesselLog) -> tuple[float, float]:
-    times = [stream.time_s[np.isfinite(stream.time_s)] for stream in log.streams]
-    begins, ends = ([float(bound(time)) for time in times if len(time)] for bound in (np.min, np.max))
-    return min(begins, default=np.inf), max(ends, default=np.inf)
-
-
-def _follows(before: VesselLog, log: VesselLog) -> bool:
-    shared = {stream.name for stream in before.streams} & {stream.name for stream in log.streams}
-    alike = before.dated and log.dated and before.format == log.format
-    return alike and bool(shared) and _span(before)[1] <= _span(log)[0] + OVERLAP_S
-
-
-def _joined(before: VesselLog, log: VesselLog) -> VesselLog:
-    later = {stream.name: stream for stream in log.streams}
-    streams = [_continued(stream, later.pop(stream.name, None)) for stream in before.streams]
-    findings = (*before.findings, *log.findings, note(f"{log.path.name} continues {before.path.name}"))
-    return replace(before, path=log.path, streams=(*streams, *later.values()), findings=findings)
-
-
-def _continued(stream: LogStream, later: LogStream | None) -> LogStream:
-    if later is None or not len(later.time_s):
-        return stream
-    if not len(stream.time_s):
-        return later
-    new = ~(later.time_s <= np.nanmax(stream.time_s))
-    time_s, values = np.append(stream.time_s, later.time_s[new]), np.append(stream.values, later.values[new])
-    return replace(stream, time_s=time_s, values=values)

@@ -15,7 +15,7 @@ from tank2sim.apps.logs.gear import LoggedGear, logged_gear
 from tank2sim.apps.logs.quantities import QUANTITIES
 from tank2sim.apps.logs.stretches import Stretch, StretchKind
 from tank2sim.apps.logs.trial_files import TrialCut
-from tank2sim.apps.logs.voyage import DriftCurrent, Voyage, drift_current
+from tank2sim.apps.logs.voyage import DriftCurrent, Voyage, drift_current, records_of
 from tank2sim.arrays import Columns, Number
 from tank2sim.identification.craft.study import CraftIdentificationStudy
 from tank2sim.notices import Notice, caution
@@ -90,6 +90,8 @@ class StretchStudy:
     yaw_rate_rms_degps : float
     file : str or None
         The trial; None if none was cut.
+    log : str or None
+        First file of its record; None where the voyage is one record.
     """
 
     kind: StretchKind
@@ -105,6 +107,7 @@ class StretchStudy:
     largest_speed_mps: Number
     yaw_rate_rms_degps: Number
     file: str | None
+    log: str | None = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -117,6 +120,7 @@ class LogStudy:
     begins_utc : str or None
         None for a voyage without a date.
     duration_s : float
+        Of several records, their sum.
     origin_deg : (float, float) or None
         Latitude and longitude of the origin of the track; None where positions are local.
     channels : tuple of ChannelStudy
@@ -153,6 +157,7 @@ class LogStudy:
 def study_log(voyage: Voyage, stretches: Sequence[Stretch], cuts: Sequence[TrialCut]) -> LogStudy:
     """Study of a voyage, its stretches and the trials that were cut from it."""
     current = drift_current(voyage, voyage.begin_s, voyage.end_s)
+    records = records_of(voyage)
     files = {id(stretch): cut.trial.path.name for cut in cuts for stretch in cut.stretches}
     return LogStudy(
         logs=tuple(
@@ -165,10 +170,12 @@ def study_log(voyage: Voyage, stretches: Sequence[Stretch], cuts: Sequence[Trial
             for log in voyage.logs
         ),
         begins_utc=utc_text(voyage.begin_s) if voyage.dated else None,
-        duration_s=voyage.end_s - voyage.begin_s,
+        duration_s=sum(record.end_s - record.begin_s for record in records),
         origin_deg=voyage.origin_deg,
         channels=tuple(map(_channel, voyage.channels.channels)),
-        stretches=tuple(_stretch(voyage, stretch, files.get(id(stretch))) for stretch in stretches),
+        stretches=tuple(
+            _stretch(voyage, stretch, files.get(id(stretch)), _log_of(records, stretch)) for stretch in stretches
+        ),
         current=current,
         track=_track(voyage),
         time_line=_time_line(voyage),
@@ -217,7 +224,14 @@ def _channel(channel: LogChannel) -> ChannelStudy:
     return ChannelStudy(unit=unit, **same)
 
 
-def _stretch(voyage: Voyage, stretch: Stretch, file: str | None) -> StretchStudy:
+def _log_of(records: Sequence[Voyage], stretch: Stretch) -> str | None:
+    """First file of the record of a stretch; None of one record."""
+    if len(records) == 1:
+        return None
+    return next((one.logs[0].path.name for one in reversed(records) if one.begin_s <= stretch.begin_s), None)
+
+
+def _stretch(voyage: Voyage, stretch: Stretch, file: str | None, log: str | None) -> StretchStudy:
     rudder = "rudder_angle" in voyage.series or "rudder_order" in voyage.series
     level = None
     if not math.isnan(stretch.rudder_rad):
@@ -237,6 +251,7 @@ def _stretch(voyage: Voyage, stretch: Stretch, file: str | None) -> StretchStudy
         largest_speed_mps=most,
         yaw_rate_rms_degps=math.degrees(stretch.yaw_rate_radps),
         file=file,
+        log=log,
     )
 
 

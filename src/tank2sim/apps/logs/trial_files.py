@@ -75,8 +75,8 @@ class TrialCut:
     steered: bool
 
 
-def cut_trials(voyage: Voyage, stretches: tuple[Stretch, ...]) -> list[TrialCut]:
-    """Cut the stretches that excite the vessel into trials, in the order of time.
+def cut_trials(voyage: Voyage, stretches: tuple[Stretch, ...], first: int = 1) -> list[TrialCut]:
+    """Cut the stretches that excite the vessel into trials, in the order of time, with numbers from the `first` on.
 
     The rows of a trial have an even step, the heading's between :data:`SHORTEST_STEP_S` and
     :data:`LONGEST_STEP_S`. Each sample of a slower stream is in the nearest row, by a straight line to its neighbour at
@@ -90,7 +90,7 @@ def cut_trials(voyage: Voyage, stretches: tuple[Stretch, ...]) -> list[TrialCut]
     for place, length in _places(stretches, whole=not steered):
         before = stretches[place - 1] if place else None
         lead = 0.0 if before is None else min(LEAD_S, before.duration_s)
-        cut = _cut(voyage, stretches[place : place + length], stretches[place].begin_s - lead, len(cuts) + 1)
+        cut = _cut(voyage, stretches[place : place + length], stretches[place].begin_s - lead, first + len(cuts))
         if cut is not None:
             cuts.append(cut)
     return cuts

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from tank2sim.apps.logs.channels import SURE_FROM, ChannelSet, LogChannel
 from tank2sim.apps.logs.clock import gaps_of, tidied, utc_text
 from tank2sim.apps.logs.content import AGREES
 from tank2sim.apps.logs.findings import LogFinding, fault, merged_findings, note
+from tank2sim.apps.logs.parts import joined_parts, log_span_s, on_one_clock
 from tank2sim.apps.logs.quantities import QUANTITIES
 from tank2sim.apps.logs.recorded import pulses_of, without_missing
 from tank2sim.apps.logs.reference import (
@@ -26,7 +28,7 @@ from tank2sim.apps.logs.reference import (
     rounded_origin,
     thinned_series,
 )
-from tank2sim.apps.logs.streams import LogStream, VesselLog, joined_parts
+from tank2sim.apps.logs.streams import LogStream, VesselLog
 from tank2sim.arrays import Array
 from tank2sim.errors import InputError
 from tank2sim.notices import Notice, caution
@@ -40,8 +42,15 @@ LONGEST_VOYAGE_S = 1e7
 """Longest time that a log may span, s. Project choice: four months; more is a clock that was not set, and the even
 grids of so long a time would exhaust the memory."""
 
+RECORDS_APART_S = 10.0
+"""Time without any log, s, from which a voyage goes on with another record. Project choice: recorders start a new file
+within a second; what a vessel does in more time is not known."""
+
 _GAPS_LISTED = 5
 """Gaps of a channel that are listed one by one. Project choice: more are a rate of loss."""
+
+
+_CONTINUOUS_HEADINGS = ("heading", "magnetic_heading")
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,11 +110,15 @@ def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -
     """Join logs, files that follow each other as one: find or take their channels, convert them to SI, and bring
     positions to local metres.
 
+    Records with clocks of their own are put one behind the other, and have their channels together.
+
     Raises
     ------
     InputError
-        A channel names a stream that no log has, or nothing in the logs is understood.
+        A channel names a stream that no log has, nothing in the logs is understood, or it is not clear to which of
+        several records a log belongs.
     """
+    logs = on_one_clock(logs)
     parts = joined_parts(logs)
     counts: dict[str, dict[str, int]] = {log.path.name: dict(log.counts) for log in logs}
     streams, findings = _tidied_streams(parts, counts)
@@ -119,10 +132,58 @@ def make_voyage(logs: Sequence[VesselLog], channels: ChannelSet | None = None) -
     if channels is None:
         findings += _not_understood(found, streams)
     series, origin = _derived(series)
-    findings += _gap_findings(series)
+    findings += _gap_findings(series, _spans_of_records(logs))
     begin = min(float(entry.time_s[0]) for entry in series.values())
     end = max(float(entry.time_s[-1]) for entry in series.values())
     return Voyage(tuple(logs), found, series, origin, begin, end, tuple(findings), counts)
+
+
+def records_of(voyage: Voyage) -> list[Voyage]:
+    """The voyage in records, each as a voyage with its logs: between them no log runs for :data:`RECORDS_APART_S`."""
+    records = _spans_of_records(voyage.logs)
+    if len(records) == 1:
+        return [voyage]
+    middles = [0.5 * (before.end_s + after.begin_s) for before, after in pairwise(records)]
+    edges = pairwise([-math.inf, *middles, math.inf])
+    cut = [_between(voyage, record.logs, *edge) for record, edge in zip(records, edges, strict=True)]
+    return [record for record in cut if record.series]
+
+
+@dataclass(frozen=True)
+class _RecordSpan:
+    """Logs of a record, and its begin and end, s."""
+
+    logs: tuple[VesselLog, ...]
+    begin_s: float
+    end_s: float
+
+
+def _spans_of_records(logs: Sequence[VesselLog]) -> list[_RecordSpan]:
+    """Logs in the order of time, together where less than :data:`RECORDS_APART_S` is between them."""
+    records: list[_RecordSpan] = []
+    for log in sorted(logs, key=log_span_s):
+        begin, end = log_span_s(log)
+        if records and begin <= records[-1].end_s + RECORDS_APART_S:
+            last = records[-1]
+            records[-1] = _RecordSpan((*last.logs, log), last.begin_s, max(last.end_s, end))
+        else:
+            records.append(_RecordSpan((log,), begin, end))
+    return records
+
+
+def _between(voyage: Voyage, logs: tuple[VesselLog, ...], begin_s: float, end_s: float) -> Voyage:
+    """The part of a voyage between two times, as the record of some of its logs."""
+    series = {}
+    for name, entry in voyage.series.items():
+        inside = (entry.time_s >= begin_s) & (entry.time_s < end_s)
+        if inside.any():
+            values = entry.values[inside]
+            if name in _CONTINUOUS_HEADINGS:
+                values = values - 2 * math.pi * math.floor(values[0] / (2 * math.pi))
+            series[name] = QuantitySeries(entry.time_s[inside], values)
+    ends = [(entry.time_s[0], entry.time_s[-1]) for entry in series.values()]
+    begin, end = min((first for first, _ in ends), default=begin_s), max((last for _, last in ends), default=end_s)
+    return replace(voyage, logs=logs, series=series, begin_s=float(begin), end_s=float(end))
 
 
 def _refuse_odd_times(logs: Sequence[VesselLog], streams: Sequence[LogStream]) -> None:
@@ -304,21 +365,27 @@ def _derived(series: dict[str, QuantitySeries]) -> tuple[dict[str, QuantitySerie
         at, north, east = on("v_north", "v_east")
         out.setdefault("sog", QuantitySeries(at, np.hypot(north, east)))
         out.setdefault("cog", QuantitySeries(at, np.arctan2(east, north) % (2 * math.pi)))
-    for name in ("heading", "magnetic_heading"):
+    for name in _CONTINUOUS_HEADINGS:
         if name in out:
             out[name] = QuantitySeries(out[name].time_s, np.unwrap(out[name].values))
     return out, origin
 
 
-def _gap_findings(series: Mapping[str, QuantitySeries]) -> list[LogFinding]:
-    """A note of the gaps of each set of channels that share them."""
+def _gap_findings(series: Mapping[str, QuantitySeries], records: Sequence[_RecordSpan]) -> list[LogFinding]:
+    """A note of the gaps of each set of channels that share them; the time between undated records is none."""
+    between = [(before.end_s, after.begin_s) for before, after in pairwise(records) if not before.logs[0].dated]
     words = {name: "position" if name == "x" else QUANTITIES[name].words for name in series if name != "y"}
     groups: dict[tuple[str, ...], tuple[list[tuple[float, float]], list[str]]] = {}
     for name, word in words.items():
-        time = series[name].time_s
-        gaps = gaps_of(time, max(_GAP_LEAST_S, GAP_STEPS * usual_step(time))) if len(time) > 2 else []
+        gaps = _gaps_within(series[name].time_s, between)
         groups.setdefault(tuple(utc_text(begin)[:19] for begin, _ in gaps), (gaps, []))[1].append(word)
     return [_gap_note(gaps, names) for gaps, names in groups.values() if gaps]
+
+
+def _gaps_within(time_s: Array, between: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Gaps that are reported, without the times `between` records."""
+    gaps = gaps_of(time_s, max(_GAP_LEAST_S, GAP_STEPS * usual_step(time_s))) if len(time_s) > 2 else []
+    return [(begin, end) for begin, end in gaps if not any(begin <= a and b <= end for a, b in between)]
 
 
 def _gap_note(gaps: list[tuple[float, float]], names: list[str]) -> LogFinding:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -108,9 +108,9 @@ class Prediction:
     full: Numbers
     ratios: Mapping[str, Array]  # Logarithm of F/B of each member (n,), where it has both
     spreads: Mapping[str, float]  # Standard deviation of the logarithm of B over the members
-    is_full_load: bool = (
-        False  # Whether the trial itself shows full load in calm water: R is T, whatever the model does
-    )
+    # Whether the trial itself shows full load in calm water: R is T, whatever the model does
+    is_full_load: bool = False
+    runs: Sequence[tuple[Numbers, Numbers]] = ()  # Figures of each member as tried and at full load
 
     def at_full_load(self, one: Tried, name: str) -> tuple[float, float] | None:
         """R = T F/B of a manoeuvre without the current and the standard error of its logarithm; None where unknown."""
@@ -153,7 +153,8 @@ def prediction(one: Tried, ships: TriedShips, wind: Mapping[str, float], *, at_f
     before, after = both(({}, {}))
     calm = _run(lambda: simulated(one, ships.tried, {}, {})) if wind else before
     logarithms: dict[str, list[tuple[float, float]]] = {}
-    for first, second in map(both, ships.drawn):
+    runs = [both(values) for values in ships.drawn]
+    for first, second in runs:
         for name in first.keys() & second.keys():
             if min(first[name], second[name]) > SMALLEST:
                 pair = math.log(second[name] / first[name]), math.log(first[name])
@@ -161,7 +162,7 @@ def prediction(one: Tried, ships: TriedShips, wind: Mapping[str, float], *, at_f
     drawn = {name: np.array(pairs) for name, pairs in logarithms.items()}
     ratios = {name: pairs[:, 0] for name, pairs in drawn.items()}
     spreads = {name: robust_deviation(pairs[:, 1]) for name, pairs in drawn.items()}
-    return Prediction(before, calm, after, ratios, spreads, is_full_load=calm_full_load)
+    return Prediction(before, calm, after, ratios, spreads, is_full_load=calm_full_load, runs=runs)
 
 
 def _run(simulation: Callable[[], Numbers]) -> Numbers:

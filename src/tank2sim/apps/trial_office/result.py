@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
@@ -13,9 +14,12 @@ from tank2sim.answer.result import Result
 from tank2sim.apps.trial_office.study import CURRENT_CHANGES, TrialOffice
 from tank2sim.apps.trial_office.verdict import LOADING_HOLDS, CriterionVerdict
 from tank2sim.dynamics.effects.loading import LOADING
+from tank2sim.results.ensembles import members_frame
 from tank2sim.units import in_words
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from tank2sim.apps.bridge.study import DataBasis
     from tank2sim.cards.card import ManoeuvringCard
 
@@ -44,6 +48,21 @@ class TrialOfficeResult(Result[TrialOffice]):
     as_tried: ManoeuvringCard | None = None
     full_load: ManoeuvringCard | None = None
     command: ClassVar[str] = "trials"
+
+    @cached_property
+    def members(self) -> pd.DataFrame:
+        """The ships of the ensemble, one row each: the numbers drawn, by the dotted keys of the card and as its file
+        has them; figures named ``trial, as tried: figure`` and ``trial, at full load: figure``; and whether any trial
+        could be run (``usable``).
+
+        The errors of the formulas for the loading are drawn on top of these numbers.
+
+        Raises
+        ------
+        InputError
+            There are no members, or the result was read from its JSON.
+        """
+        return members_frame(self.study.drawn, self.study.members)
 
     @property
     def title(self) -> str:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import Field
 
-from tank2sim.analysis.ensemble.results import EnsembleRequest, named_bands
+from tank2sim.analysis.ensemble.results import DrawnShips, EnsembleRequest, named_bands
 from tank2sim.analysis.stability.imo import SHORTEST_SHIP_M
-from tank2sim.analysis.validation.standard_trials import SEED
+from tank2sim.analysis.validation.standard_trials import SEED, drawn_ships
 from tank2sim.apps.guess.study import OVERSHOOT_ERROR_DEG, TRIAL_ERROR
 from tank2sim.apps.trial_office.conditions import Met, TrialCondition, TrialState, trial_conditions
 from tank2sim.apps.trial_office.drift import LEAST_ARC, STEADY_FROM, CircleDrift, circle_drift
@@ -35,6 +37,7 @@ from tank2sim.identification.trials.assessment.other_ship import evidence_of_oth
 from tank2sim.identification.trials.problem.prepare_trials import Measured, measured
 from tank2sim.notices import Notice, caution
 from tank2sim.records.trials import Trial, mean_wind
+from tank2sim.simulation.card_range import Numbers
 from tank2sim.simulation.integrator import Integrator
 from tank2sim.simulation.manoeuvres import Stop, Turn, Zigzag, parse_manoeuvre
 from tank2sim.simulation.recorded import repeat, steerable
@@ -149,7 +152,8 @@ class TrialOffice:
 
     `loading_validity`: 1 where the formulas that take the ship from the trial to full load hold, 0 where they do not;
     `stable_as_tried`, `stable_at_full_load`: probability that a straight course is stable, by the members, None without
-    them; `applies`: whether MSC.137(76) is for a ship of this length.
+    them; `drawn`: members with their figures as tried and at full load, not part of the JSON; `applies`: whether
+    MSC.137(76) is for a ship of this length.
     """
 
     ship: str
@@ -174,6 +178,7 @@ class TrialOffice:
     sea_state: int | None
     applies: bool
     notices: tuple[Notice, ...]
+    drawn: Annotated[Any, Field(exclude=True)] = None
 
     @property
     def tried(self) -> tuple[CriterionVerdict, ...]:
@@ -240,8 +245,18 @@ def study_trials(
         sea_state=notes.sea_state,
         applies=card.ship.length_m >= SHORTEST_SHIP_M,
         notices=tuple(dict.fromkeys(doubts)),
+        drawn=_drawn(ships, still, predicted),
     )
     return study, ships.as_tried, ships.full_load
+
+
+def _drawn(ships: TriedShips, still: Sequence[Tried], predicted: Sequence[Prediction]) -> DrawnShips | None:
+    """The members with their figures as tried and at full load."""
+    runs: dict[str, list[Numbers]] = {}
+    for one, found in zip(still, predicted, strict=True):
+        for place, condition in enumerate(("as tried", "at full load")):
+            runs[f"{one.name}, {condition}"] = [run[place] for run in found.runs]
+    return drawn_ships(ships.as_tried, runs)
 
 
 def _manoeuvres(

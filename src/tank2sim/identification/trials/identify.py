@@ -58,7 +58,7 @@ from tank2sim.identification.trials.options import (
 )
 from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
 from tank2sim.identification.trials.problem.estimation_problem import Estimate, Problem, SearchReport, silent
-from tank2sim.identification.trials.problem.prepare_trials import Measured
+from tank2sim.identification.trials.problem.prepare_trials import Measured, coarse_rows
 from tank2sim.identification.trials.problem.problem_from_card import (
     card_with_estimate,
     lowered_bound_notice,
@@ -203,6 +203,7 @@ def _identified(
         manoeuvres=_manoeuvres(fit.card, every),
         notices=(
             *dict.fromkeys((*doubts(given), *doubts(fit.card))),
+            *coarse_rows(every, card),
             *trials.notices,
             *(held.notices if held else ()),
             *lowered_bound_notice(given, card),

@@ -257,11 +257,24 @@ def _spread(name: str, values: Array) -> float:
 
 
 @dataclass(frozen=True, eq=False)
+class PredictedMembers:
+    """Ships behind prediction intervals: numbers drawn, by the dotted keys of the card and as its file has them, and
+    figures named ``trial: figure``; each (members,), nan where a ship has none."""
+
+    coefficients: Mapping[str, Array]
+    figures: Mapping[str, Array]
+
+
+@dataclass(frozen=True, eq=False)
 class Comparison:
-    """Comparison of a model with trials: over windows and whole runs, and in the figures of manoeuvres."""
+    """Comparison of a model with trials: over windows and whole runs, and in the figures of manoeuvres.
+
+    `members`: of held-out trials with prediction intervals, else None.
+    """
 
     following: tuple[Following, ...]
     figures: tuple[FigureComparison, ...]
+    members: PredictedMembers | None = None
 
 
 def compare_card(

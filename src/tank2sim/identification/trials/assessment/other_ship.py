@@ -191,7 +191,8 @@ def _effect(problem: Problem, runs: Sequence[SampledRun]) -> RudderEffect | None
     slope = float(np.mean(by_rudder)) if len(X) > X.shape[1] else 0.0
     if not slope or np.linalg.matrix_rank(X) < X.shape[1] or not np.isfinite(Y).all():
         return None
-    inverse = np.linalg.inv(X.T @ X)
+    half = np.linalg.inv(np.linalg.qr(X).R)  # X'X has the square of the condition of X, and may be singular
+    inverse = half @ half.T
     if 1 / (inverse[0, 0] * len(X)) < _LEAST_RUDDER**2:  # a turn of few readings: yaw rate and mean have all of it
         return None
     coefficients = inverse @ X.T @ Y

@@ -30,9 +30,10 @@ from scipy.optimize import minimize_scalar
 from tank2sim.arrays import Array
 from tank2sim.cards.card import ManoeuvringCard
 from tank2sim.dynamics import build
+from tank2sim.dynamics.card_parameters import card_parameters, study_model
 from tank2sim.dynamics.model import Model, Parameter, Quantity, State
 from tank2sim.errors import InputError
-from tank2sim.identification.trials.assessment.evaluation import Comparison, compare_card, or_none
+from tank2sim.identification.trials.assessment.evaluation import Comparison, PredictedMembers, compare_card, or_none
 from tank2sim.identification.trials.assessment.model_selection import MethodChoice
 from tank2sim.identification.trials.methods.coloured_noise import white
 from tank2sim.identification.trials.methods.output_error import Pieces, Shooting, Shot, cut, whitened
@@ -446,14 +447,16 @@ def compare_held_out(
     model = build(steerable(fit.card))
     parts = [(part, part.disturbances(), round(weight * members)) for part, weight in average or ((fit, 1.0),)]
     intervals: dict[tuple[str, str], tuple[float, float]] = {}
+    by_part: list[dict[str, Array]] = [{} for _ in parts]
     for trial in held.trials:
         manoeuvre = recorded(trial, model)
         if manoeuvre is None:
             continue
         pooled_members: dict[str, list[Array]] = {}
-        for part, forces, count in parts:
+        for (part, forces, count), found in zip(parts, by_part, strict=True):
             for name, values in _members(part, forces, manoeuvre, count, executor).items():
                 pooled_members.setdefault(name, []).append(values)
+                found[f"{trial.name}: {IN_BANDS.get(name, name)}"] = values
         for name, figures_of_parts in pooled_members.items():
             lowest, median, highest = np.nanquantile(np.concatenate(figures_of_parts), LEVELS)
             figure = IN_BANDS.get(name, name)
@@ -461,7 +464,29 @@ def compare_held_out(
             below, above = math.hypot(median - lowest, error), math.hypot(highest - median, error)
             intervals[trial.name, figure] = (median - below, median + above)
     figures = tuple(replace(figure, interval=intervals.get((figure.trial, figure.name))) for figure in plain.figures)
-    return replace(plain, figures=figures)
+    counts = [count for *_, count in parts]
+    coefficients = [_drawn_numbers(part, count) for part, _, count in parts]
+    drawn = PredictedMembers(_stacked(coefficients, counts), _stacked(by_part, counts))
+    return replace(plain, figures=figures, members=drawn)
+
+
+def _drawn_numbers(fit: Fit, members: int) -> dict[str, Array]:
+    """Numbers that :func:`bands` draws for its members (members,), by the keys of the card and as its file has them."""
+    model = DrivenShip(steerable(fit.card).text, "order").model
+    rows = [np.clip(fit.estimate.draw(rng), *model_bounds(model, fit.estimate.free)) for rng in generators(members)]
+    numbers = {number.name: number for number in card_parameters(fit.card, study_model(fit.card))}
+    columns = zip(fit.estimate.free, np.reshape(rows, (members, -1)).T, strict=True)
+    return {numbers[name].key: numbers[name].factor * values for name, values in columns if name in numbers}
+
+
+def _stacked(parts: Sequence[Mapping[str, Array]], counts: Sequence[int]) -> dict[str, Array]:
+    """Columns of several parts, of `counts` rows each, below each other; nan where a part lacks one."""
+    names = dict.fromkeys(chain.from_iterable(parts))
+    lacking = [np.full(count, np.nan) for count in counts]
+    return {
+        name: np.concatenate([part.get(name, none) for part, none in zip(parts, lacking, strict=True)])
+        for name in names
+    }
 
 
 def _members(

@@ -15,11 +15,11 @@ from tank2sim.cards.form import FittedTrial
 from tank2sim.cards.reading import changed_text, parse_card
 from tank2sim.dynamics.effects import EFFECTS
 from tank2sim.errors import InputError
-from tank2sim.notices import Level, Notice
+from tank2sim.notices import Level, Notice, caution
 from tank2sim.records.audit import Finding, audit_and_repair
 from tank2sim.records.reading import read_trial_file
 from tank2sim.records.same_record import refuse_copies, same_record, signature
-from tank2sim.records.trials import RUDDERS, Trial, froude_scaled
+from tank2sim.records.trials import RUDDERS, Trial, froude_scaled, sampling_step
 
 if TYPE_CHECKING:
     from tank2sim.identification.trials.problem.captive_tests import CaptiveRuns
@@ -29,6 +29,15 @@ TYPICAL_SPEED = 95
 
 SAME_LENGTH = 0.03
 """Lengths that differ by less than this share are of the same ship: definitions of length differ."""
+
+COARSE_ROWS, FINE_ROWS = 0.08, 0.03
+"""Steps of the rows over L/u0: above the first estimates are off, below the second they are not, and between them where
+the rudder moves within a step. Two zigzags and a turn of the Mariner and KVLCC2, identified from a part of their rows,
+with gears of 2 to 40 deg/s: linear derivatives are off by 0.3 to 1 % at 0.05 (3 % where the rudder moves within a
+step), by 0.7 to 4 % at 0.1, and by 3 to 18 % at 0.25."""
+
+MOVEMENT_RAD = math.radians(20.0)
+"""Movement of the rudder that rows should show, rad: the first of a 20/20 zigzag."""
 
 FARTHEST_FROUDE = 2.5
 """A trial whose approach speed differs from the card's speed by more than this factor is at another scale."""
@@ -97,6 +106,33 @@ def measured(given: Iterable[Path | Trial], card: ManoeuvringCard, *, report_unu
         if not finding.repaired
     )
     return Measured(tuple(trials), driven_by, tuple(notices), doubts=doubts)
+
+
+def _movement_s(card: ManoeuvringCard) -> float:
+    """Time in which the gear of a card moves its rudder by :data:`MOVEMENT_RAD`, s."""
+    gear = card.steering_gear
+    if gear is None:
+        return 0.0
+    moving = MOVEMENT_RAD / gear.max_rate_radps if gear.max_rate_radps else 0.0
+    return moving + (gear.time_constant_s or 0.0)
+
+
+def coarse_rows(trials: Sequence[Trial], card: ManoeuvringCard) -> Iterator[Notice]:
+    """Cautions on trials whose rows are too far apart for the motion of the ship, those of one step together."""
+    ship_time = card.ship.length_m / card.model.speed_mps
+    finest = min(COARSE_ROWS * ship_time, max(FINE_ROWS * ship_time, _movement_s(card)))
+    names: dict[float, list[str]] = {}
+    for trial in trials:
+        step = float(f"{sampling_step(trial):.3g}")
+        if step > finest:
+            names.setdefault(step, []).append(trial.path.name)
+    for step, files in names.items():
+        text = (
+            f"rows are {step:g} s apart, {step / ship_time:.2g} of L/u0 ({ship_time:.3g} s): rudder and motion between "
+            "them are taken as straight, and estimates may be off by far more than their standard errors; give rows at "
+            f"most {finest:.2g} s apart, of the rudder at least (empty cells where the motion was not measured)"
+        )
+        yield caution(text).of(", ".join(files))
 
 
 def _refuse_shared_names(trials: Sequence[Trial]) -> None:
