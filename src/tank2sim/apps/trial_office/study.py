@@ -19,6 +19,7 @@ from tank2sim.apps.trial_office.drift import LEAST_ARC, STEADY_FROM, CircleDrift
 from tank2sim.apps.trial_office.full_load import (
     SMALLEST,
     Prediction,
+    TriedShips,
     loading_validity,
     prediction,
     tried_ships,
