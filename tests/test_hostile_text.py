@@ -272,6 +272,7 @@ def test_pictures_stay_in_their_folder(tmp_path: Path, monkeypatch: pytest.Monke
         study: Nothing
         title = ""
         headline, sections = (), ()
+        chart_names = ("10/10 zigzag",)
 
         def pictures(self) -> dict[str, bytes]:
             return dict.fromkeys(["../../MARK", "/MARK", "10/10 zigzag", "a\nb", ".."], b"\x89PNG")

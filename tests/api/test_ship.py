@@ -71,7 +71,7 @@ def test_a_manoeuvre_as_an_object_has_the_words_of_the_command_line(ship) -> Non
 def test_an_angle_of_no_rudder_is_refused(ship) -> None:
     with pytest.raises(t2s.InputError) as raised:
         ship.turn(120)
-    assert "90 deg" in raised.value.remedy
+    assert "up to 90" in raised.value.remedy
 
 
 def test_a_run_is_a_trial_for_whoever_reads_it(ship, tmp_path) -> None:

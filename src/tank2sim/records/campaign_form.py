@@ -19,9 +19,9 @@ from tank2sim.quantities import (
     BlockCoefficient,
     Breadth,
     Draught,
+    Length,
     Mass,
     Speed,
-    TankModelLength,
     TankSize,
     Viscosity,
     WaterDensity,
@@ -56,7 +56,7 @@ class ModelSection(CardSection):
     """
 
     name: Text
-    length_m: TankModelLength
+    length_m: Length
     beam_m: Breadth | None = None
     draught_m: Draught | None = None
     mass_kg: Mass

@@ -188,7 +188,7 @@ def number(written, key):
         ("mass_kg", 1e-3, "model.mass_kg"),
         ("mass_kg", 2.2, "model.mass_kg"),
         ("draught_m", 100, "model.mass_kg"),
-        ("beam_m", 1000, "model.mass_kg"),
+        ("beam_m", 1000, "model.beam_m"),
         ("yaw_inertia_kgm2", 1e-3, "model.yaw_inertia_kgm2"),
         ("yaw_inertia_kgm2", 10, "model.yaw_inertia_kgm2"),
         ("x_G_m", 1000, "model.x_G_m"),

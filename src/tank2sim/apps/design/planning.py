@@ -61,7 +61,8 @@ def planned_campaign(
 ) -> tuple[CampaignStudy, CaptiveDesign]:
     """The campaign as numbers, and its design. Arguments and errors as in :func:`.design_campaign`.
 
-    `limits`: the tank's; `settings`: without `usual` and `largest`, which are read here.
+    `card`, `figures`, `usual`, `largest`: as there; `limits`: the tank's; `settings`: without `usual` and `largest`,
+    which are read here.
     """
     polynomial, converted = _polynomial(card)
     asked = _figures_of(figures)
@@ -148,7 +149,8 @@ def planned_trial(
     sensors: Mapping[str, float] | None,
     one_side: bool,
 ) -> tuple[TrialStudy, TrialDesign]:
-    """The trial as numbers, and its design. Arguments and errors as in :func:`.design_trial`."""
+    """The trial as numbers, and its design. `card`, `figures`, `minutes`, `sensors`, `one_side` and errors: as of
+    :func:`.design_trial`."""
     polynomial, converted = _polynomial(card)
     found = SENSORS if sensors is None else _sensors(sensors)
     asked = _figures_of(figures)
@@ -196,7 +198,7 @@ def planned_trial(
 
 
 def counted(count: int, word: str) -> str:
-    """A number of things: ``1 run``, ``2 runs``."""
+    """A number of things, `count` and `word`: ``1 run``, ``2 runs``."""
     return f"{count} {word}" if count == 1 else f"{count} {word}s"
 
 

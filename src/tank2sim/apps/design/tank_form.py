@@ -115,7 +115,7 @@ class GaugesSection(CardSection):
     rate_hz: Annotated[float, Field(ge=0.01, le=1e5)] = 20.0
 
     def stated(self, what: str, force: str) -> float | None:
-        """``range``, ``noise`` or ``zero`` of the gauge of a force, N or N m; None where no key has it."""
+        """`what` (``range``, ``noise`` or ``zero``) of the gauge of a `force`, N or N m; None where no key has it."""
         value: float | None = getattr(self, f"{force}_{what}_{GAUGE_UNITS[force]}")
         return value
 

@@ -247,7 +247,7 @@ class TrialOfficeResult(Result[TrialOffice]):
         return Section("Form for reporting to IMO", tables=tables, folded=True)
 
     def files(self, folder: Path) -> dict[Path, str | bytes]:
-        """Return the files of the report by path: page, PDF, form, poster, pilot card, JSON, and both cards."""
+        """Return the report's files in a `folder` by path: page, PDF, form, poster, pilot card, JSON, both cards."""
         from tank2sim.apps.bridge.command import sheet_data
         from tank2sim.apps.bridge.result import PilotCardResult, PosterResult
         from tank2sim.apps.trial_office.form import form_page
