@@ -118,7 +118,7 @@ def test_a_gauge_that_shows_nothing_in_any_row_of_averages_is_refused_by_its_col
     ("change", "place", "reported"),
     [
         (("length_m = 4.0", "lenght_m = 4.0"), "model.lenght_m", "did you mean length_m"),
-        (("length_m = 4.0", "length_m = -4.0"), "model.length_m", "at least 0.1"),
+        (("length_m = 4.0", "length_m = -4.0"), "model.length_m", "at least 0.01"),
         (("mass_kg = 400.0", ""), "model.mass_kg", "is missing"),
         (('"on_gauge"', '"gauge"'), "test.force_convention", "on_model"),
         (("speed_mps = 1.2", 'speed_mps = "fast"'), "test.speed_mps", "a number was expected"),
