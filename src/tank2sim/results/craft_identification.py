@@ -15,7 +15,7 @@ from tank2sim.identification.trials.study import ParameterEstimate
 from tank2sim.results.identification import parameter_chart
 
 _IN_ERRORS = (
-    "Value less that of the card in the card's standard errors, with the interval of 95 %, and the share of the "
+    "Value less the card's in the card's standard errors, with the interval of 95 %, and the share of the "
     "information that is from the trials."
 )
 

@@ -52,7 +52,7 @@ last part of a gear with a lag (project choice)."""
 
 TURNS_AT_EXECUTE = 0.2
 """Share of the largest yaw rate of a record above which the ship turns at its execute: smoothed, it is 0.07 at most in
-the trials of the 3 m Esso Osaka, 0.04 in those of HSVA and MARIN, and 0.11 in a 10/10 zigzag of a Mariner (project
+the trials of the 3 m Esso Osaka, 0.04 in HSVA's and MARIN's, and 0.11 in a 10/10 zigzag of a Mariner (project
 choice)."""
 
 _BEGINNING = 5

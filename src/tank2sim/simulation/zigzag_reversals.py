@@ -48,7 +48,7 @@ class FittedZigzag:
 
     manoeuvre: Zigzag
     errors: dict[str, float]  # Standard errors of the fit: ``heading_rad``, ``course_rad``, ``lag_s``
-    # Standard errors of figures by that of the course and of the reversals: rad for overshoots, s for times.
+    # Standard errors of figures by the errors of course and reversals: rad for overshoots, s for times.
     reading_errors: dict[str, float]
     # (k,): Heading beyond the manoeuvre's at which each reversal was made, rad: 0 for a controller, a helmsman's
     # scatter.

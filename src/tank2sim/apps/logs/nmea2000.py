@@ -258,7 +258,7 @@ class _Reader:
         instances = {other.instance for other in self.columns if (other.pgn, other.field) == (key.pgn, key.field)}
         if len(instances) < 2:
             return "", key.quantity
-        # Of engines the port one is the first (canboat, ENGINE_INSTANCE).
+        # The port engine is the first (canboat, ENGINE_INSTANCE).
         order = sorted(instances, key=lambda other: ("Starboard" in other and "Port" not in other, other))
         place = order.index(key.instance)
         if key.pgn != _ENGINE:

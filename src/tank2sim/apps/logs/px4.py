@@ -25,7 +25,7 @@ _AIRFRAME_ROVER_DIFFERENTIAL = 6
 
 @dataclass(frozen=True, eq=False)
 class _Topic:
-    """A topic of a ULog: its number among those of its name, how many these are, and its columns (n,)."""
+    """A topic of a ULog: its number among the topics of its name, how many these are, and its columns (n,)."""
 
     name: str
     instance: int

@@ -120,7 +120,7 @@ class LogStudy:
     begins_utc : str or None
         None for a voyage without a date.
     duration_s : float
-        Of several records, their sum.
+        The sum, where there are several records.
     origin_deg : (float, float) or None
         Latitude and longitude of the origin of the track; None where positions are local.
     channels : tuple of ChannelStudy

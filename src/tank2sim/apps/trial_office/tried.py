@@ -134,7 +134,7 @@ _STOPPED = "time_to_stop_s"
 def simulated(one: Tried, integrator: Integrator, weather: Mapping[str, float], values: Mapping[str, float]) -> Numbers:
     """Figures of the manoeuvre by a model from the same approach: in closed loop where it was recorded.
 
-    `integrator`: Of a :func:`.steerable` ship; `weather`: Inputs of the model; without any, a calm approach; `values`:
+    `integrator`: For a :func:`.steerable` ship; `weather`: Inputs of the model; without any, a calm approach; `values`:
     Parameters of the model in place of its own.
     """
     if one.record is not None and weather:

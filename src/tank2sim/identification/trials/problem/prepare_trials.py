@@ -118,7 +118,7 @@ def _movement_s(card: ManoeuvringCard) -> float:
 
 
 def coarse_rows(trials: Sequence[Trial], card: ManoeuvringCard) -> Iterator[Notice]:
-    """Cautions on trials whose rows are too far apart for the motion of the ship, those of one step together."""
+    """Cautions on trials whose rows are too far apart for the motion of the ship; one for each step."""
     ship_time = card.ship.length_m / card.model.speed_mps
     finest = min(COARSE_ROWS * ship_time, max(FINE_ROWS * ship_time, _movement_s(card)))
     names: dict[float, list[str]] = {}
